@@ -22,6 +22,8 @@ run() {
 }
 
 # README and the first pages: the user's robot.
+run 0 "$dynident" completions bash
+run 0 "$dynident" man "$out/man"
 run 0 "$dynident" inspect robots/ur10.urdf
 run 0 "$dynident" check examples/ur10_simulated.toml
 run 0 "$dynident" log examples/ur10_simulated/train.csv
@@ -37,10 +39,10 @@ run 0 "$dynident" inspect "$out/slip.urdf" --fix "$out/mended.urdf"
 run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
-for form in c cpp rust python matlab mjcf urdf; do
+for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json; do
     run 0 "$dynident" export "$out/result/result.json" --study examples/ur10_simulated.toml --to "$form" --out "$out/exported.$form"
 done
-run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export"
+run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export" "$examples/description"
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
 
 # A designed motion, looked at again, and its torques.

@@ -1,19 +1,24 @@
-"""export.py DYNIDENT RESULT STUDY SCRATCH: what `dynident export` writes, read by those it is written for.
+"""export.py DYNIDENT RESULT STUDY SCRATCH DESCRIPTION: what `dynident export` writes, read by those it is written for.
 
-The Python module against the compiled C header at 1,000 states (the C header is compared with the core in the tests); MuJoCo's inverse dynamics of the MJCF and Pinocchio's of the URDF
-against the same model. Prints the time of the C inverse dynamics beside pin.rnea, alternating; no check depends on it. Needs cc, numpy, mujoco and pin (golden/requirements.txt).
+The Python module against the C header as gcc and clang compile it at 1,000 states (the C header is compared with the core in the tests); MuJoCo's inverse dynamics of the MJCF and
+Pinocchio's of the URDF against the same model; Pinocchio's of the numbers that json reads from JSON, PyYAML from ROS 2 parameters and libsdformat from SDF. DESCRIPTION is the example of
+dynident-export: with it libsdformat reads every robot of robots/ as well. Prints the time of the C inverse dynamics beside pin.rnea, alternating; no check depends on it.
+Needs gcc, clang, g++, libsdformat-dev with pkg-config, and golden/requirements.txt.
 """
 import ctypes
 import importlib.util
 import json
+import math
 import pathlib
 import subprocess
 import sys
 import time
 
+import jsonschema
 import mujoco
 import numpy as np
 import pinocchio
+import yaml
 
 STATES = 1000
 # Rounding of some thousand operations, as in the tests.
@@ -36,8 +41,8 @@ def exported(dynident, result, study, form, path):
     return path
 
 
-def compiled(header, prefix, dof, folder):
-    """The C functions as Python functions of contiguous vectors."""
+def compiled(compiler, header, prefix, dof, folder):
+    """The C functions as Python functions of contiguous vectors, without a warning of the compiler."""
     calls = []
     for name, inputs in FUNCTIONS.items():
         arguments = ", ".join(f"const double *{vector}" for vector in inputs)
@@ -49,9 +54,9 @@ def compiled(header, prefix, dof, folder):
         " for (long k = 0; k < n; k++) { called(q, dq, ddq, out); ddq[0] += 1e-30 * out[0]; } }"
     )
     (folder / "calls.c").write_text(f'#include "{header.name}"\n' + "\n".join(calls) + "\n")
-    library = folder / "calls.so"
+    library = folder / f"calls_{compiler}.so"
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC"]
-    subprocess.run(["cc", *flags, str(folder / "calls.c"), "-o", str(library), "-lm"], check=True)
+    subprocess.run([compiler, *flags, str(folder / "calls.c"), "-o", str(library), "-lm"], check=True)
     loaded = ctypes.CDLL(str(library))
     pointer = lambda vector: vector.ctypes.data_as(ctypes.c_void_p)
 
@@ -76,20 +81,212 @@ def worst(found, expected):
     return float(np.max(np.abs(found - expected)) / max(1.0, np.max(np.abs(expected))))
 
 
+def step(constants, dq):
+    if constants["shape"] == "smooth":
+        return np.tanh(dq / constants["width_rad_s"])
+    return np.where(np.abs(dq) <= constants["dead_band_rad_s"], 0.0, np.sign(dq))
+
+
+def friction_of(kind, constants, dq):
+    """The function of the velocity that a term of a joint that turns has, as the book's page on export says."""
+    part = lambda x: np.maximum(x, 0.0) if constants["direction"] == "+" else np.minimum(x, 0.0)
+    logistic = lambda v: 1 / (1 + np.exp(-constants["steepness_s_per_rad"] * (v + constants["offset_speed_rad_s"])))
+    return {
+        "viscous": lambda: dq,
+        "coulomb": lambda: step(constants, dq),
+        "directional-viscous": lambda: part(dq),
+        "directional-coulomb": lambda: part(step(constants, dq)),
+        "stribeck": lambda: np.exp(-np.abs(dq / constants["speed_rad_s"]) ** constants["exponent"]) * step(constants, dq),
+        "sigmoid": lambda: logistic(dq) - logistic(0.0),
+        "power": lambda: dq * np.hypot(dq, constants["rounding_rad_s"]) ** (constants["exponent"] - 1),
+        "offset": lambda: np.ones_like(dq),
+    }[kind]()
+
+
+def drives_of(terms, couplings, names, dq):
+    """Friction at velocities and the drives' part of the mass matrix. `terms` are those of each joint, `couplings` those of two, both with kind, value and constants."""
+    friction, inertia = np.zeros_like(dq), np.zeros((len(names), len(names)))
+    for joint, own in enumerate(terms):
+        for term in own:
+            if term["kind"] == "drive-inertia":
+                inertia[joint, joint] += term["value"]
+            else:
+                friction[:, joint] += term["value"] * friction_of(term["kind"], term["constants"], dq[:, joint])
+    for term in couplings:
+        (a, b), (ka, kb) = (names.index(name) for name in term["joints"]), term["constants"]["ratios"]
+        if term["constants"]["effect"] == "inertia":
+            inertia[a, b] += term["value"] * ka * kb
+            inertia[b, a] += term["value"] * ka * kb
+        else:
+            felt = {"viscous": lambda: None, "coulomb": lambda: step(term["constants"], ka * dq[:, a] + kb * dq[:, b])}[term["constants"]["effect"]]()
+            friction[:, a] += term["value"] * (ka * kb * dq[:, b] if felt is None else ka * felt)
+            friction[:, b] += term["value"] * (ka * kb * dq[:, a] if felt is None else kb * felt)
+    return friction, inertia
+
+
+def matrix(six):
+    xx, xy, xz, yy, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def assembled(joints, gravity):
+    """A model of Pinocchio from numbers: for each joint parent (-1: the base), whether it turns, placement, axis, mass, centre of mass and inertia about it."""
+    model = pinocchio.Model()
+    for number, (parent, turns, rotation, translation, axis, mass, com, inertia) in enumerate(joints):
+        kind = pinocchio.JointModelRevoluteUnaligned if turns else pinocchio.JointModelPrismaticUnaligned
+        # The first joint of Pinocchio is the universe.
+        joint = model.addJoint(parent + 1, kind(np.array(axis)), pinocchio.SE3(np.array(rotation), np.array(translation)), f"joint {number}")
+        model.appendBodyToJoint(joint, pinocchio.Inertia(mass, np.array(com), np.array(inertia)), pinocchio.SE3.Identity())
+    model.gravity.linear = np.array(gravity)
+    return model
+
+
+def torques(model, q, dq, ddq):
+    data = model.createData()
+    return np.array([pinocchio.rnea(model, data, *state) for state in zip(q, dq, ddq)])
+
+
+def read_sdf(reader, path):
+    """The joints of an SDF as libsdformat reads it, in the order of the file, as `assembled` wants them; and damping and friction of each."""
+    told = subprocess.run([reader, str(path)], check=True, capture_output=True, text=True).stdout
+    lines = [line.split() for line in told.splitlines()]
+    numbers = lambda words: [float(word) for word in words]
+
+    def placed(seven):
+        x, y, z, qw, qx, qy, qz = seven
+        return pinocchio.Quaternion(qw, qx, qy, qz).toRotationMatrix(), np.array([x, y, z])
+
+    links = {words[1]: numbers(words[2:]) for words in lines if words[0] == "link"}
+    listed = [words for words in lines if words[0] == "joint"]
+    children = [words[4] for words in listed]
+    joints, friction = [], []
+    for _, _, motion, parent, child, *rest in listed:
+        values = numbers(rest)
+        mass, *frame = links[child]
+        _, com = placed(frame[:7])
+        joints.append((children.index(parent) if parent in children else -1, motion == "turns", *placed(values[:7]), values[7:10], mass, com, np.array(frame[7:]).reshape(3, 3)))
+        friction.append(values[14:])
+    return joints, np.array(friction)
+
+
+def sdf_reader(folder):
+    """.ci/sdf.cpp, compiled against whatever version of libsdformat there is."""
+    listed = subprocess.run(["pkg-config", "--list-all"], check=True, capture_output=True, text=True).stdout.split("\n")
+    packages = sorted({line.split()[0] for line in listed if line.startswith("sdformat")})
+    assert packages, "libsdformat is not there: install libsdformat-dev"
+    flags = subprocess.run(["pkg-config", "--cflags", "--libs", packages[-1]], check=True, capture_output=True, text=True).stdout.split()
+    source, program = pathlib.Path(__file__).with_name("sdf.cpp"), folder / "sdf"
+    subprocess.run(["g++", "-std=c++17", "-O0", "-w", str(source), "-o", str(program), *flags], check=True)
+    return str(program)
+
+
+def check_numbers(files, reader, module, state, schema):
+    """JSON, ROS 2 parameters and SDF of the result: the same torques from their numbers alone."""
+    q, dq, ddq = state["q"], state["dq"], state["ddq"]
+    of_json = json.loads(files["json"].read_text())
+    jsonschema.Draft7Validator(schema).validate(of_json)
+    names = [joint["name"] for joint in of_json["joints"]]
+    joints = [
+        (
+            names.index(joint["parent"]) if joint["parent"] else -1,
+            joint["type"] != "prismatic",
+            joint["placement"]["rotation"],
+            joint["placement"]["translation_m"],
+            joint["axis"],
+            joint["body"]["mass_kg"],
+            joint["body"]["com_m"],
+            matrix(joint["body"]["inertia_at_com_kgm2"]),
+        )
+        for joint in of_json["joints"]
+    ]
+    friction, drives = drives_of([joint["terms"] for joint in of_json["joints"]], of_json["couplings"], names, dq)
+    rigid = torques(assembled(joints, of_json["gravity_m_s2"]), q, dq, ddq)
+    off = worst(rigid + ddq @ drives + friction, module.inverse_dynamics(q, dq, ddq))
+    print(f"Pinocchio's inverse dynamics of the JSON's numbers differ by {off:.1e}")
+    assert off < SAME_PHYSICS
+
+    (node, section), = yaml.safe_load(files["ros2-yaml"].read_text()).items()
+    assert node == "/**" and list(section) == ["ros__parameters"]
+    parameters = section["ros__parameters"]
+
+    def only_parameters(value, at):
+        """ROS takes true, integers, numbers, words and arrays of one of them, and names without dots and slashes."""
+        if isinstance(value, dict):
+            assert value and all(key.replace("_", "a").isalnum() and key.isascii() for key in value), at
+            for key, inner in value.items():
+                only_parameters(inner, f"{at}.{key}")
+        else:
+            values = value if isinstance(value, list) else [value]
+            assert values and type(values[0]) in (float, str) and all(type(one) is type(values[0]) for one in values), (at, value)
+
+    only_parameters(parameters, "")
+    assert parameters["joints"] == names
+    listed = list(parameters["dynamics"].values())
+    flat = lambda terms: [{"constants": term, **term} for term in terms.values()]
+    friction, drives = drives_of([flat(one.get("terms", {})) for one in listed], flat(parameters.get("couplings", {})), names, dq)
+    assert all(drives[k, k] == one["drive_inertia_kgm2"] for k, one in enumerate(listed))
+    # Placements are robot_description's, which JSON has as well.
+    of_yaml = [(*joint[:5], one["mass_kg"], one["com_m"], matrix(one["inertia_at_com_kgm2"])) for joint, one in zip(joints, listed)]
+    rigid = torques(assembled(of_yaml, parameters["gravity_m_s2"]), q, dq, ddq)
+    off = worst(rigid + ddq @ drives + friction, module.inverse_dynamics(q, dq, ddq))
+    print(f"Pinocchio's inverse dynamics of the ROS 2 parameters' numbers differ by {off:.1e}")
+    assert off < SAME_PHYSICS
+
+    of_sdf, dry_and_viscous = read_sdf(reader, files["sdf"])
+    off = worst(torques(assembled(of_sdf, of_json["gravity_m_s2"]), q, dq, ddq) + ddq @ drives, module.inverse_dynamics(q, dq, ddq) - module.friction(dq))
+    print(f"Pinocchio's inverse dynamics of the SDF as libsdformat reads it differ by {off:.1e}")
+    assert off < SAME_PHYSICS
+    assert np.array_equal(dry_and_viscous, [[one["viscous_nm_s_per_rad"], one["coulomb_nm"]] for one in listed])
+
+
+def check_descriptions(description, reader, folder):
+    """Every robot of robots/ as SDF, against Pinocchio's own reading of the URDF."""
+    random = np.random.default_rng(2)
+    read = 0
+    for urdf in sorted(pathlib.Path("robots").glob("*.urdf")):
+        written = subprocess.run([description, str(urdf), "sdf"], capture_output=True, text=True)
+        if written.returncode != 0:
+            # A description whose bodies are none.
+            assert "NotPhysical" in written.stderr, written.stderr
+            print(f"{urdf.name}: {written.stderr.strip()}")
+            continue
+        (folder / "one.sdf").write_text(written.stdout)
+        found, expected = assembled(read_sdf(reader, folder / "one.sdf")[0], [0, 0, -9.81]), pinocchio.buildModelFromUrdf(str(urdf))
+        expected.armature = np.zeros(expected.nv)
+        assert found.nv == expected.nv, urdf
+        # Pinocchio goes through branches by name, and gives angles without limits as cosine and sine.
+        q, dq, ddq = (random.uniform(-2, 2, (50, found.nv)) for _ in range(3))
+        joints = written.stdout.split('<joint name="')[2:]
+        order = [expected.joints[expected.getJointId(joint.split('"')[0])].idx_v for joint in joints]
+        data, off = expected.createData(), 0.0
+        for k in range(len(q)):
+            angles, velocity, acceleration = pinocchio.neutral(expected), np.zeros(expected.nv), np.zeros(expected.nv)
+            for own, place in enumerate(order):
+                joint = next(joint for joint in expected.joints if joint.idx_v == place and joint.nv)
+                angles[joint.idx_q : joint.idx_q + joint.nq] = q[k, own] if joint.nq == 1 else (math.cos(q[k, own]), math.sin(q[k, own]))
+                velocity[place], acceleration[place] = dq[k, own], ddq[k, own]
+            theirs = pinocchio.rnea(expected, data, angles, velocity, acceleration)[order]
+            off = max(off, worst(pinocchio.rnea(found, found.createData(), q[k], dq[k], ddq[k]), theirs))
+        print(f"{urdf.name} as SDF: torque by libsdformat's reading and by Pinocchio's of the URDF differ by {off:.1e}")
+        assert off < SAME_PHYSICS
+        read += 1
+    assert read >= 6, read
+
+
 def main():
-    dynident, result, study, scratch = sys.argv[1:]
+    dynident, result, study, scratch, description = sys.argv[1:]
     folder = pathlib.Path(scratch)
     folder.mkdir(exist_ok=True)
-    header, module_file, mjcf, urdf = (
-        exported(dynident, result, study, form, folder / name)
-        for form, name in [("c", "robot.h"), ("python", "robot.py"), ("mjcf", "robot.xml"), ("urdf", "robot.urdf")]
-    )
+    forms = {"c": "robot.h", "python": "robot.py", "mjcf": "robot.xml", "urdf": "robot.urdf", "sdf": "robot.sdf", "ros2-yaml": "robot.yaml", "json": "robot.json"}
+    files = {form: exported(dynident, result, study, form, folder / name) for form, name in forms.items()}
+    header, module_file, mjcf, urdf = (files[form] for form in ("c", "python", "mjcf", "urdf"))
     spec = importlib.util.spec_from_file_location("robot", module_file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     dof = module.DOF
     prefix = header.read_text().split("_inverse_dynamics(")[0].split()[-1]
-    of_c, repeat = compiled(header, prefix, dof, folder)
+    of_c, repeat = compiled("gcc", header, prefix, dof, folder)
+    of_clang, _ = compiled("clang", header, prefix, dof, folder)
 
     random = np.random.default_rng(1)
     state = {"q": random.uniform(-3, 3, (STATES, dof)), "dq": random.uniform(-2, 2, (STATES, dof)), "ddq": random.uniform(-8, 8, (STATES, dof))}
@@ -97,10 +294,11 @@ def main():
     for name, inputs in FUNCTIONS.items():
         vectors = [state[vector] for vector in inputs]
         together = getattr(module, name)(*vectors)
-        single = np.array([of_c[name](*(np.ascontiguousarray(vector[k]) for vector in vectors)) for k in range(STATES)])
-        off = worst(together, single)
-        print(f"{name}: Python and C differ by {off:.1e} of the largest")
-        assert off < (SAME_PHYSICS if name == "forward_dynamics" else SAME_CODE), name
+        for compiler, functions in [("gcc", of_c), ("clang", of_clang)]:
+            single = np.array([functions[name](*(np.ascontiguousarray(vector[k]) for vector in vectors)) for k in range(STATES)])
+            off = worst(together, single)
+            print(f"{name}: Python and C of {compiler} differ by {off:.1e} of the largest")
+            assert off < (SAME_PHYSICS if name == "forward_dynamics" else SAME_CODE), name
     assert worst(module.forward_dynamics(state["q"], state["dq"], state["tau"]), state["ddq"]) < SAME_PHYSICS
 
     q, dq, ddq = state["q"], state["dq"], state["ddq"]
@@ -119,6 +317,10 @@ def main():
     off = worst(np.array(torque), bare + simulated.dof_damping * dq)
     print(f"MuJoCo's inverse dynamics of the MJCF differ by {off:.1e}")
     assert off < SAME_PHYSICS
+
+    reader = sdf_reader(folder)
+    check_numbers(files, reader, module, state, json.loads(pathlib.Path("docs/schemas/model.json").read_text()))
+    check_descriptions(description, reader, folder)
 
     # URDF has no drive inertia: what is compared does not hold it.
     described = pinocchio.buildModelFromUrdf(str(urdf))

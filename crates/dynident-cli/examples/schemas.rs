@@ -4,6 +4,7 @@
 //! cargo run -p dynident-cli --features schema --example schemas
 //! ```
 
+use dynident::export::{MODEL_SCHEMA, ModelFile};
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
@@ -31,6 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (INSPECTION_SCHEMA, written::<Inspection>()),
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
         (LOG_SCHEMA, written::<LogContents>()),
+        (MODEL_SCHEMA, written::<ModelFile>()),
         (NEW_STUDY_SCHEMA, written::<NewStudyFile>()),
         (PAPER_SCHEMA, written::<PaperFile>()),
         (RESULT_SCHEMA, written::<ResultFile>()),

@@ -6,7 +6,7 @@ mod progress;
 mod summary;
 mod terminal;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -66,7 +66,7 @@ enum Command {
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
-    /// Write a finished model as C, C++, Rust, Python, MATLAB, MJCF or URDF, or a payload for a controller.
+    /// Write a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters or JSON, or a payload.
     Export(commands::export::Options),
     /// Let a simulated robot run a trajectory under a controller: a log, and the truth beside it.
     Simulate(commands::simulate::Options),
@@ -77,6 +77,11 @@ enum Command {
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error
     /// bars.
     Benchmark(commands::benchmark::Options),
+    /// Print what lets a shell complete commands, options and files.
+    Completions(commands::completions::Options),
+    /// Write the manual pages: `dynident.1`, and one for each command.
+    #[command(hide = true)]
+    Man(commands::manual::Options),
 }
 
 /// How a command ended when it did what it was asked to.
@@ -120,6 +125,8 @@ fn main() -> ExitCode {
         Command::Iterate(options) => commands::iterate::run(&options, &context),
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
+        Command::Completions(options) => commands::completions::run(&options, Arguments::command(), &context),
+        Command::Man(options) => commands::manual::run(&options, Arguments::command(), &context),
     });
     ended(outcome)
 }

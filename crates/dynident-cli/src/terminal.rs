@@ -15,6 +15,15 @@ pub(crate) fn print(text: &str) -> Result<(), String> {
     written(write!(out, "{text}{end}").and_then(|()| out.flush()))
 }
 
+/// Prints text that is the program's own, byte by byte: a script may hold tabs.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_own(text: &[u8]) -> Result<(), String> {
+    let mut out = io::stdout().lock();
+    written(out.write_all(text).and_then(|()| out.flush()))
+}
+
 /// What came of writing to standard output; a reader that has gone has seen what it wanted.
 pub(crate) fn written(outcome: io::Result<()>) -> Result<(), String> {
     match outcome {

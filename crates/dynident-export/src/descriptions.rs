@@ -8,7 +8,7 @@ use crate::robot_model::RobotModel;
 use crate::rotation::quaternion;
 use core::fmt::Write;
 use dynident_model::terms::{CouplingEffect, TorqueTerm};
-use dynident_model::{Body, Joint, Model, STANDARD_GRAVITY, Transform, write_urdf};
+use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, write_urdf};
 
 /// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
 /// leaves rounding, a narrow smooth step in place of a sign some thousandth.
@@ -18,7 +18,7 @@ const WORTH_SAYING: f64 = 1e-3;
 /// for each joint. No shapes.
 pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let (model, dof) = (robot.model(), robot.model().dof());
-    let friction = frictions(robot, "frictionloss", &mut notes);
+    let friction = frictions(robot, "frictionloss", "damping", &mut notes);
     notes.extend(left_out(robot));
     notes.push("MJCF has no velocity limits; shapes are left out.".to_owned());
     let rotors = drive_inertia(robot);
@@ -46,7 +46,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
 /// URDF: links with their inertials, joints with limits, damping and friction. No shapes.
 pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
-    let friction = frictions(robot, "friction", &mut notes);
+    let friction = frictions(robot, "friction", "damping", &mut notes);
     notes.extend(left_out(robot));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("URDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
@@ -66,13 +66,18 @@ pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
 }
 
 /// The nearest friction of every joint, and a sentence on each that is not the law itself.
-fn frictions(robot: &RobotModel, coulomb: &str, notes: &mut Vec<String>) -> Vec<NearestFriction> {
+pub(crate) fn frictions(
+    robot: &RobotModel,
+    coulomb: &str,
+    viscous: &str,
+    notes: &mut Vec<String>,
+) -> Vec<NearestFriction> {
     let joints = robot.model().joints();
     let nearest: Vec<_> = (0..joints.len()).map(|joint| NearestFriction::of(robot, joint)).collect();
     for (joint, found) in joints.iter().zip(&nearest) {
         if found.most_error > WORTH_SAYING * (found.coulomb + found.viscous * found.most_speed) {
             notes.push(format!(
-                "Joint {}: {coulomb} and damping are the nearest to its friction and offset for velocities up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
+                "Joint {}: {coulomb} and {viscous} are the nearest to its friction and offset for velocities up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
                 joint.name,
                 found.most_speed,
                 if joint.turns() { "rad/s" } else { "m/s" },
@@ -86,7 +91,7 @@ fn frictions(robot: &RobotModel, coulomb: &str, notes: &mut Vec<String>) -> Vec<
 }
 
 /// Terms that no joint of a description has.
-fn left_out(robot: &RobotModel) -> Vec<String> {
+pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
         let (symbol, unit) = (term.symbol(), term.unit());
@@ -130,7 +135,7 @@ fn write_body(
     let (joint, body) = (&model.joints()[index], &model.bodies()[index]);
     let pad = "  ".repeat(depth);
     let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", body_name(body.name()), placement(&joint.placement));
-    let _ = writeln!(text, "{pad}  {}", inertial(model, index, body)?);
+    let _ = writeln!(text, "{pad}  {}", inertial(model, index)?);
     let kind = if joint.turns() { "hinge" } else { "slide" };
     let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
     let range = limits.map_or(String::new(), |(lower, upper)| format!(" range=\"{lower:?} {upper:?}\""));
@@ -158,24 +163,27 @@ fn body_name(link: &str) -> String {
     if link == "world" { "world_link".to_owned() } else { attribute(link) }
 }
 
-/// Mass, centre of mass and inertia about it, which MuJoCo reads only of a body that can be real.
-fn inertial(model: &Model, index: usize, body: &Body) -> Result<String, ExportError> {
+/// Mass, centre of mass and inertia about it of a body, which simulators read only of one that can be real.
+pub(crate) fn real_inertial(
+    model: &Model,
+    index: usize,
+    reader: &'static str,
+) -> Result<(f64, Vec3, Mat3), ExportError> {
     let parameters = &model.inertials()[index];
     let moments =
         parameters.principal_moments().filter(|[a, b, c]| parameters.mass_kg() > 0.0 && *a > 0.0 && a + b >= *c);
     let (Some(_), Some(com), Some(inertia)) = (moments, parameters.com_m(), parameters.inertia_at_com()) else {
-        return Err(ExportError::NotPhysical { body: body.name().to_owned() });
+        return Err(ExportError::NotPhysical { body: model.bodies()[index].name().to_owned(), reader });
     };
+    Ok((parameters.mass_kg(), com, inertia))
+}
+
+fn inertial(model: &Model, index: usize) -> Result<String, ExportError> {
+    let (mass, com, inertia) = real_inertial(model, index, "MuJoCo")?;
     let ([x, y, z], i) = (com.0, inertia.0);
     Ok(format!(
-        "<inertial mass=\"{:?}\" pos=\"{x:?} {y:?} {z:?}\" fullinertia=\"{:?} {:?} {:?} {:?} {:?} {:?}\"/>",
-        parameters.mass_kg(),
-        i[0][0],
-        i[1][1],
-        i[2][2],
-        i[0][1],
-        i[0][2],
-        i[1][2]
+        "<inertial mass=\"{mass:?}\" pos=\"{x:?} {y:?} {z:?}\" fullinertia=\"{:?} {:?} {:?} {:?} {:?} {:?}\"/>",
+        i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]
     ))
 }
 
@@ -185,7 +193,7 @@ fn placement(placement: &Transform) -> String {
 }
 
 /// Notes as a comment of XML, in which two hyphens may not stand.
-fn comment(notes: &[String]) -> String {
+pub(crate) fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();
     }
@@ -195,7 +203,11 @@ fn comment(notes: &[String]) -> String {
 }
 
 /// A name as the value of an attribute in double quotes.
-fn attribute(name: &str) -> String {
-    let plain: String = name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+pub(crate) fn attribute(name: &str) -> String {
+    plain(name).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Text on one line, whatever counts as the end of one.
+pub(crate) fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c }).collect()
 }

@@ -52,11 +52,19 @@ pub enum ExportError {
     },
     /// A body that a simulator refuses.
     #[error(
-        "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so MuJoCo would refuse it: identify with physical consistency, which is the default"
+        "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so {reader} would refuse it: identify with physical consistency, which is the default"
     )]
     NotPhysical {
         /// The body.
         body: String,
+        /// Who would refuse it.
+        reader: &'static str,
+    },
+    /// What JSON cannot hold.
+    #[error("the model cannot be written as JSON: {message}")]
+    Json {
+        /// Why.
+        message: String,
     },
     /// Terms that do not belong to the model.
     #[error(transparent)]

@@ -12,7 +12,9 @@
 //! | [`Target::Rust`] | one module, no `std`, no dependency |
 //! | [`Target::Python`] | one module over NumPy, many states at once |
 //! | [`Target::Matlab`] | one function file for MATLAB and Octave |
-//! | [`Target::Mjcf`], [`Target::Urdf`] | descriptions for simulators, with the nearest friction that they know |
+//! | [`Target::Mjcf`], [`Target::Urdf`], [`Target::Sdf`] | descriptions for simulators, with the nearest friction that they know |
+//! | [`Target::Ros2Yaml`] | parameters of a ROS 2 node |
+//! | [`Target::Json`] | all numbers, a [`ModelFile`] |
 //!
 //! A payload by itself becomes the command of a controller: [`payload_command`].
 //!
@@ -29,16 +31,22 @@ mod error;
 mod exported;
 mod graph;
 mod languages;
+mod model_file;
 mod nearest_friction;
 mod payload;
 mod robot_model;
+mod ros2_parameters;
 mod rotation;
+mod sdf;
 mod statements;
 mod symbol;
 mod target;
 
 pub use error::ExportError;
 pub use exported::Exported;
+pub use model_file::{
+    MODEL_SCHEMA, ModelBody, ModelConstant, ModelFile, ModelJoint, ModelLimits, ModelLink, ModelPlacement, ModelTerm,
+};
 pub use nearest_friction::NearestFriction;
 pub use payload::{PayloadBody, PayloadReader, payload_command};
 pub use robot_model::RobotModel;

@@ -6,7 +6,10 @@ use crate::equations::Equations;
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::languages::{Source, c_header, cpp_header, matlab_function, python_module, rust_module};
+use crate::model_file::model_json;
 use crate::robot_model::RobotModel;
+use crate::ros2_parameters::ros2_parameters;
+use crate::sdf::sdf;
 
 /// A form of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,11 +28,28 @@ pub enum Target {
     Mjcf,
     /// URDF.
     Urdf,
+    /// SDF.
+    Sdf,
+    /// Parameters of a ROS 2 node, in YAML.
+    Ros2Yaml,
+    /// All numbers of the model, in JSON: a [`ModelFile`](crate::ModelFile).
+    Json,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 7] = [Self::C, Self::Cpp, Self::Rust, Self::Python, Self::Matlab, Self::Mjcf, Self::Urdf];
+    pub const ALL: [Self; 10] = [
+        Self::C,
+        Self::Cpp,
+        Self::Rust,
+        Self::Python,
+        Self::Matlab,
+        Self::Mjcf,
+        Self::Urdf,
+        Self::Sdf,
+        Self::Ros2Yaml,
+        Self::Json,
+    ];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
@@ -41,6 +61,9 @@ impl Target {
             Self::Matlab => "matlab",
             Self::Mjcf => "mjcf",
             Self::Urdf => "urdf",
+            Self::Sdf => "sdf",
+            Self::Ros2Yaml => "ros2-yaml",
+            Self::Json => "json",
         }
     }
 }
@@ -68,5 +91,9 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
         Target::Matlab => code(matlab_function, notes),
         Target::Mjcf => mjcf(robot, notes),
         Target::Urdf => urdf(robot, notes),
+        Target::Sdf => sdf(robot, notes),
+        // Temperature is not left out here.
+        Target::Ros2Yaml => ros2_parameters(robot, further.to_vec()),
+        Target::Json => model_json(robot, further.to_vec()),
     }
 }

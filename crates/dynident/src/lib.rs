@@ -6,7 +6,7 @@
 //! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
 //! | a finished model on other logs | [`validate()`] |
 //! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
-//! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF; a payload for a controller | [`export_model()`], [`export_payload()`] |
+//! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; a payload for a controller | [`export_model()`], [`export_payload()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
 //! | what a recording holds | [`log_contents()`] |

@@ -46,6 +46,12 @@ enum Form {
     Mjcf,
     /// URDF.
     Urdf,
+    /// SDF of Gazebo.
+    Sdf,
+    /// Parameters of a ROS 2 node.
+    Ros2Yaml,
+    /// All numbers of the model.
+    Json,
     /// A payload for Universal Robots: a line of URScript.
     PayloadUr,
     /// A payload for Franka: JSON.
@@ -67,6 +73,9 @@ impl Form {
             Self::Matlab => Ok(Target::Matlab),
             Self::Mjcf => Ok(Target::Mjcf),
             Self::Urdf => Ok(Target::Urdf),
+            Self::Sdf => Ok(Target::Sdf),
+            Self::Ros2Yaml => Ok(Target::Ros2Yaml),
+            Self::Json => Ok(Target::Json),
             Self::PayloadUr => Err(PayloadReader::UniversalRobots),
             Self::PayloadFranka => Err(PayloadReader::Franka),
             Self::PayloadKuka => Err(PayloadReader::Kuka),

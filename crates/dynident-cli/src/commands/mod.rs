@@ -2,6 +2,7 @@
 
 pub(crate) mod benchmark;
 pub(crate) mod check;
+pub(crate) mod completions;
 pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod export;
@@ -10,6 +11,7 @@ pub(crate) mod inspect;
 pub(crate) mod interruption;
 pub(crate) mod iterate;
 pub(crate) mod log;
+pub(crate) mod manual;
 pub(crate) mod new;
 mod permission;
 pub(crate) mod reproduce;

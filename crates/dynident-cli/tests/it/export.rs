@@ -4,7 +4,7 @@ use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
 use std::path::Path;
 
-const FORMS: [(&str, &str); 7] = [
+const FORMS: [(&str, &str); 10] = [
     ("c", "arm_inverse_dynamics(const double q[2]"),
     ("cpp", "inline Vector inverse_dynamics(const Vector& q"),
     ("rust", "pub fn inverse_dynamics<M: Math>(q: &[f64; 2]"),
@@ -12,6 +12,9 @@ const FORMS: [(&str, &str); 7] = [
     ("matlab", "case 'inverse_dynamics'"),
     ("mjcf", "<mujoco model=\"arm\">"),
     ("urdf", "<robot name=\"arm\">"),
+    ("sdf", "<model name=\"arm\">"),
+    ("ros2-yaml", "  ros__parameters:\n    robot: \"arm\""),
+    ("json", "\"schema\": \"dynident/model/1\""),
 ];
 
 /// A folder with the fixture's study and the result of it.

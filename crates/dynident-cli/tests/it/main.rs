@@ -11,6 +11,7 @@ mod evaluation;
 mod export;
 mod files;
 mod iterate;
+mod packing;
 mod reproduce;
 mod robots_outside;
 mod verdict;

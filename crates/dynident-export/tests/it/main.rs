@@ -5,4 +5,5 @@
 mod common;
 mod compiled;
 mod descriptions;
+mod parameters;
 mod refused;

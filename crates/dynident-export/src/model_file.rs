@@ -1,0 +1,271 @@
+//! The model as JSON, for programs that nobody has written a form for.
+
+use crate::error::ExportError;
+use crate::exported::Exported;
+use crate::robot_model::RobotModel;
+use dynident_model::terms::{CoulombShape, TermConstant, TorqueTerm};
+use dynident_model::{Body, Joint, Transform};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Name and version of the schema of [`ModelFile`].
+pub const MODEL_SCHEMA: &str = "dynident/model/1";
+
+/// The whole model: `tau = M(q) ddq + C(q, dq) dq + g(q)` and the torque of all terms. A joint that slides has m, N and
+/// kg in place of rad, Nm and kg m²; units and the names of constants say which.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelFile {
+    /// [`MODEL_SCHEMA`].
+    pub schema: String,
+    /// The robot's name.
+    pub name: String,
+    /// Program and version.
+    pub written_by: String,
+    /// Where the model comes from and what speaks against it, a sentence each.
+    pub notes: Vec<String>,
+    /// Gravity in the frame of the base, m/s².
+    pub gravity_m_s2: [f64; 3],
+    /// Links that do not move; the first has the frame of the base.
+    pub base_links: Vec<ModelLink>,
+    /// Joints in the order of all vectors, parents before children, each with the body that it moves.
+    pub joints: Vec<ModelJoint>,
+    /// Inertia and friction of drives that turn with two joints.
+    pub couplings: Vec<ModelTerm>,
+}
+
+/// A joint and what moves with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelJoint {
+    /// Its name.
+    pub name: String,
+    /// `revolute`, `continuous` or `prismatic`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// The joint that moves the body it stands on; null for the base.
+    pub parent: Option<String>,
+    /// Where the body stands in the parent's frame at position zero.
+    pub placement: ModelPlacement,
+    /// The axis in the frame of the body, of length one.
+    pub axis: [f64; 3],
+    /// Limits as described; null where the description has none.
+    pub limits: ModelLimits,
+    /// What it moves.
+    pub body: ModelBody,
+    /// Friction, offset and drive inertia.
+    pub terms: Vec<ModelTerm>,
+}
+
+/// Limits of a joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelLimits {
+    /// Lowest position, rad (m).
+    pub lower: Option<f64>,
+    /// Highest position, rad (m).
+    pub upper: Option<f64>,
+    /// Highest velocity, rad/s (m/s).
+    pub velocity: Option<f64>,
+    /// Highest torque, Nm (N).
+    pub effort: Option<f64>,
+}
+
+/// A body: the links that move with a joint, as one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelBody {
+    /// Name of the joint's own link, whose frame the numbers are in.
+    pub name: String,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Centre of mass, m; null for a body without mass.
+    pub com_m: Option<[f64; 3]>,
+    /// Inertia about the centre of mass, kg m²: xx, xy, xz, yy, yz, zz; null for a body without mass.
+    pub inertia_at_com_kgm2: Option<[f64; 6]>,
+    /// The ten numbers in which torque is linear: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin.
+    pub parameters: [f64; 10],
+    /// Links fixed to it and its own.
+    pub links: Vec<ModelLink>,
+}
+
+/// A link.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelLink {
+    /// Its name.
+    pub name: String,
+    /// Where it stands in the frame of its body.
+    pub placement: ModelPlacement,
+}
+
+/// A frame in another one: `p_other = rotation p + translation_m`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelPlacement {
+    /// Its origin, m.
+    pub translation_m: [f64; 3],
+    /// Its axes as columns, written row by row.
+    pub rotation: [[f64; 3]; 3],
+}
+
+/// A torque term: the value times the function of the motion that the kind names.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelTerm {
+    /// Its symbol, as in `result.json`.
+    pub symbol: String,
+    /// `viscous`, `coulomb`, `directional-viscous`, `directional-coulomb`, `stribeck`, `sigmoid`, `power`, `load`,
+    /// `maxwell-slip`, `temperature-viscous`, `temperature-coulomb`, `offset`, `drive-inertia` or `coupling`; the page
+    /// on export of the book has their functions.
+    pub kind: String,
+    /// The joints that feel it: one, or two of a coupling.
+    pub joints: Vec<String>,
+    /// Its value.
+    pub value: f64,
+    /// The unit of the value.
+    pub unit: String,
+    /// What the function needs beside the motion, by names with units.
+    pub constants: BTreeMap<String, ModelConstant>,
+}
+
+/// A constant of a term.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(untagged)]
+pub enum ModelConstant {
+    /// A number.
+    Number(f64),
+    /// A number for each joint.
+    Numbers([f64; 2]),
+    /// A word.
+    Word(String),
+}
+
+impl ModelFile {
+    /// The model with `notes`.
+    pub fn of(robot: &RobotModel, notes: &[String]) -> Self {
+        let model = robot.model();
+        let joints = model.joints().iter().zip(model.bodies()).zip(model.inertials()).enumerate();
+        let joints = joints.map(|(index, ((joint, body), inertial))| ModelJoint {
+            name: joint.name.clone(),
+            kind: joint.kind.name().to_owned(),
+            parent: joint.parent.map(|parent| model.joints()[parent].name.clone()),
+            placement: ModelPlacement::of(&joint.placement),
+            axis: joint.axis.0,
+            limits: ModelLimits {
+                lower: joint.limits.lower,
+                upper: joint.limits.upper,
+                velocity: joint.limits.velocity,
+                effort: joint.limits.effort,
+            },
+            body: ModelBody {
+                name: body.name().to_owned(),
+                mass_kg: inertial.mass_kg(),
+                com_m: inertial.com_m().map(|com| com.0),
+                inertia_at_com_kgm2: inertial.inertia_at_com().map(|inertia| upper_triangle(&inertia.0)),
+                parameters: inertial.0,
+                links: links(body),
+            },
+            terms: ModelTerm::of(robot, |term| term.own_joint() == Some(index)),
+        });
+        Self {
+            schema: MODEL_SCHEMA.to_owned(),
+            name: model.name().to_owned(),
+            written_by: format!("dynident {}", env!("CARGO_PKG_VERSION")),
+            notes: notes.to_vec(),
+            gravity_m_s2: model.gravity().0,
+            base_links: links(model.base()),
+            joints: joints.collect(),
+            couplings: ModelTerm::of(robot, |term| term.own_joint().is_none()),
+        }
+    }
+}
+
+/// The model as JSON.
+pub(crate) fn model_json(robot: &RobotModel, notes: Vec<String>) -> Result<Exported, ExportError> {
+    let text = serde_json::to_string_pretty(&ModelFile::of(robot, &notes));
+    Ok(Exported { text: text.map_err(|error| ExportError::Json { message: error.to_string() })? + "\n", notes })
+}
+
+impl ModelPlacement {
+    fn of(placement: &Transform) -> Self {
+        Self { translation_m: placement.translation.0, rotation: placement.rotation.0 }
+    }
+}
+
+impl ModelTerm {
+    /// The terms of a robot that are wanted.
+    pub(crate) fn of(robot: &RobotModel, wanted: impl Fn(&TorqueTerm) -> bool) -> Vec<Self> {
+        let joints = robot.model().joints();
+        let terms = robot.terms().filter(|(term, _)| wanted(term));
+        terms
+            .map(|(term, value)| {
+                let felt: Vec<&Joint> = term.joints().into_iter().map(|joint| &joints[joint]).collect();
+                // A coupling of a joint that turns with one that slides has both in its ratios.
+                let turns = felt.iter().any(|joint| joint.turns());
+                Self {
+                    symbol: term.symbol(),
+                    kind: term.kind_name().to_owned(),
+                    joints: felt.iter().map(|joint| joint.name.clone()).collect(),
+                    value,
+                    unit: unit(term.unit(), turns),
+                    constants: term.constants().into_iter().flat_map(|one| constants(one, turns)).collect(),
+                }
+            })
+            .collect()
+    }
+}
+
+/// A unit at a joint that turns, or in its place that of one that slides.
+fn unit(revolute: &str, turns: bool) -> String {
+    if turns {
+        return revolute.to_owned();
+    }
+    revolute.replace("kg m^2", "kg").replace("Nm", "N").replace("rad", "m")
+}
+
+/// A constant with its unit in its name; a step is its shape and its width.
+fn constants((name, value): (&'static str, TermConstant), turns: bool) -> Vec<(String, ModelConstant)> {
+    let with_unit = |name: &str, at_revolute: &str| {
+        let unit = if turns { at_revolute.to_owned() } else { at_revolute.replace("rad", "m") };
+        format!("{name}{unit}")
+    };
+    let number = |name: String, value: f64| (name, ModelConstant::Number(value));
+    match value {
+        TermConstant::Nothing => Vec::new(),
+        TermConstant::Word(word) => vec![(name.to_owned(), ModelConstant::Word(word.to_owned()))],
+        TermConstant::Numbers(values) => vec![(name.to_owned(), ModelConstant::Numbers(values))],
+        TermConstant::Number(value) => {
+            let at_revolute = match name {
+                "speed" | "offset_speed" | "rounding" => "_rad_s",
+                "steepness" => "_s_per_rad",
+                "yield_displacement" => "_rad",
+                // Without a unit, or with it in its name.
+                _ => "",
+            };
+            vec![number(with_unit(name, at_revolute), value)]
+        }
+        TermConstant::Step(shape) => {
+            let (word, width, value) = match shape {
+                CoulombShape::Sign { dead_band } => ("sign", "dead_band", dead_band),
+                CoulombShape::Smooth { width } => ("smooth", "width", width),
+            };
+            let word = (name.to_owned(), ModelConstant::Word(word.to_owned()));
+            vec![word, number(with_unit(width, "_rad_s"), value)]
+        }
+    }
+}
+
+fn links(body: &Body) -> Vec<ModelLink> {
+    let link = |link: &dynident_model::Link| ModelLink {
+        name: link.name.clone(),
+        placement: ModelPlacement::of(&link.placement),
+    };
+    body.links.iter().map(link).collect()
+}
+
+/// xx, xy, xz, yy, yz, zz.
+pub(crate) fn upper_triangle(m: &[[f64; 3]; 3]) -> [f64; 6] {
+    [m[0][0], m[0][1], m[0][2], m[1][1], m[1][2], m[2][2]]
+}

@@ -1,0 +1,140 @@
+//! SDF, which Gazebo and Drake read.
+
+use crate::descriptions::{attribute, comment, frictions, left_out, real_inertial};
+use crate::error::ExportError;
+use crate::exported::Exported;
+use crate::nearest_friction::NearestFriction;
+use crate::robot_model::RobotModel;
+use crate::rotation::z_y_x_angles;
+use core::fmt::Write;
+use dynident_model::{Body, Joint, JointKind, STANDARD_GRAVITY, Transform};
+
+/// A model of SDF 1.7, the first version whose poses may be relative to other frames: links with their inertials,
+/// joints with limits, damping and friction, links fixed to others as frames, and the base fixed to the world. No
+/// shapes.
+pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
+    let model = robot.model();
+    let friction = frictions(robot, "friction", "damping", &mut notes);
+    notes.extend(left_out(robot));
+    for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
+        notes.push(format!("SDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
+    }
+    if model.gravity() != STANDARD_GRAVITY {
+        notes.push(format!(
+            "A model of SDF has no gravity, which is the world's: it is {:?} m/s² in the base frame.",
+            model.gravity().0
+        ));
+    }
+    let mut names = Names::default();
+    let base = names.of(model.base().name());
+    let links: Vec<String> = model.bodies().iter().map(|body| names.of(body.name())).collect();
+    let joints: Vec<String> = model.joints().iter().map(|joint| names.of(&joint.name)).collect();
+    let mut text = String::new();
+    let _ = write!(
+        text,
+        "  <model name=\"{}\">\n    <link name=\"{base}\"/>\n    <joint name=\"{}\" type=\"fixed\">\n      <parent>world</parent>\n      <child>{base}</child>\n    </joint>\n",
+        name(model.name()),
+        names.of("fixed_to_world")
+    );
+    write_frames(&mut text, model.base(), &base, &mut names);
+    for (index, (joint, body)) in model.joints().iter().zip(model.bodies()).enumerate() {
+        let (mass, com, inertia) = real_inertial(model, index, "libsdformat")?;
+        let (link, parent) = (&links[index], joint.parent.map_or(&base, |parent| &links[parent]));
+        let [x, y, z] = com.0;
+        let i = inertia.0;
+        let _ = write!(
+            text,
+            "    <link name=\"{link}\">\n      <pose relative_to=\"{}\">0 0 0 0 0 0</pose>\n      <inertial>\n        <pose>{x:?} {y:?} {z:?} 0 0 0</pose>\n        <mass>{mass:?}</mass>\n        \
+             <inertia>\n          <ixx>{:?}</ixx>\n          <ixy>{:?}</ixy>\n          <ixz>{:?}</ixz>\n          <iyy>{:?}</iyy>\n          <iyz>{:?}</iyz>\n          <izz>{:?}</izz>\n        </inertia>\n      </inertial>\n    </link>\n",
+            joints[index], i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]
+        );
+        write_joint(&mut text, joint, &friction[index], [&joints[index], parent, link]);
+        write_frames(&mut text, body, link, &mut names);
+    }
+    notes.extend(names.notes());
+    let text = format!("<?xml version=\"1.0\"?>\n<sdf version=\"1.7\">\n{}{text}  </model>\n</sdf>\n", comment(&notes));
+    Ok(Exported { text, notes })
+}
+
+fn write_joint(text: &mut String, joint: &Joint, friction: &NearestFriction, [name, parent, child]: [&String; 3]) {
+    let limits = &joint.limits;
+    let stops = limits.lower.zip(limits.upper).filter(|(lower, upper)| lower < upper);
+    let stops = stops.filter(|_| joint.kind != JointKind::Continuous);
+    let kind = match (joint.turns(), stops) {
+        (true, Some(_)) => "revolute",
+        (true, None) => "continuous",
+        (false, _) => "prismatic",
+    };
+    let mut limit = String::new();
+    let mut write_limit = |element: &str, value: f64| {
+        let _ = writeln!(limit, "          <{element}>{value:?}</{element}>");
+    };
+    if let Some((lower, upper)) = stops {
+        write_limit("lower", lower);
+        write_limit("upper", upper);
+    }
+    // Zero is how descriptions say that nobody knows; here a negative number does, which is the default.
+    for (element, value) in [("effort", limits.effort), ("velocity", limits.velocity)] {
+        if let Some(value) = value.filter(|value| *value > 0.0) {
+            write_limit(element, value);
+        }
+    }
+    let [x, y, z] = joint.axis.0;
+    let _ = write!(
+        text,
+        "    <joint name=\"{name}\" type=\"{kind}\">\n      {}\n      <parent>{parent}</parent>\n      <child>{child}</child>\n      <axis>\n        <xyz>{x:?} {y:?} {z:?}</xyz>\n        \
+         <limit>\n{limit}        </limit>\n        <dynamics>\n          <damping>{:?}</damping>\n          <friction>{:?}</friction>\n        </dynamics>\n      </axis>\n    </joint>\n",
+        pose(&joint.placement, parent),
+        friction.viscous,
+        friction.coulomb
+    );
+}
+
+/// The links that are fixed to a body's own, which has the name `link`.
+fn write_frames(text: &mut String, body: &Body, link: &str, names: &mut Names) {
+    for fixed in &body.links[1..] {
+        let name = names.of(&fixed.name);
+        let _ = writeln!(
+            text,
+            "    <frame name=\"{name}\" attached_to=\"{link}\">\n      {}\n    </frame>",
+            pose(&fixed.placement, link)
+        );
+    }
+}
+
+fn pose(placement: &Transform, relative_to: &str) -> String {
+    let ([x, y, z], [yaw, pitch, roll]) = (placement.translation.0, z_y_x_angles(&placement.rotation));
+    format!("<pose relative_to=\"{relative_to}\">{x:?} {y:?} {z:?} {roll:?} {pitch:?} {yaw:?}</pose>")
+}
+
+/// Names inside of a model: links, joints and frames share them.
+#[derive(Default)]
+struct Names {
+    taken: Vec<(String, String)>,
+}
+
+impl Names {
+    /// The name as the text of XML, with an underscore behind it while another part of the robot has it.
+    fn of(&mut self, original: &str) -> String {
+        let mut free = name(original);
+        while self.taken.iter().any(|(_, taken)| *taken == free) {
+            free.push('_');
+        }
+        self.taken.push((original.to_owned(), free.clone()));
+        free
+    }
+
+    /// What is called otherwise than in the description.
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let others = self.taken.iter().filter(|(original, name)| attribute(original) != *name);
+        others.map(|(original, name)| {
+            format!("SDF allows no second part with the name {original}, or none at all: it is called {name} here.")
+        })
+    }
+}
+
+/// A name that SDF allows: not `world`, no `__` around it, no `::` in it.
+fn name(original: &str) -> String {
+    let text = attribute(original).replace("::", "_");
+    if text.is_empty() || text == "world" || text.starts_with("__") { format!("robot_{text}") } else { text }
+}
