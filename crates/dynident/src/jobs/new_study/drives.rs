@@ -12,8 +12,8 @@ use std::path::Path;
 /// Standard deviations of [`together`] from which drive inertia counts as seen: by chance once in some 30,000 studies.
 const SEEN: f64 = 4.0;
 
-/// What the logs say of drive inertia: the table `[drive]` that a study should have where they show it, else the figures
-/// that do not.
+/// What the logs say of drive inertia: the table `[drive]` of the study where they show it, else the figures that do
+/// not.
 pub(super) enum DriveInertia {
     /// Written into the study.
     Seen(Table),
