@@ -29,6 +29,9 @@ run 0 "$dynident" check examples/ur10_simulated.toml
 run 0 "$dynident" log examples/ur10_simulated/train.csv
 run 0 "$dynident" log golden/formats/two_clocks.mcap --json
 run 0 "$dynident" log golden/formats/bag
+run 0 "$dynident" new --robot robots/ur10.urdf --log examples/ur10_simulated/train.csv examples/ur10_simulated/test.csv --out "$out/new.toml"
+run 0 "$dynident" identify "$out/new.toml" --out "$out/new"
+run 0 "$venv/bin/python" .ci/first_minutes.py "$dynident" "$out/first_minutes"
 # All moments negated, as exporters do: named, and undone in a copy.
 sed -E 's/(i[xyz][xyz]=")([1-9]|0\.0*[1-9])/\1-\2/g' robots/iiwa14.urdf >"$out/slip.urdf"
 run 1 "$dynident" inspect "$out/slip.urdf" --json

@@ -8,8 +8,8 @@ use dynident::export::{MODEL_SCHEMA, ModelFile};
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
-    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, RESULT_SCHEMA,
-    ResultFile, SIMULATION_SCHEMA, SimulationFile, VALIDATION_SCHEMA, ValidationFile,
+    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, NEW_STUDY_SCHEMA,
+    NewStudyFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile, VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
         (LOG_SCHEMA, written::<LogContents>()),
         (MODEL_SCHEMA, written::<ModelFile>()),
+        (NEW_STUDY_SCHEMA, written::<NewStudyFile>()),
         (PAPER_SCHEMA, written::<PaperFile>()),
         (RESULT_SCHEMA, written::<ResultFile>()),
         (RUN_SCHEMA, written::<RunFile>()),

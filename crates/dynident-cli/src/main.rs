@@ -19,7 +19,7 @@ use std::process::ExitCode;
     long_about = "Robot dynamic identification: from a URDF and logs to a dynamic model with error bars.\n\n\
         The path:\n  \
         1. dynident inspect arm.urdf             what the description says, and what is wrong with it\n  \
-        2. write study.toml                      robot, logs, columns (examples/, docs/src/study.md)\n  \
+        2. dynident new --robot arm.urdf --log run.csv    writes study.toml: robot, logs, columns\n  \
         3. dynident check study.toml             do study, robot and logs fit together? names mistakes and their keys\n  \
         4. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
         5. dynident validate R/result.json --study other.toml\n  \
@@ -54,6 +54,8 @@ enum Command {
     Inspect(commands::inspect::Options),
     /// What a recording holds: format, channels with rates and ranges, and how a study could begin.
     Log(commands::log::Options),
+    /// Write a study from a robot and its recordings, every line with what speaks for it, and examine it.
+    New(commands::new::Options),
     /// Dynamics of a robot for a table of states, as CSV with 17 digits.
     Evaluate(commands::evaluate::Options),
     /// Find the motion that says most about a study's robot, inside every limit.
@@ -112,6 +114,7 @@ fn main() -> ExitCode {
     let outcome = commands::with_threads(threads, || match arguments.command {
         Command::Inspect(options) => commands::inspect::run(&options, &context),
         Command::Log(options) => commands::log::run(&options, &context),
+        Command::New(options) => commands::new::run(&options, &context),
         Command::Evaluate(options) => commands::evaluate::run(&options, &context),
         Command::Design(options) => commands::design::run(&options, &context),
         Command::Check(options) => commands::check::run(&options, &context),

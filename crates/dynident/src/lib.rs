@@ -10,6 +10,7 @@
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
 //! | what a recording holds | [`log_contents()`] |
+//! | a study from a robot and its recordings | [`new_study()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
 //! | run, identify, run again | [`iterate_study()`] |
 //! | the sections of a study, the parts of results | [`study`], [`result`] |
@@ -60,7 +61,7 @@ pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
-pub use error::{Error, Expected, StudyError};
+pub use error::{Error, Expected, NewStudyError, StudyError};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
@@ -70,6 +71,7 @@ pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instrume
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
 pub use jobs::iterate::{IterationWatch, iterate_study};
 pub use jobs::log::log_contents;
+pub use jobs::new_study::{NewStudy, new_study};
 pub use jobs::options::RunOptions;
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;

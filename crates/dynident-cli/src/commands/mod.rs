@@ -12,6 +12,7 @@ pub(crate) mod interruption;
 pub(crate) mod iterate;
 pub(crate) mod log;
 pub(crate) mod manual;
+pub(crate) mod new;
 mod permission;
 pub(crate) mod reproduce;
 mod search;

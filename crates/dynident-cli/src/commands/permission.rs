@@ -17,7 +17,7 @@ pub(crate) fn for_command(study: &Study, allowed: bool) -> Result<(), String> {
         return Ok(());
     }
     let question = format!("the study starts this program as the robot:\n  {command}\nStart it?");
-    match asked(&question) {
+    match agreed(&question) {
         Some(true) => Ok(()),
         Some(false) => Err("the robot's program was not allowed: nothing was run".to_owned()),
         None => Err(format!(
@@ -41,7 +41,7 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
         motion.controller,
         speeds.join(", ")
     );
-    asked(&question).unwrap_or(false)
+    agreed(&question).unwrap_or(false)
 }
 
 /// That there is somebody who can be asked.
@@ -53,18 +53,27 @@ pub(crate) fn somebody() -> Result<(), String> {
         .to_owned())
 }
 
-/// Yes or no; none if nobody is there.
-fn asked(question: &str) -> Option<bool> {
+/// A line of text; none if nobody is there, or nothing is said.
+pub(crate) fn text_asked(question: &str) -> Option<String> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;
     }
-    terminal::ask(&format!("{question} [y/N] "));
+    terminal::ask(&format!("{question} "));
     let mut answer = String::new();
     std::io::stdin().lock().read_line(&mut answer).ok()?;
     if interruption::pressed() {
-        return Some(false);
+        return None;
     }
-    Some(matches!(answer.trim().to_lowercase().as_str(), "y" | "yes"))
+    Some(answer.trim().to_owned()).filter(|answer| !answer.is_empty())
+}
+
+/// Yes or no; none if nobody is there.
+pub(crate) fn agreed(question: &str) -> Option<bool> {
+    if !(std::io::stdin().is_terminal() && terminal::watched()) {
+        return None;
+    }
+    let answer = text_asked(&format!("{question} [y/N]")).unwrap_or_default();
+    Some(matches!(answer.to_lowercase().as_str(), "y" | "yes"))
 }
 
 /// Words as a shell would take them, near enough for a person to read.

@@ -5,7 +5,7 @@
 //! best are named beside it.
 
 use super::candidates::candidates;
-use super::mistake::Mistake;
+use super::mistake::{Channels, Mistake};
 use super::reading::{Corrected, Reading};
 use crate::consistent::ConsistencySettings;
 use dynident_estimation::EstimationError;
@@ -134,7 +134,24 @@ fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) 
     // What explains a weak joint at the cost of the strong ones explains the wrong thing.
     fitted.retain(|(_, reading)| reading.left_of_all <= NO_WORSE * best.left_of_all && !sacrifices(reading, best));
     fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
+    likelier_sign_first(&mut fitted);
     (fitted, all.len())
+}
+
+/// A negative torque and a negative position of the same joints are one robot and its mirror image, which logs seldom
+/// tell apart: the torque's sign, which no description fixes, is the likelier mistake.
+fn likelier_sign_first(fitted: &mut [(Corrected, Reading)]) {
+    let of_sign = |reading: &Reading| match reading.mistakes.last() {
+        Some(Mistake::Sign { joints, channels }) => Some((joints.clone(), *channels)),
+        _ => None,
+    };
+    let Some((_, least)) = fitted.first() else { return };
+    let (Some((joints, _)), limit) = (of_sign(least), least.score() + ALIKE) else { return };
+    let torque = Some((joints, Channels::Torque));
+    let found = fitted.iter().position(|(_, reading)| of_sign(reading) == torque && reading.score() < limit);
+    if let Some(found) = found {
+        fitted[..=found].rotate_right(1);
+    }
 }
 
 /// Whether a reading leaves clearly more of some joint's torque than the one it was made from.

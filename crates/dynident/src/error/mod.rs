@@ -1,7 +1,9 @@
 //! Everything that can stop a job, each with the file, the place and the fix in its message.
 
+mod new_study;
 mod study;
 
+pub use new_study::NewStudyError;
 pub use study::{Expected, StudyError};
 
 use dynident_export::ExportError;
@@ -84,6 +86,9 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// Recordings from which no study can be written.
+    #[error(transparent)]
+    NewStudy(NewStudyError),
     /// A model that a form cannot hold.
     #[error("{}: {source}", path.display())]
     Export {

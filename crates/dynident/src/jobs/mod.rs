@@ -1,6 +1,7 @@
 //! The jobs of the command: each reads files, calls the crates below, and returns what is written.
 
 pub(crate) mod check;
+mod columns;
 pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod export;
@@ -9,6 +10,7 @@ pub(crate) mod inspect;
 pub(crate) mod iterate;
 pub(crate) mod log;
 mod log_summary;
+pub(crate) mod new_study;
 pub(crate) mod options;
 pub(crate) mod provenance;
 pub(crate) mod simulate;

@@ -88,6 +88,11 @@ impl StudyChange {
     pub fn place(&self) -> String {
         if self.table.starts_with('[') { self.table.clone() } else { format!("[{}]", self.table) }
     }
+
+    /// Whether the line is one key with a value of TOML.
+    pub fn is_well_formed(&self) -> bool {
+        self.line.parse::<toml::Table>().is_ok_and(|table| table.len() == 1)
+    }
 }
 
 impl CheckFinding {

@@ -9,6 +9,7 @@ mod identification;
 mod inspection;
 mod iterations;
 mod log;
+mod new_study;
 mod numbers;
 mod problems;
 mod provenance;
@@ -34,6 +35,7 @@ pub use iterations::{
     INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetCondition,
 };
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
+pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 // What the files hold of the crates below.

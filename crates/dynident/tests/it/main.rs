@@ -23,6 +23,7 @@ mod log_formats;
 mod masses;
 mod modules;
 mod mutated_studies;
+mod new_study;
 mod payload;
 mod payload_unknowns;
 mod real_logs;

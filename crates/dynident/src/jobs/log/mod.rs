@@ -1,9 +1,10 @@
 //! What a recording holds.
 
 mod channel;
-mod names;
+mod study_format;
 
 use crate::error::Error;
+use crate::jobs::columns::{time_unit_s, unit};
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 use channel::Tally;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
@@ -53,7 +54,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         found.channels.extend(tallies.iter().zip(names).map(|(tally, name)| LogChannel {
             name: name.clone(),
             group: index,
-            unit: names::unit(name).map(str::to_owned),
+            unit: unit(name).map(str::to_owned),
             rate_hz,
             samples: tally.samples,
             missing: rows - tally.samples,
@@ -68,7 +69,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
             rate_hz,
         });
     }
-    found.study_format = names::study_format(&found);
+    found.study_format = study_format::study_format(&found);
     Ok(found)
 }
 
@@ -93,7 +94,7 @@ fn bytes(path: &Path) -> Result<u64, RecordingError> {
 fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
     match group.time {
         Some(column) => Some((column - group.columns.start, 1.0)),
-        None => names.iter().enumerate().find_map(|(column, name)| Some((column, names::time_unit_s(name)?))),
+        None => names.iter().enumerate().find_map(|(column, name)| Some((column, time_unit_s(name)?))),
     }
 }
 

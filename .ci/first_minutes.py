@@ -1,0 +1,88 @@
+"""first_minutes.py DYNIDENT SCRATCH: a person with a robot and a rosbag2 recording alone: new, check, identify, export.
+
+The simulated recordings of README go into bags by rosbags, which knows nothing of this project: joints in alphabetical order as ros2_control sorts them, stamps that are not those of the recorder, a second topic beside them. The model has to be
+the one that the same samples as CSV give, and the C that is written to compile.
+"""
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+ROBOT = "robots/ur10.urdf"
+CSV_STUDY = "examples/ur10_simulated.toml"
+JOINTS = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
+# Stamps count whole nanoseconds from an epoch, and sums of other rounding: nothing against an error bar.
+SAME_STD = 1e-3
+
+
+def bag(table, folder, storage):
+    types = get_typestore(Stores.ROS2_JAZZY)
+    state, header, stamp, temperature = (types.types[name] for name in ["sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time", "std_msgs/msg/Float64"])
+    order = sorted(range(len(JOINTS)), key=lambda joint: JOINTS[joint])
+    start = 1_700_000_000_123_456_789
+    with Writer(folder, version=9, storage_plugin=storage) as writer:
+        states = writer.add_connection("/joint_states", state.__msgtype__, typestore=types)
+        other = writer.add_connection("/motor_temperature", temperature.__msgtype__, typestore=types)
+        for number, row in enumerate(csv.DictReader(table.open())):
+            at = start + round(float(row["t_s"]) * 1e9)
+            values = lambda name: np.array([float(row[name.format(joint + 1)]) for joint in order])
+            message = state(
+                header=header(stamp=stamp(sec=at // 10**9, nanosec=at % 10**9), frame_id=""),
+                name=[JOINTS[joint] for joint in order],
+                position=values("q{}_rad"),
+                velocity=np.array([]),
+                effort=values("tau{}_Nm"),
+            )
+            # Recorded a while after it was measured.
+            recorded = at + 400_000 + (number * 7919) % 300_000
+            writer.write(states, recorded, types.serialize_cdr(message, state.__msgtype__))
+            if number % 100 == 0:
+                writer.write(other, recorded, types.serialize_cdr(temperature(data=40.0), temperature.__msgtype__))
+
+
+def called(*command):
+    ended = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+    assert ended.returncode == 0, f"{command}\n{ended.stdout}{ended.stderr}"
+    return ended.stdout
+
+
+def parameters(result):
+    """Estimates and their standard deviations by name, of the base parameters that both have."""
+    found = json.loads((result / "result.json").read_text())["base_parameters"]
+    return {entry["symbol"]: (entry["value"], entry["std"]) for entry in found if entry["std"]}
+
+
+def main(dynident, scratch):
+    scratch = pathlib.Path(scratch)
+    scratch.mkdir()
+    data = pathlib.Path("examples/ur10_simulated")
+    bag(data / "train.csv", scratch / "train", StoragePlugin.SQLITE3)
+    bag(data / "test.csv", scratch / "test", StoragePlugin.MCAP)
+
+    study = scratch / "study.toml"
+    called(dynident, "new", "--robot", ROBOT, "--log", scratch / "train", scratch / "test", "--out", study)
+    called(dynident, "check", study)
+    called(dynident, "identify", study, "--out", scratch / "result")
+    called(dynident, "export", scratch / "result/result.json", "--study", study, "--to", "c", "--out", scratch / "arm.h")
+    (scratch / "arm.c").write_text('#include "arm.h"\n')
+    called("cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-c", scratch / "arm.c", "-o", scratch / "arm.o")
+
+    # The same samples as CSV, the study that a person wrote.
+    by_hand = pathlib.Path(CSV_STUDY).read_text()
+    by_hand = by_hand.replace('"../robots', f'"{pathlib.Path("robots").resolve()}').replace('"ur10_simulated/', f'"{data.resolve()}/')
+    (scratch / "csv.toml").write_text(by_hand)
+    called(dynident, "identify", scratch / "csv.toml", "--out", scratch / "csv")
+    bagged, plain = parameters(scratch / "result"), parameters(scratch / "csv")
+    assert bagged.keys() == plain.keys(), bagged.keys() ^ plain.keys()
+    far = max(abs(bagged[name][0] - value) / std for name, (value, std) in plain.items())
+    assert far < SAME_STD, f"{far} standard deviations from the model of the CSV"
+    print(f"{len(plain)} parameters, at most {far:.1e} standard deviations from those of the CSV")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

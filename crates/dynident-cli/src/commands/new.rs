@@ -1,0 +1,96 @@
+//! `dynident new --robot ROBOT --log FILE..`.
+
+use super::permission::{agreed, text_asked};
+use super::{Context, json, message_of};
+use crate::{Verdict, terminal};
+use dynident::result::{StudyChange, Unsure};
+use dynident::{NewStudy, RunOptions, new_study};
+use std::path::PathBuf;
+
+/// Options of `new`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The robot: URDF, or D-H table in TOML.
+    #[arg(long, value_name = "FILE")]
+    robot: PathBuf,
+    /// The recordings, of any format that is read; the last of several tests the model.
+    #[arg(long = "log", required = true, num_args = 1.., value_name = "FILE")]
+    logs: Vec<PathBuf>,
+    /// The study to write.
+    #[arg(long, value_name = "STUDY.toml", default_value = "study.toml")]
+    out: PathBuf,
+    /// Samples a second, for recordings without time stamps.
+    #[arg(long, value_name = "HZ")]
+    rate_hz: Option<f64>,
+    /// Write over a study that is there.
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    if options.out.exists() && !options.force {
+        return Err(format!(
+            "{} is there already, and may hold what somebody wrote: give another --out, or --force",
+            options.out.display()
+        ));
+    }
+    let mut inputs = options.logs.clone();
+    inputs.push(options.robot.clone());
+    dynident::refuse_overwriting(core::slice::from_ref(&options.out), &inputs).map_err(message_of)?;
+    if options.rate_hz.is_some_and(|rate_hz| !(rate_hz > 0.0 && rate_hz.is_finite())) {
+        return Err("--rate-hz: give samples a second, more than 0".to_owned());
+    }
+
+    let progress = context.progress();
+    let run = RunOptions { data: None, threads: context.threads, progress: &*progress };
+    let mut request = NewStudy {
+        robot: options.robot.clone(),
+        logs: options.logs.clone(),
+        out: options.out.clone(),
+        rate_hz: options.rate_hz,
+        stated: Vec::new(),
+    };
+    let mut found = new_study(&request, &run).map_err(message_of)?;
+    request.stated = found.unsure.iter().flat_map(stated).collect();
+    if !request.stated.is_empty() {
+        found = new_study(&request, &run).map_err(message_of)?;
+    }
+    dynident::write_whole(&options.out, found.text.as_bytes()).map_err(message_of)?;
+
+    if context.json {
+        terminal::print(&json(&found)?)?;
+    } else if !context.quiet {
+        terminal::print(found.text.trim_end())?;
+    }
+    for unsure in &found.unsure {
+        terminal::remark(&format!("look at {}", unsure.sentence()));
+    }
+    if !context.json && !context.quiet {
+        terminal::remark(&format!("written: {0}; next: dynident identify {0} --out result", options.out.display()));
+    }
+    Ok(if found.unsure.is_empty() { Verdict::Good } else { Verdict::Negative })
+}
+
+/// What a person on the terminal states: a line in place of one that is not sure, or what the examination proposes;
+/// empty where it is left.
+fn stated(unsure: &Unsure) -> Vec<StudyChange> {
+    if !unsure.proposed.is_empty() {
+        let is_agreed = agreed(&format!("{}\nWrite it?", unsure.reason)).unwrap_or(false);
+        return if is_agreed { unsure.proposed.clone() } else { Vec::new() };
+    }
+    let shown = |change: &StudyChange| line_stated(change, &unsure.reason);
+    unsure.line.as_ref().and_then(shown).into_iter().collect()
+}
+
+/// The line that stands in place of `change`, once it is one.
+fn line_stated(change: &StudyChange, reason: &str) -> Option<StudyChange> {
+    let (key, value) = change.line.split_once(" = ")?;
+    let mut question = format!("{}: {reason}\n  {key} [{value}]:", change.place());
+    loop {
+        let answer = StudyChange { line: format!("{key} = {}", text_asked(&question)?), ..change.clone() };
+        if answer.is_well_formed() {
+            return Some(answer);
+        }
+        question = format!("  that is no value of TOML, such as {value}; {key}:");
+    }
+}

@@ -1,0 +1,129 @@
+//! Units that names of columns end with.
+
+use super::meaning::Quantity;
+
+/// Endings of names, the unit that they say as studies write it, and the quantity of a joint that has it; the longest
+/// first.
+const ENDINGS: [(&str, &str, Option<Quantity>); 30] = [
+    ("rad_per_s2", "rad/s^2", Some(Quantity::Acceleration)),
+    ("rad_s2", "rad/s^2", Some(Quantity::Acceleration)),
+    ("rad/s^2", "rad/s^2", Some(Quantity::Acceleration)),
+    ("rad/s2", "rad/s^2", Some(Quantity::Acceleration)),
+    ("deg/s^2", "deg/s^2", Some(Quantity::Acceleration)),
+    ("rad_per_s", "rad/s", Some(Quantity::Velocity)),
+    ("rad_s", "rad/s", Some(Quantity::Velocity)),
+    ("rad/s", "rad/s", Some(Quantity::Velocity)),
+    ("radps", "rad/s", Some(Quantity::Velocity)),
+    ("deg_s", "deg/s", Some(Quantity::Velocity)),
+    ("deg/s", "deg/s", Some(Quantity::Velocity)),
+    ("rpm", "rpm", Some(Quantity::Velocity)),
+    ("mrad", "mrad", Some(Quantity::Position)),
+    ("rad", "rad", Some(Quantity::Position)),
+    ("deg", "deg", Some(Quantity::Position)),
+    ("rev", "rev", Some(Quantity::Position)),
+    ("mnm", "mN m", Some(Quantity::Torque)),
+    ("n m", "N m", Some(Quantity::Torque)),
+    ("nm", "N m", Some(Quantity::Torque)),
+    ("ma", "mA", Some(Quantity::Current)),
+    ("amps", "A", Some(Quantity::Current)),
+    ("a", "A", Some(Quantity::Current)),
+    // Of no joint, or of times.
+    ("degc", "degC", None),
+    ("mm", "mm", None),
+    ("ms", "ms", None),
+    ("us", "us", None),
+    ("ns", "ns", None),
+    ("sec", "s", None),
+    ("m", "m", None),
+    ("s", "s", None),
+];
+
+/// Fields of ROS messages that hold joints, and their units (REP 103).
+const FIELDS: [(&str, &str); 8] = [
+    (".position", "rad"),
+    (".positions", "rad"),
+    (".velocity", "rad/s"),
+    (".velocities", "rad/s"),
+    (".effort", "N m"),
+    (".efforts", "N m"),
+    (".log_time", "s"),
+    (".stamp", "s"),
+];
+
+/// The unit that a name says: `q1_rad`, `tau_Nm[3]`, `/joint_states.effort[elbow]`.
+pub(in crate::jobs) fn unit(name: &str) -> Option<&'static str> {
+    let lower = name.to_lowercase();
+    // Only ROS topics begin with a stroke.
+    if name.starts_with('/') {
+        let field = indexed(&lower).0;
+        if let Some((_, unit)) = FIELDS.iter().find(|(end, _)| field.ends_with(end)) {
+            return Some(unit);
+        }
+    }
+    // A number counts joints: `tau3`, `tau_3`.
+    ended(&lower).map(|(_, unit, _)| unit)
+}
+
+/// What stands before the unit that a name in small letters ends with, the unit, and the quantity that has it; an index
+/// in brackets stays.
+pub(super) fn ended(lower: &str) -> Option<(String, &'static str, Option<Quantity>)> {
+    // `tau_Nm[3]` has its unit before the index.
+    let (name, index) = indexed(lower);
+    let name = name.trim_end_matches([')', ']', ' ']);
+    let before = |ending: &str| {
+        name.strip_suffix(ending).filter(|before| before.ends_with(|c: char| "_ ([/-".contains(c)) && before.len() > 1)
+    };
+    let found = ENDINGS.iter().find_map(|(ending, unit, quantity)| Some((before(ending)?, *unit, *quantity)));
+    found.map(|(before, unit, quantity)| (format!("{before}{index}"), unit, quantity))
+}
+
+/// A name and its index in brackets at the end.
+fn indexed(name: &str) -> (&str, &str) {
+    match name.rfind('[') {
+        Some(at) if name.ends_with(']') && at > 0 => name.split_at(at),
+        _ => (name, ""),
+    }
+}
+
+/// The unit in seconds of a column that is a time by its name.
+pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
+    let lower = name.to_lowercase();
+    let own = lower.rsplit(['.', '/']).next().unwrap_or(&lower);
+    let (word, unit) = own.rsplit_once('_').unwrap_or((own, ""));
+    let named = |word: &str| matches!(word, "t" | "time" | "timestamp" | "stamp" | "log_time" | "elapsed" | "seconds");
+    match (named(own), named(word), unit) {
+        (true, _, _) | (_, true, "s" | "sec") => Some(1.0),
+        (_, true, "ms") => Some(1e-3),
+        (_, true, "us") => Some(1e-6),
+        (_, true, "ns") => Some(1e-9),
+        _ => None,
+    }
+}
+
+/// The column of times as a study's `time` has it.
+pub(in crate::jobs) fn time_as_toml(name: &str) -> String {
+    let unit = match time_unit_s(name) {
+        Some(1e-3) => ", unit = \"ms\"",
+        Some(1e-6) => ", unit = \"us\"",
+        Some(1e-9) => ", unit = \"ns\"",
+        _ => "",
+    };
+    format!("{{ column = {}{unit} }}", super::spelling::quoted(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_units_and_times() {
+        assert_eq!(unit("q1_rad"), Some("rad"));
+        assert_eq!(unit("tau_Nm[3]"), Some("N m"));
+        assert_eq!(unit("/joint_states.effort[elbow]"), Some("N m"));
+        assert_eq!(unit("alpha"), None);
+        assert_eq!(time_unit_s("t_ms"), Some(1e-3));
+        assert_eq!(time_unit_s("/arm.header.stamp"), Some(1.0));
+        assert_eq!(time_unit_s("tau"), None);
+        assert_eq!(time_as_toml("t_us"), "{ column = \"t_us\", unit = \"us\" }");
+    }
+}

@@ -1,0 +1,32 @@
+//! How the study of a recording could begin.
+
+use crate::jobs::columns::{Quantity, best, column_list, families, time_as_toml};
+use crate::result::LogContents;
+use core::fmt::Write;
+use std::path::Path;
+
+/// A beginning of a study's `[format]`, by the names of columns alone: no robot is known here.
+pub(super) fn study_format(found: &LogContents) -> String {
+    let all = families([(Path::new(&found.file), found)], &[]);
+    let position = best(&all, Quantity::Position, |_| true);
+    let torque = best(&all, Quantity::Torque, |_| true).or_else(|| best(&all, Quantity::Current, |_| true));
+    let group = position.or(torque).map_or(0, |family| family.group);
+    let mut text = "[format]\n".to_owned();
+    match found.groups.get(group).and_then(|group| group.time.as_ref()) {
+        Some(time) => {
+            let _ = writeln!(text, "time = {}", time_as_toml(time));
+        }
+        None => text += "rate_hz = 0.0  # no column of time was recognised: give its rate, or time = { column = .. }\n",
+    }
+    for (key, usual, family) in [("position", "rad", position), ("torque", "N m", torque)] {
+        let Some(family) = family else {
+            let _ = writeln!(text, "{key} = {{ columns = [] }}  # not recognised by name: which columns?");
+            continue;
+        };
+        let names: Vec<String> = family.columns.iter().map(|(_, name)| name.clone()).collect();
+        let unit = family.unit.filter(|unit| *unit != usual);
+        let unit = unit.map_or(String::new(), |unit| format!(", unit = \"{unit}\""));
+        let _ = writeln!(text, "{key} = {{ columns = {}{unit} }}", column_list(&names));
+    }
+    text
+}

@@ -1,0 +1,131 @@
+//! Which joints of the robot the columns of a family are.
+
+use crate::jobs::columns::{Family, JointKey};
+
+/// Which joints of the robot a family's columns are, in the order of the columns, and whether that is sure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct LoggedJoints {
+    /// Places of the robot's joints.
+    pub(super) joints: Vec<usize>,
+    /// Why these.
+    pub(super) reason: String,
+    pub(super) is_sure: bool,
+}
+
+/// The joints behind the columns of `family`, for a robot whose joints that move by themselves stand at the places
+/// `free` and turn where `turns` says so; none where the columns are more than the joints.
+pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usize) -> bool) -> Option<LoggedJoints> {
+    let of_name = |(key, _): &(JointKey, String)| match key {
+        JointKey::Joint(place) => Some(*place),
+        JointKey::Name(_) | JointKey::Number(_) | JointKey::Alone => None,
+    };
+    let named: Option<Vec<usize>> = family.columns.iter().map(of_name).collect();
+    if let Some(joints) = named {
+        return Some(LoggedJoints { joints, reason: "the columns' names say the joints".to_owned(), is_sure: true });
+    }
+    let count = family.columns.len();
+    let turning: Vec<usize> = free.iter().copied().filter(|&joint| turns(joint)).collect();
+    let of_all = format!("{count} columns, as many as the robot has joints, in the order of the description");
+    let of_turning = format!("{count} columns, as many as the robot has joints that turn, in that order");
+    let of_first = format!("{count} columns for {} joints: taken for the first ones of the description", free.len());
+    // Names that the description does not have: nothing says their order.
+    let foreign = family.columns.iter().find_map(|(key, _)| match key {
+        JointKey::Name(name) => Some(name),
+        JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+    });
+    if let Some(name) = foreign {
+        let reason = format!("the description has no joint `{name}`: {count} columns, taken in their order");
+        return (count <= free.len()).then(|| LoggedJoints { joints: free[..count].to_vec(), reason, is_sure: false });
+    }
+    match count {
+        _ if count == free.len() => Some(LoggedJoints { joints: free.to_vec(), reason: of_all, is_sure: true }),
+        _ if count == turning.len() => Some(LoggedJoints { joints: turning, reason: of_turning, is_sure: true }),
+        _ if count < free.len() => {
+            Some(LoggedJoints { joints: free[..count].to_vec(), reason: of_first, is_sure: false })
+        }
+        _ => None,
+    }
+}
+
+/// The columns of `family` in the order of `joints`; none where one is missing.
+pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Option<Vec<String>> {
+    let name_at = |place: usize, joint: usize| {
+        let by_name = family.columns.iter().find(|(key, _)| *key == JointKey::Joint(joint));
+        let by_number = || family.columns.iter().find(|(key, _)| *key == logged.columns[place].0);
+        by_name.or_else(by_number).map(|(_, name)| name.clone())
+    };
+    joints.iter().enumerate().map(|(place, joint)| name_at(place, *joint)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::columns::{Quantity, Source, best, families};
+    use crate::result::{LOG_SCHEMA, LogChannel, LogContents};
+    use std::path::Path;
+
+    fn contents(names: &[&str]) -> LogContents {
+        let channel = |name: &&str| LogChannel {
+            name: (*name).to_owned(),
+            group: 0,
+            unit: None,
+            rate_hz: None,
+            samples: 10,
+            missing: 0,
+            range: Some([-1.0, 1.0]),
+            course: Vec::new(),
+        };
+        LogContents {
+            schema: LOG_SCHEMA.to_owned(),
+            file: String::new(),
+            format: "text".to_owned(),
+            bytes: 0,
+            groups: Vec::new(),
+            channels: names.iter().map(channel).collect(),
+            truncated: None,
+            notes: Vec::new(),
+            study_format: String::new(),
+        }
+    }
+
+    #[test]
+    fn measured_columns_are_taken_and_paired_joint_by_joint() {
+        let joints = ["a", "b"].map(|name| format!("joint_{name}"));
+        let names =
+            ["target_q_0", "target_q_1", "actual_q_0", "actual_q_1", "tau_1", "tau_0", "tau_ext_0", "tau_ext_1"];
+        let logs = [(Path::new("run.csv"), contents(&names))];
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
+        let position = best(&found, Quantity::Position, |_| true).unwrap();
+        assert_eq!(position.source, Source::Measured);
+        let logged = logged_joints(position, &[0, 1], |_| true).unwrap();
+        assert!(logged.is_sure && logged.joints == [0, 1]);
+        let torque = best(&found, Quantity::Torque, |_| true).unwrap();
+        // In the order of the positions, not in that of the file.
+        assert_eq!(in_order(torque, position, &logged.joints).unwrap(), ["tau_0", "tau_1"]);
+        assert_eq!(found.iter().filter(|family| family.quantity == Quantity::Torque).count(), 1);
+    }
+
+    #[test]
+    fn files_say_what_columns_of_joints_are() {
+        let joints = ["Joint_1", "Joint_2"].map(str::to_owned);
+        let logs = [
+            (Path::new("pos_read_data.csv"), contents(&["Joint_1", "Joint_2"])),
+            (Path::new("curr_data.csv"), contents(&["Joint_1", "Joint_2"])),
+        ];
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
+        assert_eq!(best(&found, Quantity::Position, |_| true).unwrap().file, 0);
+        assert!(best(&found, Quantity::Current, |_| true).unwrap().by_file_name);
+    }
+
+    #[test]
+    fn fingers_that_are_not_in_the_log_are_left_out() {
+        let names: Vec<String> = (1..=7).map(|k| format!("q{k}_rad")).collect();
+        let logs = [(Path::new("run.csv"), contents(&names.iter().map(String::as_str).collect::<Vec<_>>()))];
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &[]);
+        let free: Vec<usize> = (0..9).collect();
+        let logged = logged_joints(&found[0], &free, |joint| joint < 7).unwrap();
+        assert!(logged.is_sure && logged.joints == (0..7).collect::<Vec<_>>(), "{logged:?}");
+        assert!(!logged_joints(&found[0], &free, |_| true).unwrap().is_sure);
+        assert_eq!(logged_joints(&found[0], &free[..5], |_| true), None);
+    }
+}

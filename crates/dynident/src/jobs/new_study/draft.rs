@@ -1,0 +1,153 @@
+//! A study as it is written down: tables, lines, and beside each line why it is there.
+
+use crate::result::{StudyChange, Unsure};
+use core::fmt::Write;
+
+/// A key with its value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Line {
+    key: String,
+    /// As TOML.
+    value: String,
+    reason: String,
+    is_sure: bool,
+}
+
+/// A table, or one entry of a list of tables.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Table {
+    /// In brackets: `[robot]`, `[[log]]`; empty for the top.
+    heading: String,
+    reason: String,
+    lines: Vec<Line>,
+}
+
+impl Table {
+    /// A table without lines.
+    pub(super) fn new(heading: &str, reason: impl Into<String>) -> Self {
+        Self { heading: heading.to_owned(), reason: reason.into(), lines: Vec::new() }
+    }
+
+    /// With a further line.
+    #[must_use]
+    pub(super) fn with(self, key: &str, value: impl Into<String>, reason: impl Into<String>) -> Self {
+        self.with_line(key, value, reason, true)
+    }
+
+    /// With a line that a person should look at.
+    #[must_use]
+    pub(super) fn with_unsure(self, key: &str, value: impl Into<String>, reason: impl Into<String>) -> Self {
+        self.with_line(key, value, reason, false)
+    }
+
+    #[must_use]
+    pub(super) fn with_line(
+        mut self,
+        key: &str,
+        value: impl Into<String>,
+        reason: impl Into<String>,
+        is_sure: bool,
+    ) -> Self {
+        self.lines.push(Line { key: key.to_owned(), value: value.into(), reason: reason.into(), is_sure });
+        self
+    }
+}
+
+/// A study under way.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Draft {
+    pub(super) tables: Vec<Table>,
+}
+
+impl Draft {
+    /// With a further table at its end.
+    #[must_use]
+    pub(super) fn with(&self, table: Table) -> Self {
+        let mut tables = self.tables.clone();
+        tables.push(table);
+        Self { tables }
+    }
+
+    /// Writes what an examination of the study asks for; false where it names no line, or a table that is not there.
+    pub(super) fn apply(&mut self, change: &StudyChange, reason: &str) -> bool {
+        let Some((key, value)) = change.line.split_once('=') else { return false };
+        let (key, value) = (key.trim(), value.trim());
+        if key.starts_with('#') {
+            return false;
+        }
+        let heading = format!("[{}]", change.table);
+        let Some(table) = self.tables.iter_mut().find(|table| table.heading == heading) else { return false };
+        let line = Line { key: key.to_owned(), value: value.to_owned(), reason: reason.to_owned(), is_sure: true };
+        match table.lines.iter_mut().find(|old| old.key == key) {
+            Some(old) if old.value == line.value => return false,
+            Some(old) => *old = line,
+            None => table.lines.push(line),
+        }
+        true
+    }
+
+    /// The lines that a person should look at.
+    pub(super) fn unsure(&self) -> Vec<Unsure> {
+        let of_table = |table: &Table| {
+            let unsure = |line: &Line| Unsure {
+                line: Some(StudyChange {
+                    table: table.heading.trim_matches(['[', ']']).to_owned(),
+                    line: format!("{} = {}", line.key, line.value),
+                }),
+                proposed: Vec::new(),
+                reason: line.reason.clone(),
+            };
+            table.lines.iter().filter(|line| !line.is_sure).map(unsure).collect::<Vec<_>>()
+        };
+        self.tables.iter().flat_map(of_table).collect()
+    }
+
+    /// The study as TOML.
+    pub(super) fn text(&self) -> String {
+        let mut text =
+            "# Written by `dynident new`: every line with what speaks for it. Lines under UNSURE want a look.\n"
+                .to_owned();
+        let is_empty = |table: &&Table| table.heading.is_empty() && table.reason.is_empty();
+        for table in self.tables.iter().filter(|table| !is_empty(table)) {
+            text.push('\n');
+            if !table.reason.is_empty() {
+                let _ = writeln!(text, "# {}", one_line(&table.reason));
+            }
+            if !table.heading.is_empty() {
+                let _ = writeln!(text, "{}", table.heading);
+            }
+            for Line { key, value, reason, is_sure } in &table.lines {
+                if !reason.is_empty() {
+                    let _ = writeln!(text, "# {}{}", if *is_sure { "" } else { "UNSURE: " }, one_line(reason));
+                }
+                let _ = writeln!(text, "{key} = {value}");
+            }
+        }
+        text
+    }
+}
+
+/// A text as a comment holds it.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_go_into_their_table_once() {
+        let torque = Table::new("[format.torque]", "").with("columns", "\"tau{1..2}\"", "by name");
+        let mut draft = Draft { tables: vec![torque] };
+        let change = StudyChange { table: "format.torque".to_owned(), line: "sign = -1".to_owned() };
+        assert!(draft.apply(&change, "negative masses\notherwise"));
+        assert!(!draft.apply(&change, "again"));
+        let elsewhere = StudyChange { table: "robot".to_owned(), line: "gravity_m_s2 = [0.0, 0.0, 9.81]".to_owned() };
+        let advice = StudyChange { table: "format.torque".to_owned(), line: "# matrix: the negative = 2".to_owned() };
+        assert!(!draft.apply(&elsewhere, "") && !draft.apply(&advice, ""));
+        let text = draft.text();
+        assert!(text.contains("# negative masses otherwise\nsign = -1\n"), "{text}");
+        assert!(text.parse::<toml::Table>().is_ok() && draft.unsure().is_empty(), "{text}");
+    }
+}

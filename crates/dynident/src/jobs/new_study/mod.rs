@@ -1,0 +1,352 @@
+//! A study from a robot and its recordings.
+
+mod channels;
+mod draft;
+mod drives;
+mod paths;
+
+use crate::error::{Error, NewStudyError};
+use crate::jobs::check::check;
+use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, quoted, time_as_toml};
+use crate::jobs::log::log_contents;
+use crate::jobs::options::RunOptions;
+use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
+use crate::study::Study;
+use channels::{LoggedJoints, in_order, logged_joints};
+use draft::{Draft, Table};
+use drives::{DriveInertia, drive_inertia};
+use dynident_model::{JointKind, Model, load_robot};
+use dynident_recording::Level;
+use paths::seen_from;
+use std::path::{Path, PathBuf};
+
+/// Rounds of examining the study and writing what the examination asks for, at most.
+const MOST_ROUNDS: usize = 3;
+/// Parts of a single recording that are fitted to and tested on; between them a gap, for neighbours are alike.
+const TRAINING: [f64; 2] = [0.0, 0.65];
+const TEST: [f64; 2] = [0.7, 1.0];
+/// Angles beyond this many turns are none in radians.
+const MOST_TURNS: f64 = 4.0;
+
+/// What a study is written from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NewStudy {
+    /// The description: URDF, or D-H table in TOML.
+    pub robot: PathBuf,
+    /// The recordings, at least one.
+    pub logs: Vec<PathBuf>,
+    /// Where the study will stand: paths in it are as seen from there.
+    pub out: PathBuf,
+    /// Samples a second, for recordings without time stamps.
+    pub rate_hz: Option<f64>,
+    /// Lines that a person states, in place of what would be written there: the answers to
+    /// [`NewStudyFile::unsure`].
+    pub stated: Vec<StudyChange>,
+}
+
+/// Writes a study: which joints the columns are by their names and their number, units by names, limits and spread,
+/// which part tests the model; then examines it as [`check`] does and writes what that names without an alternative,
+/// and fits once to see whether drives have inertia.
+/// Every line has its reason beside it; what is not sure is marked. Nothing is written to a file.
+///
+/// # Errors
+/// A description or a recording that cannot be read, or without columns of positions and torques that could be
+/// recognised.
+pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStudyFile, Error> {
+    let robot = load_robot(&request.robot).map_err(|source| Error::Robot(Box::new(source)))?;
+    let logs: Vec<(&Path, LogContents)> =
+        request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
+    let recorded = Recorded::find(&robot.model, &logs).map_err(Error::NewStudy)?;
+    let mut draft = recorded.draft(request, &robot.model, &logs);
+    for change in &request.stated {
+        draft.apply(change, "As stated");
+    }
+
+    // What the data say of the reading so far.
+    let mut examined = None;
+    let mut unsure = draft.unsure();
+    let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
+    if !unsure.iter().any(without_rate) {
+        for _ in 0..MOST_ROUNDS {
+            let study = Study::parse(&draft.text(), &request.out)?;
+            let found = check(&study, &request.out, options)?.check;
+            let changed = mend(&mut draft, &found);
+            examined = Some(found);
+            if !changed {
+                break;
+            }
+        }
+    }
+    let left = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
+    unsure.extend(left.map(|finding| Unsure {
+        line: None,
+        proposed: finding.write.iter().filter(|change| change.is_well_formed()).cloned().collect(),
+        reason: finding.sentence(),
+    }));
+    if unsure.is_empty() && examined.is_some() {
+        match drive_inertia(&draft, &request.out, options)? {
+            DriveInertia::Seen(table) => draft = draft.with(table),
+            DriveInertia::NotSeen(figures) => draft = draft.with(Table::new("", figures)),
+        }
+    }
+    Ok(NewStudyFile {
+        schema: NEW_STUDY_SCHEMA.to_owned(),
+        file: request.out.display().to_string(),
+        text: draft.text(),
+        unsure,
+        check: examined,
+    })
+}
+
+/// Writes what an examination asks for where it knows no alternative; whether anything changed. A sign, an order, a
+/// mounting or a unit is one of a few; a zero or a factor of any size may make up for another mistake, and is left to
+/// a person.
+fn mend(draft: &mut Draft, found: &StudyCheck) -> bool {
+    let is_one_of_few = |finding: &&CheckFinding| match finding.kind.as_str() {
+        "sign" | "order" | "mounting" => true,
+        "unit" => finding.write.iter().all(|change| change.line.starts_with("unit")),
+        _ => false,
+    };
+    let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
+    let asked = problems.filter(is_one_of_few);
+    let mut changed = false;
+    for finding in asked {
+        for change in &finding.write {
+            let reason = format!("By `dynident check`: {}: {}", finding.what, finding.evidence);
+            changed |= draft.apply(change, &reason);
+        }
+    }
+    changed
+}
+
+/// What was recognised in the recordings.
+struct Recorded {
+    /// Places of the joints, in the order of the columns.
+    logged: LoggedJoints,
+    position: Family,
+    torque: Family,
+    velocity: Option<Family>,
+    /// Columns of the joints, in their order.
+    columns: [Vec<String>; 2],
+    velocity_columns: Option<Vec<String>>,
+    /// Recordings with these columns; those of torques alone are parts of them.
+    files: Vec<usize>,
+    /// The time column with its rate.
+    time: Option<(String, Option<f64>)>,
+}
+
+impl Recorded {
+    fn find(model: &Model, logs: &[(&Path, LogContents)]) -> Result<Self, NewStudyError> {
+        let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+        let all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
+        let missing = |quantity| NewStudyError::NotRecognised {
+            quantity,
+            columns: logs.iter().flat_map(|(_, log)| &log.channels).map(|channel| channel.name.clone()).collect(),
+        };
+        let position = best(&all, Quantity::Position, |_| true).ok_or_else(|| missing("positions"))?;
+        let free: Vec<usize> = (0..model.dof()).filter(|&joint| model.joints()[joint].mimic.is_none()).collect();
+        let turns = |joint: usize| model.joints()[joint].kind != JointKind::Prismatic;
+        let logged = logged_joints(position, &free, turns)
+            .ok_or(NewStudyError::MoreColumnsThanJoints { columns: position.columns.len(), joints: free.len() })?;
+        let ordered = |family: &Family| in_order(family, position, &logged.joints);
+
+        // Beside the positions if they are there, else in a file of their own with as many rows.
+        let beside = |family: &Family| family.file == position.file && ordered(family).is_some();
+        let rows = |family: &Family| logs[family.file].1.groups.get(family.group).map(|group| group.rows);
+        let elsewhere = |family: &Family| {
+            family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
+        };
+        let measured = |quantity, fits: &dyn Fn(&Family) -> bool| best(&all, quantity, fits);
+        let torque = measured(Quantity::Torque, &beside)
+            .or_else(|| measured(Quantity::Current, &beside))
+            .or_else(|| measured(Quantity::Torque, &elsewhere))
+            .or_else(|| measured(Quantity::Current, &elsewhere))
+            .ok_or_else(|| missing("torques or currents"))?;
+        let velocity = measured(Quantity::Velocity, &beside)
+            .or_else(|| measured(Quantity::Velocity, &elsewhere))
+            .filter(|family| family.source != Source::Commanded);
+
+        let (Some(of_position), Some(of_torque)) = (ordered(position), ordered(torque)) else {
+            return Err(missing("torques or currents"));
+        };
+        let has = |log: &LogContents, columns: &[String]| {
+            columns.iter().all(|column| log.channels.iter().any(|channel| channel.name == *column))
+        };
+        let is_pair = torque.file != position.file;
+        let holds = |file: &usize| {
+            let log = &logs[*file].1;
+            if is_pair { *file == position.file } else { has(log, &of_position) && has(log, &of_torque) }
+        };
+        let group = logs[position.file].1.groups.get(position.group);
+        let time = group.and_then(|group| Some((group.time.clone()?, group.rate_hz)));
+        let files = (0..logs.len()).filter(holds).collect();
+        Ok(Self {
+            columns: [of_position, of_torque],
+            velocity_columns: velocity.and_then(ordered),
+            files,
+            time,
+            logged,
+            position: position.clone(),
+            torque: torque.clone(),
+            velocity: velocity.cloned(),
+        })
+    }
+
+    fn draft(&self, request: &NewStudy, model: &Model, logs: &[(&Path, LogContents)]) -> Draft {
+        let from = request.out.parent().unwrap_or_else(|| Path::new(""));
+        let joints = model.joints();
+        let tables = [
+            vec![self.of_robot(request, model, from), self.of_time(request)],
+            vec![self.of_position(model, &logs[self.position.file].1)],
+            self.of_velocity(logs, from).into_iter().collect(),
+            vec![self.of_torque(logs, from)],
+            self.of_logs(logs, from),
+        ];
+        let mut tables = tables.concat();
+        let known = |limit: fn(&dynident_model::JointLimits) -> Option<f64>| {
+            self.logged.joints.iter().filter(|&&joint| limit(&joints[joint].limits).is_some()).count()
+        };
+        let note = format!(
+            "Friction, cut-off, lag and estimator are chosen by the logs; keys that state them: docs/src/study.md. A motor that turns two joints: [[coupling]]. Limits that `dynident design` keeps, of {} joints: {} positions, {} velocities, {} torques of the description",
+            self.logged.joints.len(),
+            known(|limits| limits.upper),
+            known(|limits| limits.velocity),
+            known(|limits| limits.effort)
+        );
+        tables.push(Table::new("", note));
+        Draft { tables }
+    }
+
+    fn of_robot(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
+        let LoggedJoints { joints, reason, is_sure } = &self.logged;
+        let table = Table::new("[robot]", "").with("file", quoted(&seen_from(&request.robot, from)), "");
+        if joints.len() == model.dof() && joints.is_sorted() {
+            return table;
+        }
+        let names: Vec<String> = joints.iter().map(|&joint| quoted(&model.joints()[joint].name)).collect();
+        let reason = format!("{reason}; every other joint is locked");
+        table.with_line("joints", format!("[{}]", names.join(", ")), reason, *is_sure)
+    }
+
+    fn of_time(&self, request: &NewStudy) -> Table {
+        let table = Table::new("[format]", "");
+        match (&self.time, request.rate_hz) {
+            (Some((name, rate_hz)), _) => {
+                let reason =
+                    rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} rows a second on average"));
+                table.with("time", time_as_toml(name), reason)
+            }
+            (None, Some(rate_hz)) => {
+                table.with("rate_hz", format!("{rate_hz:?}"), "As given: no column is a time by its name")
+            }
+            (None, None) => table.with_unsure(
+                "rate_hz",
+                "1000.0",
+                "no column is a time by its name: give the rate of the recording, or time = { column = .. }",
+            ),
+        }
+    }
+
+    fn of_position(&self, model: &Model, log: &LogContents) -> Table {
+        let [columns, _] = &self.columns;
+        let table = Table::new("[format.position]", self.said(&self.position, "positions")).with(
+            "columns",
+            column_list(columns),
+            &self.logged.reason,
+        );
+        if let Some(unit) = self.position.unit.filter(|unit| *unit != "rad") {
+            return table.with("unit", quoted(unit), "by the names");
+        }
+        // Without a unit in the name: angles of many turns, or beyond the limits, are degrees.
+        let range = |name: &String| log.channels.iter().find(|channel| channel.name == *name)?.range;
+        let largest = |joint: usize, name: &String| {
+            let most = range(name)?.map(f64::abs).into_iter().fold(0.0, f64::max);
+            (model.joints()[joint].kind != JointKind::Prismatic).then_some(most)
+        };
+        let pairs = self.logged.joints.iter().zip(columns);
+        let most = pairs.filter_map(|(&joint, name)| largest(joint, name)).fold(0.0, f64::max);
+        if self.position.unit.is_none() && most > MOST_TURNS * core::f64::consts::TAU {
+            let reason =
+                format!("a joint moves to {most:.1}: too far for radians; degrees, or the motor's side of a gear");
+            return table.with_unsure("unit", quoted("deg"), reason);
+        }
+        table
+    }
+
+    fn of_velocity(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
+        let (family, columns) = self.velocity.as_ref().zip(self.velocity_columns.as_ref())?;
+        let table = Table::new("[format.velocity]", "Compared with the positions' derivative");
+        let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
+        Some(match family.unit.filter(|unit| *unit != "rad/s") {
+            Some(unit) => table.with("unit", quoted(unit), "by the names"),
+            None => table,
+        })
+    }
+
+    fn of_torque(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+        let [_, columns] = &self.columns;
+        let table = Table::new("[format.torque]", self.said(&self.torque, "torques"));
+        let table = self.with_file(table, &self.torque, logs, from);
+        let table = match self.torque.source {
+            Source::Commanded => {
+                table.with_unsure("columns", column_list(columns), "commanded, not measured: no other torque was found")
+            }
+            Source::Unsaid | Source::Measured => table.with("columns", column_list(columns), ""),
+        };
+        if self.torque.quantity == Quantity::Current {
+            let unit = self.torque.unit.unwrap_or("A");
+            let reason = "newton metres per ampere: gear ratio times motor constant, one for each joint; 1 leaves torques in amperes";
+            return table.with("unit", quoted(unit), "a current").with_unsure("scale", "1.0", reason);
+        }
+        match self.torque.unit.filter(|unit| *unit != "N m") {
+            Some(unit) => table.with("unit", quoted(unit), "by the names"),
+            None => table,
+        }
+    }
+
+    /// With the file of columns that do not stand beside the positions, as seen from the folder of the positions'.
+    fn with_file(&self, table: Table, family: &Family, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+        if family.file == self.position.file {
+            return table;
+        }
+        let folder = logs[self.position.file].0.parent().unwrap_or(from);
+        let file = quoted(&seen_from(logs[family.file].0, folder));
+        table.with("file", file, "a file of its own, with as many rows")
+    }
+
+    /// What says that a family is what it is taken for.
+    fn said(&self, family: &Family, what: &str) -> String {
+        let by = if family.by_file_name { "by the file's name" } else { "by the columns' names" };
+        let source = match family.source {
+            Source::Measured => "measured ",
+            Source::Commanded => "commanded ",
+            Source::Unsaid => "",
+        };
+        let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
+        format!("{source}{what} {by}{unit}")
+    }
+
+    fn of_logs(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
+        let file = |number: usize| quoted(&seen_from(logs[number].0, from));
+        if let [only] = self.files[..] {
+            let part = |[from, to]: [f64; 2]| format!("[{from:?}, {to:?}]");
+            return vec![
+                Table::new("[[log]]", "One recording: its first part is fitted to, its last tests the model")
+                    .with("file", file(only), "")
+                    .with("fraction", part(TRAINING), ""),
+                Table::new("[[log]]", "").with("file", file(only), "").with("fraction", part(TEST), "").with(
+                    "role",
+                    quoted("validate"),
+                    "",
+                ),
+            ];
+        }
+        let last = self.files.len().saturating_sub(1);
+        let table = |(place, &number): (usize, &usize)| {
+            let reason = if place == last { "the last recording tests the model" } else { "" };
+            let table = Table::new("[[log]]", reason).with("file", file(number), "");
+            if place == last { table.with("role", quoted("validate"), "") } else { table }
+        };
+        self.files.iter().enumerate().map(table).collect()
+    }
+}
