@@ -73,11 +73,11 @@ pub(in crate::jobs) fn families<'a>(
 }
 
 /// The family with this quantity that says most: of the most joints, nearest to the joint; of equals the first.
-pub(in crate::jobs) fn best<'a>(
-    families: &'a [Family],
+pub(in crate::jobs) fn best(
+    families: &[Family],
     quantity: Quantity,
     fits: impl Fn(&Family) -> bool,
-) -> Option<&'a Family> {
+) -> Option<&Family> {
     let of_quantity = families.iter().filter(|family| family.quantity == quantity && fits(family));
     of_quantity.rev().max_by_key(|family| (family.source > Source::Commanded, family.columns.len(), family.source))
 }

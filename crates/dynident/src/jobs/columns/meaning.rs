@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn names_of_real_recordings_are_understood() {
         let joints = ["arm_1_joint", "arm_11_joint", "shoulder_pan_joint", "Joint_1"].map(str::to_owned);
-        let cases: [(&str, Option<Quantity>, JointKey, Source, Option<&str>); 25] = [
+        let cases = [
             ("q1_rad", Some(Position), Number(1), Source::Unsaid, Some("rad")),
             ("qd1_rad_s", Some(Velocity), Number(1), Source::Unsaid, Some("rad/s")),
             ("qdd7_rad_s2", Some(Acceleration), Number(7), Source::Unsaid, Some("rad/s^2")),

@@ -249,7 +249,7 @@ impl Recorded {
 
     fn of_position(&self, model: &Model, log: &LogContents) -> Table {
         let [columns, _] = &self.columns;
-        let table = Table::new("[format.position]", self.said(&self.position, "positions")).with(
+        let table = Table::new("[format.position]", said(&self.position, "positions")).with(
             "columns",
             column_list(columns),
             &self.logged.reason,
@@ -285,7 +285,7 @@ impl Recorded {
 
     fn of_torque(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
-        let table = Table::new("[format.torque]", self.said(&self.torque, "torques"));
+        let table = Table::new("[format.torque]", said(&self.torque, "torques"));
         let table = self.with_file(table, &self.torque, logs, from);
         let table = match self.torque.source {
             Source::Commanded => {
@@ -314,18 +314,6 @@ impl Recorded {
         table.with("file", file, "a file of its own, with as many rows")
     }
 
-    /// What says that a family is what it is taken for.
-    fn said(&self, family: &Family, what: &str) -> String {
-        let by = if family.by_file_name { "by the file's name" } else { "by the columns' names" };
-        let source = match family.source {
-            Source::Measured => "measured ",
-            Source::Commanded => "commanded ",
-            Source::Unsaid => "",
-        };
-        let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
-        format!("{source}{what} {by}{unit}")
-    }
-
     fn of_logs(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
         let file = |number: usize| quoted(&seen_from(logs[number].0, from));
         if let [only] = self.files[..] {
@@ -349,4 +337,16 @@ impl Recorded {
         };
         self.files.iter().enumerate().map(table).collect()
     }
+}
+
+/// What says that a family is what it is taken for.
+fn said(family: &Family, what: &str) -> String {
+    let by = if family.by_file_name { "by the file's name" } else { "by the columns' names" };
+    let source = match family.source {
+        Source::Measured => "measured ",
+        Source::Commanded => "commanded ",
+        Source::Unsaid => "",
+    };
+    let unit = family.unit.map_or_else(String::new, |unit| format!(", in {unit}"));
+    format!("{source}{what} {by}{unit}")
 }
