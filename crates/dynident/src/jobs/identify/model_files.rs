@@ -50,6 +50,7 @@ pub(super) fn model_files(
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
     match format {
         DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None }),
+        DescriptionFormat::Mjcf => Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None }),
         DescriptionFormat::Dh => {
             let table = rewrite_dh(text, &links, &joints).map_err(|error| error.to_string())?;
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table) })
