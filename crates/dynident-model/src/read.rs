@@ -1,7 +1,7 @@
 //! From a file to a robot: URDF, MJCF or D-H table, distinguished by the file's name or its content.
 
 use crate::dh::{DhError, read_dh};
-use crate::mjcf::{MjcfError, MjcfNotice, is_mjcf, read_mjcf_with};
+use crate::mjcf::{MjcfError, MjcfNotice, included_from, is_mjcf, read_mjcf_with};
 use crate::place::line_and_column;
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
@@ -153,7 +153,7 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
         }
         DescriptionFormat::Mjcf => {
             let folder = path.parent().unwrap_or(Path::new(""));
-            let robot = read_mjcf_with(&text, |file| included(&folder.join(file)))
+            let robot = read_mjcf_with(&text, included_from(folder))
                 .map_err(|error| ReadError::Mjcf { path: named(), source: Box::new(error) })?;
             notices = robot.notices;
             robot.model
@@ -176,17 +176,6 @@ fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
         return Err(ReadError::TooLarge { path: path.to_owned() });
     }
     Ok(bytes)
-}
-
-/// The text of a file that an MJCF includes, or why it cannot be read. No pipes or devices: their names come from a
-/// document and not from the user.
-fn included(path: &Path) -> Result<String, String> {
-    let metadata = std::fs::metadata(path).map_err(|error| error.to_string())?;
-    if !metadata.is_file() || metadata.len() > MAX_DESCRIPTION_BYTES {
-        return Err(format!("it is no file of at most {} MiB", MAX_DESCRIPTION_BYTES >> 20));
-    }
-    let bytes = bounded(path).map_err(|error| error.to_string())?;
-    String::from_utf8(bytes).map_err(|_| "it is not UTF-8 text".to_owned())
 }
 
 /// Extensions of recordings and tables.

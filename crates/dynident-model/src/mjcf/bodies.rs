@@ -89,6 +89,8 @@ pub(super) struct Tree {
     pub(super) bodies: Vec<Body>,
     pub(super) base: Body,
     pub(super) links: Vec<LinkPlace>,
+    /// Links that have mass which is not known.
+    pub(super) unknown: HashSet<String>,
 }
 
 /// A `<body>` still to visit.
@@ -149,6 +151,7 @@ impl<'t> Reader<'t> {
             bodies: Vec::new(),
             base: Body { links: vec![world] },
             links: Vec::new(),
+            unknown: HashSet::new(),
         };
         // A stack, not recursion: a chain may be as long as the file.
         let mut ahead: Vec<Ahead<'t>> = Vec::new();
@@ -167,6 +170,7 @@ impl<'t> Reader<'t> {
             self.visit(next, &mut tree, &mut ahead)?;
         }
         self.set_total_mass(&mut tree)?;
+        tree.unknown = self.unknown.into_keys().collect();
         Ok(tree)
     }
 

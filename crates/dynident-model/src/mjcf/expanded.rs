@@ -7,7 +7,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashSet;
 
 /// Most bytes in all files together.
-const MAX_BYTES: usize = 16 << 20;
+pub(super) const MAX_BYTES: usize = 16 << 20;
 
 /// An attribute and where its value stands.
 #[derive(Debug)]
@@ -54,7 +54,7 @@ pub(super) struct Expanded {
 }
 
 /// Gives the text of an included file, or why it cannot be read.
-pub(super) type Include<'f> = dyn FnMut(&str) -> Result<String, String> + 'f;
+pub type Include<'f> = dyn FnMut(&str) -> Result<String, String> + 'f;
 
 impl Expanded {
     /// The document `text` with its included files, which `include` reads.

@@ -28,23 +28,29 @@ mod compiler;
 mod drives;
 mod expanded;
 mod fault;
+mod files;
 mod geoms;
 mod inertials;
 mod joints;
 mod notices;
 mod orientation;
 mod values;
+mod write;
 
+pub use expanded::Include;
 pub(crate) use expanded::is_mjcf;
 pub use fault::{MjcfError, MjcfFault};
+pub use files::included_from;
 pub use notices::{Loss, MjcfNotice};
+pub use write::{MjcfWriteError, rewrite_mjcf};
 
 use crate::tree::Model;
-use bodies::{Reader, Tree};
+use bodies::{LinkPlace, Reader, Tree};
 use classes::Classes;
 use compiler::Compiler;
-use expanded::Expanded;
+use expanded::{Expanded, Place};
 use notices::Notices;
+use std::collections::HashSet;
 
 /// What an MJCF says.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,6 +88,12 @@ pub fn read_mjcf_with(
 struct Found {
     model: Model,
     notices: Vec<MjcfNotice>,
+    compiler: Compiler,
+    links: Vec<LinkPlace>,
+    /// In the order of the model's joints.
+    joint_places: Vec<Place>,
+    /// Links that have mass which is not known.
+    unknown: HashSet<String>,
 }
 
 fn read(document: &Expanded) -> Result<Found, MjcfError> {
@@ -99,8 +111,8 @@ fn read(document: &Expanded) -> Result<Found, MjcfError> {
         return Err(document.fault(root.place, MjcfFault::NoMovingJoint));
     }
     let name = root.attribute("model").map_or("robot", |name| &name.value);
-    let Tree { joints, bodies, base, .. } = tree;
+    let Tree { joints, bodies, base, links, joint_places, unknown, .. } = tree;
     let model = Model::new(name, base, joints, bodies).and_then(|model| model.with_gravity(gravity));
     let model = model.map_err(|error| document.fault(root.place, MjcfFault::Model(error)))?;
-    Ok(Found { model, notices: notices.list })
+    Ok(Found { model, notices: notices.list, compiler, links, joint_places, unknown })
 }

@@ -356,7 +356,7 @@ fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
         other => {
             let hint = match other {
                 "sdf" => " (this is SDF: convert it)",
-                "mujoco" => " (this is MJCF: convert it)",
+                "mujoco" => " (this is MJCF)",
                 "COLLADA" => " (this is a mesh)",
                 _ => "",
             };

@@ -51,6 +51,8 @@ pub struct JointChange {
     pub damping: Option<f64>,
     /// Coulomb friction, Nm (N).
     pub friction: Option<f64>,
+    /// Drive inertia, kg m² (kg), which only MJCF holds.
+    pub drive_inertia: Option<f64>,
 }
 
 /// Why a URDF could not be rewritten.
