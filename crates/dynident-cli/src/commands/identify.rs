@@ -19,7 +19,8 @@ const PROBLEMS_SHOWN: usize = 8;
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well, of an MJCF identified.xml).
+    /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well, of an MJCF
+    /// identified.xml).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder of the recordings, in place of the study's own.

@@ -2,7 +2,7 @@
 
 use crate::golden::numbers;
 use dynident_dynamics::{Workspace, inverse_dynamics};
-use dynident_model::load_robot;
+use dynident_model::{InertialParameters, load_robot};
 use dynident_testing::repository;
 use serde_json::Value;
 
@@ -45,7 +45,7 @@ fn every_model_has_the_joints_and_torques_of_mujoco() {
             assert_eq!(stated, theirs, "{what}");
         }
         assert_eq!(model.gravity().0[..], numbers(&file["gravity"]), "{name}");
-        let mass: f64 = model.inertials().iter().map(|inertial| inertial.mass_kg()).sum();
+        let mass: f64 = model.inertials().iter().map(InertialParameters::mass_kg).sum();
         close(&[mass], &[file["moving_mass"].as_f64().unwrap()], &format!("{name}: mass"));
         let mut workspace = Workspace::new(&model);
         for state in file["states"].as_array().unwrap() {

@@ -94,6 +94,7 @@ pub(super) struct Tree {
 }
 
 /// A `<body>` still to visit.
+#[derive(Clone, Copy)]
 struct Ahead<'t> {
     element: &'t Element,
     /// The body of the model that carries the one around it.
@@ -247,23 +248,19 @@ impl<'t> Reader<'t> {
         body: &str,
         number: usize,
     ) -> Result<Joint, MjcfError> {
-        let name = match element.name {
-            Some(name) => {
-                if !self.joint_names.insert(name.clone()) {
-                    let fault = MjcfFault::DuplicateName { kind: "joint", name: shortened(&name) };
-                    return Err(self.document.fault(element.place, fault));
-                }
-                name
+        let name = if let Some(name) = element.name {
+            if !self.joint_names.insert(name.clone()) {
+                let fault = MjcfFault::DuplicateName { kind: "joint", name: shortened(&name) };
+                return Err(self.document.fault(element.place, fault));
             }
-            None => {
-                let mut name = format!("{body}_joint");
-                let mut count = number;
-                while !self.joint_names.insert(name.clone()) {
-                    count += 1;
-                    name = format!("{body}_joint{count}");
-                }
-                name
+            name
+        } else {
+            let (mut name, mut count) = (format!("{body}_joint"), number);
+            while !self.joint_names.insert(name.clone()) {
+                count += 1;
+                name = format!("{body}_joint{count}");
             }
+            name
         };
         let axis = element.axis;
         let drawn = match (element.reference == 0.0, element.anchor.is_some()) {

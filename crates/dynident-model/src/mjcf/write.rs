@@ -14,6 +14,7 @@ use crate::spatial::{Mat3, Transform, Vec3};
 use crate::urdf::{JointChange, LinkChange, MAX_MAGNITUDE};
 use crate::xml::MAX_NODES;
 use crate::xml::edit::{Source, comment_text, edited};
+use core::fmt::Write;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -263,7 +264,7 @@ fn drive(
         }
         match node.attribute_node(name) {
             Some(old) => edits.push((old.range_value(), format!("{value:?}"))),
-            None => new += &format!(" {name}=\"{value:?}\""),
+            None => drop(write!(new, " {name}=\"{value:?}\"")),
         }
     }
     if !new.is_empty() {

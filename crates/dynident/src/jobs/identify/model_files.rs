@@ -33,9 +33,7 @@ pub(super) fn model_files(
 ) -> Result<ModelFiles, String> {
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
-    let lost =
-        |property: Option<JointProperty>| !matches!(property, Some(JointProperty::Damping | JointProperty::Friction));
-    note_sources(model, parameters, (sources, &lost), &mut links);
+    note_sources(model, parameters, sources, lost_in_urdf, &mut links);
     let joints = joint_changes(model, parameters);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
@@ -43,12 +41,7 @@ pub(super) fn model_files(
         DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None }),
         DescriptionFormat::Mjcf => {
             let mjcf = keeping_locked(robot, model.model(), inertials).and_then(|mut links| {
-                note_sources(
-                    model,
-                    parameters,
-                    (sources, &|property: Option<JointProperty>| property.is_none()),
-                    &mut links,
-                );
+                note_sources(model, parameters, sources, |property| property.is_none(), &mut links);
                 let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
                 rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
             });
@@ -59,6 +52,11 @@ pub(super) fn model_files(
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None })
         }
     }
+}
+
+/// URDF and the D-H table have no drive inertia.
+fn lost_in_urdf(property: Option<JointProperty>) -> bool {
+    !matches!(property, Some(JointProperty::Damping | JointProperty::Friction))
 }
 
 /// New damping, friction and drive inertia of the joints.
@@ -133,7 +131,8 @@ fn keeping_locked(
 fn note_sources(
     model: &ParametricModel,
     parameters: &[f64],
-    (sources, lost): (&[[ValueSource; 10]], &dyn Fn(Option<JointProperty>) -> bool),
+    sources: &[[ValueSource; 10]],
+    lost: fn(Option<JointProperty>) -> bool,
     changes: &mut [LinkChange],
 ) {
     for (index, (body, sources)) in model.model().bodies().iter().zip(sources).enumerate() {
