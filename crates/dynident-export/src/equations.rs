@@ -22,6 +22,13 @@ pub(crate) struct Equation {
     pub(crate) values: Vec<Symbol>,
 }
 
+impl Equation {
+    /// The names of its inputs, as arguments stand.
+    pub(crate) fn arguments(&self) -> String {
+        self.inputs.iter().map(|input| input.name()).collect::<Vec<_>>().join(", ")
+    }
+}
+
 /// All functions of a robot over one graph.
 #[derive(Debug)]
 pub(crate) struct Equations {

@@ -40,6 +40,19 @@ pub(crate) enum Function {
     Abs,
 }
 
+impl Function {
+    /// What nearly every language calls it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Sin => "sin",
+            Self::Cos => "cos",
+            Self::Tanh => "tanh",
+            Self::Exp => "exp",
+            Self::Abs => "abs",
+        }
+    }
+}
+
 /// One value. Numbers are kept as bits, so that equal ones are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {

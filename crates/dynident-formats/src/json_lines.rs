@@ -18,6 +18,7 @@ mod json {
     use super::{BufRead, FileError, Path, Table};
     use crate::arrays::MOST_COLUMNS;
     use crate::kind::FileFormat;
+    use crate::table::slots;
     use serde_json::Value;
     use std::collections::{HashMap, VecDeque};
     use std::io::Read;
@@ -161,10 +162,7 @@ mod json {
         }
 
         fn select(&mut self, columns: &[usize]) {
-            self.slot_of = vec![None; self.names.len()];
-            for (slot, column) in columns.iter().enumerate() {
-                self.slot_of[*column] = Some(slot);
-            }
+            self.slot_of = slots(self.names.len(), columns);
         }
 
         fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError> {

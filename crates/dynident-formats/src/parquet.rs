@@ -17,6 +17,7 @@ mod reading {
     use super::{FileError, Path, Table};
     use crate::arrays::MOST_COLUMNS;
     use crate::kind::FileFormat;
+    use crate::table::slots;
     use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
     use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
     use parquet::data_type::DataType;
@@ -346,10 +347,7 @@ mod reading {
         }
 
         fn select(&mut self, columns: &[usize]) {
-            self.slot_of = vec![None; self.names.len()];
-            for (slot, column) in columns.iter().enumerate() {
-                self.slot_of[*column] = Some(slot);
-            }
+            self.slot_of = slots(self.names.len(), columns);
             self.wanted = columns.len();
         }
 

@@ -15,6 +15,16 @@ pub struct ColumnGroup {
     pub time: Option<usize>,
 }
 
+/// For each of `width` columns its place among the selected ones.
+#[cfg(any(feature = "json", feature = "parquet"))]
+pub(crate) fn slots(width: usize, columns: &[usize]) -> Vec<Option<usize>> {
+    let mut slot_of = vec![None; width];
+    for (slot, column) in columns.iter().enumerate() {
+        slot_of[*column] = Some(slot);
+    }
+    slot_of
+}
+
 /// One pass over a table, from its first row to its last.
 pub trait Table: fmt::Debug + Send {
     /// Number of columns.

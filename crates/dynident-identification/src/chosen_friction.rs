@@ -6,6 +6,7 @@ use crate::friction::{
     CandidateColumn, ConstantsError, FrictionConstants, FrictionSearch, JointFriction, candidate_columns,
     choose_friction as choose_terms, chosen_model, step_columns,
 };
+use crate::likelihood::deviance;
 use crate::logs::Logs;
 use crate::payload::{Payload, free_gains, with_free_gains};
 use crate::regressor_model::RegressorModel;
@@ -227,13 +228,12 @@ fn step_width(joint: &JointFriction) -> Option<f64> {
     })
 }
 
-/// What a fit leaves: −2 ln of the likelihood with every joint's noise as found, `Σ_j n_j ln σ_j²`; where joints count
-/// alike the sum of squares.
+/// What a fit leaves: its deviance; where joints count alike the sum of squares.
 fn misfit(problem: &LinearProblem, fit: &Estimate, equal_weights: bool) -> f64 {
-    let of_joint = |(rows, sigma): (usize, &f64)| {
-        let square = if equal_weights { sigma * sigma } else { 2.0 * sigma.max(f64::MIN_POSITIVE).ln() };
-        rows as f64 * square
-    };
+    if !equal_weights {
+        return deviance(problem, fit);
+    }
+    let of_joint = |(rows, sigma): (usize, &f64)| rows as f64 * sigma * sigma;
     problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
 }
 

@@ -9,13 +9,14 @@ use crate::execution::Execution;
 use crate::friction::ConstantsError;
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
+use crate::likelihood::schwarz;
 use crate::logs::Logs;
 use crate::payload::{KnownArm, free_gains};
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
-use dynident_estimation::{Estimate, LinearProblem};
+use dynident_estimation::Estimate;
 use dynident_recording::MotionSettings;
 use dynident_recording::log::OneOrMany;
 use std::time::Instant;
@@ -143,16 +144,6 @@ fn without_lag<'a>(
     Ok(found)
 }
 
-/// Schwarz's criterion `Σ_j n_j ln σ_j² + k ln n` of a fit with k free parameters, with the noise of every joint as
-/// found. Source: Annals of Statistics 6 (1978) 461.
-fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
-    let rows = problem.joint_rows();
-    let of_joint = |(rows, sigma): (&usize, &f64)| *rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln();
-    let free = fit.values.len() - fit.rank.fixed.len();
-    rows.iter().zip(&fit.joint_sigma).map(of_joint).sum::<f64>()
-        + free as f64 * (rows.iter().sum::<usize>().max(1) as f64).ln()
-}
-
 /// Fits from these rounds on, until the rows show no lag that moves parameters.
 fn lag_rounds<'a>(
     (task, mut settings, mut rounds): (&'a IdentificationTask, IdentificationSettings, LagRounds),
@@ -164,8 +155,7 @@ fn lag_rounds<'a>(
     let mut times = StageTimes::default();
     loop {
         let mut found = fitted_once(task, &settings, chosen, execution, job)?;
-        times.logs_s += found.times.logs_s;
-        times.estimation_s += found.times.estimation_s;
+        times = times.and(&found.times);
         let started = Instant::now();
         let fit = if is_free { free_lag(&found, chosen)? } else { None };
         found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);

@@ -132,6 +132,7 @@ pub mod friction;
 mod identify;
 mod lag;
 mod less_noise;
+mod likelihood;
 mod log_noise;
 mod logs;
 pub mod payload;

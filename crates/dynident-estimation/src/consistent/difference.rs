@@ -25,7 +25,8 @@ pub struct ConsistencyTest {
 impl PhysicalFit {
     /// Tests whether the logs contradict this set: the squared distance `d²` from the estimate ([`moved_sigma`]
     /// squared, white residuals) of `p` parameters, corrected for residuals that are correlated in time by the mean
-    /// ratio `δ` of the parameters' variances with and without that,
+    /// ratio `δ` of the parameters' variances with and without that ([`noise_std`](Estimate::noise_std): both sets
+    /// have the same lag and the same constants of friction, whose errors tell nothing of their difference),
     ///
     /// ```text
     ///     F = d² / (p δ)   against   F(p, ν),   ν = time segments − 1 (of white residuals: rows − parameters)
@@ -38,7 +39,7 @@ impl PhysicalFit {
     /// [`moved_sigma`]: PhysicalFit::moved_sigma
     pub fn difference(&self, estimate: &Estimate) -> Option<ConsistencyTest> {
         let white = estimate.covariance_white.diagonal();
-        let ratios: Vec<f64> = (estimate.std.iter().zip(white.iter()))
+        let ratios: Vec<f64> = (estimate.noise_std.iter().zip(white.iter()))
             .filter(|(std, white)| **std > 0.0 && **white > 0.0)
             .map(|(std, white)| std * std / white)
             .collect();

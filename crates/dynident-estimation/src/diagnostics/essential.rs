@@ -176,6 +176,10 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
     reduced.covariance = &map * &estimate.covariance * map.transpose();
     reduced.covariance_white = &map * white * map.transpose();
     reduced.std = reduced.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
+    // The residuals have the share of every bar that they had.
+    let share = |(noise, std): (&f64, &f64)| if *std > 0.0 { noise / std } else { 0.0 };
+    let shares = estimate.noise_std.iter().zip(&estimate.std).map(share);
+    reduced.noise_std = reduced.std.iter().zip(shares).map(|(std, share)| std * share).collect();
     let half = |(std, degrees_of_freedom): (&f64, &f64)| student_half_width(0.95, *degrees_of_freedom) * std;
     reduced.half_width_95 = reduced.std.iter().zip(&reduced.std_degrees_of_freedom).map(half).collect();
     let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());

@@ -199,6 +199,7 @@ fn joined(
         values,
         covariance,
         covariance_white,
+        noise_std: std.clone(),
         std,
         std_degrees_of_freedom,
         half_width_95,

@@ -105,6 +105,8 @@ pub struct Estimate {
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
+    /// The same by the residuals alone: what [`with_further_error`](Self::with_further_error) adds is not in it.
+    pub noise_std: Vec<f64>,
     /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of
     /// freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
     pub std_degrees_of_freedom: Vec<f64>,
@@ -193,6 +195,7 @@ impl PointEstimate {
                 .collect(),
             std_degrees_of_freedom: covariances.degrees_of_freedom,
             relative_std_percent: std.iter().zip(&self.solution.values).map(relative).collect(),
+            noise_std: std.clone(),
             std,
             covariance: covariances.chosen,
             covariance_white: covariances.white,

@@ -19,13 +19,7 @@ impl Syntax for CSyntax {
     }
 
     fn call(&self, function: Function, of: &str) -> String {
-        let name = match function {
-            Function::Sin => "sin",
-            Function::Cos => "cos",
-            Function::Tanh => "tanh",
-            Function::Exp => "exp",
-            Function::Abs => "fabs",
-        };
+        let name = if function == Function::Abs { "fabs" } else { function.name() };
         format!("{}{name}({of})", self.functions)
     }
 
@@ -47,8 +41,7 @@ pub(crate) fn c_header(source: &Source<'_>) -> String {
     let (name, dof) = (source.robot.identifier(), source.dof());
     let syntax = CSyntax { functions: "", step: format!("{name}_step") };
     let guard = format!("{}_DYNAMICS_H", name.to_uppercase());
-    let mut text = source.comment("//").replace("// ", " * ");
-    text.insert_str(0, "/*\n");
+    let mut text = format!("/*\n{}", source.comment(" *"));
     let _ = write!(
         text,
         "\n * C99; thread-safe; no allocation, no state. Inputs and outputs must not overlap.\n */\n#ifndef {guard}\n#define {guard}\n\n\

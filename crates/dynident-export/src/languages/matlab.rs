@@ -13,14 +13,7 @@ impl Syntax for MatlabSyntax {
     }
 
     fn call(&self, function: Function, of: &str) -> String {
-        let name = match function {
-            Function::Sin => "sin",
-            Function::Cos => "cos",
-            Function::Tanh => "tanh",
-            Function::Exp => "exp",
-            Function::Abs => "abs",
-        };
-        format!("{name}({of})")
+        format!("{}({of})", function.name())
     }
 
     fn power(&self, of: &str, exponent: f64) -> String {
@@ -39,13 +32,12 @@ pub(crate) fn matlab_function(source: &Source<'_>) -> String {
     let mut text = format!("function out = {name}(quantity, varargin)\n{}\n", source.comment("%"));
     let _ = writeln!(text, "% Keep it as {name}.m. Joint vectors are columns or rows; columns come back.");
     for function in functions {
-        let names: Vec<&str> = function.inputs.iter().map(|input| input.name()).collect();
         let _ = writeln!(
             text,
             "%   {} = {name}('{}', {})  {}",
             function.output,
             function.name,
-            names.join(", "),
+            function.arguments(),
             function.about
         );
     }
@@ -66,8 +58,7 @@ pub(crate) fn matlab_function(source: &Source<'_>) -> String {
     }
     for function in functions {
         let statements = source.statements(function, &MatlabSyntax);
-        let names: Vec<&str> = function.inputs.iter().map(|input| input.name()).collect();
-        let _ = writeln!(text, "\nfunction out = {}_({})", function.name, names.join(", "));
+        let _ = writeln!(text, "\nfunction out = {}_({})", function.name, function.arguments());
         for (variable, expression) in &statements.lines {
             let _ = writeln!(text, "  {variable} = {expression};");
         }

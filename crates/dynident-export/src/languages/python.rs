@@ -13,14 +13,7 @@ impl Syntax for PythonSyntax {
     }
 
     fn call(&self, function: Function, of: &str) -> String {
-        let name = match function {
-            Function::Sin => "sin",
-            Function::Cos => "cos",
-            Function::Tanh => "tanh",
-            Function::Exp => "exp",
-            Function::Abs => "abs",
-        };
-        format!("np.{name}({of})")
+        format!("np.{}({of})", function.name())
     }
 
     fn power(&self, of: &str, exponent: f64) -> String {
@@ -52,8 +45,7 @@ pub(crate) fn python_module(source: &Source<'_>) -> String {
     }
     for function in &source.equations.functions {
         let statements = source.statements(function, &PythonSyntax);
-        let names: Vec<&str> = function.inputs.iter().map(|input| input.name()).collect();
-        let names = names.join(", ");
+        let names = function.arguments();
         let _ = write!(text, "\n\ndef {}({names}):\n    \"\"\"{}\"\"\"\n", function.name, function.about);
         let given = if function.inputs.len() == 1 { format!("{names},") } else { names };
         let _ = writeln!(text, "    {given} = given = [_joints(vector) for vector in ({given})]");

@@ -14,11 +14,9 @@ impl Syntax for RustSyntax {
 
     fn call(&self, function: Function, of: &str) -> String {
         match function {
-            Function::Sin => format!("M::sin({of})"),
-            Function::Cos => format!("M::cos({of})"),
-            Function::Tanh => format!("M::tanh({of})"),
-            Function::Exp => format!("M::exp({of})"),
+            // The only one that `core` has.
             Function::Abs => format!("({of}).abs()"),
+            Function::Sin | Function::Cos | Function::Tanh | Function::Exp => format!("M::{}({of})", function.name()),
         }
     }
 

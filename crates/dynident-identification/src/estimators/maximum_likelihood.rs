@@ -392,6 +392,7 @@ fn estimate_of(found: MaximumLikelihoodEstimate, problem: &LinearProblem) -> Res
         covariance_white: found.covariance,
         covariance_method: CovarianceMethod::White,
         clusters: 0,
+        noise_std: std.clone(),
         std,
         status: found.status,
         iterations: found.iterations,

@@ -165,7 +165,9 @@ impl LoadColumns {
     pub fn arm_estimate(&self, estimate: &Estimate) -> Estimate {
         let mut arm = estimate.clone();
         let base = self.base;
-        for values in [&mut arm.values, &mut arm.std, &mut arm.std_degrees_of_freedom, &mut arm.half_width_95] {
+        for values in
+            [&mut arm.values, &mut arm.std, &mut arm.noise_std, &mut arm.std_degrees_of_freedom, &mut arm.half_width_95]
+        {
             values.truncate(base);
         }
         arm.names.truncate(base);

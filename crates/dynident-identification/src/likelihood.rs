@@ -1,0 +1,17 @@
+//! How well a fit explains its rows: likelihood, and likelihood against parameters.
+
+use dynident_estimation::{Estimate, LinearProblem};
+
+/// −2 ln of the likelihood with every joint's noise as found, `Σ_j n_j ln σ_j²`, up to a constant of the rows.
+pub(crate) fn deviance(problem: &LinearProblem, fit: &Estimate) -> f64 {
+    let of_joint = |(rows, sigma): (usize, &f64)| rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln();
+    problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
+}
+
+/// Schwarz's criterion of a fit with k free parameters and n rows: the [`deviance`] and `k ln n`; the less the better.
+/// Source: Annals of Statistics 6 (1978) 461.
+pub(crate) fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
+    let rows = problem.joint_rows().into_iter().sum::<usize>().max(1) as f64;
+    let free = (fit.values.len() - fit.rank.fixed.len()) as f64;
+    deviance(problem, fit) + free * rows.ln()
+}
