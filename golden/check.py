@@ -23,6 +23,7 @@ GENERATORS = {
     "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
     "mujoco-closed-loop": ("mujoco_closed_loop.py", "mujoco_closed_loop.json"),
+    "mjcf": ("mjcf.py", "mjcf.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),
     "newey-west": ("statsmodels_newey_west.py", "statsmodels_newey_west.json"),
     "statsmodels": ("statsmodels_estimators.py", "statsmodels_estimators.json"),

@@ -23,12 +23,13 @@ pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
         let limits = &robot.model().joints()[joint].limits;
         let Some(effort) = limits.effort else { continue };
         let typical = match (term.property(), term.action()) {
-            (None, TermAction::Inertia { .. }) => effort / DRIVE_ACCELERATION,
+            (Some(JointProperty::DriveInertia), _) => effort / DRIVE_ACCELERATION,
             (Some(JointProperty::Friction), _) => FRICTION * effort,
             (Some(JointProperty::Damping), _) => FRICTION * effort / limits.velocity.unwrap_or(SPEED),
             (
                 None,
-                TermAction::Damping { .. }
+                TermAction::Inertia { .. }
+                | TermAction::Damping { .. }
                 | TermAction::Friction(_)
                 | TermAction::Hysteresis
                 | TermAction::Temperature

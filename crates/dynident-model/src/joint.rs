@@ -68,6 +68,8 @@ pub struct Joint {
     pub damping: Option<f64>,
     /// Coulomb friction of the description, Nm (N).
     pub friction: Option<f64>,
+    /// Inertia of rotor and gear, reflected to the joint, kg m² (kg), where the description gives it.
+    pub drive_inertia: Option<f64>,
     /// The joint it follows, if the description says so. The dynamics treat it as a free joint; see
     /// [`Model::locked`](crate::Model::locked).
     pub mimic: Option<Mimic>,

@@ -7,15 +7,15 @@
 //!
 //! | task | take |
 //! | --- | --- |
-//! | read a robot from a file | [`load_robot`]: URDF or Denavit-Hartenberg table |
-//! | read it from a text | [`read_urdf`], [`read_dh`] |
+//! | read a robot from a file | [`load_robot`]: URDF, MJCF or Denavit-Hartenberg table |
+//! | read it from a text | [`read_urdf`], [`read_mjcf`], [`read_dh`] |
 //! | make one in code | [`Model::new`] of [`Joint`]s and [`Body`]s |
 //! | gravity, mounting, locked joints | [`Model::with_gravity`], [`Model::with_base_orientation`], [`Model::locked`] |
 //! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
 //! | other ones in their place | [`Model::with_inertials`] |
 //! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; one by one: [`terms::TorqueTerm`] |
 //! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
-//! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_dh`] |
+//! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_dh`] |
 //! | a URDF of any model | [`write_urdf`] |
 //!
 //! ```
@@ -56,6 +56,7 @@ pub mod dh;
 mod error;
 mod inertial;
 mod joint;
+pub mod mjcf;
 mod place;
 mod read;
 pub mod sample;
@@ -63,12 +64,14 @@ mod spatial;
 pub mod terms;
 mod tree;
 pub mod urdf;
+mod xml;
 
 pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
 pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
 pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
+pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
 pub use place::{Located, line_and_column};
 pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot};
 pub use spatial::{Mat3, Transform, Vec3};

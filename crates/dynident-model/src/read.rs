@@ -1,6 +1,7 @@
-//! From a file to a robot: URDF or D-H table, distinguished by the file's name or its content.
+//! From a file to a robot: URDF, MJCF or D-H table, distinguished by the file's name or its content.
 
 use crate::dh::{DhError, read_dh};
+use crate::mjcf::{MjcfError, MjcfNotice, included_from, is_mjcf, read_mjcf_with};
 use crate::place::line_and_column;
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
@@ -17,6 +18,8 @@ pub const MAX_DESCRIPTION_BYTES: u64 = 16 << 20;
 pub enum DescriptionFormat {
     /// URDF.
     Urdf,
+    /// MJCF, MuJoCo's format.
+    Mjcf,
     /// D-H table in TOML.
     Dh,
 }
@@ -36,6 +39,8 @@ pub struct Robot {
     pub unread: Vec<UnreadElement>,
     /// What of a URDF is against the rules and leaves no doubt about the robot.
     pub irregularities: Vec<UrdfIrregularity>,
+    /// What an MJCF says and the model does not hold.
+    pub notices: Vec<MjcfNotice>,
 }
 
 /// Why a file gave no robot. Every message begins with the file, and with line and column where there are any.
@@ -51,13 +56,13 @@ pub enum ReadError {
         source: std::io::Error,
     },
     /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
-    #[error("{}: larger than {} MiB: this is no robot description, name the URDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
+    #[error("{}: larger than {} MiB: this is no robot description, name the URDF, MJCF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
     TooLarge {
         /// The file.
         path: PathBuf,
     },
     /// The file is empty.
-    #[error("{}:1:1: the file is empty: name a URDF or a D-H table", path.display())]
+    #[error("{}:1:1: the file is empty: name a URDF, an MJCF or a D-H table", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -92,6 +97,14 @@ pub enum ReadError {
         /// Place and fault.
         source: Box<UrdfError>,
     },
+    /// The MJCF is faulty.
+    #[error("{}:{source}", path.display())]
+    Mjcf {
+        /// The file.
+        path: PathBuf,
+        /// Place and fault.
+        source: Box<MjcfError>,
+    },
     /// The D-H table is faulty.
     #[error("{}:{source}", path.display())]
     Dh {
@@ -102,24 +115,17 @@ pub enum ReadError {
     },
 }
 
-/// Reads a robot description: `.urdf` and `.xml` as URDF, `.toml` as D-H table, any other name by whether the text
-/// begins with `<`.
+/// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF if
+/// its root element is `<mujoco>`, else as URDF. Files that an MJCF includes are looked for from its folder.
 ///
 /// # Errors
 /// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the
 /// file.
-#[doc(alias("urdf", "denavit-hartenberg"))]
+#[doc(alias("urdf", "mjcf", "mujoco", "denavit-hartenberg"))]
 pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     let path = path.as_ref();
     let named = || path.to_owned();
-    let mut bytes = Vec::new();
-    // Bounded reading: the length that the system reports may be wrong (pipes, devices).
-    File::open(path)
-        .and_then(|file| file.take(MAX_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|source| ReadError::File { path: named(), source })?;
-    if bytes.len() as u64 > MAX_DESCRIPTION_BYTES {
-        return Err(ReadError::TooLarge { path: named() });
-    }
+    let bytes = bounded(path)?;
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     if let Some((what, fix)) = other_kind(&bytes, extension.as_deref()) {
         return Err(ReadError::NoDescription { path: named(), what, fix });
@@ -128,23 +134,48 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(ReadError::Empty { path: named() });
     }
-    let format = match extension.as_deref() {
-        Some("urdf" | "xml" | "xacro") => DescriptionFormat::Urdf,
-        Some("toml") => DescriptionFormat::Dh,
-        _ if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') => DescriptionFormat::Urdf,
-        _ => DescriptionFormat::Dh,
+    let is_xml = match extension.as_deref() {
+        Some("urdf" | "xml" | "xacro" | "mjcf") => true,
+        Some("toml") => false,
+        _ => text.trim_start_matches('\u{feff}').trim_start().starts_with('<'),
     };
-    let (model, unread, irregularities) = match format {
+    let format = match is_xml {
+        true if is_mjcf(&text) => DescriptionFormat::Mjcf,
+        true => DescriptionFormat::Urdf,
+        false => DescriptionFormat::Dh,
+    };
+    let (mut unread, mut irregularities, mut notices) = (Vec::new(), Vec::new(), Vec::new());
+    let model = match format {
         DescriptionFormat::Urdf => {
             let robot = read_urdf(&text).map_err(|error| ReadError::Urdf { path: named(), source: Box::new(error) })?;
-            (robot.model, robot.unread, robot.irregularities)
+            (unread, irregularities) = (robot.unread, robot.irregularities);
+            robot.model
+        }
+        DescriptionFormat::Mjcf => {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let robot = read_mjcf_with(&text, included_from(folder))
+                .map_err(|error| ReadError::Mjcf { path: named(), source: Box::new(error) })?;
+            notices = robot.notices;
+            robot.model
         }
         DescriptionFormat::Dh => {
-            let model = read_dh(&text).map_err(|error| ReadError::Dh { path: named(), source: Box::new(error) })?;
-            (model, Vec::new(), Vec::new())
+            read_dh(&text).map_err(|error| ReadError::Dh { path: named(), source: Box::new(error) })?
         }
     };
-    Ok(Robot { model, format, path: named(), text, unread, irregularities })
+    Ok(Robot { model, format, path: named(), text, unread, irregularities, notices })
+}
+
+/// The bytes of a file.
+fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let mut bytes = Vec::new();
+    // Bounded reading: the length that the system reports may be wrong (pipes, devices).
+    File::open(path)
+        .and_then(|file| file.take(MAX_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
+    if bytes.len() as u64 > MAX_DESCRIPTION_BYTES {
+        return Err(ReadError::TooLarge { path: path.to_owned() });
+    }
+    Ok(bytes)
 }
 
 /// Extensions of recordings and tables.

@@ -68,6 +68,7 @@ fn plain_joint(name: String, kind: JointKind, parent: Option<usize>, placement: 
         limits: JointLimits::default(),
         damping: None,
         friction: None,
+        drive_inertia: None,
         mimic: None,
     }
 }

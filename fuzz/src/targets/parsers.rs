@@ -4,7 +4,8 @@ use super::Run;
 use dynident::iteration::IterationStore;
 use dynident::iteration::robot::{ToHost, read_log_table};
 use dynident::model::{
-    AuditFinding, Model, audit, link_changes, read_dh, read_urdf, rewrite_inertials, rewrite_urdf, slips,
+    AuditFinding, Model, audit, link_changes, read_dh, read_mjcf_with, read_urdf, rewrite_inertials, rewrite_mjcf,
+    rewrite_urdf, slips,
 };
 use dynident::recording::log::{ChannelGroup, ColumnRef, Columns, TimeColumn};
 use dynident::recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
@@ -88,6 +89,29 @@ pub(crate) fn urdf() -> io::Result<Box<dyn Run>> {
 }
 
 /// D-H table.
+pub(crate) fn mjcf() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let Ok(text) = core::str::from_utf8(input) else { return false };
+        // A file that includes itself, and another that is not there.
+        let mut include = |file: &str| match file {
+            "itself.xml" => Ok(text.to_owned()),
+            _ => Err("no such file".to_owned()),
+        };
+        let robot = match read_mjcf_with(text, &mut include) {
+            Ok(robot) => robot,
+            Err(error) => return said(&error),
+        };
+        sound(&robot.model);
+        assert_eq!(rewrite_mjcf(text, &mut include, &[], &[]).as_deref(), Ok(text));
+        if let Ok(changes) = link_changes(&robot.model, robot.model.inertials())
+            && let Ok(written) = rewrite_mjcf(text, &mut include, &changes, &[])
+        {
+            assert!(read_mjcf_with(&written, &mut include).is_ok(), "what was written is not read");
+        }
+        true
+    })
+}
+
 pub(crate) fn dh() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };

@@ -9,6 +9,8 @@ use std::path::PathBuf;
 const URDF: &str = "identified.urdf";
 /// The same as a D-H table, where the user's is one.
 const TABLE: &str = "identified.toml";
+/// The same as an MJCF, where the user's is one.
+const MJCF: &str = "identified.xml";
 /// Problems on standard error; the others stand in the file.
 const PROBLEMS_SHOWN: usize = 8;
 
@@ -17,7 +19,8 @@ const PROBLEMS_SHOWN: usize = 8;
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well).
+    /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well, of an MJCF
+    /// identified.xml).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder of the recordings, in place of the study's own.
@@ -30,7 +33,7 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(message_of)?;
-    let out = (&*options.out, &[URDF, TABLE, "report.html", "result.json"][..]);
+    let out = (&*options.out, &[URDF, TABLE, MJCF, "report.html", "result.json"][..]);
     let of_study = (&study, &*options.study, options.data.as_deref());
     refuse_overwriting(out, of_study, &["robot", "log", "arm", "format", "motion", "estimator"], &[])?;
     check_writable(&options.out).map_err(message_of)?;
@@ -45,7 +48,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         .file("result.json", pretty_json(result)?)
         .file("report.html", identification.report().map_err(message_of)?);
     let mut models = Vec::new();
-    for (name, text) in [(URDF, &identification.urdf), (TABLE, &identification.table)] {
+    for (name, text) in [(URDF, &identification.urdf), (TABLE, &identification.table), (MJCF, &identification.mjcf)] {
         models.extend(text.as_ref().map(|_| name));
         set = match text {
             Some(text) => set.file(name, text.as_str()),

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Options of `inspect`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// URDF, or D-H table in TOML.
+    /// URDF, MJCF, or D-H table in TOML.
     robot: PathBuf,
     /// Write a copy of the URDF in which the slips that were found are corrected, and nothing else is changed.
     #[arg(long, value_name = "OUT.urdf")]
@@ -49,7 +49,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
             Ok(verdict(&inspection))
         }
         MendedDescription::NoUrdf => {
-            Err(format!("{}: --fix looks for slips in URDFs, and this is a D-H table", options.robot.display()))
+            Err(format!("{}: --fix looks for slips in URDFs, and this is none", options.robot.display()))
         }
     }
 }

@@ -19,7 +19,7 @@ pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
     /// Folder for iterations.json, report.html, trajectory.json, runs/, and the robot that was found: result.json,
-    /// identified.urdf (and .toml), identification.html, controller.json.
+    /// identified.urdf (and .toml or .xml), identification.html, controller.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make every run anew: by default runs that are in the folder already are not made again.
@@ -53,7 +53,14 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
     let legs: Vec<String> = (1..=legs).map(|leg| format!("leg_{leg}/runs")).collect();
     let mut names = vec!["iterations.json", "report.html", "trajectory.json", "runs"];
-    names.extend(["result.json", "identified.urdf", "identified.toml", "identification.html", "controller.json"]);
+    names.extend([
+        "result.json",
+        "identified.urdf",
+        "identified.toml",
+        "identified.xml",
+        "identification.html",
+        "controller.json",
+    ]);
     names.extend(legs.iter().map(String::as_str));
     let of_study = (&study, &*options.study, options.data.as_deref());
     let sections = ["robot", "design", "iteration", "simulation", "controller"];

@@ -72,6 +72,9 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     if let Some(reason) = &r.no_urdf {
         text += &wrapped(&format!("no identified.urdf: {reason}"), 2);
     }
+    if let Some(reason) = &r.no_mjcf {
+        text += &wrapped(&format!("no identified.xml: {reason}"), 2);
+    }
     text
 }
 

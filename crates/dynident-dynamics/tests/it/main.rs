@@ -5,4 +5,5 @@ mod base_parameters;
 mod golden;
 mod golden_base_parameters;
 mod invariants;
+mod mjcf;
 mod pinocchio;

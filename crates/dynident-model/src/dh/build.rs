@@ -73,6 +73,7 @@ pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
             limits: source.limits(kind, &row.limits)?,
             damping: source.number("damping", damping)?,
             friction: source.number("friction", friction)?,
+            drive_inertia: None,
             mimic: None,
         });
         let inertial = row

@@ -89,7 +89,7 @@ pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) 
             LinkChange::Remove { .. } => drop(row.remove("inertial")),
         }
     }
-    for JointChange { joint, damping, friction } in joints {
+    for JointChange { joint, damping, friction, .. } in joints {
         once("joint", joint)?;
         let place = rows.iter().position(|row| row.joint == *joint).ok_or_else(|| unknown("joint", joint))?;
         let row = row_mut(&mut document, place).ok_or_else(|| unknown("joint", joint))?;

@@ -1,6 +1,6 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::kind::{JointProperty, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +24,10 @@ impl TermKind for DriveInertia {
 
     fn is_nonnegative(&self) -> bool {
         true
+    }
+
+    fn property(&self) -> Option<JointProperty> {
+        Some(JointProperty::DriveInertia)
     }
 
     fn action(&self) -> TermAction<'_> {

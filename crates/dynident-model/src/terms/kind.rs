@@ -107,13 +107,15 @@ pub struct MotionFunction {
     pub factor: f64,
 }
 
-/// What a robot's description (URDF) can say of a term.
+/// What a robot's description can say of a term, by its name in URDF (MJCF).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointProperty {
     /// `damping`.
     Damping,
-    /// `friction`.
+    /// `friction` (`frictionloss`).
     Friction,
+    /// Nothing (`armature`).
+    DriveInertia,
 }
 
 /// A constant of a term, such as a velocity or an exponent, for programs that are not this one.

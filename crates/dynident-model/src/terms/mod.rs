@@ -234,6 +234,7 @@ impl TorqueTerm {
         match self.property()? {
             JointProperty::Damping => joint.damping,
             JointProperty::Friction => joint.friction,
+            JointProperty::DriveInertia => joint.drive_inertia,
         }
     }
 

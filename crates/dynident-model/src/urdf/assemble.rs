@@ -84,6 +84,7 @@ pub(super) fn model(
                 limits: joint.limits,
                 damping: joint.damping,
                 friction: joint.friction,
+                drive_inertia: None,
                 mimic: joint.mimic.clone(),
             });
             bodies.push(Body { links: vec![link_at(child, Transform::IDENTITY)] });

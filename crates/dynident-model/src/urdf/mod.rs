@@ -26,7 +26,6 @@
 mod assemble;
 mod collision;
 mod elements;
-mod flood;
 mod from_model;
 mod origin;
 mod prefixes;
@@ -41,6 +40,7 @@ pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_u
 use crate::error::ModelError;
 use crate::place::{Located, line_and_column};
 use crate::tree::Model;
+use crate::xml::{MAX_NODES, flood};
 use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
@@ -50,9 +50,6 @@ pub const MAX_MOVING_JOINTS: usize = 1000;
 /// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and
 /// products of such numbers would leave the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
-
-/// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.
-const MAX_NODES: u32 = 2_000_000;
 
 /// What a URDF says.
 #[derive(Clone, Debug, PartialEq)]
@@ -342,7 +339,7 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
 
 /// The XML tree of a URDF, if it is one, whose prefixes are all declared.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
-    if let Some(at) = flood::flood(text) {
+    if let Some(at) = flood(text) {
         return Err(Located::at(text, at, UrdfFault::Flood));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
@@ -359,7 +356,7 @@ fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
         other => {
             let hint = match other {
                 "sdf" => " (this is SDF: convert it)",
-                "mujoco" => " (this is MJCF: convert it)",
+                "mujoco" => " (this is MJCF)",
                 "COLLADA" => " (this is a mesh)",
                 _ => "",
             };

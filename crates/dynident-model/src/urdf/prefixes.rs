@@ -2,7 +2,7 @@
 //! other readers of URDF know no namespaces and read on. Their colon becomes an underscore, so that every byte stays
 //! at its place and no such name is one of URDF's.
 
-use super::flood::length_beside_elements;
+use crate::xml::length_beside_elements;
 use std::borrow::Cow;
 use std::collections::HashSet;
 

@@ -3,9 +3,9 @@
 use super::origin::origin;
 use super::prefixes::without_undeclared;
 use super::values::{child, required_child, required_number};
-use super::write::edited;
 use super::{UrdfError, UrdfWriteError, parse};
 use crate::spatial::{Mat3, Vec3};
+use crate::xml::edit::edited;
 use roxmltree::Node;
 use std::ops::Range;
 

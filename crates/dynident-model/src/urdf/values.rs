@@ -2,6 +2,7 @@
 
 use super::{MAX_MAGNITUDE, UrdfError, UrdfFault, fault_at};
 use crate::place::Located;
+use crate::xml::{parse_number, shortened};
 use roxmltree::{Attribute, Node};
 
 /// The first child called `element`; further ones are listed as unread, as the reference parser of URDF passes over
@@ -43,7 +44,7 @@ pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Re
     let count = words.clone().count();
     let mut numbers = [0.0; N];
     for (number, word) in numbers.iter_mut().zip(words) {
-        *number = parse(word).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))?;
+        *number = parse_number(word).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))?;
         if number.abs() > MAX_MAGNITUDE {
             let fix = "a value below 1e9 in m, rad, kg or kg m^2";
             return Err(number_fault(node, found, word, "too large for a robot", fix));
@@ -66,7 +67,7 @@ pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>,
     let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
     refuse_xacro(node, found)?;
     let word = found.value().trim();
-    parse(word).map(Some).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))
+    parse_number(word).map(Some).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))
 }
 
 /// One number that must be there.
@@ -74,22 +75,6 @@ pub(super) fn required_number(node: Node<'_, '_>, attribute: &'static str) -> Re
     numbers::<1>(node, attribute)?.map(|[number]| number).ok_or_else(|| {
         fault_at(node, UrdfFault::MissingAttribute { element: node.tag_name().name().to_owned(), attribute })
     })
-}
-
-/// A finite number in plain decimal or exponent notation; else what is wrong and what to write.
-fn parse(word: &str) -> Result<f64, (&'static str, &'static str)> {
-    const PLAIN: &str = "a plain number such as 0.25";
-    if word.contains(',') {
-        return Err(("not a number", "a dot for the decimal comma and spaces between numbers"));
-    }
-    // Rust also accepts `inf` and `nan`: only digits, signs, dots and exponents may pass.
-    let looks_numeric =
-        word.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'e' | b'E'));
-    match word.parse::<f64>() {
-        Ok(number) if looks_numeric && number.is_finite() => Ok(number),
-        Ok(_) => Err(("not finite", "a finite number")),
-        Err(_) => Err(("not a number", PLAIN)),
-    }
 }
 
 fn refuse_xacro(node: Node<'_, '_>, attribute: Attribute<'_, '_>) -> Result<(), UrdfError> {
@@ -120,13 +105,4 @@ fn number_fault(
 fn fault_in(node: Node<'_, '_>, attribute: Attribute<'_, '_>, fault: UrdfFault) -> UrdfError {
     let at = node.document().text_pos_at(attribute.range_value().start);
     Located { line: at.row, column: at.col, fault }
-}
-
-/// At most forty characters of foreign text, so that a message stays a line.
-fn shortened(text: &str) -> String {
-    let mut short: String = text.chars().take(40).collect();
-    if short.len() < text.len() {
-        short.push('…');
-    }
-    short
 }

@@ -9,6 +9,7 @@ use super::prefixes::without_undeclared;
 use super::{MAX_MAGNITUDE, UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
+use crate::xml::edit::{Line, Source, comment_text, edited, start_tag_length};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -50,6 +51,8 @@ pub struct JointChange {
     pub damping: Option<f64>,
     /// Coulomb friction, Nm (N).
     pub friction: Option<f64>,
+    /// Drive inertia, kg m² (kg), which only MJCF holds.
+    pub drive_inertia: Option<f64>,
 }
 
 /// Why a URDF could not be rewritten.
@@ -158,7 +161,7 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
     let (regular, _) = without_undeclared(original);
     let document = parse(&regular)?;
     let robot = document.root_element();
-    let source = Source { text: original, eol: if original.contains("\r\n") { "\r\n" } else { "\n" } };
+    let source = Source::new(original);
     let mut nodes = HashMap::new();
     for node in robot.children().filter(Node::is_element) {
         if let Some(name) = node.attribute("name") {
@@ -193,28 +196,11 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
         if !seen.insert(("joint", &change.joint)) {
             return Err(UrdfWriteError::Repeated { kind: "joint", name: change.joint.clone() });
         }
-        source.friction(node, change, &mut edits)?;
+        friction(&source, node, change, &mut edits)?;
     }
 
     Ok(edited(original, edits))
 }
-
-/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays.
-pub(super) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
-    edits.sort_by_key(|(range, _)| range.start);
-    let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
-    let mut done = 0;
-    for (range, new) in edits {
-        text += &original[done..range.start];
-        text += &new;
-        done = range.end;
-    }
-    text += &original[done..];
-    text
-}
-
-/// A line of a new element, with its depth below the element's own indentation.
-type Line = (usize, String);
 
 /// An `<inertial>` about the centre of mass, in axes parallel to the link's.
 pub(super) fn inertial_lines(
@@ -257,162 +243,49 @@ pub(super) fn inertial_lines(
     Ok(lines)
 }
 
-/// XML allows neither two hyphens in a row nor control characters in a comment.
-fn comment_text(note: &str) -> String {
-    let mut text = String::with_capacity(note.len());
-    for c in note.chars() {
-        if c == '-' && text.ends_with('-') {
-            text.push(' ');
-        }
-        text.push(if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c });
+/// The two friction values of one joint, into its `<dynamics>` or a new one.
+fn friction(
+    source: &Source<'_>,
+    joint: Node<'_, '_>,
+    change: &JointChange,
+    edits: &mut Vec<(Range<usize>, String)>,
+) -> Result<(), UrdfWriteError> {
+    let values = [("damping", change.damping), ("friction", change.friction)];
+    let values: Vec<(&str, f64)> = values.iter().filter_map(|&(name, value)| Some((name, value?))).collect();
+    if values.iter().any(|(_, value)| !value.is_finite()) {
+        return Err(UrdfWriteError::NotFinite { kind: "joint", name: change.joint.clone() });
     }
-    text
-}
-
-/// The original text and how it breaks lines.
-struct Source<'a> {
-    text: &'a str,
-    eol: &'a str,
-}
-
-impl Source<'_> {
-    /// The white space before `at` on its line; `None` if something else stands there.
-    fn indentation(&self, at: usize) -> Option<&str> {
-        let start = self.text[..at].rfind('\n').map_or(0, |newline| newline + 1);
-        let prefix = &self.text[start..at];
-        prefix.chars().all(|c| c == ' ' || c == '\t').then_some(prefix)
+    if values.is_empty() {
+        return Ok(());
     }
-
-    /// By how much the children of `node` stand further in than `node`.
-    fn step(&self, node: Node<'_, '_>) -> String {
-        let own = self.indentation(node.range().start).unwrap_or("");
-        let child = node.children().find(Node::is_element).and_then(|child| self.indentation(child.range().start));
-        match child.and_then(|child| child.strip_prefix(own)) {
-            Some(step) if !step.is_empty() => step.to_owned(),
-            // Links are children of the root, so that their own indentation is one step.
-            _ if !own.is_empty() && node.parent_element().is_some_and(|parent| parent.has_tag_name("robot")) => {
-                own.to_owned()
-            }
-            _ => "  ".to_owned(),
+    let as_attributes = |values: &[(&str, f64)]| -> String {
+        values.iter().flat_map(|(name, value)| [" ".to_owned(), format!(r#"{name}="{value:?}""#)]).collect()
+    };
+    if let Some(dynamics) = joint.children().find(|child| child.has_tag_name("dynamics")) {
+        let (old, new): (Vec<_>, Vec<_>) =
+            values.into_iter().partition(|(name, _)| dynamics.attribute_node(*name).is_some());
+        for (name, value) in old {
+            edits.extend(dynamics.attribute_node(name).map(|old| (old.range_value(), format!("{value:?}"))));
         }
+        if !new.is_empty() {
+            let at = dynamics.range().start + "<dynamics".len();
+            edits.push((at..at, as_attributes(&new)));
+        }
+        return Ok(());
     }
-
-    fn joined(&self, lines: &[Line], indentation: &str, step: &str) -> String {
-        let separator = format!("{}{indentation}", self.eol);
-        let lines: Vec<String> = lines.iter().map(|(depth, line)| step.repeat(*depth) + line).collect();
-        lines.join(&separator)
+    let new = format!("<dynamics{}/>", as_attributes(&values));
+    if let Some(last) = joint.children().rfind(Node::is_element) {
+        let at = last.range().end;
+        let lead = source.indentation(last.range().start).map(|own| format!("{}{own}", source.eol)).unwrap_or_default();
+        edits.push((at..at, lead + &new));
+        return Ok(());
     }
-
-    fn compact(lines: &[Line]) -> String {
-        lines.iter().map(|(_, line)| line.as_str()).collect()
-    }
-
-    /// The new element in the old one's place; on one line if the old one was.
-    fn replacement(&self, old: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
-        let range = old.range();
-        let new = match self.indentation(range.start) {
-            Some(indentation) if self.text[range.clone()].contains('\n') => {
-                self.joined(lines, indentation, &self.step(old))
-            }
-            _ => Self::compact(lines),
-        };
-        (range, new)
-    }
-
-    /// The new element as the first child of `node`.
-    fn insertion_at_start(&self, node: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
-        let range = node.range();
-        let tag = &self.text[range.clone()];
-        let tag_end = range.start + start_tag_length(tag);
-        let empty = self.text[..tag_end].ends_with("/>");
-        let Some(own) = self.indentation(range.start) else {
-            let new = Self::compact(lines);
-            return if empty { (tag_end - 2..tag_end, format!(">{new}</link>")) } else { (tag_end..tag_end, new) };
-        };
-        let step = self.step(node);
-        let inner = format!("{own}{step}");
-        let new = format!("{}{inner}{}", self.eol, self.joined(lines, &inner, &step));
-        if empty {
-            let kept = self.text[..tag_end - 2].trim_end().len();
-            return (kept..tag_end, format!(">{new}{}{own}</link>", self.eol));
-        }
-        // `<link name="a"></link>`: the end tag goes to a line of its own.
-        let closing = if self.text[tag_end..].starts_with("</") { format!("{}{own}", self.eol) } else { String::new() };
-        (tag_end..tag_end, new + &closing)
-    }
-
-    /// The element, and the line it stands on if it stands there alone.
-    fn with_own_line(&self, node: Node<'_, '_>) -> Range<usize> {
-        let range = node.range();
-        let Some(indentation) = self.indentation(range.start) else { return range };
-        let rest = self.text[range.end..].split('\n').next().unwrap_or("");
-        if !rest.trim().is_empty() {
-            return range;
-        }
-        let mut start = range.start - indentation.len();
-        for end in ['\n', '\r'] {
-            start -= usize::from(self.text[..start].ends_with(end));
-        }
-        start..range.end
-    }
-
-    fn friction(
-        &self,
-        joint: Node<'_, '_>,
-        change: &JointChange,
-        edits: &mut Vec<(Range<usize>, String)>,
-    ) -> Result<(), UrdfWriteError> {
-        let values = [("damping", change.damping), ("friction", change.friction)];
-        let values: Vec<(&str, f64)> = values.iter().filter_map(|&(name, value)| Some((name, value?))).collect();
-        if values.iter().any(|(_, value)| !value.is_finite()) {
-            return Err(UrdfWriteError::NotFinite { kind: "joint", name: change.joint.clone() });
-        }
-        if values.is_empty() {
-            return Ok(());
-        }
-        let as_attributes = |values: &[(&str, f64)]| -> String {
-            values.iter().flat_map(|(name, value)| [" ".to_owned(), format!(r#"{name}="{value:?}""#)]).collect()
-        };
-        if let Some(dynamics) = joint.children().find(|child| child.has_tag_name("dynamics")) {
-            let (old, new): (Vec<_>, Vec<_>) =
-                values.into_iter().partition(|(name, _)| dynamics.attribute_node(*name).is_some());
-            for (name, value) in old {
-                edits.extend(dynamics.attribute_node(name).map(|old| (old.range_value(), format!("{value:?}"))));
-            }
-            if !new.is_empty() {
-                let at = dynamics.range().start + "<dynamics".len();
-                edits.push((at..at, as_attributes(&new)));
-            }
-            return Ok(());
-        }
-        let new = format!("<dynamics{}/>", as_attributes(&values));
-        if let Some(last) = joint.children().rfind(Node::is_element) {
-            let at = last.range().end;
-            let lead = self.indentation(last.range().start).map(|own| format!("{}{own}", self.eol)).unwrap_or_default();
-            edits.push((at..at, lead + &new));
-            return Ok(());
-        }
-        let start = joint.range().start;
-        let tag_end = start + start_tag_length(&self.text[joint.range()]);
-        edits.push(if self.text[..tag_end].ends_with("/>") {
-            (tag_end - 2..tag_end, format!(">{new}</joint>"))
-        } else {
-            (tag_end..tag_end, new)
-        });
-        Ok(())
-    }
-}
-
-/// Length of the start tag with which `element` begins: to the first `>` outside quotes.
-fn start_tag_length(element: &str) -> usize {
-    let mut quote = None;
-    for (at, byte) in element.bytes().enumerate() {
-        match (quote, byte) {
-            (None, b'>') => return at + 1,
-            (None, b'"' | b'\'') => quote = Some(byte),
-            (Some(open), byte) if open == byte => quote = None,
-            _ => {}
-        }
-    }
-    element.len()
+    let start = joint.range().start;
+    let tag_end = start + start_tag_length(&source.text[joint.range()]);
+    edits.push(if source.text[..tag_end].ends_with("/>") {
+        (tag_end - 2..tag_end, format!(">{new}</joint>"))
+    } else {
+        (tag_end..tag_end, new)
+    });
+    Ok(())
 }

@@ -1,6 +1,6 @@
 //! Broken descriptions: each is refused with file, line, column and the fix, and nothing panics.
 
-use crate::common::ARM;
+use crate::common::{ARM, mutate, mutations};
 use dynident_model::{audit, link_changes, load_robot, read_dh, read_urdf, rewrite_urdf};
 use dynident_testing::count;
 use proptest::prelude::*;
@@ -127,35 +127,8 @@ sign = -1
 inertial = { parameters = [1, 0, 0, 0.1, 0.02, 0, 0, 0.02, 0, 0.001] }
 "#;
 
-/// One mutation of a text: where, and what to do there.
-type Mutation = (prop::sample::Index, u8, u8);
-
-fn mutate(text: &str, mutations: &[Mutation]) -> String {
-    const PIECES: [&str; 12] =
-        ["1e308", "-", "nan", "0", "\"", "<", "</link>", "name=\"base\"", "[[joint]]\n", "é", "\u{feff}", "}"];
-    let mut bytes = text.as_bytes().to_vec();
-    for (index, what, value) in mutations {
-        if bytes.is_empty() {
-            break;
-        }
-        let at = index.index(bytes.len());
-        match what % 5 {
-            0 => bytes[at] = *value,
-            1 => bytes[at] ^= 1 << (value % 8),
-            2 => drop(bytes.drain(at..(at + usize::from(*value)).min(bytes.len()))),
-            3 => drop(bytes.splice(at..at, PIECES[usize::from(*value) % PIECES.len()].bytes())),
-            _ => {
-                let copy = bytes[at..(at + usize::from(*value)).min(bytes.len())].to_vec();
-                drop(bytes.splice(at..at, copy));
-            }
-        }
-    }
-    String::from_utf8_lossy(&bytes).into_owned()
-}
-
-fn mutations() -> impl Strategy<Value = Vec<Mutation>> {
-    prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), any::<u8>()), 1..6)
-}
+const PIECES: [&str; 12] =
+    ["1e308", "-", "nan", "0", "\"", "<", "</link>", "name=\"base\"", "[[joint]]\n", "é", "\u{feff}", "}"];
 
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(500, 4000) as u32) })]
@@ -163,7 +136,7 @@ proptest! {
     /// What is read after all is finite, can be audited, and can be rewritten without a change.
     #[test]
     fn a_mutated_urdf_never_panics(mutations in mutations()) {
-        let text = mutate(ARM, &mutations);
+        let text = mutate(ARM, &mutations, &PIECES);
         if let Ok(robot) = read_urdf(&text) {
             prop_assert!(robot.model.parameter_vector().iter().all(|x| x.is_finite()));
             audit(&robot.model);
@@ -180,7 +153,7 @@ proptest! {
 
     #[test]
     fn a_mutated_table_never_panics(mutations in mutations()) {
-        if let Ok(model) = read_dh(&mutate(TABLE, &mutations)) {
+        if let Ok(model) = read_dh(&mutate(TABLE, &mutations, &PIECES)) {
             prop_assert!(model.parameter_vector().iter().all(|x| x.is_finite()));
             audit(&model);
         }

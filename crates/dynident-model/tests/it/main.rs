@@ -7,6 +7,8 @@ mod common;
 mod dh;
 mod dh_write;
 mod friction_laws;
+mod mjcf;
+mod mjcf_write;
 mod slips;
 mod urdf;
 mod urdf_write;

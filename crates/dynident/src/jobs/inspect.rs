@@ -33,7 +33,7 @@ pub enum MendedDescription {
     Urdf(String),
     /// No slip was found whose numbers can be known.
     NothingToMend,
-    /// A D-H table, in which no slips are looked for.
+    /// A D-H table or an MJCF, in which no slips are looked for.
     NoUrdf,
 }
 
@@ -52,7 +52,7 @@ pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescripti
         .map_err(|error| Error::Result { path: path.to_owned(), message: error.to_string() })
 }
 
-/// The slips of a URDF; none for a D-H table.
+/// The slips of a URDF; none for another description.
 fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, Error> {
     if robot.format != DescriptionFormat::Urdf {
         return Ok(None);
@@ -108,6 +108,15 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
         what: format!("<{}> under <{}> was not read: misspelt, or given twice", unread.element, unread.parent),
     }));
     entries.extend(robot.irregularities.iter().map(irregularity));
+    entries.extend(robot.notices.iter().map(|notice| AuditEntry {
+        level: "warning".to_owned(),
+        check: notice.loss.name().to_owned(),
+        place: match &notice.file {
+            Some(file) => format!("{file}, line {}", notice.line),
+            None => format!("line {}", notice.line),
+        },
+        what: notice.loss.to_string(),
+    }));
     Ok(Inspection {
         schema: INSPECTION_SCHEMA.to_owned(),
         name: model.name().to_owned(),

@@ -112,6 +112,9 @@ pub struct ResultFile {
     pub check: Option<StudyCheck>,
     /// Why there is no identified.urdf; none when there is one.
     pub no_urdf: Option<String>,
+    /// Why there is no identified.xml although the description is an MJCF and there is an identified.urdf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_mjcf: Option<String>,
     /// Where the time went.
     pub timings_s: Timings,
 }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
-    /// URDF, or D-H table in TOML.
+    /// URDF, MJCF, or D-H table in TOML.
     pub file: PathBuf,
     /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints
     /// of the description that `lock` does not name, in the order of the tree.
@@ -20,7 +20,7 @@ pub struct RobotSection {
     /// Joints that are held, and where (rad, m).
     #[serde(default)]
     pub lock: BTreeMap<String, f64>,
-    /// Gravitational acceleration in the world, m/s²; (0, 0, -9.81), or the D-H table's own, by default.
+    /// Gravitational acceleration in the world, m/s²; (0, 0, -9.81), or the MJCF's or D-H table's own, by default.
     #[serde(default, deserialize_with = "exactly")]
     pub gravity_m_s2: Option<[f64; 3]>,
     /// How the base is mounted in the world: roll, pitch, yaw about fixed axes, rad.

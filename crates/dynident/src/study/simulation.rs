@@ -173,11 +173,12 @@ impl SimulationSection {
                 let by_kind = term.own_joint().and_then(|joint| match (term.property(), term.action()) {
                     (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
                     (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
-                    (None, TermAction::Inertia { .. }) => Some(self.drive_inertia.of(joint)),
+                    (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
                     (None, TermAction::Constant) => Some(self.offset.of(joint)),
                     (
                         None,
-                        TermAction::Damping { .. }
+                        TermAction::Inertia { .. }
+                        | TermAction::Damping { .. }
                         | TermAction::Friction(_)
                         | TermAction::Hysteresis
                         | TermAction::Temperature,

@@ -21,6 +21,7 @@ mod iteration_legs;
 mod iteration_report;
 mod log_formats;
 mod masses;
+mod mjcf;
 mod modules;
 mod mutated_studies;
 mod new_study;

@@ -1,6 +1,7 @@
 //! The robot descriptions at hand, and a small arm.
 
 use dynident_testing::{recordings, repository};
+use proptest::prelude::*;
 use std::path::PathBuf;
 
 /// All URDF files at hand: of the repository, and beside the recordings.
@@ -23,3 +24,33 @@ pub(crate) fn foreign_urdfs() -> Vec<PathBuf> {
 /// A clean arm of three joints (one prismatic), with a tool of two links fixed to the last, one of them without
 /// inertial.
 pub(crate) const ARM: &str = include_str!("arm.urdf");
+
+/// One mutation of a text: where, and what to do there.
+pub(crate) type Mutation = (prop::sample::Index, u8, u8);
+
+/// Up to five mutations.
+pub(crate) fn mutations() -> impl Strategy<Value = Vec<Mutation>> {
+    prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), any::<u8>()), 1..6)
+}
+
+/// The text with bytes set, flipped, taken out, doubled, and `pieces` put in.
+pub(crate) fn mutate(text: &str, mutations: &[Mutation], pieces: &[&str]) -> String {
+    let mut bytes = text.as_bytes().to_vec();
+    for (index, what, value) in mutations {
+        if bytes.is_empty() {
+            break;
+        }
+        let at = index.index(bytes.len());
+        match what % 5 {
+            0 => bytes[at] = *value,
+            1 => bytes[at] ^= 1 << (value % 8),
+            2 => drop(bytes.drain(at..(at + usize::from(*value)).min(bytes.len()))),
+            3 => drop(bytes.splice(at..at, pieces[usize::from(*value) % pieces.len()].bytes())),
+            _ => {
+                let copy = bytes[at..(at + usize::from(*value)).min(bytes.len())].to_vec();
+                drop(bytes.splice(at..at, copy));
+            }
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}

@@ -41,11 +41,14 @@ pub struct IdentificationOutcome {
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values, or one of the robot that a D-H table describes; without it,
+    /// The user's own URDF with the new values, or one of the robot that a D-H table or an MJCF describes; without it,
     /// [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
     /// The user's own D-H table with the new values, where the description is one.
     pub table: Option<String>,
+    /// The user's own MJCF with the new values, where the description is one; without it, [`ResultFile::no_mjcf`] says
+    /// why.
+    pub mjcf: Option<String>,
     /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was
     /// fitted to, the first 100 000 filtered rows of a held-out one.
     pub traces: Vec<LogTrace>,
@@ -172,7 +175,15 @@ pub(in crate::jobs) fn written(
         Ok(files) => (Some(files.with_provenance(&provenance)), None),
         Err(reason) => (None, Some(reason)),
     };
-    let (urdf, table) = files.map_or((None, None), |files| (Some(files.urdf), files.table));
+    let (mut urdf, mut table, mut mjcf, mut no_mjcf) = (None, None, None, None);
+    if let Some(files) = files {
+        (urdf, table) = (Some(files.urdf), files.table);
+        match files.mjcf {
+            Some(Ok(text)) => mjcf = Some(text),
+            Some(Err(reason)) => no_mjcf = Some(reason),
+            None => {}
+        }
+    }
     let training = training_result(&found, &task.recordings).map_err(|error| in_study(error.into()))?;
     let parts = Parts {
         name: study_name(study, study_path),
@@ -180,6 +191,7 @@ pub(in crate::jobs) fn written(
         provenance,
         verdict,
         no_urdf,
+        no_mjcf,
         inertials: &inertials,
         training,
     };
@@ -192,7 +204,7 @@ pub(in crate::jobs) fn written(
     }
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
-    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, traces })
+    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, mjcf, traces })
 }
 
 /// The earlier result of an arm, and where it lies.
@@ -254,6 +266,7 @@ struct Parts<'a> {
     provenance: Provenance,
     verdict: PhysicalVerdict,
     no_urdf: Option<String>,
+    no_mjcf: Option<String>,
     inertials: &'a [InertialParameters],
     training: TrainingResult,
 }
@@ -324,6 +337,7 @@ fn result_file(
         logs: log_summaries(task, found),
         check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check((study, robot), &task.settings, diagnosis)),
         no_urdf: parts.no_urdf,
+        no_mjcf: parts.no_mjcf,
         timings_s: parts.timings,
     }
 }

@@ -1,22 +1,26 @@
-//! The user's own description with the identified values; of a D-H table a URDF beside it.
+//! The user's own description with the identified values; of a D-H table or an MJCF a URDF beside it.
 
 use crate::result::{InputFile, Provenance, ValueSource};
 use crate::study::StudyRobot;
 use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
+use dynident_model::mjcf::{Loss, included_from};
 use dynident_model::terms::JointProperty;
 use dynident_model::{
-    DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Robot, link_changes, rewrite_dh,
-    rewrite_urdf, write_urdf,
+    Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Model, Robot, link_changes,
+    rewrite_dh, rewrite_mjcf, rewrite_urdf, write_urdf,
 };
+use std::path::Path;
 
 /// Descriptions with the identified values.
 #[derive(Debug)]
 pub(super) struct ModelFiles {
-    /// The user's own URDF, or one of the robot that a D-H table describes.
+    /// The user's own URDF, or one of the robot that a D-H table or an MJCF describes.
     pub(super) urdf: String,
     /// The user's own D-H table.
     pub(super) table: Option<String>,
+    /// The user's own MJCF, or why there is none.
+    pub(super) mjcf: Option<Result<String, String>>,
 }
 
 /// The user's description with the new values; joints that were locked keep theirs. Otherwise the reason why there is
@@ -29,39 +33,106 @@ pub(super) fn model_files(
 ) -> Result<ModelFiles, String> {
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
-    note_sources(model, parameters, sources, &mut links);
-    let mut joints: Vec<JointChange> = Vec::new();
-    let terms = model.terms().iter().zip(&parameters[10 * model.model().dof()..]);
-    for (term, &value) in terms {
-        let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
-        let (damping, friction) = match property {
-            JointProperty::Damping => (Some(value), None),
-            JointProperty::Friction => (None, Some(value)),
-        };
-        let name = &model.model().joints()[joint].name;
-        let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {
-            joints.push(JointChange { joint: name.clone(), damping: None, friction: None });
-            joints.len() - 1
-        });
-        joints[place].damping = damping.or(joints[place].damping);
-        joints[place].friction = friction.or(joints[place].friction);
-    }
+    note_sources(model, parameters, sources, lost_in_urdf, &mut links);
+    let joints = joint_changes(model, parameters);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
     match format {
-        DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None }),
+        DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None }),
+        DescriptionFormat::Mjcf => {
+            let mjcf = keeping_locked(robot, model.model(), inertials).and_then(|mut links| {
+                note_sources(model, parameters, sources, |property| property.is_none(), &mut links);
+                let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
+                rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
+            });
+            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: Some(mjcf) })
+        }
         DescriptionFormat::Dh => {
             let table = rewrite_dh(text, &links, &joints).map_err(|error| error.to_string())?;
-            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table) })
+            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None })
         }
     }
 }
 
-/// Says in a body's comment which of its values torque told, and what of its joint's drive no URDF holds.
+/// URDF and the D-H table have no drive inertia.
+fn lost_in_urdf(property: Option<JointProperty>) -> bool {
+    !matches!(property, Some(JointProperty::Damping | JointProperty::Friction))
+}
+
+/// New damping, friction and drive inertia of the joints.
+fn joint_changes(model: &ParametricModel, parameters: &[f64]) -> Vec<JointChange> {
+    let mut joints: Vec<JointChange> = Vec::new();
+    let terms = model.terms().iter().zip(&parameters[10 * model.model().dof()..]);
+    for (term, &value) in terms {
+        let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
+        let name = &model.model().joints()[joint].name;
+        let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {
+            let joint = name.clone();
+            joints.push(JointChange { joint, damping: None, friction: None, drive_inertia: None });
+            joints.len() - 1
+        });
+        *match property {
+            JointProperty::Damping => &mut joints[place].damping,
+            JointProperty::Friction => &mut joints[place].friction,
+            JointProperty::DriveInertia => &mut joints[place].drive_inertia,
+        } = Some(value);
+    }
+    joints
+}
+
+/// The changes of an MJCF, in which bodies behind locked joints must keep their mass, for MuJoCo takes no body with a
+/// joint and without mass: the body that carries them gets the rest.
+fn keeping_locked(
+    robot: &StudyRobot,
+    model: &Model,
+    inertials: &[InertialParameters],
+) -> Result<Vec<LinkChange>, String> {
+    let mut rest = inertials.to_vec();
+    let mut bodies: Vec<Body> = model.bodies().to_vec();
+    let mut kept = Vec::new();
+    for (body, rest) in bodies.iter_mut().zip(&mut rest) {
+        let own = robot.robot.model.bodies().iter().find(|original| original.name() == body.name());
+        let is_own = |name: &str| own.is_none_or(|own| own.links.iter().any(|link| link.name == name));
+        let (own, behind): (Vec<_>, Vec<_>) = body.links.drain(..).partition(|link| is_own(&link.name));
+        body.links = own;
+        for link in &behind {
+            let is_unknown = |loss: &Loss| matches!(loss, Loss::UnknownMass { body, .. } if *body == link.name);
+            if robot.robot.notices.iter().any(|notice| is_unknown(&notice.loss)) {
+                return Err(format!(
+                    "the mass of `{}` behind a locked joint is not known: give it an <inertial>",
+                    link.name
+                ));
+            }
+            if let Some(inertial) = link.inertial {
+                let theirs = inertial.expressed_in(&link.placement);
+                *rest = InertialParameters(core::array::from_fn(|k| rest.0[k] - theirs.0[k]));
+            }
+        }
+        let names: Vec<String> = behind.into_iter().map(|link| link.name).collect();
+        kept.push(names);
+    }
+    let reduced = Model::new(model.name(), model.base().clone(), model.joints().to_vec(), bodies);
+    let reduced = reduced.map_err(|error| error.to_string())?;
+    let mut links = link_changes(&reduced, &rest).map_err(|error| error.to_string())?;
+    for (body, kept) in model.bodies().iter().zip(kept).filter(|(_, kept)| !kept.is_empty()) {
+        let set = links.iter_mut().find_map(|change| match change {
+            LinkChange::Set { link, note, .. } if link == body.name() => Some(note),
+            _ => None,
+        });
+        if let Some(note) = set {
+            let text = format!("without what stands behind locked joints and keeps its values: {}", kept.join(", "));
+            *note = Some(note.take().map_or(text.clone(), |note| format!("{note}; {text}")));
+        }
+    }
+    Ok(links)
+}
+
+/// Says in a body's comment which of its values torque told, and what of its joint's drive the file does not hold.
 fn note_sources(
     model: &ParametricModel,
     parameters: &[f64],
     sources: &[[ValueSource; 10]],
+    lost: fn(Option<JointProperty>) -> bool,
     changes: &mut [LinkChange],
 ) {
     for (index, (body, sources)) in model.model().bodies().iter().zip(sources).enumerate() {
@@ -77,7 +148,7 @@ fn note_sources(
             of(ValueSource::Nominal)
         );
         let terms = model.terms().iter().zip(&parameters[10 * model.dof()..]);
-        let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && term.property().is_none());
+        let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && lost(term.property()));
         let lost: Vec<String> =
             lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();
         if !lost.is_empty() {
@@ -107,13 +178,14 @@ impl ModelFiles {
             let rest = earlier.map_or(&*text, |(_, rest)| rest);
             format!("{TABLE_SIGNATURE}{line}\n{}", rest.trim_start_matches('\u{feff}'))
         };
-        Self { urdf: commented_urdf(&self.urdf, &line), table: self.table.map(table) }
+        let mjcf = self.mjcf.map(|mjcf| mjcf.map(|text| commented_xml(&text, &line)));
+        Self { urdf: commented_xml(&self.urdf, &line), table: self.table.map(table), mjcf }
     }
 }
 
 /// The description with a comment that says where its values come from, before everything but the XML declaration; that
 /// of an earlier identification gives way.
-fn commented_urdf(urdf: &str, line: &str) -> String {
+fn commented_xml(urdf: &str, line: &str) -> String {
     let comment = format!("{SIGNATURE}{line} -->");
     let declared = urdf.find("<?xml").and_then(|from| urdf[from..].find("?>").map(|length| from + length + 2));
     let mark = if urdf.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
@@ -180,11 +252,11 @@ mod tests {
             ("<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot/>", "<?xml version=\"1.0\"?>\n"),
             ("\u{feff}<?xml version=\"1.0\"?><robot/>", "\u{feff}<?xml version=\"1.0\"?>\n"),
         ] {
-            let once = commented_urdf(urdf, &provenance_line(&of("one")));
+            let once = commented_xml(urdf, &provenance_line(&of("one")));
             assert!(once.starts_with(&format!("{head}<!-- dynident ")) && once.contains("identity one"), "{once}");
             let rest = |text: &str| text.split_once("-->").unwrap().1.trim_start().to_owned();
             assert!(urdf.ends_with(&rest(&once)), "{once}");
-            let twice = commented_urdf(&once, &provenance_line(&of("two")));
+            let twice = commented_xml(&once, &provenance_line(&of("two")));
             assert_eq!(twice, once.replace("identity one", "identity two"));
         }
     }
@@ -199,7 +271,7 @@ mod tests {
         };
         let provenance =
             Provenance { study: Some(file("study")), inputs: vec![file("robot")], ..Provenance::default() };
-        let urdf = commented_urdf("<robot name=\"a\"/>", &provenance_line(&provenance));
+        let urdf = commented_xml("<robot name=\"a\"/>", &provenance_line(&provenance));
         assert_eq!(roxmltree_names(&urdf), ["a"]);
     }
 

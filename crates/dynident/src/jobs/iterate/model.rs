@@ -19,6 +19,7 @@ use std::time::Instant;
 const RESULT: &str = "result.json";
 const URDF: &str = "identified.urdf";
 const TABLE: &str = "identified.toml";
+const MJCF: &str = "identified.xml";
 const CONTROLLER: &str = "controller.json";
 const PAGE: &str = "identification.html";
 
@@ -111,9 +112,12 @@ pub(super) fn robot_found(
         (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
         (PAGE, outcome.report()?.into_bytes()),
     ];
-    let IdentificationOutcome { urdf, table, result, .. } = outcome;
-    files
-        .extend([(URDF, urdf), (TABLE, table)].into_iter().filter_map(|(name, text)| Some((name, text?.into_bytes()))));
+    let IdentificationOutcome { urdf, table, mjcf, result, .. } = outcome;
+    files.extend(
+        [(URDF, urdf), (TABLE, table), (MJCF, mjcf)]
+            .into_iter()
+            .filter_map(|(name, text)| Some((name, text?.into_bytes()))),
+    );
     Ok(RobotFiles { files, base_parameters: result.base_parameters })
 }
 

@@ -8,7 +8,7 @@ const MAX_ATTRIBUTES: usize = 1000;
 const MAX_NAMESPACES: usize = 5000;
 
 /// Where text begins with a comment, a CDATA section or an instruction: its length, all of the text if it never ends.
-pub(super) fn length_beside_elements(rest: &str) -> Option<usize> {
+pub(crate) fn length_beside_elements(rest: &str) -> Option<usize> {
     let kinds = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
     let (open, close) = kinds.into_iter().find(|(open, _)| rest.starts_with(open))?;
     Some(rest[open.len()..].find(close).map_or(rest.len(), |end| open.len() + end + close.len()))
@@ -16,7 +16,7 @@ pub(super) fn length_beside_elements(rest: &str) -> Option<usize> {
 
 /// The byte at which a document becomes a flood, if it does. One pass, no memory; malformed markup is left to the
 /// parser.
-pub(super) fn flood(text: &str) -> Option<usize> {
+pub(crate) fn flood(text: &str) -> Option<usize> {
     if let Some((at, _)) = text.match_indices("xmlns").nth(MAX_NAMESPACES) {
         return Some(at);
     }

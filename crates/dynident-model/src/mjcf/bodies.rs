@@ -1,0 +1,446 @@
+//! From nested `<body>` elements to the tree of moving bodies.
+
+use super::classes::{ClassId, Classes, MAIN, Stated};
+use super::compiler::{Compiler, FromGeoms};
+use super::expanded::{Element, Expanded, Place};
+use super::fault::{MjcfError, MjcfFault};
+use super::geoms::{Geom, GeomMass, Meshes, geom};
+use super::inertials::{corrected, inertial};
+use super::joints::{JointElement, floating, joint};
+use super::notices::{Loss, Notices};
+use super::orientation::place;
+use crate::collision::CollisionShape;
+use crate::inertial::InertialParameters;
+use crate::joint::Joint;
+use crate::spatial::{Mat3, Transform, Vec3};
+use crate::tree::{Body, Link};
+use crate::urdf::MAX_MOVING_JOINTS;
+use crate::xml::shortened;
+use std::collections::{HashMap, HashSet};
+
+/// Name of the link that does not move.
+const WORLD: &str = "world";
+
+/// Elements that a body may hold and that play no part in its dynamics.
+const APART: [&str; 4] = ["site", "camera", "light", "plugin"];
+const IN_BODY: [&str; 14] = [
+    "name",
+    "class",
+    "childclass",
+    "pos",
+    "quat",
+    "axisangle",
+    "xyaxes",
+    "zaxis",
+    "euler",
+    "mocap",
+    "gravcomp",
+    "user",
+    "sleep",
+    "simple",
+];
+const IN_INERTIAL: [&str; 9] =
+    ["pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "mass", "diaginertia", "fullinertia"];
+const IN_JOINT: [&str; 25] = [
+    "name",
+    "class",
+    "type",
+    "group",
+    "pos",
+    "axis",
+    "springdamper",
+    "limited",
+    "actuatorfrclimited",
+    "solreflimit",
+    "solimplimit",
+    "solreffriction",
+    "solimpfriction",
+    "stiffness",
+    "range",
+    "actuatorfrcrange",
+    "actuatorgravcomp",
+    "margin",
+    "ref",
+    "springref",
+    "armature",
+    "damping",
+    "frictionloss",
+    "user",
+    "align",
+];
+
+/// Where a link stands in the document.
+#[derive(Clone, Debug)]
+pub(super) struct LinkPlace {
+    pub(super) name: String,
+    /// The `<body>`; `None` for a link between two joints of one body, which the document does not have.
+    pub(super) body: Option<Place>,
+    /// The origin of the link's frame in the body's frame, which has the same axes, m.
+    pub(super) origin: Vec3,
+}
+
+/// The tree so far.
+pub(super) struct Tree {
+    pub(super) joints: Vec<Joint>,
+    /// The elements of the joints, in the same order.
+    pub(super) joint_places: Vec<Place>,
+    /// Positions in the drawn pose, in the same order, rad or m.
+    pub(super) references: Vec<f64>,
+    pub(super) bodies: Vec<Body>,
+    pub(super) base: Body,
+    pub(super) links: Vec<LinkPlace>,
+    /// Links that have mass which is not known.
+    pub(super) unknown: HashSet<String>,
+}
+
+/// A `<body>` still to visit.
+#[derive(Clone, Copy)]
+struct Ahead<'t> {
+    element: &'t Element,
+    /// The body of the model that carries the one around it.
+    carrier: Option<usize>,
+    /// Where the body around it, or the `<frame>` in that, stands in the carrier.
+    carrier_from_parent: Transform,
+    childclass: ClassId,
+}
+
+/// What the elements of a body say.
+#[derive(Default)]
+struct Contents<'t> {
+    inertial: Option<InertialParameters>,
+    joints: Vec<JointElement>,
+    geoms: Vec<Result<Geom, MjcfError>>,
+    /// Bodies in it, where their frames stand in the body, and their class.
+    bodies: Vec<(&'t Element, Transform, ClassId)>,
+}
+
+/// Reads `<worldbody>`.
+pub(super) struct Reader<'t> {
+    pub(super) document: &'t Expanded,
+    pub(super) classes: &'t Classes<'t>,
+    pub(super) compiler: &'t Compiler,
+    pub(super) meshes: &'t Meshes,
+    pub(super) notices: &'t mut Notices,
+    body_count: usize,
+    body_names: HashSet<String>,
+    joint_names: HashSet<String>,
+    /// Links whose mass is not known although they have some, and why.
+    unknown: HashMap<String, (&'static str, Place)>,
+}
+
+impl<'t> Reader<'t> {
+    pub(super) fn new(
+        document: &'t Expanded,
+        classes: &'t Classes<'t>,
+        compiler: &'t Compiler,
+        meshes: &'t Meshes,
+        notices: &'t mut Notices,
+    ) -> Self {
+        let body_names = HashSet::from([WORLD.to_owned()]);
+        let (joint_names, unknown) = (HashSet::new(), HashMap::new());
+        Self { document, classes, compiler, meshes, notices, body_count: 0, body_names, joint_names, unknown }
+    }
+
+    /// Depth first, bodies in the order of the document.
+    pub(super) fn tree(mut self) -> Result<Tree, MjcfError> {
+        let world =
+            Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() };
+        let mut tree = Tree {
+            joints: Vec::new(),
+            joint_places: Vec::new(),
+            references: Vec::new(),
+            bodies: Vec::new(),
+            base: Body { links: vec![world] },
+            links: Vec::new(),
+            unknown: HashSet::new(),
+        };
+        // A stack, not recursion: a chain may be as long as the file.
+        let mut ahead: Vec<Ahead<'t>> = Vec::new();
+        for world in self.document.sections("worldbody") {
+            let contents = self.contents(world, WORLD, MAIN, true)?;
+            tree.base.links[0].collision.extend(shapes(contents.geoms, Vec3::ZERO));
+            ahead.extend(contents.bodies.into_iter().map(|(element, carrier_from_parent, childclass)| Ahead {
+                element,
+                carrier: None,
+                carrier_from_parent,
+                childclass,
+            }));
+        }
+        ahead.reverse();
+        while let Some(next) = ahead.pop() {
+            self.visit(next, &mut tree, &mut ahead)?;
+        }
+        self.set_total_mass(&mut tree)?;
+        tree.unknown = self.unknown.into_keys().collect();
+        Ok(tree)
+    }
+
+    fn visit(&mut self, next: Ahead<'t>, tree: &mut Tree, ahead: &mut Vec<Ahead<'t>>) -> Result<(), MjcfError> {
+        let Ahead { element, carrier, carrier_from_parent, childclass } = next;
+        let stated = Stated::own(self.document, element);
+        let name = self.body_name(element)?;
+        self.note_unread(&stated, &IN_BODY);
+        if stated.number("gravcomp")?.is_some_and(|part| part != 0.0) {
+            self.notices.note(&stated, Loss::GravityCompensation { body: name.clone() });
+        }
+        let class = self.classes.named(self.document, element, "childclass")?.unwrap_or(childclass);
+        let mut contents = self.contents(element, &name, class, false)?;
+        let moves = carrier.is_some() || !contents.joints.is_empty();
+        let inertial = self.mass(&name, element, &mut contents, moves)?;
+
+        // The joints one after the other, each with a body of its own; all but the last are without mass.
+        let joints = std::mem::take(&mut contents.joints);
+        let (mut at, mut origin) = (carrier, Vec3::ZERO);
+        let mut placement = carrier_from_parent.then(&place(&stated, self.compiler)?);
+        let last = joints.len().checked_sub(1);
+        for (number, element) in joints.into_iter().enumerate() {
+            let anchor = element.anchor.unwrap_or(origin);
+            let frame = Transform { rotation: Mat3::IDENTITY, translation: anchor - origin };
+            origin = anchor;
+            let (place, reference) = (element.place, element.reference);
+            let joint = self.joint(element, at, placement.then(&frame), &name, number)?;
+            at = Some(tree.joints.len());
+            placement = Transform::IDENTITY;
+            let link = if Some(number) == last {
+                tree.links.push(LinkPlace { name: name.clone(), body: Some(stated.place), origin });
+                Link { name: name.clone(), placement, inertial: None, collision: Vec::new() }
+            } else {
+                let between = self.free_name(format!("{name}/{}", joint.name));
+                tree.links.push(LinkPlace { name: between.clone(), body: None, origin });
+                let inertial = Some(InertialParameters::ZERO);
+                Link { name: between, placement, inertial, collision: Vec::new() }
+            };
+            if tree.joints.len() >= MAX_MOVING_JOINTS {
+                return Err(self.document.fault(place, MjcfFault::TooManyJoints { limit: MAX_MOVING_JOINTS }));
+            }
+            tree.joints.push(joint);
+            tree.joint_places.push(place);
+            tree.references.push(reference);
+            tree.bodies.push(Body { links: vec![link] });
+        }
+        let shift = Transform { rotation: Mat3::IDENTITY, translation: -origin };
+        let inertial =
+            inertial.map(|inertial| if origin == Vec3::ZERO { inertial } else { inertial.expressed_in(&shift) });
+        let collision = shapes(std::mem::take(&mut contents.geoms), origin);
+        let host = at.map_or(&mut tree.base, |at| &mut tree.bodies[at]);
+        if last.is_some() {
+            (host.links[0].inertial, host.links[0].collision) = (inertial, collision);
+        } else {
+            tree.links.push(LinkPlace { name: name.clone(), body: Some(stated.place), origin });
+            host.links.push(Link { name, placement, inertial, collision });
+        }
+        let carrier_from_body = placement.then(&shift);
+        ahead.extend(contents.bodies.into_iter().rev().map(|(element, body_from_frame, childclass)| Ahead {
+            element,
+            carrier: at,
+            carrier_from_parent: carrier_from_body.then(&body_from_frame),
+            childclass,
+        }));
+        Ok(())
+    }
+
+    /// The joint at `placement` in its parent; `ref` moves the position zero back from the drawn pose.
+    fn joint(
+        &mut self,
+        element: JointElement,
+        parent: Option<usize>,
+        placement: Transform,
+        body: &str,
+        number: usize,
+    ) -> Result<Joint, MjcfError> {
+        let name = if let Some(name) = element.name {
+            if !self.joint_names.insert(name.clone()) {
+                let fault = MjcfFault::DuplicateName { kind: "joint", name: shortened(&name) };
+                return Err(self.document.fault(element.place, fault));
+            }
+            name
+        } else {
+            let (mut name, mut count) = (format!("{body}_joint"), number);
+            while !self.joint_names.insert(name.clone()) {
+                count += 1;
+                name = format!("{body}_joint{count}");
+            }
+            name
+        };
+        let axis = element.axis;
+        let drawn = match (element.reference == 0.0, element.anchor.is_some()) {
+            (true, _) => Transform::IDENTITY,
+            (false, true) => {
+                Transform { rotation: Mat3::from_axis_angle(axis, -element.reference), translation: Vec3::ZERO }
+            }
+            (false, false) => Transform { rotation: Mat3::IDENTITY, translation: axis.scale(-element.reference) },
+        };
+        Ok(Joint {
+            name,
+            kind: element.kind,
+            parent,
+            placement: placement.then(&drawn),
+            axis,
+            limits: element.limits,
+            damping: element.damping,
+            friction: element.friction,
+            drive_inertia: element.drive_inertia,
+            mimic: None,
+        })
+    }
+
+    /// Everything in a body, through `<frame>` elements.
+    fn contents(
+        &mut self,
+        body: &'t Element,
+        name: &str,
+        class: ClassId,
+        is_world: bool,
+    ) -> Result<Contents<'t>, MjcfError> {
+        let mut found = Contents::default();
+        let children = |element: &'t Element| self.document.children(element).rev();
+        let mut ahead: Vec<(&'t Element, Transform, ClassId)> =
+            children(body).map(|child| (child, Transform::IDENTITY, class)).collect();
+        while let Some((element, frame, class)) = ahead.pop() {
+            let unsupported = |what: &str, fix| {
+                Err(self.document.fault(element.place, MjcfFault::Unsupported { what: what.to_owned(), fix }))
+            };
+            match element.tag.as_str() {
+                "frame" => {
+                    let inside = frame.then(&place(&Stated::own(self.document, element), self.compiler)?);
+                    let class = self.classes.named(self.document, element, "childclass")?.unwrap_or(class);
+                    ahead.extend(self.document.children(element).rev().map(|child| (child, inside, class)));
+                }
+                "body" => {
+                    found.bodies.push((element, frame, class));
+                }
+                "geom" => {
+                    let stated = self.classes.stated(self.document, element, class)?;
+                    found.geoms.push(geom(&stated, &frame, self.compiler, self.meshes));
+                }
+                "inertial" if is_world => return Err(self.document.fault(element.place, MjcfFault::WorldInertial)),
+                "inertial" => {
+                    if found.inertial.is_some() {
+                        let fault = MjcfFault::RepeatedInertial { body: name.to_owned() };
+                        return Err(self.document.fault(element.place, fault));
+                    }
+                    let stated = Stated::own(self.document, element);
+                    found.inertial = Some(inertial(&stated, &frame, self.compiler)?);
+                    self.note_unread(&stated, &IN_INERTIAL);
+                }
+                "joint" | "freejoint" if is_world => {
+                    return unsupported("a joint of the world", "put it into the <body> that it moves");
+                }
+                "joint" => {
+                    let stated = self.classes.stated(self.document, element, class)?;
+                    found.joints.push(joint(&stated, &frame, self.compiler, self.notices)?);
+                    self.note_unread(&Stated::own(self.document, element), &IN_JOINT);
+                }
+                "freejoint" => {
+                    let label = element
+                        .attribute("name")
+                        .map_or("without a name".to_owned(), |name| format!("`{}`", shortened(&name.value)));
+                    return Err(self.document.fault(element.place, floating(&label)));
+                }
+                "composite" | "flexcomp" | "replicate" | "attach" => {
+                    let what = format!("<{}>", element.tag);
+                    return unsupported(&what, "save the model from MuJoCo (mj_saveLastXML), which writes it out");
+                }
+                tag if APART.contains(&tag) => {}
+                tag => {
+                    let loss = Loss::Unread { element: shortened(tag), attribute: None };
+                    self.notices.note_at(self.document, element.place, loss);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// The mass of a body by its `<inertial>` or its geoms, with the compiler's corrections.
+    fn mass(
+        &mut self,
+        name: &str,
+        element: &Element,
+        contents: &mut Contents<'_>,
+        moves: bool,
+    ) -> Result<Option<InertialParameters>, MjcfError> {
+        let from_geoms = match self.compiler.from_geoms {
+            FromGeoms::Always => true,
+            FromGeoms::WhereMissing => contents.inertial.is_none(),
+            FromGeoms::Never => false,
+        };
+        let mut sum: Option<InertialParameters> = None;
+        if from_geoms {
+            if let Some(faulty) = contents.geoms.iter().position(Result::is_err) {
+                contents.geoms.swap_remove(faulty)?;
+            }
+            for mass in contents.geoms.iter().flatten().map(|geom| geom.mass) {
+                match mass {
+                    GeomMass::Nothing => {}
+                    GeomMass::Known(inertial) => sum = Some(sum.map_or(inertial, |sum| sum.plus(&inertial))),
+                    GeomMass::Unknown(why) => {
+                        self.unknown.insert(name.to_owned(), (why, element.place));
+                        if moves {
+                            let loss = Loss::UnknownMass { body: name.to_owned(), why };
+                            self.notices.note_at(self.document, element.place, loss);
+                        }
+                        return Ok(None);
+                    }
+                }
+            }
+        }
+        Ok(corrected(sum.or(contents.inertial), self.compiler))
+    }
+
+    /// `settotalmass`: all masses and inertias by one factor.
+    fn set_total_mass(&self, tree: &mut Tree) -> Result<(), MjcfError> {
+        let Some(total) = self.compiler.total_mass else { return Ok(()) };
+        if let Some((body, (why, place))) = self.unknown.iter().min_by_key(|(_, (_, place))| (place.source, place.at)) {
+            return Err(self.document.fault(*place, MjcfFault::TotalMass { body: body.clone(), why }));
+        }
+        let all = || tree.bodies.iter().chain([&tree.base]).flat_map(|body| &body.links);
+        let sum: f64 = all().filter_map(|link| link.inertial).map(|inertial| inertial.mass_kg()).sum();
+        if sum > 0.0 {
+            let factor = total / sum;
+            for link in tree.bodies.iter_mut().chain([&mut tree.base]).flat_map(|body| &mut body.links) {
+                link.inertial = link.inertial.map(|inertial| InertialParameters(inertial.0.map(|x| x * factor)));
+            }
+        }
+        Ok(())
+    }
+
+    fn body_name(&mut self, element: &Element) -> Result<String, MjcfError> {
+        self.body_count += 1;
+        match element.attribute("name").filter(|name| !name.value.trim().is_empty()) {
+            None => Ok(self.free_name(format!("body{}", self.body_count))),
+            Some(name) => {
+                if !self.body_names.insert(name.value.clone()) {
+                    let fault = MjcfFault::DuplicateName { kind: "body", name: shortened(&name.value) };
+                    return Err(self.document.fault(element.place, fault));
+                }
+                Ok(name.value.clone())
+            }
+        }
+    }
+
+    /// `name`, or with underscores behind it where it is taken.
+    fn free_name(&mut self, mut name: String) -> String {
+        while !self.body_names.insert(name.clone()) {
+            name.push('_');
+        }
+        name
+    }
+
+    fn note_unread(&mut self, stated: &Stated<'_>, known: &[&str]) {
+        for attribute in stated.own_attributes().filter(|attribute| !known.contains(&&*attribute.name)) {
+            let loss = Loss::Unread { element: stated.tag.to_owned(), attribute: Some(shortened(&attribute.name)) };
+            self.notices.note_at(self.document, attribute.place, loss);
+        }
+    }
+}
+
+/// The shapes of geoms, in a frame whose origin stands at `origin` in the body.
+fn shapes(geoms: Vec<Result<Geom, MjcfError>>, origin: Vec3) -> Vec<CollisionShape> {
+    let shapes = geoms.into_iter().filter_map(|geom| geom.ok()?.shape);
+    shapes
+        .map(|mut shape| {
+            shape.placement.translation = shape.placement.translation - origin;
+            shape
+        })
+        .collect()
+}

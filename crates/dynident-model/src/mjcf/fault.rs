@@ -1,0 +1,205 @@
+//! What can be wrong in an MJCF.
+
+use crate::error::ModelError;
+use crate::place::Located;
+use thiserror::Error;
+
+/// Why an MJCF could not be read, with line and column.
+pub type MjcfError = Located<MjcfFault>;
+
+/// What is wrong in an MJCF, and the fix.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MjcfFault {
+    /// A fault in a file that stands in an `<include>` here.
+    #[error("in the included `{file}`, {line}:{column}: {fault}")]
+    Included {
+        /// The file as the document names it.
+        file: String,
+        /// Line in it.
+        line: u32,
+        /// Column in it.
+        column: u32,
+        /// The fault.
+        fault: Box<MjcfFault>,
+    },
+    /// A file of an `<include>` that cannot be read.
+    #[error("the included `{file}` cannot be read: {reason}; give its path from the folder of the main file")]
+    Include {
+        /// The file.
+        file: String,
+        /// Why.
+        reason: String,
+    },
+    /// A file that is included twice, by itself perhaps.
+    #[error("`{file}` is included a second time: delete one <include>, MuJoCo takes each file once")]
+    IncludedTwice {
+        /// The file.
+        file: String,
+    },
+    /// The XML is malformed.
+    #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
+    Xml {
+        /// What the XML parser says.
+        reason: String,
+    },
+    /// More elements or bytes than a robot has.
+    #[error("the document has more than {limit} {what}: give the MJCF of one robot")]
+    TooLarge {
+        /// The limit.
+        limit: usize,
+        /// Of what.
+        what: &'static str,
+    },
+    /// Thousands of attributes in one tag, or of namespaces.
+    #[error("more attributes in a tag, or namespaces in the document, than any robot has: give the MJCF of one robot")]
+    Flood,
+    /// A document type declaration, by which entities could be defined.
+    #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
+    Doctype,
+    /// The root element is not `<mujoco>`.
+    #[error("the root element is <{root}>, not <mujoco>: give an MJCF file")]
+    NotMjcf {
+        /// Name of the root element.
+        root: String,
+    },
+    /// An attribute is missing.
+    #[error("<{element}> has no attribute `{attribute}`: add it")]
+    MissingAttribute {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: &'static str,
+    },
+    /// Something that is not a usable number.
+    #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
+    Number {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: String,
+        /// What stands there, shortened.
+        text: String,
+        /// What is wrong with it.
+        fault: &'static str,
+        /// What to write.
+        fix: &'static str,
+    },
+    /// Too many or too few numbers.
+    #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
+    Count {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: String,
+        /// How many are needed.
+        expected: usize,
+        /// How many stand there.
+        found: usize,
+    },
+    /// A word that the attribute does not take.
+    #[error("`{attribute}` of <{element}> is `{text}`: write {expected}")]
+    Word {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: String,
+        /// What stands there, shortened.
+        text: String,
+        /// What it takes.
+        expected: &'static str,
+    },
+    /// Two bodies or two joints with one name, or two classes.
+    #[error("{kind} `{name}` is defined a second time: rename or delete one")]
+    DuplicateName {
+        /// `body`, `joint` or `default class`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A class that no `<default>` defines.
+    #[error("class `{class}` is not defined: add its <default class=\"{class}\"> or fix the name")]
+    UnknownClass {
+        /// The class.
+        class: String,
+    },
+    /// A joint that an actuator or an equality names is not there.
+    #[error("<{element}> names joint `{joint}`, which is not defined: add the joint or fix the name")]
+    UnknownJoint {
+        /// The element.
+        element: String,
+        /// The joint.
+        joint: String,
+    },
+    /// Two statements of which only one may stand.
+    #[error("<{element}> has both `{first}` and `{second}`: keep one of them")]
+    Both {
+        /// The element.
+        element: String,
+        /// One attribute.
+        first: &'static str,
+        /// The other.
+        second: &'static str,
+    },
+    /// A vector that gives no direction.
+    #[error("`{attribute}` of <{element}> gives no direction: write a vector with a length, such as `0 0 1`")]
+    NoDirection {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: &'static str,
+    },
+    /// A body with two inertials.
+    #[error("body `{body}` has a second <inertial>: keep one")]
+    RepeatedInertial {
+        /// The body.
+        body: String,
+    },
+    /// `<inertial>` outside a body.
+    #[error("the world has no inertia: delete this <inertial>, or put it into a <body>")]
+    WorldInertial,
+    /// A joint or body that a robot on a fixed base does not have.
+    #[error("{what} is not supported: {fix}")]
+    Unsupported {
+        /// What stands there.
+        what: String,
+        /// What to do.
+        fix: &'static str,
+    },
+    /// A geom without the sizes of its type.
+    #[error("a geom of type `{kind}` needs {needed} positive numbers in `size`: write them")]
+    Size {
+        /// The type.
+        kind: &'static str,
+        /// How many.
+        needed: usize,
+    },
+    /// A mass, density, moment or bound below zero.
+    #[error("`{attribute}` of <{element}> is negative: write a value of zero or more")]
+    Negative {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: &'static str,
+    },
+    /// `settotalmass` with masses that are not known.
+    #[error("`settotalmass` needs all masses, and that of body `{body}` {why}: give the body an <inertial>")]
+    TotalMass {
+        /// The body.
+        body: String,
+        /// Why its mass is not known.
+        why: &'static str,
+    },
+    /// Nothing moves.
+    #[error("the model has no joint of type hinge or slide: give the MJCF of a robot that moves")]
+    NoMovingJoint,
+    /// More moving joints than a description may have.
+    #[error("the model has more than {limit} joints: fix those that the log does not hold")]
+    TooManyJoints {
+        /// The limit.
+        limit: usize,
+    },
+    /// The parts do not make a model.
+    #[error("{0}; fix the description")]
+    Model(#[from] ModelError),
+}

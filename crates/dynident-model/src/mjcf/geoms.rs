@@ -1,0 +1,212 @@
+//! `<geom>`: the mass and inertia of its solid, and its shape for collision checking.
+
+use super::classes::{Classes, MAIN, Stated};
+use super::compiler::Compiler;
+use super::expanded::Expanded;
+use super::fault::{MjcfError, MjcfFault};
+use super::orientation::{from_z, place};
+use crate::collision::{CollisionGeometry, CollisionShape};
+use crate::inertial::InertialParameters;
+use crate::spatial::{Mat3, Transform, Vec3};
+use core::f64::consts::PI;
+use std::collections::HashMap;
+
+/// Water: MuJoCo's density of a geom that states none, kg/m³.
+const DENSITY: f64 = 1000.0;
+
+/// The mass that a geom adds to its body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum GeomMass {
+    /// None: of a group that does not count, of mass zero, or a plane.
+    Nothing,
+    /// In the body's frame.
+    Known(InertialParameters),
+    /// There is some, and why it is not known.
+    Unknown(&'static str),
+}
+
+/// A geom, in its body's frame.
+pub(super) struct Geom {
+    pub(super) mass: GeomMass,
+    pub(super) shape: Option<CollisionShape>,
+}
+
+/// The meshes of `<asset>`: file and scale by name.
+pub(super) type Meshes = HashMap<String, (String, [f64; 3])>;
+
+/// The kinds of solid with half sizes or radius and half length.
+#[derive(Clone, Copy)]
+enum Solid {
+    Sphere,
+    Capsule,
+    Cylinder,
+    Box,
+    Ellipsoid,
+}
+
+/// All meshes with a file.
+pub(super) fn meshes<'t>(
+    document: &'t Expanded,
+    classes: &'t Classes<'t>,
+    compiler: &Compiler,
+) -> Result<Meshes, MjcfError> {
+    let mut found = Meshes::new();
+    for element in document.sections("asset").flat_map(|asset| document.children(asset)) {
+        let Some(file) = element.attribute("file").filter(|_| element.tag == "mesh") else { continue };
+        let stated = classes.stated(document, element, MAIN)?;
+        let stem = file.value.rsplit(['/', '\\']).next().unwrap_or(&file.value);
+        let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
+        let name = element.attribute("name").map_or(stem, |name| &name.value);
+        let folder = compiler.meshdir.trim_end_matches('/');
+        let path = if folder.is_empty() { file.value.clone() } else { format!("{folder}/{}", file.value) };
+        // A mesh that is moved in its own frame is no shape that can be placed by its file.
+        if stated.get("refpos").is_none() && stated.get("refquat").is_none() {
+            found.insert(name.to_owned(), (path, stated.numbers("scale")?.unwrap_or([1.0; 3])));
+        }
+    }
+    Ok(found)
+}
+
+/// A geom of a body; `body_from_frame` is where the `<frame>` around it stands.
+pub(super) fn geom(
+    stated: &Stated<'_>,
+    body_from_frame: &Transform,
+    compiler: &Compiler,
+    meshes: &Meshes,
+) -> Result<Geom, MjcfError> {
+    let kind = stated.get("type").map_or("sphere", |kind| kind.value.trim());
+    let group = stated.number("group")?.unwrap_or(0.0);
+    let (contype, conaffinity) = (stated.number("contype")?, stated.number("conaffinity")?);
+    let collides = contype != Some(0.0) || conaffinity != Some(0.0);
+    let mass = stated.size("mass")?;
+    let density = stated.size("density")?.unwrap_or(DENSITY);
+    let counts = compiler.groups[0] <= group && group <= compiler.groups[1];
+    let weighs = counts && mass.unwrap_or(density) != 0.0;
+    let unknown = |why, shape| Geom { mass: if weighs { GeomMass::Unknown(why) } else { GeomMass::Nothing }, shape };
+    let solid = match kind {
+        "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Nothing, shape: None }),
+        "mesh" => {
+            let known = stated.get("mesh").and_then(|mesh| meshes.get(&mesh.value)).filter(|_| collides);
+            let shape = match known {
+                Some((file, scale)) => Some(CollisionShape {
+                    placement: body_from_frame.then(&place(stated, compiler)?),
+                    geometry: CollisionGeometry::Mesh { file: file.clone(), scale: *scale },
+                }),
+                None => None,
+            };
+            return Ok(unknown("follows from a mesh", shape));
+        }
+        "sdf" => return Ok(unknown("follows from a signed distance field", None)),
+        _ if stated.get("mesh").is_some() => return Ok(unknown("follows from a solid fitted to a mesh", None)),
+        "sphere" => Solid::Sphere,
+        "capsule" => Solid::Capsule,
+        "cylinder" => Solid::Cylinder,
+        "box" => Solid::Box,
+        "ellipsoid" => Solid::Ellipsoid,
+        _ => {
+            let expected = "sphere, capsule, ellipsoid, cylinder, box, mesh, plane, hfield or sdf";
+            return Err(match stated.get("type") {
+                Some(attribute) => stated.word_fault(attribute, expected),
+                None => stated.fault(MjcfFault::MissingAttribute { element: "geom".to_owned(), attribute: "type" }),
+            });
+        }
+    };
+    let (frame_from_geom, size) = placed(stated, compiler, solid)?;
+    let placement = body_from_frame.then(&frame_from_geom);
+    let geometry = collides.then(|| shape(solid, size));
+    let shape = geometry.map(|geometry| CollisionShape { placement, geometry });
+    if stated.flag("shellinertia")? == Some(true) {
+        return Ok(unknown("follows from a shell", shape));
+    }
+    if !weighs {
+        return Ok(Geom { mass: GeomMass::Nothing, shape });
+    }
+    let mass = mass.unwrap_or_else(|| density * volume(solid, size));
+    let [x, y, z] = moments(solid, size, mass);
+    let at_com = Mat3([[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]);
+    let own = InertialParameters::from_centre_of_mass(mass, Vec3::ZERO, &at_com);
+    Ok(Geom { mass: GeomMass::Known(own.expressed_in(&placement)), shape })
+}
+
+/// Where the geom stands in its frame, and its half sizes (or radius and half length, the last of them zero).
+fn placed(stated: &Stated<'_>, compiler: &Compiler, solid: Solid) -> Result<(Transform, [f64; 3]), MjcfError> {
+    let given = stated.numbers_between("size", 1, 3)?.unwrap_or_default();
+    let mut size = [0.0; 3];
+    size[..given.len()].copy_from_slice(&given);
+    let (kind, needed) = match solid {
+        Solid::Sphere => ("sphere", 1),
+        Solid::Capsule => ("capsule", 2),
+        Solid::Cylinder => ("cylinder", 2),
+        Solid::Box => ("box", 3),
+        Solid::Ellipsoid => ("ellipsoid", 3),
+    };
+    let ends = stated.numbers::<6>("fromto")?.filter(|_| !matches!(solid, Solid::Sphere));
+    let transform = match ends {
+        Some([a, b, c, d, e, f]) => {
+            if stated.get("pos").is_some() {
+                return Err(stated.fault(MjcfFault::Both {
+                    element: "geom".to_owned(),
+                    first: "fromto",
+                    second: "pos",
+                }));
+            }
+            let (from, to) = (Vec3([a, b, c]), Vec3([d, e, f]));
+            let along = from - to;
+            size[1] = 0.5 * along.norm();
+            if matches!(solid, Solid::Box | Solid::Ellipsoid) {
+                (size[2], size[1]) = (size[1], size[0]);
+            }
+            let z = stated.unit(along, "fromto").map_err(|fault| stated.fault(fault))?;
+            Transform { rotation: from_z(z), translation: (from + to).scale(0.5) }
+        }
+        None => place(stated, compiler)?,
+    };
+    if size[..needed].iter().any(|&size| size <= 0.0) {
+        let place = stated.get("size").map_or(stated.place, |size| size.place);
+        return Err(stated.document.fault(place, MjcfFault::Size { kind, needed }));
+    }
+    Ok((transform, size))
+}
+
+/// m³.
+fn volume(solid: Solid, [a, b, c]: [f64; 3]) -> f64 {
+    match solid {
+        Solid::Sphere => 4.0 / 3.0 * PI * a * a * a,
+        Solid::Capsule => PI * a * a * (2.0 * b + 4.0 / 3.0 * a),
+        Solid::Cylinder => PI * a * a * 2.0 * b,
+        Solid::Box => 8.0 * a * b * c,
+        Solid::Ellipsoid => 4.0 / 3.0 * PI * a * b * c,
+    }
+}
+
+/// Principal moments about the centre of mass in the geom's axes, kg m².
+fn moments(solid: Solid, [a, b, c]: [f64; 3], mass: f64) -> [f64; 3] {
+    match solid {
+        Solid::Sphere => [0.4 * mass * a * a; 3],
+        Solid::Capsule => {
+            let length = 2.0 * b;
+            let ends = mass * 4.0 * a / (4.0 * a + 3.0 * length);
+            let middle = mass - ends;
+            // Two half balls, their centres of mass 3/8 of the radius beyond the ends.
+            let across = middle * (3.0 * a * a + length * length) / 12.0
+                + ends * (0.4 * a * a + length * (3.0 * a + 2.0 * length) / 8.0);
+            [across, across, 0.5 * middle * a * a + 0.4 * ends * a * a]
+        }
+        Solid::Cylinder => {
+            let across = mass * (3.0 * a * a + 4.0 * b * b) / 12.0;
+            [across, across, 0.5 * mass * a * a]
+        }
+        Solid::Box => [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| mass * sum / 3.0),
+        Solid::Ellipsoid => [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| mass * sum / 5.0),
+    }
+}
+
+fn shape(solid: Solid, [a, b, c]: [f64; 3]) -> CollisionGeometry {
+    match solid {
+        Solid::Sphere => CollisionGeometry::Sphere { radius_m: a },
+        Solid::Capsule => CollisionGeometry::Capsule { radius_m: a, length_m: 2.0 * b },
+        Solid::Cylinder => CollisionGeometry::Cylinder { radius_m: a, length_m: 2.0 * b },
+        // The box around an ellipsoid: checks against it are on the safe side.
+        Solid::Box | Solid::Ellipsoid => CollisionGeometry::Box { size_m: [2.0 * a, 2.0 * b, 2.0 * c] },
+    }
+}

@@ -1,0 +1,118 @@
+//! MJCF, MuJoCo's model format: reading and writing back.
+//!
+//! Read are nested bodies with `<inertial>` or geoms of simple solids, and joints of type hinge and slide, on a fixed
+//! base, with `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`, `damping` and `frictionloss`,
+//! effort limits of joints and actuators, and gravity. A body without joint is lumped into the one that carries it. A
+//! body whose mass follows from a mesh is unknown, never zero.
+//!
+//! A joint's anchor need not be the origin of its body. The frame of a link that moves with a joint has the axes of its
+//! MJCF body, and its origin at the anchor of the body's last hinge. Several joints in one body become a chain with
+//! bodies of zero mass between them, called `BODY/JOINT`.
+//!
+//! ```
+//! let text = r#"<mujoco model="pendulum"><compiler angle="radian"/>
+//!   <worldbody><body name="rod">
+//!     <joint name="swing" axis="0 1 0" pos="0 0 0.5" armature="0.01" damping="0.2"/>
+//!     <inertial pos="0 0 0" mass="2" diaginertia="0.1 0.1 0.001"/>
+//!   </body></worldbody></mujoco>"#;
+//! let robot = dynident_model::read_mjcf(text)?;
+//! assert_eq!((robot.model.dof(), robot.model.joints()[0].drive_inertia), (1, Some(0.01)));
+//! // Inertia about the hinge: 0.1 + 2 · 0.5².
+//! assert!((robot.model.inertials()[0].0[4] - 0.6).abs() < 1e-15);
+//! # Ok::<(), dynident_model::MjcfError>(())
+//! ```
+
+mod bodies;
+mod classes;
+mod compiler;
+mod drives;
+mod expanded;
+mod fault;
+mod files;
+mod geoms;
+mod inertials;
+mod joints;
+mod notices;
+mod orientation;
+mod values;
+mod write;
+
+pub use expanded::Include;
+pub(crate) use expanded::is_mjcf;
+pub use fault::{MjcfError, MjcfFault};
+pub use files::included_from;
+pub use notices::{Loss, MjcfNotice};
+pub use write::{MjcfWriteError, rewrite_mjcf};
+
+use crate::tree::Model;
+use bodies::{LinkPlace, Reader, Tree};
+use classes::Classes;
+use compiler::Compiler;
+use expanded::{Expanded, Place};
+use notices::Notices;
+use std::collections::HashSet;
+
+/// What an MJCF says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MjcfRobot {
+    /// The robot on a fixed base.
+    pub model: Model,
+    /// What the document says and the model does not hold, in the order of reading; at most 200 are kept.
+    pub notices: Vec<MjcfNotice>,
+}
+
+/// Reads an MJCF without `<include>`.
+///
+/// # Errors
+/// If the text is malformed XML, no MJCF, includes a file, or describes no tree of bodies on one fixed base; with line
+/// and column.
+#[doc(alias("mujoco"))]
+pub fn read_mjcf(text: &str) -> Result<MjcfRobot, MjcfError> {
+    read_mjcf_with(text, |_| Err("files are included only where the MJCF is read from a file".to_owned()))
+}
+
+/// Reads an MJCF; `include` gives the text of a file that an `<include>` names, or the reason why it cannot.
+///
+/// # Errors
+/// As [`read_mjcf`], and what `include` says; a fault in an included file names it.
+pub fn read_mjcf_with(
+    text: &str,
+    mut include: impl FnMut(&str) -> Result<String, String>,
+) -> Result<MjcfRobot, MjcfError> {
+    let document = Expanded::new(text, &mut include)?;
+    let found = read(&document)?;
+    Ok(MjcfRobot { model: found.model, notices: found.notices })
+}
+
+/// A document read, with the places of its bodies and joints.
+struct Found {
+    model: Model,
+    notices: Vec<MjcfNotice>,
+    compiler: Compiler,
+    links: Vec<LinkPlace>,
+    /// In the order of the model's joints.
+    joint_places: Vec<Place>,
+    /// Links that have mass which is not known.
+    unknown: HashSet<String>,
+}
+
+fn read(document: &Expanded) -> Result<Found, MjcfError> {
+    let compiler = Compiler::new(document)?;
+    let classes = Classes::new(document)?;
+    let meshes = geoms::meshes(document, &classes, &compiler)?;
+    let mut notices = Notices::default();
+    let mut tree = Reader::new(document, &classes, &compiler, &meshes, &mut notices).tree()?;
+    drives::efforts(document, &classes, &mut tree, &mut notices)?;
+    drives::couplings(document, &mut tree, &mut notices)?;
+    drives::tendons(document, &mut notices)?;
+    let gravity = drives::gravity(document, &mut notices)?;
+    let root = document.root();
+    if tree.joints.is_empty() {
+        return Err(document.fault(root.place, MjcfFault::NoMovingJoint));
+    }
+    let name = root.attribute("model").map_or("robot", |name| &name.value);
+    let Tree { joints, bodies, base, links, joint_places, unknown, .. } = tree;
+    let model = Model::new(name, base, joints, bodies).and_then(|model| model.with_gravity(gravity));
+    let model = model.map_err(|error| document.fault(root.place, MjcfFault::Model(error)))?;
+    Ok(Found { model, notices: notices.list, compiler, links, joint_places, unknown })
+}

@@ -1,0 +1,275 @@
+//! Writing identified values back into the user's own MJCF.
+//!
+//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change; every other byte stays.
+//! A body that is fixed to one with a joint gets an `<inertial>` without mass instead of none, for without any its
+//! geoms would weigh.
+
+use super::bodies::LinkPlace;
+use super::compiler::FromGeoms;
+use super::expanded::{Expanded, Include, Place};
+use super::fault::MjcfError;
+use super::{Found, read};
+use crate::inertial::InertialParameters;
+use crate::spatial::{Mat3, Transform, Vec3};
+use crate::urdf::{JointChange, LinkChange, MAX_MAGNITUDE};
+use crate::xml::MAX_NODES;
+use crate::xml::edit::{Source, comment_text, edited};
+use core::fmt::Write;
+use roxmltree::{Document, Node, ParsingOptions};
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use thiserror::Error;
+
+/// Why an MJCF could not be rewritten.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MjcfWriteError {
+    /// The original is not readable.
+    #[error(transparent)]
+    Original(#[from] MjcfError),
+    /// A change to something that the original does not hold.
+    #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
+    Unknown {
+        /// `body` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// Two changes to one body or joint.
+    #[error("two changes to {kind} `{name}`: give one")]
+    Repeated {
+        /// `body` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// Something that stands in an included file.
+    #[error("{kind} `{name}` stands in an included file, which is not rewritten: put the robot into one file")]
+    Included {
+        /// `body` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A value that is not finite, or beyond what a description may hold.
+    #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
+    NotFinite {
+        /// `body` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A body that MuJoCo refuses.
+    #[error(
+        "the new values of body `{body}` are those of no body with mass, which MuJoCo refuses: use physically consistent parameters"
+    )]
+    NotPhysical {
+        /// The body.
+        body: String,
+    },
+    /// Mass between two joints of one body.
+    #[error(
+        "`{link}` stands between two joints of one MJCF body and cannot hold mass there: write the joints into bodies of their own"
+    )]
+    Between {
+        /// The link.
+        link: String,
+    },
+    /// A setting of `<compiler>` by which MuJoCo would not take the values as they are written.
+    #[error("`{setting}` of <compiler> changes the masses that are written: {fix}")]
+    Compiler {
+        /// The attribute.
+        setting: &'static str,
+        /// What to do.
+        fix: &'static str,
+    },
+}
+
+/// `original` with the changes made and every other byte as it was: inertials in the links' frames, as
+/// [`read_mjcf`](super::read_mjcf) gives them, are written about the centre of mass in the axes of the `<body>`, every
+/// number in the shortest form that reads back to the same `f64`. `include` as for
+/// [`read_mjcf_with`](super::read_mjcf_with).
+///
+/// # Errors
+/// If the original is no MJCF, a body or joint is unknown, named twice or in an included file, or MuJoCo would not take
+/// the values or change them.
+pub fn rewrite_mjcf(
+    original: &str,
+    include: &mut Include<'_>,
+    links: &[LinkChange],
+    joints: &[JointChange],
+) -> Result<String, MjcfWriteError> {
+    let document = Expanded::new(original, include)?;
+    let found = read(&document)?;
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    // The same text has been parsed a moment ago.
+    let Ok(parsed) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
+    let nodes: HashMap<usize, Node<'_, '_>> =
+        parsed.descendants().filter(Node::is_element).map(|node| (node.range().start, node)).collect();
+    let source = Source::new(original);
+    let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+    let places: HashMap<&str, &LinkPlace> = found.links.iter().map(|link| (&*link.name, link)).collect();
+    if !links.is_empty() {
+        refuse_compiler(&found)?;
+    }
+    let mut seen = HashSet::new();
+    for (link, change) in all_changes(&found, links) {
+        let unknown = || MjcfWriteError::Unknown { kind: "body", name: link.to_owned() };
+        let place = places.get(link).ok_or_else(unknown)?;
+        if !seen.insert(link) {
+            return Err(MjcfWriteError::Repeated { kind: "body", name: link.to_owned() });
+        }
+        let Some(body) = place.body else {
+            match change {
+                Some((inertial, _)) if inertial != InertialParameters::ZERO => {
+                    return Err(MjcfWriteError::Between { link: link.to_owned() });
+                }
+                _ => continue,
+            }
+        };
+        let node = node_at(&nodes, body, "body", link)?;
+        let lines = match change {
+            Some((inertial, note)) => {
+                let body_from_link = Transform { rotation: Mat3::IDENTITY, translation: place.origin };
+                let own = if place.origin == Vec3::ZERO { inertial } else { inertial.expressed_in(&body_from_link) };
+                inertial_line(&found, link, &own, note)?
+            }
+            None => r#"<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>"#.to_owned(),
+        };
+        let lines = [(0, lines)];
+        match inertial_of(node) {
+            Some(old) if old.parent_element() == Some(node) => edits.push(source.replacement(old, &lines)),
+            old => {
+                edits.extend(old.map(|old| (source.with_own_line(old), String::new())));
+                edits.push(source.insertion_at_start(node, &lines));
+            }
+        }
+    }
+    let mut seen = HashSet::new();
+    for change in joints {
+        let unknown = || MjcfWriteError::Unknown { kind: "joint", name: change.joint.clone() };
+        let index = found.model.joint_index(&change.joint).ok_or_else(unknown)?;
+        if !seen.insert(&*change.joint) {
+            return Err(MjcfWriteError::Repeated { kind: "joint", name: change.joint.clone() });
+        }
+        let node = node_at(&nodes, found.joint_places[index], "joint", &change.joint)?;
+        drive(node, change, &mut edits)?;
+    }
+    Ok(edited(original, edits))
+}
+
+/// The new inertial of a link and a note on it; `None` for one without mass.
+type Change<'c> = Option<(InertialParameters, Option<&'c str>)>;
+
+/// The changes, and those that follow from them: a body whose mass follows from a mesh, and that is fixed to a changed
+/// one, has its mass in that one now.
+fn all_changes<'c>(found: &'c Found, links: &'c [LinkChange]) -> Vec<(&'c str, Change<'c>)> {
+    let mut all: Vec<(&str, Change<'_>)> = Vec::new();
+    for change in links {
+        match change {
+            LinkChange::Set { link, inertial, note } => {
+                all.push((link, Some((*inertial, note.as_deref()))));
+                let body = found.model.bodies().iter().find(|body| body.name() == link);
+                let fixed = body.into_iter().flat_map(|body| &body.links[1..]);
+                let weighs = fixed.filter(|fixed| found.unknown.contains(&fixed.name));
+                all.extend(weighs.map(|fixed| (&*fixed.name, None)));
+            }
+            LinkChange::Remove { link } => all.push((link, None)),
+        }
+    }
+    all
+}
+
+fn refuse_compiler(found: &Found) -> Result<(), MjcfWriteError> {
+    let refused = |setting, fix| Err(MjcfWriteError::Compiler { setting, fix });
+    if found.compiler.total_mass.is_some() {
+        return refused("settotalmass", "delete it");
+    }
+    if found.compiler.from_geoms == FromGeoms::Always {
+        return refused("inertiafromgeom", "write `auto`");
+    }
+    Ok(())
+}
+
+fn node_at<'a, 'input>(
+    nodes: &HashMap<usize, Node<'a, 'input>>,
+    place: Place,
+    kind: &'static str,
+    name: &str,
+) -> Result<Node<'a, 'input>, MjcfWriteError> {
+    let found = (place.source == 0).then(|| nodes.get(&place.at).copied()).flatten();
+    found.ok_or_else(|| MjcfWriteError::Included { kind, name: name.to_owned() })
+}
+
+/// The `<inertial>` of a body, perhaps inside `<frame>` elements.
+fn inertial_of<'a, 'input>(body: Node<'a, 'input>) -> Option<Node<'a, 'input>> {
+    let mut ahead: Vec<Node<'a, 'input>> = body.children().collect();
+    while let Some(node) = ahead.pop() {
+        match node.tag_name().name() {
+            "inertial" => return Some(node),
+            "frame" => ahead.extend(node.children()),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// `<inertial>` with a note as a comment in it.
+fn inertial_line(
+    found: &Found,
+    body: &str,
+    inertial: &InertialParameters,
+    note: Option<&str>,
+) -> Result<String, MjcfWriteError> {
+    if inertial.0.iter().any(|x| x.abs().is_nan() || x.abs() > MAX_MAGNITUDE) {
+        return Err(MjcfWriteError::NotFinite { kind: "body", name: body.to_owned() });
+    }
+    let not_physical = || MjcfWriteError::NotPhysical { body: body.to_owned() };
+    let (Some(com), Some(inertia), Some([a, b, c])) =
+        (inertial.com_m(), inertial.inertia_at_com(), inertial.principal_moments())
+    else {
+        return Err(not_physical());
+    };
+    let mass = inertial.mass_kg();
+    if com.0.iter().any(|x| x.abs() > MAX_MAGNITUDE) || !(mass > 0.0 && a > 0.0 && a + b >= c) {
+        return Err(not_physical());
+    }
+    if mass < found.compiler.bound_mass || a < found.compiler.bound_inertia {
+        let setting = if mass < found.compiler.bound_mass { "boundmass" } else { "boundinertia" };
+        return Err(MjcfWriteError::Compiler { setting, fix: "lower or delete it" });
+    }
+    let ([x, y, z], i) = (com.0, inertia.0);
+    let tag = format!(
+        r#"<inertial pos="{x:?} {y:?} {z:?}" mass="{mass:?}" fullinertia="{:?} {:?} {:?} {:?} {:?} {:?}""#,
+        i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]
+    );
+    Ok(match note {
+        Some(note) => format!("{tag}><!-- {} --></inertial>", comment_text(note)),
+        None => format!("{tag}/>"),
+    })
+}
+
+/// The attributes of one joint that change.
+fn drive(
+    node: Node<'_, '_>,
+    change: &JointChange,
+    edits: &mut Vec<(Range<usize>, String)>,
+) -> Result<(), MjcfWriteError> {
+    let values = [("damping", change.damping), ("frictionloss", change.friction), ("armature", change.drive_inertia)];
+    let mut new = String::new();
+    for (name, value) in values {
+        let Some(value) = value else { continue };
+        if !value.is_finite() {
+            return Err(MjcfWriteError::NotFinite { kind: "joint", name: change.joint.clone() });
+        }
+        match node.attribute_node(name) {
+            Some(old) => edits.push((old.range_value(), format!("{value:?}"))),
+            None => drop(write!(new, " {name}=\"{value:?}\"")),
+        }
+    }
+    if !new.is_empty() {
+        let at = node.range().start + "<joint".len();
+        edits.push((at..at, new));
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! Edits of a text that leave every other byte alone: elements replaced or put in, with the indentation around them.
+
+use roxmltree::Node;
+use std::ops::Range;
+
+/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays.
+pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
+    edits.sort_by_key(|(range, _)| range.start);
+    let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
+    let mut done = 0;
+    for (range, new) in edits {
+        text += &original[done..range.start];
+        text += &new;
+        done = range.end;
+    }
+    text += &original[done..];
+    text
+}
+
+/// A line of a new element, with its depth below the element's own indentation.
+pub(crate) type Line = (usize, String);
+
+/// XML allows neither two hyphens in a row nor control characters in a comment.
+pub(crate) fn comment_text(note: &str) -> String {
+    let mut text = String::with_capacity(note.len());
+    for c in note.chars() {
+        if c == '-' && text.ends_with('-') {
+            text.push(' ');
+        }
+        text.push(if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c });
+    }
+    text
+}
+
+/// The original text and how it breaks lines.
+pub(crate) struct Source<'a> {
+    pub(crate) text: &'a str,
+    pub(crate) eol: &'a str,
+}
+
+impl<'a> Source<'a> {
+    /// With the line ends that the text has.
+    pub(crate) fn new(text: &'a str) -> Self {
+        Self { text, eol: if text.contains("\r\n") { "\r\n" } else { "\n" } }
+    }
+}
+
+impl Source<'_> {
+    /// The white space before `at` on its line; `None` if something else stands there.
+    pub(crate) fn indentation(&self, at: usize) -> Option<&str> {
+        let start = self.text[..at].rfind('\n').map_or(0, |newline| newline + 1);
+        let prefix = &self.text[start..at];
+        prefix.chars().all(|c| c == ' ' || c == '\t').then_some(prefix)
+    }
+
+    /// By how much the children of `node` stand further in than `node`.
+    fn step(&self, node: Node<'_, '_>) -> String {
+        let own = self.indentation(node.range().start).unwrap_or("");
+        let child = node.children().find(Node::is_element).and_then(|child| self.indentation(child.range().start));
+        match child.and_then(|child| child.strip_prefix(own)) {
+            Some(step) if !step.is_empty() => step.to_owned(),
+            // Links are children of the root, so that their own indentation is one step.
+            _ if !own.is_empty() && node.parent_element().is_some_and(|parent| parent.has_tag_name("robot")) => {
+                own.to_owned()
+            }
+            _ => "  ".to_owned(),
+        }
+    }
+
+    fn joined(&self, lines: &[Line], indentation: &str, step: &str) -> String {
+        let separator = format!("{}{indentation}", self.eol);
+        let lines: Vec<String> = lines.iter().map(|(depth, line)| step.repeat(*depth) + line).collect();
+        lines.join(&separator)
+    }
+
+    fn compact(lines: &[Line]) -> String {
+        lines.iter().map(|(_, line)| line.as_str()).collect()
+    }
+
+    /// The new element in the old one's place; on one line if the old one was.
+    pub(crate) fn replacement(&self, old: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
+        let range = old.range();
+        let new = match self.indentation(range.start) {
+            Some(indentation) if self.text[range.clone()].contains('\n') => {
+                self.joined(lines, indentation, &self.step(old))
+            }
+            _ => Self::compact(lines),
+        };
+        (range, new)
+    }
+
+    /// The new element as the first child of `node`.
+    pub(crate) fn insertion_at_start(&self, node: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
+        let range = node.range();
+        let tag = &self.text[range.clone()];
+        let tag_end = range.start + start_tag_length(tag);
+        let empty = self.text[..tag_end].ends_with("/>");
+        let name = node.tag_name().name();
+        let Some(own) = self.indentation(range.start) else {
+            let new = Self::compact(lines);
+            return if empty { (tag_end - 2..tag_end, format!(">{new}</{name}>")) } else { (tag_end..tag_end, new) };
+        };
+        let step = self.step(node);
+        let inner = format!("{own}{step}");
+        let new = format!("{}{inner}{}", self.eol, self.joined(lines, &inner, &step));
+        if empty {
+            let kept = self.text[..tag_end - 2].trim_end().len();
+            return (kept..tag_end, format!(">{new}{}{own}</{name}>", self.eol));
+        }
+        // `<link name="a"></link>`: the end tag goes to a line of its own.
+        let closing = if self.text[tag_end..].starts_with("</") { format!("{}{own}", self.eol) } else { String::new() };
+        (tag_end..tag_end, new + &closing)
+    }
+
+    /// The element, and the line it stands on if it stands there alone.
+    pub(crate) fn with_own_line(&self, node: Node<'_, '_>) -> Range<usize> {
+        let range = node.range();
+        let Some(indentation) = self.indentation(range.start) else { return range };
+        let rest = self.text[range.end..].split('\n').next().unwrap_or("");
+        if !rest.trim().is_empty() {
+            return range;
+        }
+        let mut start = range.start - indentation.len();
+        for end in ['\n', '\r'] {
+            start -= usize::from(self.text[..start].ends_with(end));
+        }
+        start..range.end
+    }
+}
+
+/// Length of the start tag with which `element` begins: to the first `>` outside quotes.
+pub(crate) fn start_tag_length(element: &str) -> usize {
+    let mut quote = None;
+    for (at, byte) in element.bytes().enumerate() {
+        match (quote, byte) {
+            (None, b'>') => return at + 1,
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), byte) if open == byte => quote = None,
+            _ => {}
+        }
+    }
+    element.len()
+}

@@ -1,0 +1,44 @@
+//! What readers and writers of XML descriptions share: guards, numbers, and edits that leave every other byte alone.
+
+pub(crate) mod edit;
+mod flood;
+mod number;
+
+pub(crate) use flood::{flood, length_beside_elements};
+pub(crate) use number::{parse_number, shortened};
+
+/// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.
+pub(crate) const MAX_NODES: u32 = 2_000_000;
+
+/// Name of the root element of `text`, as far as it can be told without parsing the rest.
+pub(crate) fn root_name(text: &str) -> Option<&str> {
+    let mut rest = text;
+    loop {
+        rest = &rest[rest.find('<')?..];
+        match length_beside_elements(rest) {
+            Some(length) => rest = &rest[length..],
+            // A document type declaration; the parser refuses it.
+            None if rest.starts_with("<!") => rest = &rest[2..],
+            None => break,
+        }
+    }
+    let name = &rest[1..];
+    let end = name.find(|c: char| c.is_ascii_whitespace() || matches!(c, '>' | '/' | '<'));
+    Some(&name[..end.unwrap_or(name.len())])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::root_name;
+
+    #[test]
+    fn the_root_stands_behind_comments_and_instructions() {
+        assert_eq!(root_name("\u{feff}<?xml version='1.0'?>\n<!-- <robot> -->\n<mujoco model=\"a\">"), Some("mujoco"));
+        assert_eq!(root_name("<robot>"), Some("robot"));
+        assert_eq!(root_name("<mujoco/>"), Some("mujoco"));
+        assert_eq!(root_name("<!DOCTYPE a><b/>"), Some("b"));
+        for none in ["", "text", "<!--", "<?xml", "<!-- <a> "] {
+            assert_eq!(root_name(none), None, "{none}");
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Numbers as descriptions write them.
+
+/// A finite number in plain decimal or exponent notation; else what is wrong and what to write.
+pub(crate) fn parse_number(word: &str) -> Result<f64, (&'static str, &'static str)> {
+    const PLAIN: &str = "a plain number such as 0.25";
+    if word.contains(',') {
+        return Err(("not a number", "a dot for the decimal comma and spaces between numbers"));
+    }
+    // Rust also accepts `inf` and `nan`: only digits, signs, dots and exponents may pass.
+    let looks_numeric =
+        word.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'e' | b'E'));
+    match word.parse::<f64>() {
+        Ok(number) if looks_numeric && number.is_finite() => Ok(number),
+        Ok(_) => Err(("not finite", "a finite number")),
+        Err(_) => Err(("not a number", PLAIN)),
+    }
+}
+
+/// At most forty characters of foreign text, so that a message stays a line.
+pub(crate) fn shortened(text: &str) -> String {
+    let mut short: String = text.chars().take(40).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.chars().nth(40).is_some() {
+        short.push('…');
+    }
+    short
+}

@@ -1,0 +1,281 @@
+//! MJCF: rules of the format, what is refused, what is said. The torques of whole models are held against MuJoCo's in
+//! the tests of `dynident-dynamics`.
+
+use crate::common::{mutate, mutations};
+use dynident_model::mjcf::Loss;
+use dynident_model::{DescriptionFormat, JointKind, Mimic, audit, load_robot, read_mjcf, read_mjcf_with, rewrite_mjcf};
+use dynident_testing::{count, repository};
+use proptest::prelude::*;
+
+/// A document around the contents of a body that one hinge moves.
+fn with_body(contents: &str) -> String {
+    format!("<mujoco><worldbody><body name=\"b\"><joint name=\"j\"/>{contents}</body></worldbody></mujoco>")
+}
+
+#[test]
+fn faults_are_named_at_their_place() {
+    let ball = with_body("<joint name=\"k\" type=\"ball\"/>");
+    let cases: Vec<(String, &str)> = vec![
+        ("<mujoco/>".into(), "1:1: the model has no joint"),
+        ("<robot/>".into(), "1:1: the root element is <robot>, not <mujoco>"),
+        ("<mujoco>\n<worldbody>".into(), "2:12: malformed XML: the document ends too early"),
+        ("<!DOCTYPE a><mujoco/>".into(), "1:1: a document type declaration"),
+        (ball, "1:52: joint `k` of type ball is not supported: write it as three hinges"),
+        (with_body("<freejoint name=\"f\"/>"), "a floating base (joint `f` of type free) is not supported: delete"),
+        (with_body("<joint type=\"free\"/>"), "a floating base (joint without a name of type free)"),
+        (with_body("<joint name=\"j\"/>"), "joint `j` is defined a second time"),
+        (with_body("<body name=\"b\"/>"), "body `b` is defined a second time"),
+        (with_body("<joint axis=\"0 0 0\"/>"), "`axis` of <joint> gives no direction"),
+        (with_body("<joint axis=\"1 0\"/>"), "`axis` of <joint> holds 2 numbers: write 3"),
+        (with_body("<joint damping=\"nan\"/>"), "`damping` of <joint> holds `nan`, which is not finite"),
+        (with_body("<joint pos=\"1,2,3\"/>"), "`pos` of <joint> holds `1,2,3`, which is not a number"),
+        (with_body("<joint pos=\"1e10 0 0\"/>"), "too large for a robot"),
+        (with_body("<joint armature=\"-1\"/>"), "`armature` of <joint> is negative"),
+        (with_body("<joint class=\"light\"/>"), "class `light` is not defined"),
+        (with_body("<joint type=\"screw\"/>"), "`type` of <joint> is `screw`: write hinge or slide"),
+        (with_body("<body quat=\"0 0 0 0\"/>"), "`quat` of <body> gives no direction"),
+        (with_body("<body quat=\"1 0 0 0\" euler=\"0 0 1\"/>"), "<body> has both `quat` and `euler`: keep one"),
+        (with_body("<body xyaxes=\"1 0 0 2 0 0\"/>"), "`xyaxes` of <body> gives no direction"),
+        (with_body("<inertial mass=\"1\"/>"), "<inertial> has no attribute `pos`"),
+        (with_body("<inertial pos=\"0 0 0\"/>"), "<inertial> has no attribute `mass`"),
+        (with_body("<inertial pos=\"0 0 0\" mass=\"-1\"/>"), "`mass` of <inertial> is negative"),
+        (
+            with_body("<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\" fullinertia=\"1 1 1 0 0 0\"/>"),
+            "<inertial> has both `fullinertia` and `diaginertia`",
+        ),
+        (
+            with_body("<inertial pos=\"0 0 0\" mass=\"1\" euler=\"1 0 0\" fullinertia=\"1 1 1 0 0 0\"/>"),
+            "<inertial> has both `fullinertia` and `euler`",
+        ),
+        (
+            with_body("<inertial pos=\"0 0 0\" mass=\"1\"/><inertial pos=\"0 0 0\" mass=\"1\"/>"),
+            "body `b` has a second <inertial>",
+        ),
+        (with_body("<geom size=\"0\"/>"), "a geom of type `sphere` needs 1 positive numbers"),
+        (with_body("<geom type=\"box\" size=\"1 1\"/>"), "a geom of type `box` needs 3 positive numbers"),
+        (
+            with_body("<geom type=\"capsule\" size=\"1\" fromto=\"0 0 0 0 0 1\" pos=\"0 0 0\"/>"),
+            "<geom> has both `fromto` and `pos`",
+        ),
+        (with_body("<geom type=\"cone\" size=\"1\"/>"), "`type` of <geom> is `cone`"),
+        (with_body("<replicate count=\"3\"/>"), "<replicate> is not supported: save the model from MuJoCo"),
+        ("<mujoco><worldbody><inertial/></worldbody></mujoco>".into(), "the world has no inertia"),
+        ("<mujoco><worldbody><joint/></worldbody></mujoco>".into(), "a joint of the world is not supported"),
+        ("<mujoco><compiler angle=\"grad\"/></mujoco>".into(), "`angle` of <compiler> is `grad`: write degree or"),
+        ("<mujoco><compiler eulerseq=\"xyw\"/></mujoco>".into(), "`eulerseq` of <compiler> is `xyw`: write three"),
+        ("<mujoco><compiler coordinate=\"global\"/></mujoco>".into(), "coordinate=\"global\" is not supported: save"),
+        ("<mujoco><default class=\"a\"/></mujoco>".into(), "`class` of <default> is `a`: write `main`, or none"),
+        ("<mujoco><default><default/></default></mujoco>".into(), "<default> has no attribute `class`"),
+        (
+            "<mujoco><default><default class=\"a\"/><default class=\"a\"/></default></mujoco>".into(),
+            "default class `a` is defined a second time",
+        ),
+        ("<mujoco><include file=\"a.xml\"/></mujoco>".into(), "the included `a.xml` cannot be read: files are included"),
+        ("<mujoco><include/></mujoco>".into(), "<include> has no attribute `file`"),
+        (
+            with_body("").replace("</mujoco>", "<actuator><motor joint=\"k\"/></actuator></mujoco>"),
+            "<motor> names joint `k`, which is not defined",
+        ),
+        (
+            with_body("").replace("</mujoco>", "<equality><joint joint1=\"k\"/></equality></mujoco>"),
+            "<joint> names joint `k`, which is not defined",
+        ),
+        (
+            "<mujoco><compiler settotalmass=\"3\"/><worldbody><body name=\"b\"><joint/><geom type=\"mesh\" mesh=\"m\"/>\
+             </body></worldbody></mujoco>"
+                .into(),
+            "`settotalmass` needs all masses, and that of body `b` follows from a mesh",
+        ),
+    ];
+    for (text, fragment) in cases {
+        let message = read_mjcf(&text).expect_err(&text).to_string();
+        assert!(message.contains(fragment), "{text}\n{message}\nshould contain {fragment}");
+        assert!(message.starts_with(|c: char| c.is_ascii_digit()), "{message}");
+    }
+}
+
+#[test]
+fn included_files_stand_in_their_place_and_are_named_in_faults() {
+    let main = "<mujoco>\n  <include file=\"a.xml\"/>\n</mujoco>";
+    let mut files = |name: &str| match name {
+        "a.xml" => Ok("<mujocoinclude><worldbody>\n<include file=\"b.xml\"/></worldbody></mujocoinclude>".to_owned()),
+        "b.xml" => Ok("<mujoco><body><joint name=\"j\"/></body><body><joint name=\"k\"/></body></mujoco>".to_owned()),
+        _ => Err("no such file".to_owned()),
+    };
+    let model = read_mjcf_with(main, &mut files).unwrap().model;
+    let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
+    assert_eq!(names, ["j", "k"]);
+
+    let faulty = |name: &str| match name {
+        "a.xml" => Ok("<mujoco>\n <worldbody> <body> <joint axis=\"x\"/> </body></worldbody></mujoco>".to_owned()),
+        _ => Err("no such file".to_owned()),
+    };
+    let message = read_mjcf_with(main, faulty).unwrap_err().to_string();
+    assert!(message.starts_with("2:3: in the included `a.xml`, 2:34: `axis` of <joint> holds `x`"), "{message}");
+    let twice = |_: &str| Ok("<mujoco><include file=\"a.xml\"/></mujoco>".to_owned());
+    let message = read_mjcf_with(main, twice).unwrap_err().to_string();
+    assert!(message.contains("`a.xml` is included a second time"), "{message}");
+    let message = load_robot(repository("golden/mjcf/common/rules_options.xml")).unwrap_err().to_string();
+    assert!(message.contains("the root element is <mujocoinclude>"), "{message}");
+}
+
+#[test]
+fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
+    let text = r#"<mujoco><default><motor ctrlrange="-2 2"/></default><worldbody>
+      <body><joint name="motor"/><joint name="joint" actuatorfrcrange="-5 5"/><joint name="one-sided"/>
+        <joint name="servo"/><joint name="none"/><joint name="both"/><joint name="two"/></body></worldbody>
+      <actuator>
+        <motor joint="motor" gear="30"/> <motor joint="joint" gear="30"/>
+        <general joint="one-sided" ctrlrange="0 3"/>
+        <position joint="servo" ctrlrange="-1 1" forcerange="-7 7"/>
+        <velocity joint="none" ctrlrange="-1 1" forcelimited="false" forcerange="-1 1"/>
+        <motor joint="both" forcerange="-1.5 1.5"/>
+        <motor joint="two" gear="-1"/> <motor joint="two" gear="2"/>
+      </actuator></mujoco>"#;
+    let robot = read_mjcf(text).unwrap();
+    let efforts: Vec<Option<f64>> = robot.model.joints().iter().map(|joint| joint.limits.effort).collect();
+    // The default of motors is that of all actuators: `general` states its own, `velocity` is no force.
+    assert_eq!(efforts, [Some(60.0), Some(5.0), None, Some(7.0), None, Some(1.5), Some(6.0)]);
+    assert!(
+        matches!(&robot.notices[0].loss, Loss::OneSidedEffort { joint, high, .. } if joint == "`one-sided`" && *high == 3.0)
+    );
+    assert_eq!((robot.notices.len(), robot.notices[0].line), (1, 6));
+}
+
+#[test]
+fn a_line_of_equality_is_a_follower_and_more_is_said() {
+    let text = r#"<mujoco><compiler angle="radian"/><worldbody>
+      <body gravcomp="1"><joint name="a" ref="0.5"/><joint name="b" ref="-1"/><joint name="c" stiffness="3"/></body>
+      </worldbody>
+      <equality>
+        <joint joint1="a" joint2="b" polycoef="0.25 -2"/>
+        <joint joint1="c" joint2="b" polycoef="0 1 1"/>
+        <connect body1="x" body2="y"/>
+        <weld body1="x" active="false"/>
+      </equality>
+      <tendon><fixed name="t" stiffness="2"/><fixed name="u"/></tendon>
+      <option viscosity="0.1"/></mujoco>"#;
+    let robot = read_mjcf(text).unwrap();
+    // a - 0.5 = 0.25 - 2 (b + 1)
+    let follower = Mimic { source: "b".to_owned(), multiplier: -2.0, offset: -1.25 };
+    assert_eq!(robot.model.joints()[0].mimic, Some(follower));
+    assert!(robot.model.joints()[1..].iter().all(|joint| joint.mimic.is_none()));
+    let mut said: Vec<&str> = robot.notices.iter().map(|notice| notice.loss.name()).collect();
+    said.sort_unstable();
+    assert_eq!(said, ["constraint", "coupling-polynomial", "gravity-compensation", "medium", "spring", "tendon"]);
+}
+
+#[test]
+fn a_mass_by_a_mesh_is_unknown_and_said() {
+    let text =
+        with_body("<geom type=\"mesh\" mesh=\"m\"/><geom size=\"1\"/><body name=\"tip\"><geom size=\"0.1\"/></body>");
+    let robot = read_mjcf(&text).unwrap();
+    let body = &robot.model.bodies()[0];
+    assert!(body.links[0].inertial.is_none() && body.links[1].inertial.is_some());
+    assert!(matches!(&robot.notices[0].loss, Loss::UnknownMass { body, .. } if body == "b"));
+    // Weightless, of a group that does not count, or beside an <inertial>: nothing is missing.
+    for geom in ["mass=\"0\"", "density=\"0\"", "group=\"7\""] {
+        let text = with_body(&format!("<geom type=\"mesh\" mesh=\"m\" {geom}/><geom size=\"1\"/>"));
+        let robot = read_mjcf(&text).unwrap();
+        assert!(robot.notices.is_empty() && robot.model.inertials()[0].mass_kg() > 4000.0, "{geom}");
+    }
+    let text = with_body("<geom type=\"mesh\" mesh=\"m\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>");
+    assert!(read_mjcf(&text).unwrap().notices.is_empty());
+}
+
+#[test]
+fn several_joints_of_a_body_are_a_chain_and_misspelt_words_are_said() {
+    let text = r#"<mujoco model="m"><worldbody><body name="b"><joint name="x" type="slide" axis="1 0 0"/><joint rang="0 1"/>
+      <joint range="-90 90"/><geom size="1"/></body></worldbody></mujoco>"#;
+    let robot = read_mjcf(text).unwrap();
+    let model = &robot.model;
+    let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
+    assert_eq!(names, ["x", "b_joint", "b_joint3"]);
+    let kinds: Vec<JointKind> = model.joints().iter().map(|joint| joint.kind).collect();
+    assert_eq!(kinds, [JointKind::Prismatic, JointKind::Continuous, JointKind::Revolute]);
+    let bodies: Vec<(&str, f64)> =
+        model.bodies().iter().map(|body| (body.name(), body.prior().unwrap().mass_kg())).collect();
+    assert_eq!((bodies[0], bodies[1], bodies[2].0), (("b/x", 0.0), ("b/b_joint", 0.0), "b"));
+    let said: Vec<String> = robot.notices.iter().map(|notice| notice.loss.to_string()).collect();
+    assert_eq!(said, ["`rang` of <joint> was not read: misspelt?"]);
+}
+
+#[test]
+fn files_are_recognised_by_their_content() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["arm.xml", "arm.urdf", "arm.mjcf", "arm"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, with_body("<geom size=\"1\"/>")).unwrap();
+        assert_eq!(load_robot(&path).unwrap().format, DescriptionFormat::Mjcf, "{name}");
+    }
+    // The folder of the document counts, not that of the program.
+    std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\"arm.xml\"/></mujoco>").unwrap();
+    assert_eq!(load_robot(folder.path().join("main.xml")).unwrap().model.dof(), 1);
+    std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\"none.xml\"/></mujoco>").unwrap();
+    let message = load_robot(folder.path().join("main.xml")).unwrap_err().to_string();
+    assert!(message.contains("main.xml:1:9: the included `none.xml` cannot be read"), "{message}");
+    std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\".\"/></mujoco>").unwrap();
+    assert!(load_robot(folder.path().join("main.xml")).unwrap_err().to_string().contains("it is no file"));
+}
+
+const FILES: [&str; 4] = ["rules_orientations", "rules_joints", "rules_masses", "dm_control_finger"];
+
+fn text_of(name: &str) -> String {
+    std::fs::read_to_string(repository(&format!("golden/mjcf/{name}.xml"))).unwrap()
+}
+
+fn included(file: &str) -> Result<String, String> {
+    std::fs::read_to_string(repository("golden/mjcf").join(file)).map_err(|error| error.to_string())
+}
+
+#[test]
+fn every_truncation_is_refused() {
+    for name in FILES {
+        let text = text_of(name);
+        let end = text.trim_end().len();
+        for end in (0..end).filter(|&end| text.is_char_boundary(end)) {
+            assert!(read_mjcf_with(&text[..end], included).is_err(), "{name} to {end}");
+        }
+    }
+}
+
+const PIECES: [&str; 14] = [
+    "1e308",
+    "-",
+    "nan",
+    "0",
+    "\"",
+    "<",
+    "</body>",
+    "name=\"b\"",
+    "<frame>",
+    "<joint/>",
+    "é",
+    "<inertial/>",
+    " ",
+    "class=\"main\" ",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(1000, 20_000) as u32) })]
+
+    /// What is read after all is finite, can be audited, and can be rewritten without a change.
+    #[test]
+    fn a_mutated_mjcf_never_panics(
+        file in 0..FILES.len(),
+        mutations in mutations(),
+    ) {
+        let text = mutate(&text_of(FILES[file]), &mutations, &PIECES);
+        if let Ok(robot) = read_mjcf_with(&text, included) {
+            let model = &robot.model;
+            prop_assert!(model.parameter_vector().iter().all(|x| x.is_finite()));
+            audit(model);
+            prop_assert_eq!(&rewrite_mjcf(&text, &mut included, &[], &[]).unwrap(), &text);
+            let changes = dynident_model::link_changes(model, model.inertials()).unwrap();
+            if let Ok(written) = rewrite_mjcf(&text, &mut included, &changes, &[]) {
+                let again = read_mjcf_with(&written, included).unwrap().model;
+                prop_assert_eq!(again.joints(), model.joints());
+            }
+        }
+    }
+}

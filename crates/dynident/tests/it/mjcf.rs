@@ -1,0 +1,47 @@
+//! A robot that is described by an MJCF, from the log to the MJCF with identified values.
+
+use super::common::{Job, Motion, Random, Truth, header, repository, write_log};
+use dynident_model::{DescriptionFormat, load_robot};
+
+/// A UR5e with other masses and drives: the written MJCF holds the bodies and drives of the result, and the URDF beside
+/// it the same bodies.
+#[test]
+fn the_users_mjcf_gets_the_identified_values() {
+    let description = repository("golden/mjcf/robosuite_ur5e.xml");
+    let mut random = Random(5);
+    let truth = Truth::other(&description, &mut random);
+    let dof = truth.drive.len();
+    let folder = tempfile::tempdir().unwrap();
+    let motion = Motion::new(dof, 12);
+    write_log(&folder.path().join("log.csv"), &truth, &motion, (200.0, 15.0), &header(dof), |q, tau| {
+        let tau: Vec<f64> = tau.iter().map(|tau| tau + 0.05 * random.normal()).collect();
+        [q.to_vec(), tau].concat()
+    });
+    let study = format!(
+        "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\ndrive.drive_inertia = true\n[format]\ntime = {{ column = \"t\" }}\n\
+         position = {{ columns = \"q{{1..{dof}}}\" }}\ntorque = {{ columns = \"tau{{1..{dof}}}\" }}\n",
+        description.display().to_string(),
+    );
+    let found = Job::new(folder.path(), &study).identify();
+    let (mjcf, urdf) = (found.mjcf.expect("an MJCF"), found.urdf.expect("a URDF"));
+    assert!(found.table.is_none() && found.result.no_mjcf.is_none());
+    assert!(mjcf.starts_with("<!-- dynident "), "{}", &mjcf[..80]);
+    let mut sums = Vec::new();
+    for (name, text) in [("identified.xml", &mjcf), ("identified.urdf", &urdf)] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let robot = load_robot(&path).unwrap();
+        for (read, found) in robot.model.inertials().iter().zip(&found.inertials) {
+            let scale = found.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            // About the centre of mass and back: some ten roundings.
+            assert!((0..10).all(|k| (read.0[k] - found.0[k]).abs() <= 1e-12 * scale), "{name}: {read:?} {found:?}");
+        }
+        let is_mjcf = robot.format == DescriptionFormat::Mjcf;
+        let rotors: Vec<Option<f64>> = robot.model.joints().iter().map(|joint| joint.drive_inertia).collect();
+        assert!(rotors.iter().all(|rotor| rotor.is_some() == is_mjcf), "{name}: {rotors:?}");
+        sums.push(rotors.into_iter().flatten().sum::<f64>());
+    }
+    let terms = found.result.joints.iter().flat_map(|joint| &joint.terms).filter(|term| term.symbol.starts_with("Ia"));
+    let expected: f64 = terms.map(|term| term.value).sum();
+    assert!((sums[0] - expected).abs() < 1e-12 && expected > 0.0, "{sums:?} {expected}");
+}
