@@ -1,7 +1,7 @@
 # The program alone, for a machine without Rust. Nothing is fetched when it runs.
 #
 #   docker build --tag dynident .
-#   docker run --rm --network none --user "$(id -u):$(id -g)" --volume "$PWD:/work" dynident identify study.toml --out result
+#   docker run --rm --network none --user "$(id -u):$(id -g)" --volume "$PWD:/data" dynident identify study.toml --out result
 #
 # The first stage builds a static program for the machine's own processor.
 FROM rust:1.95-alpine AS build
@@ -18,6 +18,6 @@ COPY --from=build /source/target/dist/dynident /usr/local/bin/dynident
 COPY --from=build /source/LICENSE-MIT /source/LICENSE-APACHE /usr/share/doc/dynident/
 # Nobody: whoever mounts a folder to write into gives the owner's number by --user.
 USER 65534:65534
-WORKDIR /work
+WORKDIR /data
 ENTRYPOINT ["/usr/local/bin/dynident"]
 CMD ["--help"]
