@@ -71,7 +71,7 @@ fn help_tells_the_path_and_needs_no_arguments() {
     assert_eq!(ran.status, 0);
     for step in [
         "1. dynident inspect",
-        "2. write study.toml",
+        "2. dynident new",
         "3. dynident check",
         "4. dynident identify",
         "5. dynident validate",
@@ -80,7 +80,7 @@ fn help_tells_the_path_and_needs_no_arguments() {
         assert!(ran.stdout.contains(step), "{}", ran.stdout);
     }
     assert!(run_in(&broken(), &["--version"]).stdout.starts_with("dynident "));
-    for name in ["inspect", "evaluate", "design", "check", "identify", "validate"] {
+    for name in ["inspect", "log", "new", "evaluate", "design", "check", "identify", "validate", "export"] {
         assert_eq!(run_in(&broken(), &[name, "--help"]).status, 0);
     }
 }
