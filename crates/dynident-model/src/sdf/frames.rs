@@ -1,0 +1,84 @@
+//! Where every frame stands in the model.
+
+use super::fault::{SdfError, SdfFault, fault_at};
+use super::scopes::{Kind, Scopes, WORLD, full_name};
+use super::values::placement;
+use crate::spatial::Transform;
+use std::collections::HashMap;
+
+/// Places of frames by their full names.
+pub(super) struct Frames {
+    model_from: HashMap<String, Transform>,
+}
+
+impl Frames {
+    /// Follows every pose to the model's frame.
+    pub(super) fn new(found: &Scopes<'_, '_>) -> Result<Self, SdfError> {
+        let mut model_from = HashMap::from([(String::new(), Transform::IDENTITY)]);
+        for start in 0..found.items.len() {
+            // From this frame towards one whose place is known, then back.
+            let mut chain: Vec<usize> = Vec::new();
+            let mut at = start;
+            while !model_from.contains_key(&found.items[at].name) {
+                let item = &found.items[at];
+                if chain.contains(&at) {
+                    return Err(fault_at(item.node, SdfFault::FrameLoop { name: item.name.clone() }));
+                }
+                chain.push(at);
+                if model_from.contains_key(&item.relative_to) {
+                    break;
+                }
+                at = *found.by_name.get(&item.relative_to).ok_or_else(|| {
+                    let of = format!("the pose of `{}`", item.name);
+                    fault_at(item.node, SdfFault::UnknownFrame { name: item.relative_to.clone(), of })
+                })?;
+            }
+            for &index in chain.iter().rev() {
+                let item = &found.items[index];
+                let place = model_from[&item.relative_to].then(&placement(item.node)?);
+                model_from.insert(item.name.clone(), place);
+            }
+        }
+        Ok(Self { model_from })
+    }
+
+    /// `model_from_frame` by full name; the empty one is the model itself.
+    pub(super) fn of(&self, name: &str) -> Option<Transform> {
+        self.model_from.get(name).copied()
+    }
+}
+
+/// The link that a frame moves with, by full name; `None` for the world, and for the model's own frame.
+pub(super) fn link_behind(found: &Scopes<'_, '_>, name: &str) -> Option<Option<usize>> {
+    let mut name = name.to_owned();
+    // No chain of frames is longer than their number.
+    for _ in 0..=found.items.len() {
+        if name.is_empty() || name == WORLD {
+            return Some(None);
+        }
+        let index = *found.by_name.get(&name)?;
+        let item = &found.items[index];
+        name = match item.kind {
+            Kind::Link => return Some(Some(index)),
+            Kind::Joint => full_name(&item.scope, super::values::required_text(item.node, "child").ok()?),
+            Kind::Frame => {
+                let attached = item.node.attribute("attached_to").filter(|frame| !frame.is_empty());
+                full_name(&item.scope, attached.unwrap_or(super::scopes::MODEL))
+            }
+            // A nested model moves with its first link, or the one that it names.
+            Kind::Nested => {
+                let inner = format!("{}::", item.name);
+                match item.node.attribute("canonical_link").filter(|link| !link.is_empty()) {
+                    Some(link) => full_name(&inner, link),
+                    None => {
+                        let is_inside = |other: &&super::scopes::Item<'_, '_>| {
+                            other.kind == Kind::Link && other.name.starts_with(&inner)
+                        };
+                        found.items.iter().find(is_inside)?.name.clone()
+                    }
+                }
+            }
+        };
+    }
+    None
+}
