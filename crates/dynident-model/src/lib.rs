@@ -65,6 +65,7 @@ mod spatial;
 pub mod terms;
 mod tree;
 pub mod urdf;
+mod xacro;
 mod xml;
 
 pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};

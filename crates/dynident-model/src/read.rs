@@ -6,6 +6,7 @@ use crate::place::line_and_column;
 use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
+use crate::xacro::{has_macros, written_out};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -36,7 +37,7 @@ pub struct Robot {
     pub format: DescriptionFormat,
     /// The file.
     pub path: PathBuf,
-    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes.
+    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes; of macros what they write out.
     pub text: String,
     /// Elements of a URDF that were not read.
     pub unread: Vec<UnreadElement>,
@@ -94,6 +95,14 @@ pub enum ReadError {
         /// What to do.
         fix: &'static str,
     },
+    /// The program that writes out macros says that it cannot.
+    #[error("{}: xacro cannot write it out: {reason}; fix what it names, or give the URDF", path.display())]
+    Xacro {
+        /// The file.
+        path: PathBuf,
+        /// What the program says.
+        reason: String,
+    },
     /// The URDF is faulty.
     #[error("{}:{source}", path.display())]
     Urdf {
@@ -130,6 +139,7 @@ pub enum ReadError {
 
 /// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF
 /// if its root element is `<mujoco>`, as SDF if it is `<sdf>`, else as URDF. Files that an MJCF includes are looked for from its folder.
+/// A file with macros is written out by the program `xacro` where that is installed.
 ///
 /// # Errors
 /// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the
@@ -143,9 +153,14 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     if let Some((what, fix)) = other_kind(&bytes, extension.as_deref()) {
         return Err(ReadError::NoDescription { path: named(), what, fix });
     }
-    let text = decode(bytes, path)?;
+    let mut text = decode(bytes, path)?;
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(ReadError::Empty { path: named() });
+    }
+    if has_macros(&text)
+        && let Some(written_out) = written_out(path)?
+    {
+        text = written_out;
     }
     let is_xml = match extension.as_deref() {
         Some("urdf" | "xml" | "xacro" | "mjcf" | "sdf" | "world") => true,

@@ -54,6 +54,12 @@ pub enum SdfFault {
         /// Worlds or models.
         what: &'static str,
     },
+    /// More links, joints and frames than a robot has.
+    #[error("the model has more than {limit} links, joints and frames: give the SDF of one robot")]
+    TooMany {
+        /// The limit.
+        limit: usize,
+    },
     /// Models nested deeper than a robot's.
     #[error("models are nested more than {limit} deep: give the SDF of one robot")]
     TooDeep {

@@ -1,9 +1,10 @@
 //! Where every frame stands in the model.
 
 use super::fault::{SdfError, SdfFault, fault_at};
-use super::scopes::{Kind, Scopes, WORLD, full_name};
-use super::values::placement;
+use super::scopes::{Item, Kind, MODEL, Scopes, WORLD, full_name};
+use super::values::{placement, required_text};
 use crate::spatial::Transform;
+use roxmltree::Node;
 use std::collections::HashMap;
 
 /// Places of frames by their full names.
@@ -18,10 +19,11 @@ impl Frames {
         for start in 0..found.items.len() {
             // From this frame towards one whose place is known, then back.
             let mut chain: Vec<usize> = Vec::new();
+            let mut is_on_chain = vec![false; found.items.len()];
             let mut at = start;
             while !model_from.contains_key(&found.items[at].name) {
                 let item = &found.items[at];
-                if chain.contains(&at) {
+                if core::mem::replace(&mut is_on_chain[at], true) {
                     return Err(fault_at(item.node, SdfFault::FrameLoop { name: item.name.clone() }));
                 }
                 chain.push(at);
@@ -48,37 +50,37 @@ impl Frames {
     }
 }
 
-/// The link that a frame moves with, by full name; `None` for the world, and for the model's own frame.
+/// The link that a frame moves with, by full name, or nothing for the world; `None` where a name leads nowhere.
 pub(super) fn link_behind(found: &Scopes<'_, '_>, name: &str) -> Option<Option<usize>> {
     let mut name = name.to_owned();
     // No chain of frames is longer than their number.
     for _ in 0..=found.items.len() {
-        if name.is_empty() || name == WORLD {
+        if name == WORLD {
             return Some(None);
+        }
+        if name.is_empty() {
+            name = canonical_link(found, found.model, "")?;
         }
         let index = *found.by_name.get(&name)?;
         let item = &found.items[index];
         name = match item.kind {
             Kind::Link => return Some(Some(index)),
-            Kind::Joint => full_name(&item.scope, super::values::required_text(item.node, "child").ok()?),
+            Kind::Joint => full_name(&item.scope, required_text(item.node, "child").ok()?),
             Kind::Frame => {
                 let attached = item.node.attribute("attached_to").filter(|frame| !frame.is_empty());
-                full_name(&item.scope, attached.unwrap_or(super::scopes::MODEL))
+                full_name(&item.scope, attached.unwrap_or(MODEL))
             }
-            // A nested model moves with its first link, or the one that it names.
-            Kind::Nested => {
-                let inner = format!("{}::", item.name);
-                match item.node.attribute("canonical_link").filter(|link| !link.is_empty()) {
-                    Some(link) => full_name(&inner, link),
-                    None => {
-                        let is_inside = |other: &&super::scopes::Item<'_, '_>| {
-                            other.kind == Kind::Link && other.name.starts_with(&inner)
-                        };
-                        found.items.iter().find(is_inside)?.name.clone()
-                    }
-                }
-            }
+            Kind::Nested => canonical_link(found, item.node, &format!("{}::", item.name))?,
         };
     }
     None
+}
+
+/// The link that a model's own frame moves with: the one that it names, or its first.
+fn canonical_link(found: &Scopes<'_, '_>, model: Node<'_, '_>, inner: &str) -> Option<String> {
+    if let Some(link) = model.attribute("canonical_link").filter(|link| !link.is_empty()) {
+        return Some(full_name(inner, link));
+    }
+    let of_model = |item: &&Item<'_, '_>| item.kind == Kind::Link && item.name.starts_with(inner);
+    found.items.iter().find(of_model).map(|item| item.name.clone())
 }

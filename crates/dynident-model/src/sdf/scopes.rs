@@ -10,6 +10,8 @@ use std::collections::HashMap;
 pub(super) const MODEL: &str = "__model__";
 /// What the base stands on.
 pub(super) const WORLD: &str = "world";
+/// Most links, joints, frames and nested models: some steps compare each with each.
+const MOST_ITEMS: usize = 5000;
 /// Most models in each other.
 const MOST_NESTED: usize = 20;
 
@@ -37,6 +39,8 @@ pub(super) struct Item<'a, 'input> {
 /// All of them, in the order of the document, with their places by name.
 pub(super) struct Scopes<'a, 'input> {
     pub(super) version: Version,
+    /// The outermost model.
+    pub(super) model: Node<'a, 'input>,
     pub(super) items: Vec<Item<'a, 'input>>,
     pub(super) by_name: HashMap<String, usize>,
 }
@@ -54,7 +58,7 @@ pub(super) fn full_name(scope: &str, name: &str) -> String {
 
 /// Collects `model` and what is nested in it.
 pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> Result<Scopes<'a, 'input>, SdfError> {
-    let mut found = Scopes { version, items: Vec::new(), by_name: HashMap::new() };
+    let mut found = Scopes { version, model, items: Vec::new(), by_name: HashMap::new() };
     // Models still to look through, innermost last; each is looked through before what follows it.
     let mut ahead = vec![(model, String::new(), 0)];
     while let Some((model, scope, depth)) = ahead.pop() {
@@ -70,6 +74,9 @@ pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> R
                 "model" => Kind::Nested,
                 _ => continue,
             };
+            if found.items.len() == MOST_ITEMS {
+                return Err(fault_at(node, SdfFault::TooMany { limit: MOST_ITEMS }));
+            }
             let name = format!("{scope}{}", word_of(node, "name")?);
             let relative_to = full_name(&scope, relative_to(node, kind, version)?);
             if found.by_name.insert(name.clone(), found.items.len()).is_some() {
@@ -93,7 +100,13 @@ fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&
         return Ok(stated);
     }
     Ok(match kind {
-        Kind::Joint => required_text(node, "child")?,
+        Kind::Joint => match required_text(node, "child")? {
+            WORLD => {
+                let what = format!("joint `{}` with the world as its child", word_of(node, "name")?);
+                return Err(fault_at(node, SdfFault::Unsupported { what, fix: "exchange <parent> and <child>" }));
+            }
+            child => child,
+        },
         Kind::Frame => node.attribute("attached_to").filter(|frame| !frame.is_empty()).unwrap_or(MODEL),
         Kind::Link | Kind::Nested => MODEL,
     })

@@ -164,11 +164,11 @@ fn connections<'s, 'a, 'input>(
             })
         };
         let (parent, child) = (end("parent")?, end("child")?);
-        let fixed_to_world = || SdfFault::Unsupported {
-            what: format!("joint `{}` with the world as its child", item.name),
-            fix: "exchange <parent> and <child>",
-        };
-        let child = child.ok_or_else(|| fault_at(item.node, fixed_to_world()))?;
+        // A child may be a frame of the world.
+        let child = child.ok_or_else(|| {
+            let what = format!("joint `{}` whose child does not move", item.name);
+            fault_at(item.node, SdfFault::Unsupported { what, fix: "name the link that moves in <child>" })
+        })?;
         if parent == Some(child) {
             let link = found.items[child].name.clone();
             return Err(fault_at(item.node, SdfFault::SameLink { joint: item.name.clone(), link }));
