@@ -138,8 +138,8 @@ pub enum ReadError {
 }
 
 /// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF
-/// if its root element is `<mujoco>`, as SDF if it is `<sdf>`, else as URDF. Files that an MJCF includes are looked for from its folder.
-/// A file with macros is written out by the program `xacro` where that is installed.
+/// if its root element is `<mujoco>`, as SDF if it is `<sdf>`, else as URDF. Files that an MJCF includes are looked for
+/// from its folder. A file with macros is written out by the program `xacro` where that is installed.
 ///
 /// # Errors
 /// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the

@@ -50,13 +50,22 @@ impl Frames {
     }
 }
 
-/// The link that a frame moves with, by full name, or nothing for the world; `None` where a name leads nowhere.
-pub(super) fn link_behind(found: &Scopes<'_, '_>, name: &str) -> Option<Option<usize>> {
+/// What a frame moves with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Carrier {
+    /// Nothing: it stands still.
+    World,
+    /// A link, by its place among the items.
+    Link(usize),
+}
+
+/// What a frame moves with, by full name; `None` where a name leads nowhere.
+pub(super) fn carrier(found: &Scopes<'_, '_>, name: &str) -> Option<Carrier> {
     let mut name = name.to_owned();
     // No chain of frames is longer than their number.
     for _ in 0..=found.items.len() {
         if name == WORLD {
-            return Some(None);
+            return Some(Carrier::World);
         }
         if name.is_empty() {
             name = canonical_link(found, found.model, "")?;
@@ -64,7 +73,7 @@ pub(super) fn link_behind(found: &Scopes<'_, '_>, name: &str) -> Option<Option<u
         let index = *found.by_name.get(&name)?;
         let item = &found.items[index];
         name = match item.kind {
-            Kind::Link => return Some(Some(index)),
+            Kind::Link => return Some(Carrier::Link(index)),
             Kind::Joint => full_name(&item.scope, required_text(item.node, "child").ok()?),
             Kind::Frame => {
                 let attached = item.node.attribute("attached_to").filter(|frame| !frame.is_empty());

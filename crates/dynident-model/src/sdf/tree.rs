@@ -3,16 +3,17 @@
 use super::axes::{Axis, axis};
 use super::elements::{inertial, shapes};
 use super::fault::{SdfError, SdfFault, fault_at};
-use super::frames::{Frames, link_behind};
+use super::frames::{Carrier, Frames, carrier};
 use super::notices::Notices;
 use super::scopes::{Item, Kind, Scopes, WORLD, full_name, note_includes};
 use super::values::{required_text, word_of};
+use crate::inertial::InertialParameters;
 use crate::joint::Joint;
 use crate::spatial::Transform;
 use crate::tree::{Body, Link};
 use crate::urdf::MAX_MOVING_JOINTS;
 use crate::xml::shortened;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The parts of the model.
 pub(super) struct Tree {
@@ -24,7 +25,7 @@ pub(super) struct Tree {
 /// A joint between two links, or the world and a link.
 struct Connection<'s, 'a, 'input> {
     item: &'s Item<'a, 'input>,
-    parent: Option<usize>,
+    parent: Carrier,
     child: usize,
     /// `None` for a fixed joint.
     axis: Option<Axis>,
@@ -41,10 +42,10 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     let connections = connections(found, frames, notices)?;
 
     // Who carries whom.
-    let mut carrier: HashMap<usize, usize> = HashMap::new();
-    let mut under: HashMap<Option<usize>, Vec<usize>> = HashMap::new();
+    let mut carried_by: HashMap<usize, usize> = HashMap::new();
+    let mut under: HashMap<Carrier, Vec<usize>> = HashMap::new();
     for (number, connection) in connections.iter().enumerate() {
-        if let Some(first) = carrier.insert(connection.child, number) {
+        if let Some(first) = carried_by.insert(connection.child, number) {
             let fault = SdfFault::TwoParents {
                 link: found.items[connection.child].name.clone(),
                 first: connections[first].item.name.clone(),
@@ -55,8 +56,8 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
         under.entry(connection.parent).or_default().push(number);
     }
     // The world carries everything, or one link does.
-    let mut roots = links.iter().copied().filter(|link| !carrier.contains_key(link));
-    let root = match (under.contains_key(&None), roots.next(), roots.next()) {
+    let mut roots = links.iter().copied().filter(|link| !carried_by.contains_key(link));
+    let root = match (under.contains_key(&Carrier::World), roots.next(), roots.next()) {
         (true, None, _) => None,
         (false, Some(only), None) => Some(only),
         (true, Some(second), _) => return Err(several(found, (WORLD, second))),
@@ -73,13 +74,13 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
         let moved = |shape: &mut crate::collision::CollisionShape| shape.placement = shift.then(&shape.placement);
         let mut collision = shapes(item.node);
         collision.iter_mut().for_each(moved);
+        let stays = shift == Transform::IDENTITY;
         // What stands still may be unknown.
         let mut unheard = Notices::default();
         let notices = if moves { &mut *notices } else { &mut unheard };
-        let inertial = inertial(item, notices)?.map(|inertial| match shift == Transform::IDENTITY {
-            true => inertial,
-            false => inertial.expressed_in(&shift),
-        });
+        // Exact numbers stay exact where nothing is shifted.
+        let shifted = |inertial: InertialParameters| if stays { inertial } else { inertial.expressed_in(&shift) };
+        let inertial = inertial(item, notices)?.map(shifted);
         Ok::<Link, SdfError>(Link { name: item.name.clone(), placement: body_from_link, inertial, collision })
     };
     let model_from_link = |index: usize| frames.of(&found.items[index].name).unwrap_or(Transform::IDENTITY);
@@ -91,18 +92,18 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
         None => world(),
     };
     let mut tree = Tree { base: Body { links: vec![base] }, joints: Vec::new(), bodies: Vec::new() };
-    let mut reached: Vec<usize> = root.into_iter().collect();
-    // Joints still to visit, with the body that carries their parent link and its place. A stack, not recursion: a chain
-    // may be as long as the file.
+    let mut reached: HashSet<usize> = root.into_iter().collect();
+    // Joints still to visit, with the body that carries their parent link and its place. A stack, not recursion: a
+    // chain may be as long as the file.
     let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
-    let visit_later = |ahead: &mut Vec<_>, link: Option<usize>, body: Option<usize>, model_from_body: Transform| {
+    let visit_later = |ahead: &mut Vec<_>, link: Carrier, body: Option<usize>, model_from_body: Transform| {
         let below = under.get(&link).map_or(&[][..], Vec::as_slice);
         ahead.extend(below.iter().rev().map(|&joint| (joint, body, model_from_body)));
     };
-    visit_later(&mut ahead, root, None, Transform::IDENTITY);
+    visit_later(&mut ahead, root.map_or(Carrier::World, Carrier::Link), None, Transform::IDENTITY);
     while let Some((number, body, model_from_body)) = ahead.pop() {
         let Connection { item, child, axis, .. } = &connections[number];
-        reached.push(*child);
+        reached.insert(*child);
         let link_place = model_from_link(*child);
         if let Some(axis) = axis {
             let joint_place = frames.of(&item.name).unwrap_or(link_place);
@@ -124,12 +125,12 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
             }
             let shift = place.inverse().then(&link_place);
             tree.bodies.push(Body { links: vec![link_at(*child, Transform::IDENTITY, shift, true)?] });
-            visit_later(&mut ahead, Some(*child), Some(tree.bodies.len() - 1), place);
+            visit_later(&mut ahead, Carrier::Link(*child), Some(tree.bodies.len() - 1), place);
         } else {
             let placement = model_from_body.inverse().then(&link_place);
             let link = link_at(*child, placement, Transform::IDENTITY, body.is_some())?;
             body.map_or(&mut tree.base, |body| &mut tree.bodies[body]).links.push(link);
-            visit_later(&mut ahead, Some(*child), body, model_from_body);
+            visit_later(&mut ahead, Carrier::Link(*child), body, model_from_body);
         }
     }
     if let Some(lost) = links.iter().find(|link| !reached.contains(link)) {
@@ -155,21 +156,23 @@ fn connections<'s, 'a, 'input>(
 ) -> Result<Vec<Connection<'s, 'a, 'input>>, SdfError> {
     let mut connections = Vec::new();
     for item in found.items.iter().filter(|item| item.kind == Kind::Joint) {
-        let end = |which: &'static str| -> Result<Option<usize>, SdfError> {
+        let end = |which: &'static str| -> Result<Carrier, SdfError> {
             let written = required_text(item.node, which)?;
             let name = if written == WORLD { WORLD.to_owned() } else { full_name(&item.scope, written) };
-            link_behind(found, &name).ok_or_else(|| {
+            carrier(found, &name).ok_or_else(|| {
                 let of = format!("<{which}> of joint `{}`", item.name);
                 fault_at(item.node, SdfFault::UnknownFrame { name: written.to_owned(), of })
             })
         };
         let (parent, child) = (end("parent")?, end("child")?);
-        // A child may be a frame of the world.
-        let child = child.ok_or_else(|| {
+        let Carrier::Link(child) = child else {
             let what = format!("joint `{}` whose child does not move", item.name);
-            fault_at(item.node, SdfFault::Unsupported { what, fix: "name the link that moves in <child>" })
-        })?;
-        if parent == Some(child) {
+            return Err(fault_at(
+                item.node,
+                SdfFault::Unsupported { what, fix: "name the link that moves in <child>" },
+            ));
+        };
+        if parent == Carrier::Link(child) {
             let link = found.items[child].name.clone();
             return Err(fault_at(item.node, SdfFault::SameLink { joint: item.name.clone(), link }));
         }
