@@ -5,6 +5,7 @@ the one that the same samples as CSV give, and the C that is written to compile.
 """
 import csv
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -45,10 +46,26 @@ def bag(table, folder, storage):
                 writer.write(other, recorded, types.serialize_cdr(temperature(data=40.0), temperature.__msgtype__))
 
 
-def called(*command):
-    ended = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+def called(*command, path=None):
+    environment = os.environ | ({"PATH": path} if path else {})
+    ended = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment)
     assert ended.returncode == 0, f"{command}\n{ended.stdout}{ended.stderr}"
     return ended.stdout
+
+
+def with_macros(dynident, scratch):
+    """The robot as xacro, which the program of that name writes out; it stands beside the Python that runs this."""
+    macros = scratch / "arm.urdf.xacro"
+    text = pathlib.Path(ROBOT).read_text()
+    begin = text.index("<robot")
+    end = text.index(">", begin)
+    head = text[begin:end] + ' xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="lift" value="shoulder_lift"/>'
+    macros.write_text(text[:begin] + head + text[end + 1 :].replace("shoulder_lift_joint", "${lift}_joint"))
+    assert "${lift}_joint" in macros.read_text()
+    path = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    seen = [json.loads(called(dynident, "inspect", robot, "--json", path=path)) for robot in (ROBOT, macros)]
+    for key in ["joints", "bodies", "base_parameters", "moving_mass_kg"]:
+        assert seen[0][key] == seen[1][key], key
 
 
 def parameters(result):
@@ -81,6 +98,7 @@ def main(dynident, scratch):
     assert bagged.keys() == plain.keys(), bagged.keys() ^ plain.keys()
     far = max(abs(bagged[name][0] - value) / std for name, (value, std) in plain.items())
     assert far < SAME_STD, f"{far} standard deviations from the model of the CSV"
+    with_macros(dynident, scratch)
     print(f"{len(plain)} parameters, at most {far:.1e} standard deviations from those of the CSV")
 
 

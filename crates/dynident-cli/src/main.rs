@@ -50,7 +50,7 @@ struct Common {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Read and audit a robot description (URDF, MJCF, or D-H table in TOML).
+    /// Read and audit a robot description (URDF, MJCF, SDF, or D-H table in TOML).
     Inspect(commands::inspect::Options),
     /// What a recording holds: format, channels with rates and ranges, and how a study could begin.
     Log(commands::log::Options),

@@ -8,7 +8,7 @@
 //! | task | take |
 //! | --- | --- |
 //! | read a robot from a file | [`load_robot`]: URDF, MJCF or Denavit-Hartenberg table |
-//! | read it from a text | [`read_urdf`], [`read_mjcf`], [`read_dh`] |
+//! | read it from a text | [`read_urdf`], [`read_mjcf`], [`read_sdf`], [`read_dh`] |
 //! | make one in code | [`Model::new`] of [`Joint`]s and [`Body`]s |
 //! | gravity, mounting, locked joints | [`Model::with_gravity`], [`Model::with_base_orientation`], [`Model::locked`] |
 //! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
@@ -60,10 +60,12 @@ pub mod mjcf;
 mod place;
 mod read;
 pub mod sample;
+pub mod sdf;
 mod spatial;
 pub mod terms;
 mod tree;
 pub mod urdf;
+mod xacro;
 mod xml;
 
 pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
@@ -74,6 +76,7 @@ pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
 pub use place::{Located, line_and_column};
 pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot};
+pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, read_sdf};
 pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{

@@ -1,10 +1,12 @@
-//! From a file to a robot: URDF, MJCF or D-H table, distinguished by the file's name or its content.
+//! From a file to a robot: URDF, MJCF, SDF or D-H table, distinguished by the file's name or its content.
 
 use crate::dh::{DhError, read_dh};
 use crate::mjcf::{MjcfError, MjcfNotice, included_from, is_mjcf, read_mjcf_with};
 use crate::place::line_and_column;
+use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
+use crate::xacro::{has_macros, written_out};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -20,6 +22,8 @@ pub enum DescriptionFormat {
     Urdf,
     /// MJCF, MuJoCo's format.
     Mjcf,
+    /// SDF, Gazebo's format.
+    Sdf,
     /// D-H table in TOML.
     Dh,
 }
@@ -33,7 +37,7 @@ pub struct Robot {
     pub format: DescriptionFormat,
     /// The file.
     pub path: PathBuf,
-    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes.
+    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes; of macros what they write out.
     pub text: String,
     /// Elements of a URDF that were not read.
     pub unread: Vec<UnreadElement>,
@@ -41,6 +45,8 @@ pub struct Robot {
     pub irregularities: Vec<UrdfIrregularity>,
     /// What an MJCF says and the model does not hold.
     pub notices: Vec<MjcfNotice>,
+    /// What an SDF says and the model does not hold.
+    pub sdf_notices: Vec<SdfNotice>,
 }
 
 /// Why a file gave no robot. Every message begins with the file, and with line and column where there are any.
@@ -56,13 +62,13 @@ pub enum ReadError {
         source: std::io::Error,
     },
     /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
-    #[error("{}: larger than {} MiB: this is no robot description, name the URDF, MJCF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
+    #[error("{}: larger than {} MiB: this is no robot description, name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
     TooLarge {
         /// The file.
         path: PathBuf,
     },
     /// The file is empty.
-    #[error("{}:1:1: the file is empty: name a URDF, an MJCF or a D-H table", path.display())]
+    #[error("{}:1:1: the file is empty: name a URDF, an MJCF, an SDF or a D-H table", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -89,6 +95,14 @@ pub enum ReadError {
         /// What to do.
         fix: &'static str,
     },
+    /// The program that writes out macros says that it cannot.
+    #[error("{}: xacro cannot write it out: {reason}; fix what it names, or give the URDF", path.display())]
+    Xacro {
+        /// The file.
+        path: PathBuf,
+        /// What the program says.
+        reason: String,
+    },
     /// The URDF is faulty.
     #[error("{}:{source}", path.display())]
     Urdf {
@@ -105,6 +119,14 @@ pub enum ReadError {
         /// Place and fault.
         source: Box<MjcfError>,
     },
+    /// The SDF is faulty.
+    #[error("{}:{source}", path.display())]
+    Sdf {
+        /// The file.
+        path: PathBuf,
+        /// Place and fault.
+        source: Box<SdfError>,
+    },
     /// The D-H table is faulty.
     #[error("{}:{source}", path.display())]
     Dh {
@@ -115,8 +137,9 @@ pub enum ReadError {
     },
 }
 
-/// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF if
-/// its root element is `<mujoco>`, else as URDF. Files that an MJCF includes are looked for from its folder.
+/// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF
+/// if its root element is `<mujoco>`, as SDF if it is `<sdf>`, else as URDF. Files that an MJCF includes are looked for
+/// from its folder. A file with macros is written out by the program `xacro` where that is installed.
 ///
 /// # Errors
 /// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the
@@ -130,21 +153,28 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     if let Some((what, fix)) = other_kind(&bytes, extension.as_deref()) {
         return Err(ReadError::NoDescription { path: named(), what, fix });
     }
-    let text = decode(bytes, path)?;
+    let mut text = decode(bytes, path)?;
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(ReadError::Empty { path: named() });
     }
+    if has_macros(&text)
+        && let Some(written_out) = written_out(path)?
+    {
+        text = written_out;
+    }
     let is_xml = match extension.as_deref() {
-        Some("urdf" | "xml" | "xacro" | "mjcf") => true,
+        Some("urdf" | "xml" | "xacro" | "mjcf" | "sdf" | "world") => true,
         Some("toml") => false,
         _ => text.trim_start_matches('\u{feff}').trim_start().starts_with('<'),
     };
     let format = match is_xml {
         true if is_mjcf(&text) => DescriptionFormat::Mjcf,
+        true if is_sdf(&text) => DescriptionFormat::Sdf,
         true => DescriptionFormat::Urdf,
         false => DescriptionFormat::Dh,
     };
-    let (mut unread, mut irregularities, mut notices) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut unread, mut irregularities) = (Vec::new(), Vec::new());
+    let (mut notices, mut sdf_notices) = (Vec::new(), Vec::new());
     let model = match format {
         DescriptionFormat::Urdf => {
             let robot = read_urdf(&text).map_err(|error| ReadError::Urdf { path: named(), source: Box::new(error) })?;
@@ -158,11 +188,16 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
             notices = robot.notices;
             robot.model
         }
+        DescriptionFormat::Sdf => {
+            let robot = read_sdf(&text).map_err(|error| ReadError::Sdf { path: named(), source: Box::new(error) })?;
+            sdf_notices = robot.notices;
+            robot.model
+        }
         DescriptionFormat::Dh => {
             read_dh(&text).map_err(|error| ReadError::Dh { path: named(), source: Box::new(error) })?
         }
     };
-    Ok(Robot { model, format, path: named(), text, unread, irregularities, notices })
+    Ok(Robot { model, format, path: named(), text, unread, irregularities, notices, sdf_notices })
 }
 
 /// The bytes of a file.

@@ -23,9 +23,10 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 16] = [
+pub(crate) const TARGETS: [Target; 17] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
+    Target { name: "sdf", repetitions: 20, new: parsers::sdf },
     Target { name: "dh", repetitions: 20, new: parsers::dh },
     Target { name: "study", repetitions: 20, new: parsers::study },
     Target { name: "log", repetitions: 10, new: parsers::log },

@@ -4,8 +4,8 @@ use super::Run;
 use dynident::iteration::IterationStore;
 use dynident::iteration::robot::{ToHost, read_log_table};
 use dynident::model::{
-    AuditFinding, Model, audit, link_changes, read_dh, read_mjcf_with, read_urdf, rewrite_inertials, rewrite_mjcf,
-    rewrite_urdf, slips,
+    AuditFinding, Model, audit, link_changes, read_dh, read_mjcf_with, read_sdf, read_urdf, rewrite_inertials,
+    rewrite_mjcf, rewrite_urdf, slips, write_urdf,
 };
 use dynident::recording::log::{ChannelGroup, ColumnRef, Columns, TimeColumn};
 use dynident::recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
@@ -88,7 +88,7 @@ pub(crate) fn urdf() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// D-H table.
+/// MJCF: reading with its includes, writing back.
 pub(crate) fn mjcf() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };
@@ -112,6 +112,21 @@ pub(crate) fn mjcf() -> io::Result<Box<dyn Run>> {
     })
 }
 
+/// SDF: reading, and the URDF of it.
+pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let Ok(text) = core::str::from_utf8(input) else { return false };
+        let robot = match read_sdf(text) {
+            Ok(robot) => robot,
+            Err(error) => return said(&error),
+        };
+        sound(&robot.model);
+        assert!(!write_urdf(&robot.model).is_empty());
+        true
+    })
+}
+
+/// D-H table.
 pub(crate) fn dh() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };

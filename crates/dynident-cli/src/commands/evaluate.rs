@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Options of `evaluate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// URDF, MJCF, or D-H table in TOML.
+    /// URDF, MJCF, SDF, or D-H table in TOML.
     robot: PathBuf,
     /// Table with columns q1.., dq1.., ddq1.. (tau1.. for forward dynamics), SI units.
     #[arg(long, value_name = "S.csv")]

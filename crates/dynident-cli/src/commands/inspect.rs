@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Options of `inspect`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// URDF, MJCF, or D-H table in TOML.
+    /// URDF, MJCF, SDF, or D-H table in TOML.
     robot: PathBuf,
     /// Write a copy of the URDF in which the slips that were found are corrected, and nothing else is changed.
     #[arg(long, value_name = "OUT.urdf")]

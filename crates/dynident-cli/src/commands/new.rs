@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Options of `new`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The robot: URDF, MJCF, or D-H table in TOML.
+    /// The robot: URDF, MJCF, SDF, or D-H table in TOML.
     #[arg(long, value_name = "FILE")]
     robot: PathBuf,
     /// The recordings, of any format that is read; the last of several tests the model.

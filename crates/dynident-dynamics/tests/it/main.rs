@@ -7,3 +7,4 @@ mod golden_base_parameters;
 mod invariants;
 mod mjcf;
 mod pinocchio;
+mod sdf;

@@ -9,6 +9,7 @@ mod dh_write;
 mod friction_laws;
 mod mjcf;
 mod mjcf_write;
+mod sdf;
 mod slips;
 mod urdf;
 mod urdf_write;

@@ -117,6 +117,12 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
         },
         what: notice.loss.to_string(),
     }));
+    entries.extend(robot.sdf_notices.iter().map(|notice| AuditEntry {
+        level: "warning".to_owned(),
+        check: notice.loss.name().to_owned(),
+        place: format!("line {}", notice.line),
+        what: notice.loss.to_string(),
+    }));
     Ok(Inspection {
         schema: INSPECTION_SCHEMA.to_owned(),
         name: model.name().to_owned(),

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
-    /// URDF, MJCF, or D-H table in TOML.
+    /// URDF, MJCF, SDF, or D-H table in TOML.
     pub file: PathBuf,
     /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints
     /// of the description that `lock` does not name, in the order of the tree.

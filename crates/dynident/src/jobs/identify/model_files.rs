@@ -1,4 +1,5 @@
-//! The user's own description with the identified values; of a D-H table or an MJCF a URDF beside it.
+//! The user's own description with the identified values; of a D-H table or an MJCF a URDF beside it, of an SDF a URDF
+//! alone.
 
 use crate::result::{InputFile, Provenance, ValueSource};
 use crate::study::StudyRobot;
@@ -15,7 +16,7 @@ use std::path::Path;
 /// Descriptions with the identified values.
 #[derive(Debug)]
 pub(super) struct ModelFiles {
-    /// The user's own URDF, or one of the robot that a D-H table or an MJCF describes.
+    /// The user's own URDF, or one of the robot that a D-H table, an MJCF or an SDF describes.
     pub(super) urdf: String,
     /// The user's own D-H table.
     pub(super) table: Option<String>,
@@ -47,6 +48,7 @@ pub(super) fn model_files(
             });
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: Some(mjcf) })
         }
+        DescriptionFormat::Sdf => Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: None }),
         DescriptionFormat::Dh => {
             let table = rewrite_dh(text, &links, &joints).map_err(|error| error.to_string())?;
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None })

@@ -31,7 +31,7 @@ const MOST_TURNS: f64 = 4.0;
 /// What a study is written from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NewStudy {
-    /// The description: URDF, MJCF, or D-H table in TOML.
+    /// The description: URDF, MJCF, SDF, or D-H table in TOML.
     pub robot: PathBuf,
     /// The recordings, at least one.
     pub logs: Vec<PathBuf>,

@@ -1,0 +1,57 @@
+//! SDF models as this reader and as Drake, which reads them by Gazebo's own library, understand them: joints, limits
+//! and torques.
+
+use crate::golden::numbers;
+use dynident_dynamics::{Workspace, inverse_dynamics};
+use dynident_model::{Joint, Model, load_robot};
+use dynident_testing::repository;
+use serde_json::Value;
+
+/// Two programs in double precision on one file, poses of several frames after each other: rounding alone.
+const RELATIVE: f64 = 1e-10;
+
+fn close(ours: &[f64], theirs: &[f64], what: &str) {
+    assert_eq!(ours.len(), theirs.len(), "{what}");
+    let scale = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!((a - b).abs() <= RELATIVE * scale, "{what}: {a} is not {b}, of at most {scale}");
+    }
+}
+
+/// Where a joint of `hand::bend` stands among Drake's `bend`.
+fn place(names: &[&str], joint: &Joint) -> usize {
+    let own = joint.name.rsplit("::").next();
+    names.iter().position(|name| Some(*name) == own).unwrap()
+}
+
+/// Values in the order of the golden file, put into that of the model.
+fn in_order(model: &Model, names: &[&str], values: &[f64]) -> Vec<f64> {
+    model.joints().iter().map(|joint| values[place(names, joint)]).collect()
+}
+
+#[test]
+fn every_model_has_the_joints_and_torques_of_drake() {
+    let text = std::fs::read_to_string(repository("golden/sdf.json")).unwrap();
+    let golden: Value = serde_json::from_str(&text).unwrap();
+    let models = golden["models"].as_object().unwrap();
+    assert_eq!(models.len(), 6);
+    for (name, file) in models {
+        let model = load_robot(repository(&format!("golden/sdf/{name}.sdf"))).unwrap().model;
+        let names: Vec<&str> = file["joints"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+        assert_eq!(model.dof(), names.len(), "{name}");
+        for joint in model.joints() {
+            let k = place(&names, joint);
+            assert_eq!(joint.turns(), file["turns"][k].as_bool().unwrap(), "{name}: {}", joint.name);
+            let limits = [joint.limits.lower, joint.limits.upper, joint.limits.velocity];
+            let theirs = ["lower", "upper", "velocity"].map(|key| file[key][k].as_f64());
+            assert_eq!(limits, theirs, "{name}: {}", joint.name);
+            assert_eq!(joint.damping.unwrap_or(0.0), file["damping"][k].as_f64().unwrap(), "{name}: {}", joint.name);
+        }
+        let mut workspace = Workspace::new(&model);
+        for state in file["states"].as_array().unwrap() {
+            let [q, dq, ddq, tau] =
+                ["q", "dq", "ddq", "tau"].map(|key| in_order(&model, &names, &numbers(&state[key])));
+            close(inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, name);
+        }
+    }
+}

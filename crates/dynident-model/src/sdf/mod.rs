@@ -1,0 +1,147 @@
+//! SDF, the format of Gazebo: reading.
+//!
+//! Read is one model (in `<sdf>` or in its one `<world>`) with the models nested in it: links with `<inertial>`, joints
+//! of type revolute, continuous, prismatic and fixed, poses relative to any link, joint, frame or nested model, axes
+//! expressed in any of them, `<world>`'s gravity. Files before version 1.7 mean frames otherwise, and are read as they
+//! mean them. Fixed joints are lumped.
+//!
+//! A joint's frame need not be its child's. The frame of a link that moves with a joint has the axes of the SDF link,
+//! and its origin at the joint's. The base has the frame of the model, and gravity is turned into it by the model's
+//! pose. A link without `<inertial>`, which SDF takes for 1 kg, is unknown.
+//!
+//! Source: the specification at <http://sdformat.org/spec> and its page on the semantics of poses.
+//!
+//! ```
+//! let text = r#"<sdf version="1.9"><model name="pendulum">
+//!   <link name="base"/>
+//!   <link name="rod"><pose>0 0 1 0 0 0</pose>
+//!     <inertial><pose>0 0 -0.5 0 0 0</pose><mass>2</mass>
+//!       <inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.001</izz></inertia></inertial></link>
+//!   <joint name="mount" type="fixed"><parent>world</parent><child>base</child></joint>
+//!   <joint name="swing" type="revolute"><parent>base</parent><child>rod</child>
+//!     <axis><xyz>0 1 0</xyz><dynamics><damping>0.2</damping></dynamics></axis></joint>
+//! </model></sdf>"#;
+//! let model = dynident_model::read_sdf(text)?.model;
+//! assert_eq!((model.dof(), model.joints()[0].damping), (1, Some(0.2)));
+//! // Inertia about the joint: 0.1 + 2 · 0.5².
+//! assert!((model.inertials()[0].0[4] - 0.6).abs() < 1e-15);
+//! # Ok::<(), dynident_model::SdfError>(())
+//! ```
+
+mod axes;
+mod elements;
+mod fault;
+mod frames;
+mod notices;
+mod scopes;
+mod tree;
+mod values;
+
+pub use fault::{SdfError, SdfFault};
+pub use notices::{SdfLoss, SdfNotice};
+
+use crate::place::line_and_column;
+use crate::spatial::Vec3;
+use crate::tree::{Model, STANDARD_GRAVITY};
+use crate::xml::{MAX_NODES, flood, root_name};
+use fault::fault_at;
+use frames::Frames;
+use roxmltree::{Document, Node, ParsingOptions};
+use scopes::scopes;
+use values::{children, numbers_in, placement, word_of};
+
+/// What an SDF says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SdfRobot {
+    /// The robot on a fixed base.
+    pub model: Model,
+    /// What the document says and the model does not hold, in the order of reading; at most 200 are kept.
+    pub notices: Vec<SdfNotice>,
+}
+
+/// Whether `text` is an SDF by its root element.
+pub(crate) fn is_sdf(text: &str) -> bool {
+    root_name(text) == Some("sdf")
+}
+
+/// How a file of this version means frames.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub(super) struct Version(pub(super) [u32; 2]);
+
+/// Reads an SDF.
+///
+/// # Errors
+/// If the text is malformed XML, no SDF, or describes no tree of links on one fixed base; with line and column.
+#[doc(alias("gazebo"))]
+pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
+    if let Some(at) = flood(text) {
+        return Err(SdfError::at(text, at, SdfFault::Flood));
+    }
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options).map_err(|error| fault::of_xml(&error))?;
+    let root = document.root_element();
+    if !root.has_tag_name("sdf") {
+        let root_name = root.tag_name().name().to_owned();
+        return Err(fault_at(root, SdfFault::NotSdf { root: root_name }));
+    }
+    let version = version(root)?;
+    let worlds: Vec<Node<'_, '_>> = children(root, "world").collect();
+    let around = match worlds[..] {
+        [] => root,
+        [only] => only,
+        [_, second, ..] => return Err(fault_at(second, SdfFault::Several { what: "worlds" })),
+    };
+    let models: Vec<Node<'_, '_>> = children(around, "model").collect();
+    let model = match models[..] {
+        [only] => only,
+        [] => return Err(fault_at(around, SdfFault::NoModel { hint: include_hint(around) })),
+        [_, second, ..] => return Err(fault_at(second, SdfFault::Several { what: "models" })),
+    };
+
+    // What stands there, and where.
+    let found = scopes(model, version)?;
+    let frames = Frames::new(&found)?;
+    let mut notices = notices::Notices::default();
+    let tree = tree::tree(&found, &frames, &mut notices)?;
+
+    // Gravity of the world, in the model's frame.
+    let gravity = match children(around, "gravity").next().filter(|_| around.has_tag_name("world")) {
+        Some(node) => Vec3(numbers_in::<3>(node)?),
+        None => STANDARD_GRAVITY,
+    };
+    let mut world_from_model = placement(model)?;
+    if let Some(frame) = model.attribute("placement_frame").filter(|frame| !frame.is_empty()) {
+        let model_from_frame = frames.of(frame).ok_or_else(|| {
+            fault_at(model, SdfFault::UnknownFrame { name: frame.to_owned(), of: "model".to_owned() })
+        })?;
+        world_from_model = world_from_model.then(&model_from_frame.inverse());
+    }
+    let gravity = world_from_model.rotation.transpose_mul_vec(gravity);
+    let name = word_of(model, "name")?;
+    let model = Model::new(name, tree.base, tree.joints, tree.bodies)
+        .and_then(|model| model.with_gravity(gravity))
+        .map_err(|error| fault_at(root, SdfFault::Model(error)))?;
+    Ok(SdfRobot { model, notices: notices.list })
+}
+
+/// A model that stands in another file.
+fn include_hint(around: Node<'_, '_>) -> &'static str {
+    match children(around, "include").next() {
+        Some(_) => "; <include> is not followed: write the whole out by `gz sdf -p`",
+        None => "",
+    }
+}
+
+fn version(root: Node<'_, '_>) -> Result<Version, SdfError> {
+    let text = word_of(root, "version")?;
+    let numbers: Option<Vec<u32>> = text.trim().split('.').map(|part| part.parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([major, minor, ..]) => Ok(Version([*major, *minor])),
+        _ => Err(fault_at(root, SdfFault::Version { text: crate::xml::shortened(text) })),
+    }
+}
+
+/// Line of a node, from 1.
+fn line(node: Node<'_, '_>) -> u32 {
+    line_and_column(node.document().input_text(), node.range().start).0
+}

@@ -1,0 +1,89 @@
+"""Inverse dynamics of SDF models by Drake, whose reader is Gazebo's libsdformat: what Dynident's reader of SDF is held against.
+
+    python golden/sdf.py [--out DIR]
+
+Reads golden/sdf/*.sdf (two examples of Drake's own, and rules_*.sdf, written for single rules of the format) and writes DIR/sdf.json: joints with their limits, the torque of rigid bodies at random states, without damping and dry friction.
+"""
+import argparse
+import sys
+import xml.etree.ElementTree as ElementTree
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces, PrismaticJoint, RevoluteJoint
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+from write_json import write  # noqa: E402
+
+STATES = 4
+SEED = 20261123
+
+
+def limit(value):
+    """None where the format means none."""
+    return value if abs(value) < 1e16 else None
+
+
+def golden(path, random):
+    plant = MultibodyPlant(time_step=0.0)
+    Parser(plant).AddModels(str(path))
+    # Drake's plant has a gravity of its own in place of the document's.
+    gravity = ElementTree.parse(path).findtext(".//world/gravity")
+    if gravity is not None:
+        plant.mutable_gravity_field().set_gravity_vector([float(word) for word in gravity.split()])
+    else:
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -9.81])
+    plant.Finalize()
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    joints = [joint for joint in joints if joint.num_positions() == 1]
+    if len(joints) != plant.num_positions():
+        raise SystemExit(f"{path.name}: a body is free")
+
+    order = np.array([joint.position_start() for joint in joints])
+    turns = np.array([isinstance(joint, RevoluteJoint) for joint in joints])
+    assert all(isinstance(joint, (RevoluteJoint, PrismaticJoint)) for joint in joints)
+    entry = {
+        # Without the models around it: Drake puts a joint into its child's.
+        "joints": [joint.name() for joint in joints],
+        "turns": turns.tolist(),
+        "lower": [limit(joint.position_lower_limit()) for joint in joints],
+        "upper": [limit(joint.position_upper_limit()) for joint in joints],
+        "velocity": [limit(joint.velocity_upper_limits()[0]) for joint in joints],
+        "damping": [joint.default_damping() for joint in joints],
+        "states": [],
+    }
+    context = plant.CreateDefaultContext()
+    forces = MultibodyForces(plant)
+    for _ in range(STATES):
+        q, dq, ddq = np.zeros((3, len(joints)))
+        q[order] = np.where(turns, 3.0, 0.6) * random.uniform(-1, 1, len(joints))
+        dq[order], ddq[order] = random.uniform(-2, 2, len(joints)), random.uniform(-5, 5, len(joints))
+        plant.SetPositions(context, q)
+        plant.SetVelocities(context, dq)
+        # Gravity, and no damping.
+        gravity = plant.CalcGravityGeneralizedForces(context)
+        forces.SetZero()
+        tau = plant.CalcInverseDynamics(context, ddq, forces) - gravity
+        entry["states"].append({"q": q[order], "dq": dq[order], "ddq": ddq[order], "tau": tau[order]})
+    return entry
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=HERE, help="folder that receives sdf.json")
+    options = parser.parse_args()
+    random = np.random.default_rng(SEED)
+    models = {path.stem: golden(path, random) for path in sorted((HERE / "sdf").glob("*.sdf"))}
+    write(options.out / "sdf.json", {
+        "schema": "dynident/golden-sdf/1",
+        "made_by": {"script": "golden/sdf.py", "drake": version("drake"), "numpy": np.__version__, "seed": SEED},
+        "models": models,
+    })
+
+
+if __name__ == "__main__":
+    main()
