@@ -6,7 +6,7 @@ use crate::place::line_and_column;
 use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
-use crate::xacro::{has_macros, written_out};
+use crate::xacro::{XacroFailure, has_macros, written_out};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -157,10 +157,12 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(ReadError::Empty { path: named() });
     }
-    if has_macros(&text)
-        && let Some(written_out) = written_out(path)?
-    {
-        text = written_out;
+    if has_macros(&text) {
+        let written_out = written_out(path, MAX_DESCRIPTION_BYTES).map_err(|failure| match failure {
+            XacroFailure::TooLarge => ReadError::TooLarge { path: named() },
+            XacroFailure::Refused(reason) => ReadError::Xacro { path: named(), reason },
+        })?;
+        text = written_out.unwrap_or(text);
     }
     let is_xml = match extension.as_deref() {
         Some("urdf" | "xml" | "xacro" | "mjcf" | "sdf" | "world") => true,

@@ -1,6 +1,5 @@
 //! Macros of descriptions, written out by the program of those who made them.
 
-use crate::read::{MAX_DESCRIPTION_BYTES, ReadError};
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -10,18 +9,27 @@ const PROGRAM: &str = "xacro";
 /// Bytes of its complaints that a message shows at most.
 const SHOWN: usize = 400;
 
+/// Why nothing was written out.
+#[derive(Debug)]
+pub(crate) enum XacroFailure {
+    /// More text than was asked for.
+    TooLarge,
+    /// The program says that it cannot.
+    Refused(String),
+}
+
 /// Whether a text has macros that stand for something else. A declaration alone, as written-out files often keep, is
 /// none.
 pub(crate) fn has_macros(text: &str) -> bool {
     text.contains("xmlns:xacro") && ["<xacro:", "${", "$("].iter().any(|sign| text.contains(sign))
 }
 
-/// The text that `xacro` makes of the file; `None` where the program is not installed.
+/// The text of at most `most_bytes` that `xacro` makes of the file; `None` where the program is not installed.
 ///
 /// # Errors
-/// If the program fails, or writes no text of a robot's size.
-pub(crate) fn written_out(path: &Path) -> Result<Option<String>, ReadError> {
-    let refused = |reason: String| ReadError::Xacro { path: path.to_owned(), reason };
+/// If the program fails, or writes more, or no text.
+pub(crate) fn written_out(path: &Path, most_bytes: u64) -> Result<Option<String>, XacroFailure> {
+    let refused = XacroFailure::Refused;
     let started =
         Command::new(PROGRAM).arg(path).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = match started {
@@ -39,12 +47,12 @@ pub(crate) fn written_out(path: &Path) -> Result<Option<String>, ReadError> {
     });
     let mut bytes = Vec::new();
     if let Some(stdout) = child.stdout.take() {
-        stdout.take(MAX_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes).map_err(|error| refused(error.to_string()))?;
+        stdout.take(most_bytes + 1).read_to_end(&mut bytes).map_err(|error| refused(error.to_string()))?;
     }
-    if bytes.len() as u64 > MAX_DESCRIPTION_BYTES {
+    if bytes.len() as u64 > most_bytes {
         let _ = child.kill();
         let _ = child.wait();
-        return Err(ReadError::TooLarge { path: path.to_owned() });
+        return Err(XacroFailure::TooLarge);
     }
     let status = child.wait().map_err(|error| refused(error.to_string()))?;
     let complaints = complaints.and_then(|reader| reader.join().ok()).unwrap_or_default();

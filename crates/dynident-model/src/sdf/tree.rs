@@ -36,7 +36,7 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     let links: Vec<usize> = (0..found.items.len()).filter(|&index| found.items[index].kind == Kind::Link).collect();
     let Some(&first) = links.first() else {
         let missing = SdfFault::Missing { element: "model".to_owned(), kind: "element", name: "link" };
-        return Err(super::SdfError { line: 1, column: 1, fault: missing });
+        return Err(fault_at(found.model, missing));
     };
     note_includes(found.items[first].node.document().root_element(), notices);
     let connections = connections(found, frames, notices)?;

@@ -136,7 +136,9 @@ pub enum UrdfFault {
         hint: &'static str,
     },
     /// Macros that were not expanded.
-    #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
+    #[error(
+        "`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`), or install xacro, which is then asked"
+    )]
     Xacro {
         /// The macro.
         what: String,

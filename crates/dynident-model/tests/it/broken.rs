@@ -51,7 +51,13 @@ fn every_broken_file_is_refused_at_its_place_with_a_fix() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
         let (place, fragment) = expected.remove(name).unwrap_or_else(|| panic!("{name} is not in broken.tsv"));
-        let message = load_robot(&path).expect_err(name).to_string();
+        // Macros are asked of a program, if it is installed: here it must not matter.
+        let message = if name.starts_with("xacro_") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            format!("{}:{}", path.display(), read_urdf(&text).expect_err(name))
+        } else {
+            load_robot(&path).expect_err(name).to_string()
+        };
         let start = format!("{}:{place}: ", path.display());
         assert!(message.starts_with(&start), "{message}\nshould start with {start}");
         assert!(message.contains(fragment), "{message}\nshould contain {fragment}");
