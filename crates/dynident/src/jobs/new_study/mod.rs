@@ -65,6 +65,7 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
     // What the data say of the reading so far.
     let mut examined = None;
     let mut unsure = draft.unsure();
+    unsure.extend(recorded.left_out(&logs));
     let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
     if !unsure.iter().any(without_rate) {
         for _ in 0..MOST_ROUNDS {
@@ -190,6 +191,17 @@ impl Recorded {
             torque: torque.clone(),
             velocity: velocity.cloned(),
         })
+    }
+
+    /// Recordings that the study does not name.
+    fn left_out(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
+        let beside = [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
+        let used: Vec<usize> = self.files.iter().copied().chain(beside).collect();
+        let unused = logs.iter().enumerate().filter(|(number, _)| !used.contains(number));
+        let reason = |path: &Path| {
+            format!("{} is left out of the study: its columns are not those of the other recordings", path.display())
+        };
+        unused.map(|(_, (path, _))| Unsure { line: None, proposed: Vec::new(), reason: reason(path) }).collect()
     }
 
     fn draft(&self, request: &NewStudy, model: &Model, logs: &[(&Path, LogContents)]) -> Draft {
