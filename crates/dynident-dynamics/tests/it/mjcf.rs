@@ -1,6 +1,6 @@
 //! MJCF models as this reader and as MuJoCo understand them: joints, ranges, drives, masses and torques.
 
-use crate::golden::numbers;
+use crate::golden::{close, numbers};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::{InertialParameters, load_robot};
 use dynident_testing::repository;
@@ -8,14 +8,6 @@ use serde_json::Value;
 
 /// Two programs in double precision on one file, MuJoCo by unit quaternions and principal axes: rounding alone.
 const RELATIVE: f64 = 1e-10;
-
-fn close(ours: &[f64], theirs: &[f64], what: &str) {
-    assert_eq!(ours.len(), theirs.len(), "{what}");
-    let scale = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    for (a, b) in ours.iter().zip(theirs) {
-        assert!((a - b).abs() <= RELATIVE * scale, "{what}: {a} is not {b}, of at most {scale}");
-    }
-}
 
 #[test]
 fn every_model_has_the_joints_and_torques_of_mujoco() {
@@ -38,7 +30,7 @@ fn every_model_has_the_joints_and_torques_of_mujoco() {
             let stops = joint.limits.lower.zip(joint.limits.upper);
             assert_eq!(stops.is_some(), file["limited"][k].as_bool().unwrap(), "{what}");
             if let Some((lower, upper)) = stops {
-                close(&[lower, upper], &numbers(&file["range"][k]), &what);
+                close(RELATIVE, &[lower, upper], &numbers(&file["range"][k]), &what);
             }
             let stated = [joint.drive_inertia, joint.damping, joint.friction].map(|value| value.unwrap_or(0.0));
             let theirs = ["armature", "damping", "frictionloss"].map(|key| file[key][k].as_f64().unwrap());
@@ -46,11 +38,11 @@ fn every_model_has_the_joints_and_torques_of_mujoco() {
         }
         assert_eq!(model.gravity().0[..], numbers(&file["gravity"]), "{name}");
         let mass: f64 = model.inertials().iter().map(InertialParameters::mass_kg).sum();
-        close(&[mass], &[file["moving_mass"].as_f64().unwrap()], &format!("{name}: mass"));
+        close(RELATIVE, &[mass], &[file["moving_mass"].as_f64().unwrap()], &format!("{name}: mass"));
         let mut workspace = Workspace::new(&model);
         for state in file["states"].as_array().unwrap() {
             let [q, dq, ddq, tau] = ["q", "dq", "ddq", "tau"].map(|key| numbers(&state[key]));
-            close(inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, name);
+            close(RELATIVE, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, name);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! SDF models as this reader and as Drake, which reads them by Gazebo's own library, understand them: joints, limits
 //! and torques.
 
-use crate::golden::numbers;
+use crate::golden::{close, numbers};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::{Joint, Model, load_robot};
 use dynident_testing::repository;
@@ -9,14 +9,6 @@ use serde_json::Value;
 
 /// Two programs in double precision on one file, poses of several frames after each other: rounding alone.
 const RELATIVE: f64 = 1e-10;
-
-fn close(ours: &[f64], theirs: &[f64], what: &str) {
-    assert_eq!(ours.len(), theirs.len(), "{what}");
-    let scale = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    for (a, b) in ours.iter().zip(theirs) {
-        assert!((a - b).abs() <= RELATIVE * scale, "{what}: {a} is not {b}, of at most {scale}");
-    }
-}
 
 /// Where a joint of `hand::bend` stands among Drake's `bend`.
 fn place(names: &[&str], joint: &Joint) -> usize {
@@ -51,7 +43,7 @@ fn every_model_has_the_joints_and_torques_of_drake() {
         for state in file["states"].as_array().unwrap() {
             let [q, dq, ddq, tau] =
                 ["q", "dq", "ddq", "tau"].map(|key| in_order(&model, &names, &numbers(&state[key])));
-            close(inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, name);
+            close(RELATIVE, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, name);
         }
     }
 }

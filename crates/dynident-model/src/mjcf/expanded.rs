@@ -2,7 +2,7 @@
 
 use super::fault::{MjcfError, MjcfFault};
 use crate::place::{Located, line_and_column};
-use crate::xml::{MAX_NODES, flood, root_name, shortened};
+use crate::xml::{MAX_NODES, Malformed, flood, malformed, root_name, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashSet;
 
@@ -190,22 +190,11 @@ pub(crate) fn is_mjcf(text: &str) -> bool {
 }
 
 fn xml_fault(text: &str, error: &roxmltree::Error) -> (usize, MjcfFault) {
-    use roxmltree::Error;
-    let at = error.pos();
-    let reason = || error.to_string().replacen(&format!(" at {at}"), "", 1);
-    match error {
-        Error::DtdDetected => (text.find("<!DOCTYPE").unwrap_or(0), MjcfFault::Doctype),
-        Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
-            (text.len(), MjcfFault::Xml { reason: "the document ends too early".to_owned() })
-        }
-        Error::NodesLimitReached => (0, MjcfFault::TooLarge { limit: MAX_NODES as usize, what: "nodes" }),
-        _ => (byte_of(text, at), MjcfFault::Xml { reason: reason() }),
-    }
-}
-
-/// The byte at a line and column of the parser.
-fn byte_of(text: &str, at: roxmltree::TextPos) -> usize {
-    let (row, column) = (at.row.max(1) as usize - 1, at.col.max(1) as usize - 1);
-    let start = if row == 0 { 0 } else { text.match_indices('\n').nth(row - 1).map_or(text.len(), |(at, _)| at + 1) };
-    text[start..].char_indices().nth(column).map_or(text.len(), |(offset, _)| start + offset)
+    let (at, why) = malformed(text, error);
+    let fault = match why {
+        Malformed::Doctype => MjcfFault::Doctype,
+        Malformed::TooLarge => MjcfFault::TooLarge { limit: MAX_NODES as usize, what: "nodes" },
+        Malformed::Markup { reason } => MjcfFault::Xml { reason },
+    };
+    (at, fault)
 }

@@ -2,6 +2,7 @@
 
 use crate::error::ModelError;
 use crate::place::Located;
+use crate::xml::{MAX_NODES, Malformed, malformed};
 use roxmltree::Node;
 use thiserror::Error;
 
@@ -201,14 +202,12 @@ pub(super) fn fault_at(node: Node<'_, '_>, fault: SdfFault) -> SdfError {
 }
 
 /// What the XML parser says.
-pub(super) fn of_xml(error: &roxmltree::Error) -> SdfError {
-    use roxmltree::Error as Xml;
-    let at = error.pos();
-    let fault = match error {
-        Xml::DtdDetected => SdfFault::Doctype,
-        Xml::NodesLimitReached => SdfFault::TooLarge { limit: crate::xml::MAX_NODES },
-        Xml::AttributesLimitReached | Xml::NamespacesLimitReached => SdfFault::Flood,
-        _ => SdfFault::Xml { reason: error.to_string().replacen(&format!(" at {at}"), "", 1) },
+pub(super) fn of_xml(text: &str, error: &roxmltree::Error) -> SdfError {
+    let (at, why) = malformed(text, error);
+    let fault = match why {
+        Malformed::Doctype => SdfFault::Doctype,
+        Malformed::TooLarge => SdfFault::TooLarge { limit: MAX_NODES },
+        Malformed::Markup { reason } => SdfFault::Xml { reason },
     };
-    Located { line: at.row, column: at.col, fault }
+    Located::at(text, at, fault)
 }

@@ -78,7 +78,7 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
         return Err(SdfError::at(text, at, SdfFault::Flood));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options).map_err(|error| fault::of_xml(&error))?;
+    let document = Document::parse_with_options(text, options).map_err(|error| fault::of_xml(text, &error))?;
     let root = document.root_element();
     if !root.has_tag_name("sdf") {
         let root_name = root.tag_name().name().to_owned();

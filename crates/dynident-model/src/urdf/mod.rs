@@ -40,7 +40,7 @@ pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_u
 use crate::error::ModelError;
 use crate::place::{Located, line_and_column};
 use crate::tree::Model;
-use crate::xml::{MAX_NODES, flood};
+use crate::xml::{MAX_NODES, Malformed, flood, malformed};
 use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
@@ -368,26 +368,18 @@ fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
 }
 
 fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
-    use roxmltree::Error;
-    let at = error.pos();
-    // The parser's messages hold their position; ours lead with it.
-    let reason = || error.to_string().replacen(&format!(" at {at}"), "", 1);
-    let (line, column, fault) = match error {
-        Error::DtdDetected => {
-            let (line, column) = line_and_column(text, text.find("<!DOCTYPE").unwrap_or(0));
-            (line, column, UrdfFault::Doctype)
-        }
-        Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
-            (at.row, at.col, UrdfFault::Xacro { what: "xacro:".to_owned() })
-        }
-        Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
-            let (line, column) = line_and_column(text, text.len());
-            (line, column, UrdfFault::Xml { reason: "the document ends too early".to_owned() })
-        }
-        Error::NodesLimitReached => (1, 1, UrdfFault::TooLarge { limit: MAX_NODES }),
-        _ => (at.row, at.col, UrdfFault::Xml { reason: reason() }),
+    if let roxmltree::Error::UnknownNamespace(prefix, at) = error
+        && prefix == "xacro"
+    {
+        return Located { line: at.row, column: at.col, fault: UrdfFault::Xacro { what: "xacro:".to_owned() } };
+    }
+    let (at, why) = malformed(text, error);
+    let fault = match why {
+        Malformed::Doctype => UrdfFault::Doctype,
+        Malformed::TooLarge => UrdfFault::TooLarge { limit: MAX_NODES },
+        Malformed::Markup { reason } => UrdfFault::Xml { reason },
     };
-    Located { line, column, fault }
+    Located::at(text, at, fault)
 }
 
 /// `fault` at the start of an element.

@@ -2,9 +2,11 @@
 
 pub(crate) mod edit;
 mod flood;
+mod malformed;
 mod number;
 
 pub(crate) use flood::{flood, length_beside_elements};
+pub(crate) use malformed::{Malformed, malformed};
 pub(crate) use number::{parse_number, shortened};
 
 /// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.

@@ -98,3 +98,12 @@ pub(crate) fn assert_close(ours: &[f64], golden: &[f64], tolerance: f64, what: &
     }
     worst
 }
+
+/// Numbers that are equal but for a share of the largest of theirs.
+pub(crate) fn close(relative: f64, ours: &[f64], theirs: &[f64], what: &str) {
+    assert_eq!(ours.len(), theirs.len(), "{what}");
+    let scale = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!((a - b).abs() <= relative * scale, "{what}: {a} is not {b}, of at most {scale}");
+    }
+}
