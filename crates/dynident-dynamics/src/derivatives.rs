@@ -2,6 +2,7 @@
 
 use crate::composite::Composite;
 use crate::states::{BodyDerivative, BodyState};
+use crate::tree_scratch::TreeScratch;
 use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{InertialParameters, Model, Transform, Vec3};
@@ -36,7 +37,17 @@ pub fn inverse_dynamics_derivatives<'w>(
     ddq: &[f64],
 ) -> InverseDynamicsDerivatives<'w> {
     workspace.check(model, &[q, dq, ddq]);
-    let Workspace { level, scratch, matrices, .. } = workspace;
+    let Workspace { level, scratch, matrices, tree, .. } = workspace;
+    if let Some(coupling) = model.coupling() {
+        tree.take_motion(coupling, q, dq, ddq);
+        let TreeScratch { q, dq, ddq, matrices: [by_position, by_velocity, by_acceleration], .. } = tree;
+        dispatch_single(*level, Single { model, scratch, q, dq, ddq, by_position, by_velocity, by_acceleration });
+        for (to, from) in matrices.iter_mut().zip(&tree.matrices) {
+            coupling.project_matrix(from, to);
+        }
+        let [by_position, by_velocity, by_acceleration] = matrices;
+        return InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration };
+    }
     let [by_position, by_velocity, by_acceleration] = matrices;
     dispatch_single(*level, Single { model, scratch, q, dq, ddq, by_position, by_velocity, by_acceleration });
     InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration }
@@ -58,7 +69,7 @@ pub(crate) fn newton_euler_derivatives<T: Scalar>(model: &Model, scratch: &mut C
     crate::inverse_dynamics::newton_euler(model, scratch);
     for (slot, by) in [DerivativeBy::Position, DerivativeBy::Velocity].into_iter().enumerate() {
         scratch.matrices[slot].fill(T::ZERO);
-        for joint in 0..model.dof() {
+        for joint in 0..model.body_count() {
             vary(model, scratch, joint, by, slot);
         }
     }
@@ -67,7 +78,7 @@ pub(crate) fn newton_euler_derivatives<T: Scalar>(model: &Model, scratch: &mut C
 /// One column of one derivative matrix.
 #[inline(always)]
 fn vary<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>, joint: usize, by: DerivativeBy, slot: usize) {
-    let (maps, dof) = (model.maps(), model.dof());
+    let (maps, dof) = (model.maps(), model.body_count());
     let CoreScratch { bodies, derivative, matrices, dq, .. } = scratch;
     // Outward: children of a varied body stand after it, so one sweep from `joint` reaches the subtree.
     for index in joint..dof {
@@ -234,7 +245,7 @@ mod tests {
 
     /// Torques as dual numbers: the oracle, through the inverse dynamics only.
     fn dual_column(model: &Model, state: [&[f64]; 3], which: usize, joint: usize) -> Vec<f64> {
-        let mut scratch = CoreScratch::<Dual>::new(model.dof());
+        let mut scratch = CoreScratch::<Dual>::new(model.body_count());
         for (k, values) in state.into_iter().enumerate() {
             let to = match k {
                 0 => &mut scratch.q,

@@ -1,6 +1,7 @@
 //! Forward dynamics: the articulated-body algorithm.
 
 use crate::inverse_dynamics::{inertial_wrench, outward};
+use crate::motion_equation::mass_matrix_and_bias;
 use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{Mat3, Model, Transform, Vec3};
@@ -22,12 +23,39 @@ pub fn forward_dynamics<'w>(
     tau: &[f64],
 ) -> &'w [f64] {
     workspace.check(model, &[q, dq, tau]);
+    if model.coupling().is_some() {
+        return of_coupled_joints(model, workspace, q, dq, tau);
+    }
     let Workspace { level, scratch, vector, .. } = workspace;
     dispatch_single(*level, Single { model, scratch, q, dq, tau, ddq: vector });
     vector
 }
 
 one_sample_kernel!((q, dq, tau), articulated_bodies, ddq: ddq);
+
+/// Where joints follow others no articulated inertia stands for a subtree alone: `M q̈ = τ - bias` by Cholesky's
+/// factors, which exist where every degree of freedom moves inertia.
+fn of_coupled_joints<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64], dq: &[f64], tau: &[f64]) -> &'w [f64] {
+    mass_matrix_and_bias(model, workspace, q, dq);
+    let (dof, Workspace { vector, matrices: [factor, ..], .. }) = (model.dof(), workspace);
+    for (bias, tau) in vector.iter_mut().zip(tau) {
+        *bias = tau - *bias;
+    }
+    for row in 0..dof {
+        for column in 0..=row {
+            let products = (0..column).map(|k| factor[row * dof + k] * factor[column * dof + k]);
+            let rest = factor[row * dof + column] - products.sum::<f64>();
+            factor[row * dof + column] = if row == column { rest.sqrt() } else { rest / factor[column * dof + column] };
+        }
+        let known: f64 = (0..row).map(|k| factor[row * dof + k] * vector[k]).sum();
+        vector[row] = (vector[row] - known) / factor[row * dof + row];
+    }
+    for row in (0..dof).rev() {
+        let known: f64 = (row + 1..dof).map(|k| factor[k * dof + row] * vector[k]).sum();
+        vector[row] = (vector[row] - known) / factor[row * dof + row];
+    }
+    vector
+}
 
 #[inline(always)]
 fn full<T: Scalar>(s: &[T; 6]) -> Mat3<T> {

@@ -1,6 +1,7 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
 use crate::states::BodyState;
+use crate::tree_scratch::{TreeBatch, TreeScratch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
@@ -39,8 +40,16 @@ pub fn inverse_dynamics<'w>(
     ddq: &[f64],
 ) -> &'w [f64] {
     workspace.check(model, &[q, dq, ddq]);
-    let Workspace { level, scratch, vector, .. } = workspace;
-    dispatch_single(*level, Single { model, scratch, q, dq, ddq, tau: vector });
+    let Workspace { level, scratch, vector, tree, .. } = workspace;
+    if let Some(coupling) = model.coupling() {
+        tree.take_motion(coupling, q, dq, ddq);
+        let TreeScratch { q, dq, ddq, tau, .. } = tree;
+        dispatch_single(*level, Single { model, scratch, q, dq, ddq, tau });
+        vector.fill(0.0);
+        coupling.add_projected(tau, 1, vector);
+    } else {
+        dispatch_single(*level, Single { model, scratch, q, dq, ddq, tau: vector });
+    }
     vector
 }
 
@@ -56,8 +65,18 @@ pub fn inverse_dynamics_batch(
     tau: &mut [f64],
 ) {
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq, tau]);
-    let BatchWorkspace { level, scratch, .. } = workspace;
-    dispatch(*level, Batch { model, scratch, motion, tau });
+    let BatchWorkspace { level, scratch, tree, .. } = workspace;
+    if let Some(coupling) = model.coupling() {
+        let TreeBatch { motion: tree_motion, results: [tree_tau, ..], .. } = tree;
+        let motion = &expanded(coupling, motion, tree_motion);
+        tree_tau.clear();
+        tree_tau.resize(motion.q.len(), 0.0);
+        dispatch(*level, Batch { model, scratch, motion, tau: tree_tau });
+        tau.fill(0.0);
+        coupling.add_projected(tree_tau, motion.samples, tau);
+    } else {
+        dispatch(*level, Batch { model, scratch, motion, tau });
+    }
 }
 
 one_sample_kernel!((q, dq, ddq), newton_euler, tau: tau);

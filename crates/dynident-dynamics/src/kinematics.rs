@@ -10,10 +10,12 @@ use dynident_model::{Model, Transform};
 #[doc(alias("forward kinematics", "fk"))]
 pub fn body_placements<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [Transform] {
     workspace.check(model, &[q]);
+    let Workspace { placements, tree, .. } = workspace;
+    let q = model.coupling().map_or(q, |coupling| tree.positions(coupling, q));
     for (index, (map, &q)) in model.maps().iter().zip(q).enumerate() {
         let (sine, cosine) = q.sin_cos();
         let own = crate::workspace::joint_transform(map, q, sine, cosine);
-        workspace.placements[index] = map.parent.map_or(own, |parent| workspace.placements[parent].then(&own));
+        placements[index] = map.parent.map_or(own, |parent| placements[parent].then(&own));
     }
-    &workspace.placements
+    placements
 }

@@ -62,6 +62,7 @@ mod regressor_adjoint;
 mod regressor_panels;
 mod states;
 mod term_history;
+mod tree_scratch;
 mod workspace;
 
 pub use base_parameters::{

@@ -1,6 +1,7 @@
 //! The joint-space mass matrix: the composite-rigid-body algorithm.
 
 use crate::composite::Composite;
+use crate::tree_scratch::TreeScratch;
 use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{Model, Vec3};
@@ -14,8 +15,15 @@ use dynident_model::{Model, Vec3};
 #[doc(alias("crba", "inertia matrix", "joint-space inertia"))]
 pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
     workspace.check(model, &[q]);
-    let Workspace { level, scratch, matrices, .. } = workspace;
-    dispatch_single(*level, Single { model, scratch, q, out: &mut matrices[0] });
+    let Workspace { level, scratch, matrices, tree, .. } = workspace;
+    if let Some(coupling) = model.coupling() {
+        let TreeScratch { q: tree_q, matrices: [out, ..], .. } = tree;
+        coupling.positions(q, 1, tree_q);
+        dispatch_single(*level, Single { model, scratch, q: tree_q, out });
+        coupling.project_matrix(out, &mut matrices[0]);
+    } else {
+        dispatch_single(*level, Single { model, scratch, q, out: &mut matrices[0] });
+    }
     &matrices[0]
 }
 
@@ -31,7 +39,7 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
 /// The same with the transforms in place.
 #[inline(always)]
 pub(crate) fn composite_rigid_bodies_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let (maps, dof) = (model.maps(), model.dof());
+    let (maps, dof) = (model.maps(), model.body_count());
     for (composite, inertial) in scratch.composites.iter_mut().zip(model.inertials()) {
         *composite = Composite::of(inertial);
     }

@@ -2,6 +2,7 @@
 
 use crate::inverse_dynamics::newton_euler_placed;
 use crate::mass_matrix::composite_rigid_bodies_placed;
+use crate::tree_scratch::TreeScratch;
 use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::Model;
@@ -22,8 +23,19 @@ pub fn mass_matrix_and_bias<'w>(
     dq: &[f64],
 ) -> (&'w [f64], &'w [f64]) {
     workspace.check(model, &[q, dq]);
-    let Workspace { level, scratch, vector, matrices, .. } = workspace;
-    dispatch_single(*level, Single { model, scratch, q, dq, matrix: &mut matrices[0], bias: vector });
+    let Workspace { level, scratch, vector, matrices, tree, .. } = workspace;
+    let matrix = &mut matrices[0];
+    if let Some(coupling) = model.coupling() {
+        let TreeScratch { q: tree_q, dq: tree_dq, tau, matrices: [tree_matrix, ..], .. } = tree;
+        coupling.positions(q, 1, tree_q);
+        coupling.rates(dq, 1, tree_dq);
+        dispatch_single(*level, Single { model, scratch, q: tree_q, dq: tree_dq, matrix: tree_matrix, bias: tau });
+        coupling.project_matrix(tree_matrix, matrix);
+        vector.fill(0.0);
+        coupling.add_projected(tau, 1, vector);
+    } else {
+        dispatch_single(*level, Single { model, scratch, q, dq, matrix, bias: vector });
+    }
     (&matrices[0], vector)
 }
 

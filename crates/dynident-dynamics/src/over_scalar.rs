@@ -12,12 +12,21 @@ use dynident_model::Model;
 /// # Panics
 /// If a vector's length is not the number of joints.
 pub fn inverse_dynamics_over<T: Scalar>(model: &Model, q: &[T], dq: &[T], ddq: &[T]) -> Vec<T> {
-    let mut scratch = CoreScratch::new(model.dof());
-    scratch.q.copy_from_slice(q);
-    scratch.dq.copy_from_slice(dq);
-    scratch.ddq.copy_from_slice(ddq);
+    let mut scratch = CoreScratch::new(model.body_count());
+    let Some(coupling) = model.coupling() else {
+        scratch.q.copy_from_slice(q);
+        scratch.dq.copy_from_slice(dq);
+        scratch.ddq.copy_from_slice(ddq);
+        newton_euler(model, &mut scratch);
+        return scratch.tau;
+    };
+    coupling.positions(q, 1, &mut scratch.q);
+    coupling.rates(dq, 1, &mut scratch.dq);
+    coupling.rates(ddq, 1, &mut scratch.ddq);
     newton_euler(model, &mut scratch);
-    scratch.tau
+    let mut tau = vec![T::ZERO; model.dof()];
+    coupling.add_projected(&scratch.tau, 1, &mut tau);
+    tau
 }
 
 /// [`mass_matrix`](crate::mass_matrix()) over any [`Scalar`]: `M(q)`, row-major, dof × dof. Allocates its scratch.
@@ -25,9 +34,16 @@ pub fn inverse_dynamics_over<T: Scalar>(model: &Model, q: &[T], dq: &[T], ddq: &
 /// # Panics
 /// If `q` has not one entry per joint.
 pub fn mass_matrix_over<T: Scalar>(model: &Model, q: &[T]) -> Vec<T> {
-    let mut scratch = CoreScratch::new(model.dof());
-    scratch.q.copy_from_slice(q);
+    let mut scratch = CoreScratch::new(model.body_count());
+    let Some(coupling) = model.coupling() else {
+        scratch.q.copy_from_slice(q);
+        composite_rigid_bodies(model, &mut scratch);
+        let [matrix, ..] = scratch.matrices;
+        return matrix;
+    };
+    coupling.positions(q, 1, &mut scratch.q);
     composite_rigid_bodies(model, &mut scratch);
-    let [matrix, ..] = scratch.matrices;
+    let mut matrix = vec![T::ZERO; model.dof() * model.dof()];
+    coupling.project_matrix(&scratch.matrices[0], &mut matrix);
     matrix
 }

@@ -103,7 +103,7 @@ impl ParametricModel {
     /// # Errors
     /// Another number of values than there are parameters, or values that are not finite.
     pub fn with_nominal(mut self, nominal: Vec<f64>) -> Result<Self, ParametricModelError> {
-        let expected = 10 * self.model.dof() + self.terms.len();
+        let expected = 10 * self.model.body_count() + self.terms.len();
         if nominal.len() != expected {
             return Err(ParametricModelError::NominalLength { expected, found: nominal.len() });
         }
@@ -122,7 +122,7 @@ impl ParametricModel {
     /// As [`new`](Self::new).
     pub fn with_terms(&self, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
         let mut other = Self::new(self.model.clone(), terms)?;
-        let bodies = 10 * self.model.dof();
+        let bodies = 10 * self.model.body_count();
         other.nominal[..bodies].copy_from_slice(&self.nominal[..bodies]);
         for (place, term) in other.terms.iter().enumerate() {
             if let Some(known) = self.terms.iter().position(|kept| kept == term) {

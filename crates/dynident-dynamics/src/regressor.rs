@@ -8,11 +8,12 @@
 
 use crate::inverse_dynamics::outward;
 use crate::states::AxisScratch;
+use crate::tree_scratch::TreeScratch;
 use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
-/// The regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·dof columns: column `10 i + k` is parameter
+/// The regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·bodies columns: column `10 i + k` is parameter
 /// `k` of body `i` in the order of [`INERTIAL_NAMES`](dynident_model::INERTIAL_NAMES). Nm (N) per unit of the
 /// parameter. Does not depend on the model's own inertial parameters.
 ///
@@ -30,8 +31,17 @@ pub fn torque_regressor<'w>(
 ) -> &'w [f64] {
     workspace.check(model, &[q, dq, ddq]);
     workspace.check_tree(model);
-    let Workspace { level, scratch, regressor, .. } = workspace;
-    dispatch_single(*level, Single { model, scratch, q, dq, ddq, out: regressor });
+    let Workspace { level, scratch, regressor, tree, .. } = workspace;
+    if let Some(coupling) = model.coupling() {
+        tree.take_motion(coupling, q, dq, ddq);
+        let TreeScratch { q, dq, ddq, regressor: out, .. } = tree;
+        dispatch_single(*level, Single { model, scratch, q, dq, ddq, out });
+        // A row is ten numbers a body long: as many samples of one joint, as the coupling sees it.
+        regressor.fill(0.0);
+        coupling.add_projected(&tree.regressor, 10 * model.body_count(), regressor);
+    } else {
+        dispatch_single(*level, Single { model, scratch, q, dq, ddq, out: regressor });
+    }
     regressor
 }
 
@@ -53,7 +63,7 @@ impl Kernel for Single<'_> {
         take(&mut scratch.core.dq, self.dq);
         take(&mut scratch.core.ddq, self.ddq);
         // Entries of joints that do not move a body are never written; they stay the zeros of the new workspace.
-        let mut sink = DenseRows { columns: 10 * self.model.dof(), out: self.out };
+        let mut sink = DenseRows { columns: 10 * self.model.body_count(), out: self.out };
         regressor_blocks(self.model, &mut scratch.core, &mut scratch.axes, &mut sink);
     }
 }

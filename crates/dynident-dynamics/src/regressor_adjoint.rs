@@ -10,6 +10,7 @@
 use crate::inverse_dynamics::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
 use crate::states::{AdjointScratch, BodyAdjoint};
+use crate::tree_scratch::{TreeBatch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
 use dynident_model::terms::JointMotion;
@@ -48,9 +49,29 @@ pub fn regressor_panels_adjoint(
     workspace.check_tree(model);
     layout.check_tree(model);
     assert_eq!(adjoint.samples(), motion.samples, "one row of derivatives per sample");
-    let BatchWorkspace { level, scratch, .. } = workspace;
-    dispatch(*level, AdjointKernel { model, scratch, layout, motion, adjoint, by_q, by_dq, by_ddq });
+    let BatchWorkspace { level, scratch, tree, .. } = workspace;
     let samples = motion.samples;
+    let TreeBatch { motion: tree_motion, results, panels: buffers } = tree;
+    let mut tree_adjoint = Panels::in_buffers(core::mem::take(buffers));
+    if let (Some(coupling), Some(layout)) = (model.coupling(), layout.scattered(adjoint, &mut tree_adjoint)) {
+        let motion = &expanded(coupling, motion, tree_motion);
+        for derivatives in results.iter_mut() {
+            derivatives.clear();
+            derivatives.resize(motion.q.len(), 0.0);
+        }
+        let [tree_q, tree_dq, tree_ddq] = results;
+        let adjoint = &tree_adjoint;
+        dispatch(
+            *level,
+            AdjointKernel { model, scratch, layout, motion, adjoint, by_q: tree_q, by_dq: tree_dq, by_ddq: tree_ddq },
+        );
+        for (to, from) in [&mut *by_q, &mut *by_dq, &mut *by_ddq].into_iter().zip(results) {
+            coupling.add_projected(from, samples, to);
+        }
+    } else {
+        dispatch(*level, AdjointKernel { model, scratch, layout, motion, adjoint, by_q, by_dq, by_ddq });
+    }
+    *buffers = tree_adjoint.into_buffers();
     for joint in 0..model.dof() {
         for (place, &global) in layout.joint_columns(joint).iter().enumerate() {
             if let Column::Term(term) = &layout.columns()[global] {

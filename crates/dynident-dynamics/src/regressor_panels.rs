@@ -5,10 +5,11 @@
 
 use crate::regressor::{BlockSink, Work, regressor_blocks};
 use crate::term_history::TermHistory;
-use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, same_tree, take_lanes, tree};
+use crate::tree_scratch::{TreeBatch, expanded};
+use crate::workspace::{AnyScratch, BatchWorkspace, parents, put_lanes, same_tree, take_lanes};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
 use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
-use dynident_model::{INERTIAL_NAMES, Model};
+use dynident_model::{INERTIAL_NAMES, JointCoupling, Model};
 
 /// One column of the full regressor: a parameter of the robot.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +47,8 @@ impl Column {
 
 /// All columns of a robot: ten per body from base to tip, then the terms.
 pub fn all_columns(model: &Model, terms: &[TorqueTerm]) -> Vec<Column> {
-    let bodies = (0..model.dof()).flat_map(|body| (0..10).map(move |parameter| Column::Body { body, parameter }));
+    let bodies =
+        (0..model.body_count()).flat_map(|body| (0..10).map(move |parameter| Column::Body { body, parameter }));
     bodies.chain(terms.iter().cloned().map(Column::Term)).collect()
 }
 
@@ -63,10 +65,32 @@ pub struct PanelLayout {
     /// Where each body's places start.
     place_start: Vec<usize>,
     /// Parents of the bodies it was made for.
-    tree: Vec<Option<usize>>,
+    parents: Vec<Option<usize>>,
+    /// Where joints follow others.
+    coupled: Option<Box<CoupledPanels>>,
 }
 
+/// The panels of robots whose joints follow others: those of the joints of the tree, and what each adds to which column
+/// of which degree of freedom.
 #[derive(Clone, Debug)]
+struct CoupledPanels {
+    coupling: JointCoupling,
+    /// Of the joints of the tree: the bodies' columns.
+    tree: PanelLayout,
+    shares: Vec<ColumnShare>,
+}
+
+/// A column in the panel of a joint of the tree, as part of one in the panel of a degree of freedom.
+#[derive(Clone, Copy, Debug)]
+struct ColumnShare {
+    tree_joint: usize,
+    tree_place: usize,
+    joint: usize,
+    place: usize,
+    factor: f64,
+}
+
+#[derive(Clone, Debug, Default)]
 struct JointPanel {
     /// Global column of every panel column.
     columns: Vec<usize>,
@@ -81,16 +105,54 @@ impl PanelLayout {
     /// If a column names a body or joint that the model does not have, or the bodies' columns are not in ascending
     /// order.
     pub fn new(model: &Model, columns: Vec<Column>) -> Self {
-        let dof = model.dof();
-        let mut joints: Vec<JointPanel> =
-            (0..dof).map(|_| JointPanel { columns: Vec::new(), terms: Vec::new() }).collect();
-        let paths: Vec<Vec<usize>> = (0..dof).map(|body| model.path(body)).collect();
+        let Some(coupling) = model.coupling() else { return Self::of_tree(model, columns) };
+        let is_body = |column: &&Column| matches!(column, Column::Body { .. });
+        let bodies: Vec<Column> = columns.iter().take_while(is_body).cloned().collect();
+        assert_eq!(bodies.len(), columns.iter().filter(is_body).count(), "bodies' columns stand before those of terms");
+        let tree = Self::of_tree(model, bodies);
+        let mut joints = vec![JointPanel::default(); model.dof()];
+        for (tree_joint, panel) in tree.joints.iter().enumerate() {
+            for &(joint, _) in coupling.row(tree_joint) {
+                joints[joint].columns.extend(&panel.columns);
+            }
+        }
+        let mut shares = Vec::new();
+        for panel in &mut joints {
+            panel.columns.sort_unstable();
+            panel.columns.dedup();
+        }
+        for (tree_joint, panel) in tree.joints.iter().enumerate() {
+            for &(joint, factor) in coupling.row(tree_joint) {
+                shares.extend(panel.columns.iter().enumerate().filter_map(|(tree_place, column)| {
+                    let place = joints[joint].columns.binary_search(column).ok()?;
+                    Some(ColumnShare { tree_joint, tree_place, joint, place, factor })
+                }));
+            }
+        }
+        for (global, column) in columns.iter().enumerate() {
+            let Column::Term(term) = column else { continue };
+            for joint in term.joints() {
+                let panel = &mut joints[joint];
+                panel.terms.push((panel.columns.len(), global));
+                panel.columns.push(global);
+            }
+        }
+        let coupled = Some(Box::new(CoupledPanels { coupling: coupling.clone(), tree, shares }));
+        let parents = parents(model);
+        Self { columns, joints, parameters: Vec::new(), places: Vec::new(), place_start: Vec::new(), parents, coupled }
+    }
+
+    /// The layout of the joints of the tree, as if each moved by itself.
+    fn of_tree(model: &Model, columns: Vec<Column>) -> Self {
+        let count = model.body_count();
+        let mut joints = vec![JointPanel::default(); count];
+        let paths: Vec<Vec<usize>> = (0..count).map(|body| model.path(body)).collect();
         let mut place_start = vec![0];
         for path in &paths {
             place_start.push(place_start[place_start.len() - 1] + path.len());
         }
-        let mut parameters = vec![0_u16; dof];
-        let mut places = vec![0; place_start[dof]];
+        let mut parameters = vec![0_u16; count];
+        let mut places = vec![0; place_start[count]];
         let mut last = None;
         for (global, column) in columns.iter().enumerate() {
             match column {
@@ -116,7 +178,7 @@ impl PanelLayout {
                 }
             }
         }
-        Self { columns, joints, parameters, places, place_start, tree: tree(model) }
+        Self { columns, joints, parameters, places, place_start, parents: parents(model), coupled: None }
     }
 
     /// All columns, in global order.
@@ -135,7 +197,45 @@ impl PanelLayout {
     }
 
     pub(crate) fn check_tree(&self, model: &Model) {
-        assert!(same_tree(&self.tree, model), "the panel layout was made for a model with another tree");
+        assert!(same_tree(&self.parents, model), "the panel layout was made for a model with another tree");
+        let coupling = self.coupled.as_ref().map(|coupled| &coupled.coupling);
+        assert!(coupling == model.coupling(), "the panel layout was made for a model whose joints follow others");
+    }
+
+    /// Takes panels of the joints of the tree together into those of the degrees of freedom, `Y = Gᵀ Y_tree`.
+    fn gather(&self, coupled: &CoupledPanels, tree: &Panels, panels: &mut Panels) {
+        let samples = panels.samples;
+        for (joint, panel) in self.joints.iter().enumerate() {
+            panels.joint_mut(joint)[..(panel.columns.len() - panel.terms.len()) * samples].fill(0.0);
+        }
+        for share in &coupled.shares {
+            let from = &tree.joint(share.tree_joint)[share.tree_place * samples..(share.tree_place + 1) * samples];
+            let to = &mut panels.joint_mut(share.joint)[share.place * samples..(share.place + 1) * samples];
+            for (to, from) in to.iter_mut().zip(from) {
+                *to += share.factor * from;
+            }
+        }
+    }
+
+    /// The layout of the joints of the tree and, in `room`, the derivatives of a cost by the entries of their panels
+    /// from those by the entries of the degrees of freedom: the adjoint of gathering. `None` where all joints move by
+    /// themselves.
+    pub(crate) fn scattered<'l>(&'l self, panels: &Panels, room: &mut Panels) -> Option<&'l PanelLayout> {
+        let coupled = self.coupled.as_ref()?;
+        let samples = panels.samples;
+        room.resize(&coupled.tree, samples);
+        for panel in &mut room.joints {
+            panel.as_mut_slice().fill(0.0);
+        }
+        for share in &coupled.shares {
+            let from = &panels.joint(share.joint)[share.place * samples..(share.place + 1) * samples];
+            let start = share.tree_place * samples;
+            let to = &mut room.joint_mut(share.tree_joint)[start..start + samples];
+            for (to, from) in to.iter_mut().zip(from) {
+                *to += share.factor * from;
+            }
+        }
+        Some(&coupled.tree)
     }
 
     /// Which of the ten parameters of `body` have columns, as bits, and where these begin in the panel of the `k`-th
@@ -155,6 +255,16 @@ pub struct Panels {
 }
 
 impl Panels {
+    /// Panels that use memory from before.
+    pub(crate) fn in_buffers(joints: Vec<AlignedBuffer>) -> Self {
+        Self { samples: 0, joints }
+    }
+
+    /// The memory, for later panels.
+    pub(crate) fn into_buffers(self) -> Vec<AlignedBuffer> {
+        self.joints
+    }
+
     /// Makes room for `samples` samples of `layout`; memory is kept from block to block.
     pub fn resize(&mut self, layout: &PanelLayout, samples: usize) {
         self.samples = samples;
@@ -223,8 +333,18 @@ pub fn regressor_panels_following(
     workspace.check_tree(model);
     layout.check_tree(model);
     panels.resize(layout, motion.samples);
-    let BatchWorkspace { level, scratch, .. } = workspace;
-    dispatch(*level, Fill { model, scratch, layout, motion, panels });
+    let BatchWorkspace { level, scratch, tree, .. } = workspace;
+    if let Some(coupled) = &layout.coupled {
+        let TreeBatch { motion: tree_motion, panels: buffers, .. } = tree;
+        let motion = &expanded(&coupled.coupling, motion, tree_motion);
+        let mut tree_panels = Panels::in_buffers(core::mem::take(buffers));
+        tree_panels.resize(&coupled.tree, motion.samples);
+        dispatch(*level, Fill { model, scratch, layout: &coupled.tree, motion, panels: &mut tree_panels });
+        layout.gather(coupled, &tree_panels, panels);
+        *buffers = tree_panels.into_buffers();
+    } else {
+        dispatch(*level, Fill { model, scratch, layout, motion, panels });
+    }
     let samples = motion.samples;
     if history.temperature_c.len() != layout.dof() * samples {
         history.temperature_c.clear();

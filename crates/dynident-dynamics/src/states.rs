@@ -89,13 +89,13 @@ pub(crate) struct AxisScratch<T: Lane> {
 impl<T: Lane> AxisScratch<T> {
     pub(crate) fn new(model: &Model) -> Self {
         let (mut path, mut path_start, mut bundle_start) = (Vec::new(), vec![0], vec![0]);
-        for body in 0..model.dof() {
+        for body in 0..model.body_count() {
             let joints = model.path(body);
             bundle_start.push(bundle_start[body] + joints.len().div_ceil(T::PER_BUNDLE));
             path.extend(joints.iter().map(|&joint| joint as u32));
             path_start.push(path.len());
         }
-        let bundles = bundle_start[model.dof()];
+        let bundles = bundle_start[model.body_count()];
         Self { path, path_start, bundle_start, angular: vec![Vec3::ZERO; bundles], linear: vec![Vec3::ZERO; bundles] }
     }
 }
@@ -130,19 +130,19 @@ pub(crate) struct JointAdjoint<T> {
 impl<T: Scalar> AdjointScratch<T> {
     pub(crate) fn new(model: &Model) -> Self {
         let (mut path, mut path_start) = (Vec::new(), vec![0]);
-        for body in 0..model.dof() {
+        for body in 0..model.body_count() {
             path.extend(model.path(body).iter().map(|&joint| joint as u32));
             path_start.push(path.len());
         }
-        let (pairs, dof) = (path.len(), model.dof());
+        let (pairs, bodies) = (path.len(), model.body_count());
         let still = BodyAdjoint { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
         Self {
             path,
             path_start,
             axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
             by_axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
-            by_motion: vec![still; dof],
-            joints: vec![JointAdjoint { q: T::ZERO, dq: T::ZERO, ddq: T::ZERO }; dof],
+            by_motion: vec![still; bodies],
+            joints: vec![JointAdjoint { q: T::ZERO, dq: T::ZERO, ddq: T::ZERO }; bodies],
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::composite::Composite;
 use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyDerivative, BodyState};
+use crate::tree_scratch::{TreeBatch, TreeScratch};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
@@ -29,7 +30,7 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) composites: Vec<Composite<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia<T>>,
     pub(crate) derivative: Vec<BodyDerivative<T>>,
-    /// Square matrices (dof × dof), row-major.
+    /// Square matrices over the joints of the tree, row-major.
     pub(crate) matrices: [Vec<T>; 3],
 }
 
@@ -126,7 +127,7 @@ impl Kernel for MakeScratch<'_> {
     #[inline(always)]
     fn run<T: Lane>(self) -> AnyScratch {
         AnyScratch(Box::new(Scratch::<T> {
-            core: CoreScratch::new(self.0.dof()),
+            core: CoreScratch::new(self.0.body_count()),
             axes: AxisScratch::new(self.0),
             adjoint: AdjointScratch::new(self.0),
         }))
@@ -140,12 +141,14 @@ pub struct Workspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
     /// Parents of the bodies it was made for: the regressor's scratch follows the tree.
-    tree: Vec<Option<usize>>,
+    parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
     pub(crate) vector: Vec<f64>,
     pub(crate) matrices: [Vec<f64>; 3],
     pub(crate) regressor: Vec<f64>,
     pub(crate) placements: Vec<Transform>,
+    /// Where joints follow others.
+    pub(crate) tree: TreeScratch,
 }
 
 impl Workspace {
@@ -157,16 +160,17 @@ impl Workspace {
 
     /// A workspace at a chosen processor level.
     pub fn with_level(model: &Model, level: Level) -> Self {
-        let dof = model.dof();
+        let (dof, bodies) = (model.dof(), model.body_count());
         Self {
             level,
             dof,
-            tree: tree(model),
+            parents: parents(model),
             scratch: dispatch_single(level, MakeScratch(model)),
             vector: vec![0.0; dof],
             matrices: core::array::from_fn(|_| vec![0.0; dof * dof]),
-            regressor: vec![0.0; dof * dof * 10],
-            placements: vec![Transform::IDENTITY; dof],
+            regressor: vec![0.0; dof * bodies * 10],
+            placements: vec![Transform::IDENTITY; bodies],
+            tree: TreeScratch::new(model),
         }
     }
 
@@ -177,11 +181,12 @@ impl Workspace {
 
     /// For algorithms whose scratch follows the tree.
     pub(crate) fn check_tree(&self, model: &Model) {
-        assert!(same_tree(&self.tree, model), "the workspace was made for a model with another tree");
+        assert!(same_tree(&self.parents, model), "the workspace was made for a model with another tree");
     }
 
     pub(crate) fn check(&self, model: &Model, vectors: &[&[f64]]) {
-        assert_eq!(self.dof, model.dof(), "the workspace was made for a model with another number of joints");
+        let size = (self.dof, self.parents.len());
+        assert_eq!(size, (model.dof(), model.body_count()), "the workspace was made for a model of another size");
         for vector in vectors {
             assert_eq!(vector.len(), self.dof, "a joint vector has one entry per joint");
         }
@@ -198,8 +203,10 @@ impl core::fmt::Debug for Workspace {
 pub struct BatchWorkspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
-    tree: Vec<Option<usize>>,
+    parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
+    /// Where joints follow others.
+    pub(crate) tree: TreeBatch,
 }
 
 impl BatchWorkspace {
@@ -211,16 +218,18 @@ impl BatchWorkspace {
 
     /// A workspace at a chosen processor level.
     pub fn with_level(model: &Model, level: Level) -> Self {
-        Self { level, dof: model.dof(), tree: tree(model), scratch: dispatch(level, MakeScratch(model)) }
+        let scratch = dispatch(level, MakeScratch(model));
+        Self { level, dof: model.dof(), parents: parents(model), scratch, tree: TreeBatch::default() }
     }
 
     /// For algorithms whose scratch follows the tree.
     pub(crate) fn check_tree(&self, model: &Model) {
-        assert!(same_tree(&self.tree, model), "the workspace was made for a model with another tree");
+        assert!(same_tree(&self.parents, model), "the workspace was made for a model with another tree");
     }
 
     pub(crate) fn check(&self, model: &Model, samples: usize, arrays: &[&[f64]]) {
-        assert_eq!(self.dof, model.dof(), "the workspace was made for a model with another number of joints");
+        let size = (self.dof, self.parents.len());
+        assert_eq!(size, (model.dof(), model.body_count()), "the workspace was made for a model of another size");
         for array in arrays {
             assert_eq!(array.len(), self.dof * samples, "a motion array has one entry per joint and sample");
         }
@@ -234,13 +243,13 @@ impl core::fmt::Debug for BatchWorkspace {
 }
 
 /// Which body hangs on which.
-pub(crate) fn tree(model: &Model) -> Vec<Option<usize>> {
+pub(crate) fn parents(model: &Model) -> Vec<Option<usize>> {
     model.maps().iter().map(|map| map.parent).collect()
 }
 
-/// Whether a model's bodies hang on each other as in `tree`.
-pub(crate) fn same_tree(tree: &[Option<usize>], model: &Model) -> bool {
-    model.maps().iter().map(|map| map.parent).eq(tree.iter().copied())
+/// Whether a model's bodies hang on each other as `parents` says.
+pub(crate) fn same_tree(parents: &[Option<usize>], model: &Model) -> bool {
+    model.maps().iter().map(|map| map.parent).eq(parents.iter().copied())
 }
 
 /// Takes one joint vector into scratch scalars.

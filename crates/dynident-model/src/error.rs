@@ -32,6 +32,12 @@ pub enum ModelError {
         /// The joint.
         joint: String,
     },
+    /// Joints that follow each other.
+    #[error("joint `{joint}` follows joints that follow it: one of them has to move by itself")]
+    MimicCircle {
+        /// One of them.
+        joint: String,
+    },
     /// A body with no link at all.
     #[error("a body has no link: every body needs the link that its joint moves")]
     BodyWithoutLink,

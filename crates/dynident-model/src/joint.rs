@@ -37,15 +37,35 @@ pub struct JointLimits {
     pub effort: Option<f64>,
 }
 
-/// A joint that follows another: `q = multiplier · q_source + offset`.
+/// A joint that follows others: `q = Σ multiplier · q_source + offset`. One source in URDF's `mimic`; the passive joints
+/// of a parallelogram may have two.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
-    /// Name of the joint that is followed.
-    pub source: String,
-    /// Ratio of the two velocities.
-    pub multiplier: f64,
-    /// Position (rad or m) while the source stands at zero.
+    /// The joints that are followed.
+    pub sources: Vec<MimicSource>,
+    /// Position (rad or m) while the sources stand at zero.
     pub offset: f64,
+}
+
+/// A joint that another follows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MimicSource {
+    /// Its name.
+    pub joint: String,
+    /// Velocity of the follower per velocity of this joint.
+    pub multiplier: f64,
+}
+
+impl Mimic {
+    /// Following one joint: `q = multiplier · q_source + offset`.
+    pub fn of(source: &str, multiplier: f64, offset: f64) -> Self {
+        Self { sources: vec![MimicSource { joint: source.to_owned(), multiplier }], offset }
+    }
+
+    /// The followed joints' names for people: `a and b`.
+    pub fn source_names(&self) -> String {
+        self.sources.iter().map(|source| source.joint.as_str()).collect::<Vec<_>>().join(" and ")
+    }
 }
 
 /// A joint of the tree. Its child body's frame is the joint frame: at position zero it stands at `placement` in the
@@ -70,8 +90,8 @@ pub struct Joint {
     pub friction: Option<f64>,
     /// Inertia of rotor and gear, reflected to the joint, kg m² (kg), where the description gives it.
     pub drive_inertia: Option<f64>,
-    /// The joint it follows, if the description says so. The dynamics treat it as a free joint; see
-    /// [`Model::locked`](crate::Model::locked).
+    /// What it follows, if it does not move by itself; see [`JointCoupling`](crate::JointCoupling). A joint that follows
+    /// one which is not in the model moves by itself.
     pub mimic: Option<Mimic>,
 }
 

@@ -52,6 +52,7 @@
 
 pub mod audit;
 pub mod collision;
+mod coupling;
 pub mod dh;
 mod error;
 mod inertial;
@@ -69,10 +70,11 @@ mod xacro;
 mod xml;
 
 pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
+pub use coupling::JointCoupling;
 pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
-pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
+pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic, MimicSource};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
 pub use place::{Located, line_and_column};
 pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot};

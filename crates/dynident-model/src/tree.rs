@@ -1,9 +1,10 @@
 //! The link tree: an immutable model of the robot.
 
 use crate::collision::CollisionShape;
+use crate::coupling::JointCoupling;
 use crate::error::ModelError;
 use crate::inertial::InertialParameters;
-use crate::joint::{Joint, JointMap};
+use crate::joint::{Joint, JointMap, Mimic};
 use crate::spatial::{Mat3, Transform, Vec3};
 
 /// Standard gravity of the tools of this field (Pinocchio, MuJoCo, URDF simulators), m/s², along -z of the base.
@@ -45,14 +46,21 @@ impl Body {
     }
 }
 
-/// A robot on a fixed base: joints and bodies in an order where parents come before children. Body `i` moves with joint
-/// `i`; positions, velocities and torques are vectors in this order.
+/// A robot on a fixed base: a tree of joints and bodies in an order where parents come before children.
+///
+/// Body `i` hangs on joint `i` of the tree ([`tree_joints`](Model::tree_joints)). Most robots have one degree of freedom
+/// for each of these; where joints follow others ([`Joint::mimic`]) the **degrees of freedom** ([`joints`](Model::joints))
+/// are those that move by themselves, and [`coupling`](Model::coupling) says how the tree follows them. Positions,
+/// velocities and torques are vectors over the degrees of freedom.
 #[doc(alias("robot", "kinematic tree", "multibody"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     name: String,
     gravity: Vec3,
+    tree: Vec<Joint>,
+    /// The degrees of freedom: `tree` without the joints that follow others.
     joints: Vec<Joint>,
+    coupling: Option<JointCoupling>,
     bodies: Vec<Body>,
     base: Body,
     maps: Vec<JointMap>,
@@ -60,11 +68,11 @@ pub struct Model {
 }
 
 impl Model {
-    /// A model from its parts. `base` holds the links that do not move.
+    /// A model from the joints of its tree and the bodies that hang on them. `base` holds the links that do not move.
     ///
     /// # Errors
-    /// If counts differ, a name stands twice, a parent does not come before its child, an axis is not a unit vector, or
-    /// a number is not finite.
+    /// If counts differ, a name stands twice, a parent does not come before its child, an axis is not a unit vector,
+    /// joints follow each other in a circle, or a number is not finite.
     pub fn new(name: &str, base: Body, joints: Vec<Joint>, bodies: Vec<Body>) -> Result<Self, ModelError> {
         if joints.len() != bodies.len() {
             return Err(ModelError::Counts { joints: joints.len(), bodies: bodies.len() });
@@ -98,7 +106,14 @@ impl Model {
         }
         let inertials = bodies.iter().map(|body| body.prior().unwrap_or(InertialParameters::ZERO)).collect();
         let maps = joints.iter().map(Joint::map).collect();
-        Ok(Self { name: name.to_owned(), gravity: STANDARD_GRAVITY, joints, bodies, base, maps, inertials })
+        let tree = joints;
+        let coupling = JointCoupling::of(&tree)?;
+        let joints = coupling.as_ref().map_or_else(
+            || tree.clone(),
+            |coupling| coupling.driving().iter().map(|&joint| tree[joint].clone()).collect(),
+        );
+        let gravity = STANDARD_GRAVITY;
+        Ok(Self { name: name.to_owned(), gravity, tree, joints, coupling, bodies, base, maps, inertials })
     }
 
     /// The robot's name.
@@ -111,17 +126,38 @@ impl Model {
         self.joints.len()
     }
 
-    /// The joints, parents first.
+    /// The joints that move by themselves, parents first: the degrees of freedom.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
     }
 
-    /// The joints' numbers, prepared for the algorithms; same order as [`joints`](Model::joints).
+    /// All joints of the tree, parents first: body `i` hangs on joint `i`. The same as [`joints`](Model::joints) unless
+    /// some follow others.
+    pub fn tree_joints(&self) -> &[Joint] {
+        &self.tree
+    }
+
+    /// How the joints of the tree follow the degrees of freedom; `None` where each is one.
+    pub fn coupling(&self) -> Option<&JointCoupling> {
+        self.coupling.as_ref()
+    }
+
+    /// Place in the tree of a degree of freedom: the body that hangs on it.
+    pub fn body_of(&self, joint: usize) -> usize {
+        self.coupling.as_ref().map_or(joint, |coupling| coupling.driving()[joint])
+    }
+
+    /// Number of moving bodies, and of joints of the tree.
+    pub fn body_count(&self) -> usize {
+        self.tree.len()
+    }
+
+    /// The joints' numbers, prepared for the algorithms; same order as [`tree_joints`](Model::tree_joints).
     pub fn maps(&self) -> &[JointMap] {
         &self.maps
     }
 
-    /// The moving bodies; body `i` moves with joint `i`.
+    /// The moving bodies; body `i` hangs on joint `i` of the tree.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
@@ -157,22 +193,23 @@ impl Model {
         self.joints.iter().position(|joint| joint.name == name)
     }
 
-    /// True when body `body` moves with joint `joint`.
+    /// True when body `body` moves with degree of freedom `joint`.
     pub fn moves(&self, joint: usize, body: usize) -> bool {
         let mut at = Some(body);
         while let Some(index) = at {
-            if index == joint {
+            let follows = |coupling: &JointCoupling| coupling.row(index).iter().any(|&(dof, _)| dof == joint);
+            if self.coupling.as_ref().map_or(index == joint, follows) {
                 return true;
             }
-            at = self.joints[index].parent;
+            at = self.tree[index].parent;
         }
         false
     }
 
-    /// The joints from the base to body `body`, inclusive.
+    /// The joints of the tree from the base to body `body`, inclusive.
     pub fn path(&self, body: usize) -> Vec<usize> {
         let mut path = vec![body];
-        while let Some(parent) = self.joints[path[path.len() - 1]].parent {
+        while let Some(parent) = self.tree[path[path.len() - 1]].parent {
             path.push(parent);
         }
         path.reverse();
@@ -206,8 +243,8 @@ impl Model {
     /// # Errors
     /// If the count differs or a number is not finite.
     pub fn with_inertials(&self, inertials: &[InertialParameters]) -> Result<Self, ModelError> {
-        if inertials.len() != self.dof() {
-            return Err(ModelError::Counts { joints: self.dof(), bodies: inertials.len() });
+        if inertials.len() != self.body_count() {
+            return Err(ModelError::Counts { joints: self.body_count(), bodies: inertials.len() });
         }
         if inertials.iter().flat_map(|inertial| inertial.0).any(|x| !x.is_finite()) {
             return Err(ModelError::NotFinite { what: "inertial parameters".to_owned() });
@@ -223,16 +260,50 @@ impl Model {
         Ok(model)
     }
 
+    /// The same robot with every joint of the tree moving by itself, whatever the description says that it follows.
+    #[must_use]
+    pub fn without_followers(mut self) -> Self {
+        for joint in &mut self.tree {
+            joint.mimic = None;
+        }
+        self.joints.clone_from(&self.tree);
+        self.coupling = None;
+        self
+    }
+
+    /// The same robot with another list of what its joints follow: `followers` names joints of the tree.
+    ///
+    /// # Errors
+    /// If a name is unknown, joints follow each other in a circle, or a number is not finite.
+    pub fn with_followers(self, followers: &[(String, Mimic)]) -> Result<Self, ModelError> {
+        let Self { name, gravity, mut tree, bodies, base, .. } = self;
+        let known = || tree.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+        let unknown = |joint: &str| ModelError::UnknownJoint { joint: joint.to_owned(), known: known() };
+        let place = |name: &str| tree.iter().position(|joint| joint.name == name).ok_or_else(|| unknown(name));
+        let mut places = Vec::with_capacity(followers.len());
+        for (joint, mimic) in followers {
+            places.push(place(joint)?);
+            for source in &mimic.sources {
+                place(&source.joint)?;
+            }
+        }
+        for (place, (_, mimic)) in places.into_iter().zip(followers) {
+            tree[place].mimic = Some(mimic.clone());
+        }
+        Self::new(&name, base, tree, bodies)?.with_gravity(gravity)
+    }
+
     /// The same robot with the named joints held at the given positions (rad or m): each one's body joins its parent's.
+    /// A joint that follows held joints alone is held as well.
     ///
     /// # Errors
     /// If a name is unknown or given twice, or a position is not finite.
     pub fn locked(&self, positions: &[(String, f64)]) -> Result<Self, ModelError> {
-        let mut position_of = vec![None; self.dof()];
+        let mut position_of = vec![None; self.body_count()];
         for (name, position) in positions {
-            let index = self.joint_index(name).ok_or_else(|| ModelError::UnknownJoint {
-                joint: name.clone(),
-                known: self.joints.iter().map(|joint| joint.name.clone()).collect(),
+            let index = self.tree.iter().position(|joint| joint.name == *name).ok_or_else(|| {
+                let known = self.tree.iter().map(|joint| joint.name.clone()).collect();
+                ModelError::UnknownJoint { joint: name.clone(), known }
             })?;
             if !position.is_finite() {
                 return Err(ModelError::NotFinite { what: format!("locked position of joint `{name}`") });
@@ -241,10 +312,11 @@ impl Model {
                 return Err(ModelError::DuplicateJoint { joint: name.clone() });
             }
         }
+        let tree = self.following_the_rest(&mut position_of);
         // Where each old body went: new body index (None: base) and new_from_old.
-        let mut went: Vec<(Option<usize>, Transform)> = Vec::with_capacity(self.dof());
+        let mut went: Vec<(Option<usize>, Transform)> = Vec::with_capacity(self.body_count());
         let (mut joints, mut bodies, mut base) = (Vec::new(), Vec::<Body>::new(), self.base.clone());
-        for (index, joint) in self.joints.iter().enumerate() {
+        for (index, joint) in tree.iter().enumerate() {
             let (parent, parent_from_old) = joint.parent.map_or((None, Transform::IDENTITY), |p| went[p]);
             if let Some(position) = position_of[index] {
                 let placement = parent_from_old.then(&joint.transform(position));
@@ -263,5 +335,32 @@ impl Model {
             }
         }
         Self::new(&self.name, base, joints, bodies)?.with_gravity(self.gravity)
+    }
+
+    /// The joints of the tree once those with a position are held: what is followed and held becomes an offset, and a
+    /// follower with nothing left to follow is held too.
+    fn following_the_rest(&self, position_of: &mut [Option<f64>]) -> Vec<Joint> {
+        let mut tree = self.tree.clone();
+        let Some(coupling) = &self.coupling else { return tree };
+        let place = |name: &str| self.tree.iter().position(|joint| joint.name == *name);
+        // A chain of followers is as long as the tree at most.
+        for _ in 0..tree.len() {
+            for index in 0..tree.len() {
+                if coupling.driving().contains(&index) || position_of[index].is_some() {
+                    continue;
+                }
+                let Some(mimic) = &mut tree[index].mimic else { continue };
+                let offset = &mut mimic.offset;
+                mimic.sources.retain(|source| {
+                    let held = place(&source.joint).and_then(|at| position_of[at]);
+                    *offset += held.map_or(0.0, |position| source.multiplier * position);
+                    held.is_none()
+                });
+                if mimic.sources.is_empty() {
+                    position_of[index] = Some(*offset);
+                }
+            }
+        }
+        tree
     }
 }

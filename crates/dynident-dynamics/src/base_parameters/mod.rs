@@ -5,6 +5,7 @@
 //! Khalil 1990; Gautier 1991). The dependencies come from the robot's structure ([`structural`]); the rank of
 //! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
 
+mod coupled;
 mod determination;
 mod expression;
 mod numerical;
@@ -46,9 +47,14 @@ pub struct BaseParameters {
 }
 
 impl BaseParameters {
-    /// Base parameters from the robot's structure: no data, no random numbers.
+    /// Base parameters from the robot's structure: no data, no random numbers. Where joints follow others, from
+    /// regressors at states that are the same every time.
     pub fn new(model: &Model, terms: &[TorqueTerm], settings: &BaseParameterSettings) -> Self {
         let columns = all_columns(model, terms);
+        if model.coupling().is_some() {
+            let split = coupled::independent_columns(model, terms, settings.tolerance);
+            return Self { columns, split };
+        }
         let directions = structural::identifiable_directions(model, terms, settings.tolerance);
         let split = split_columns(&directions, settings.tolerance);
         Self { columns, split }

@@ -22,6 +22,16 @@ pub struct NumericalRank {
 /// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±1 m, velocities within ±2,
 /// accelerations within ±5) and splits their columns at `tolerance`. Deterministic in `seed`.
 pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance: f64) -> NumericalRank {
+    let split = independent_regressor_columns(&stacked_regressors(model, terms, seed), tolerance);
+    NumericalRank {
+        independent: split.independent,
+        weakest_independent: split.weakest_independent,
+        strongest_dependent: split.strongest_dependent,
+    }
+}
+
+/// Regressors at random states under one another: rows of joint after joint, all columns.
+pub(super) fn stacked_regressors(model: &Model, terms: &[TorqueTerm], seed: u64) -> DMatrix<f64> {
     let columns = all_columns(model, terms);
     let (dof, count) = (model.dof(), columns.len());
     let samples = 2 * count / dof.max(1) + 10;
@@ -42,10 +52,5 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
             stacked.view_mut((joint * samples, column), (samples, 1)).copy_from_slice(values);
         }
     }
-    let split = independent_regressor_columns(&stacked, tolerance);
-    NumericalRank {
-        independent: split.independent,
-        weakest_independent: split.weakest_independent,
-        strongest_dependent: split.strongest_dependent,
-    }
+    stacked
 }

@@ -278,7 +278,7 @@ fn term_constants(terms: &[TorqueTerm], j: usize, w: &ArrivingTwist, slots: usiz
 
 /// Friction depends on velocities alone, so it mixes with nothing above. Each distinct function of the motion in each
 /// joint's row is one condition; terms that say the same twice share it.
-fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
+pub(super) fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
     let mut places: HashMap<(usize, String), usize> = HashMap::new();
     let mut conditions: Vec<DVector<f64>> = Vec::new();
     for (x, term) in terms.iter().enumerate() {

@@ -172,15 +172,9 @@ fn unknown(model: &Model, index: usize, findings: &mut Findings) {
 
 /// Joints that move no mass at all.
 fn massless(model: &Model, findings: &mut Findings) {
-    let mut carries: Vec<bool> =
-        model.inertials().iter().map(|inertial| *inertial != InertialParameters::ZERO).collect();
-    for (index, joint) in model.joints().iter().enumerate().rev() {
-        match joint.parent {
-            Some(parent) if carries[index] => carries[parent] = true,
-            _ => {}
-        }
-    }
-    for (joint, _) in model.joints().iter().zip(carries).filter(|(_, carries)| !carries) {
+    let known: Vec<bool> = model.inertials().iter().map(|inertial| *inertial != InertialParameters::ZERO).collect();
+    let moves_mass = |joint: usize| (0..known.len()).any(|body| known[body] && model.moves(joint, body));
+    for (_, joint) in model.joints().iter().enumerate().filter(|(index, _)| !moves_mass(*index)) {
         let message =
             "moves no mass that is known: the mass matrix is singular; give an inertial, or lock the joint".to_owned();
         findings.add(Problem, "massless-subtree", format!("joint {}", joint.name), message);

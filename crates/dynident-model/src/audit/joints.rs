@@ -15,7 +15,7 @@ const LARGEST_STROKE_M: f64 = 100.0;
 const LARGEST_REVOLUTE_VELOCITY_RAD_S: f64 = 100.0;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
-    for joint in model.joints() {
+    for joint in model.tree_joints() {
         let place = || format!("joint {}", joint.name);
         let offset = joint.placement.translation.norm();
         if offset > LARGEST_OFFSET_M {
@@ -30,13 +30,13 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
             }
         }
         if let Some(mimic) = &joint.mimic {
-            let known = model.joint_index(&mimic.source).is_some();
-            let rest = if known { "" } else { " (which does not move here)" };
-            let message = format!(
-                "mimics `{}`{rest}, but counts as a free joint here: lock it if the log does not hold it",
-                mimic.source
-            );
-            findings.add(Info, "mimic", place(), message);
+            let follows = model.joint_index(&joint.name).is_none();
+            let rest = if follows {
+                ": it is no degree of freedom, and what it carries is felt by what it follows"
+            } else {
+                ", which does not move here, and counts as a free joint: lock it if the log does not hold it"
+            };
+            findings.add(Info, "mimic", place(), format!("follows {}{rest}", mimic.source_names()));
         }
     }
     // All offsets in one point leave nothing to compare with, and no arm looks like that.

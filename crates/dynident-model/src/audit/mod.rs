@@ -87,9 +87,9 @@ struct Lengths {
 
 impl Lengths {
     fn of(model: &Model) -> Self {
-        let mut from_base: Vec<f64> = Vec::with_capacity(model.dof());
-        let mut bodies = vec![0.1_f64; model.dof()];
-        for (index, joint) in model.joints().iter().enumerate() {
+        let mut from_base: Vec<f64> = Vec::with_capacity(model.body_count());
+        let mut bodies = vec![0.1_f64; model.body_count()];
+        for (index, joint) in model.tree_joints().iter().enumerate() {
             let offset = joint.placement.translation.norm();
             from_base.push(offset + joint.parent.map_or(0.0, |parent| from_base[parent]));
             bodies[index] = bodies[index].max(offset);

@@ -127,8 +127,8 @@ pub(super) fn couplings(document: &Expanded, tree: &mut Tree, notices: &mut Noti
         }
         // MuJoCo's law is between the distances from `ref`: q1 - ref1 = c0 + c1 (q2 - ref2).
         let offset = tree.references[follower] + law[0] - law[1] * tree.references[source];
-        let source = tree.joints[source].name.clone();
-        tree.joints[follower].mimic = Some(Mimic { source, multiplier: law[1], offset });
+        let mimic = Mimic::of(&tree.joints[source].name, law[1], offset);
+        tree.joints[follower].mimic = Some(mimic);
     }
     Ok(())
 }

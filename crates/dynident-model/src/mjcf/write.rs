@@ -148,7 +148,8 @@ pub fn rewrite_mjcf(
     let mut seen = HashSet::new();
     for change in joints {
         let unknown = || MjcfWriteError::Unknown { kind: "joint", name: change.joint.clone() };
-        let index = found.model.joint_index(&change.joint).ok_or_else(unknown)?;
+        let mut tree = found.model.tree_joints().iter();
+        let index = tree.position(|joint| joint.name == change.joint).ok_or_else(unknown)?;
         if !seen.insert(&*change.joint) {
             return Err(MjcfWriteError::Repeated { kind: "joint", name: change.joint.clone() });
         }

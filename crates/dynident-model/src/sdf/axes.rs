@@ -104,5 +104,5 @@ fn followed(joint: &Item<'_, '_>, mimic: Node<'_, '_>) -> Result<Mimic, SdfError
     let multiplier = number(mimic, "multiplier")?.unwrap_or(1.0);
     let reference = number(mimic, "reference")?.unwrap_or(0.0);
     let offset = number(mimic, "offset")?.unwrap_or(0.0) - multiplier * reference;
-    Ok(Mimic { source: full_name(&joint.scope, source), multiplier, offset })
+    Ok(Mimic::of(&full_name(&joint.scope, source), multiplier, offset))
 }

@@ -103,9 +103,9 @@ pub(super) fn model(
     Model::new(name, base, tree_joints, bodies).map_err(|error| robot_fault(UrdfFault::Model(error)))
 }
 
-/// A joint may follow any other joint of the file; chains of followers do not matter, since each counts as free.
+/// A joint may follow any other joint of the file.
 fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
-    match joints.iter().find(|joint| joint.mimic.as_ref().is_some_and(|mimic| mimic.source == joint.name)) {
+    match joints.iter().find(|joint| joint.mimic.as_ref().is_some_and(|mimic| mimic.sources[0].joint == joint.name)) {
         None => Ok(()),
         Some(joint) => Err(fault_at(joint.node, UrdfFault::OwnMimic { joint: joint.name.to_owned() })),
     }
@@ -115,7 +115,7 @@ fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
 pub(super) fn unknown_mimics(joints: &[JointElement<'_, '_>]) -> Vec<UrdfIrregularity> {
     let names: std::collections::HashSet<&str> = joints.iter().map(|joint| joint.name).collect();
     let unknown = joints.iter().filter_map(|joint| {
-        let source = &joint.mimic.as_ref()?.source;
+        let source = &joint.mimic.as_ref()?.sources[0].joint;
         (!names.contains(source.as_str())).then(|| UrdfIrregularity::UnknownMimic {
             line: joint.node.document().text_pos_at(joint.node.range().start).row,
             joint: joint.name.to_owned(),

@@ -153,11 +153,11 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
         element.friction = numbers::<1>(dynamics, "friction")?.map(|[x]| x);
     }
     if let Some(mimic) = child(node, "mimic") {
-        element.mimic = Some(Mimic {
-            source: name(mimic, "joint")?.to_owned(),
-            multiplier: numbers::<1>(mimic, "multiplier")?.map_or(1.0, |[x]| x),
-            offset: numbers::<1>(mimic, "offset")?.map_or(0.0, |[x]| x),
-        });
+        element.mimic = Some(Mimic::of(
+            name(mimic, "joint")?,
+            numbers::<1>(mimic, "multiplier")?.map_or(1.0, |[x]| x),
+            numbers::<1>(mimic, "offset")?.map_or(0.0, |[x]| x),
+        ));
     }
     Ok(element)
 }

@@ -9,7 +9,8 @@ use core::fmt::Write;
 /// The model as URDF: links, joints with placement, axis, limits and friction, and the inertials of links that have
 /// any. Reading it gives the model again, with these differences: URDF holds no gravity; a revolute joint without stops
 /// becomes `continuous`, for readers of URDF take stops that are not there for zero; a velocity or effort that nobody
-/// knows is written as 0 where the format demands one, with a comment.
+/// knows is written as 0 where the format demands one, with a comment; a joint that follows two is said in a comment,
+/// for `mimic` knows one.
 ///
 /// Angles are the fixed-axis roll, pitch and yaw of the placement, `R = Rz(yaw) Ry(pitch) Rx(roll)`, in rad.
 pub fn write_urdf(model: &Model) -> String {
@@ -20,7 +21,7 @@ pub fn write_urdf(model: &Model) -> String {
             writeln!(text, "  <!-- gravity in the base frame, which URDF does not hold: {x:?} {y:?} {z:?} m/s² -->");
     }
     write_links(&mut text, model.base(), true);
-    for (joint, body) in model.joints().iter().zip(model.bodies()) {
+    for (joint, body) in model.tree_joints().iter().zip(model.bodies()) {
         write_links(&mut text, body, false);
         let parent = joint.parent.map_or(model.base(), |parent| &model.bodies()[parent]);
         write_joint(&mut text, joint, parent.name(), body.name());
@@ -93,6 +94,22 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
         .collect();
     if !friction.is_empty() {
         let _ = writeln!(text, "    <dynamics{}/>", friction.concat());
+    }
+    match joint.mimic.as_ref().map(|mimic| (&mimic.sources[..], mimic.offset)) {
+        None | Some(([], _)) => {}
+        Some(([source], offset)) => {
+            let name = attribute(&source.joint);
+            let _ = writeln!(
+                text,
+                "    <mimic joint=\"{name}\" multiplier=\"{:?}\" offset=\"{offset:?}\"/>",
+                source.multiplier
+            );
+        }
+        Some((sources, offset)) => {
+            let shares = sources.iter().map(|s| format!("{:?} {} + ", s.multiplier, attribute(&s.joint)));
+            let law = format!("{}{offset:?}", shares.collect::<String>()).replace("--", "- -");
+            let _ = writeln!(text, "    <!-- follows {law}, which URDF does not hold -->");
+        }
     }
     *text += "  </joint>\n";
 }

@@ -119,8 +119,8 @@ pub enum UrdfWriteError {
 /// # Errors
 /// If the count differs.
 pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<Vec<LinkChange>, UrdfWriteError> {
-    if inertials.len() != model.dof() {
-        return Err(UrdfWriteError::Counts { expected: model.dof(), found: inertials.len() });
+    if inertials.len() != model.body_count() {
+        return Err(UrdfWriteError::Counts { expected: model.body_count(), found: inertials.len() });
     }
     let mut changes = Vec::new();
     for (body, inertial) in model.bodies().iter().zip(inertials) {

@@ -157,9 +157,9 @@ fn a_line_of_equality_is_a_follower_and_more_is_said() {
       <option viscosity="0.1"/></mujoco>"#;
     let robot = read_mjcf(text).unwrap();
     // a - 0.5 = 0.25 - 2 (b + 1)
-    let follower = Mimic { source: "b".to_owned(), multiplier: -2.0, offset: -1.25 };
-    assert_eq!(robot.model.joints()[0].mimic, Some(follower));
-    assert!(robot.model.joints()[1..].iter().all(|joint| joint.mimic.is_none()));
+    let follower = Mimic::of("b", -2.0, -1.25);
+    assert_eq!(robot.model.tree_joints()[0].mimic, Some(follower));
+    assert!(robot.model.joints().iter().all(|joint| joint.mimic.is_none()));
     let mut said: Vec<&str> = robot.notices.iter().map(|notice| notice.loss.name()).collect();
     said.sort_unstable();
     assert_eq!(said, ["constraint", "coupling-polynomial", "gravity-compensation", "medium", "spring", "tendon"]);

@@ -174,7 +174,7 @@ fn differences(old: &StatedInertial, new: &StatedInertial) -> Vec<Correction> {
 const LARGEST_OFFSET_M: f64 = 10.0;
 
 fn lengths_of(stated: &[StatedInertial], model: &Model) -> Option<Vec<f64>> {
-    if model.joints().iter().any(|joint| joint.placement.translation.norm() > LARGEST_OFFSET_M) {
+    if model.tree_joints().iter().any(|joint| joint.placement.translation.norm() > LARGEST_OFFSET_M) {
         return None;
     }
     let lengths = Lengths::of(model);
@@ -185,7 +185,7 @@ fn lengths_of(stated: &[StatedInertial], model: &Model) -> Option<Vec<f64>> {
         .flat_map(|(body, length)| body.links.iter().map(move |link| (link.name.as_str(), *length)))
         .collect();
     // The base is about as large as what stands on it is far.
-    let on_base = model.joints().iter().filter(|joint| joint.parent.is_none());
+    let on_base = model.tree_joints().iter().filter(|joint| joint.parent.is_none());
     let base = on_base.map(|joint| joint.placement.translation.norm()).fold(0.1, f64::max);
     Some(stated.iter().map(|one| of_body.get(one.link.as_str()).copied().unwrap_or(base)).collect())
 }

@@ -1,0 +1,79 @@
+//! Robots whose joints follow others: the algorithms run over the joints of the tree, and this is where motions arrive
+//! from the degrees of freedom and results wait to go back, by `q_tree = G q + q_0` and `tau = Gᵀ tau_tree`
+//! ([`JointCoupling`]). Empty, and passed by, for all other robots.
+
+use dynident_lanes::AlignedBuffer;
+use dynident_model::terms::JointMotion;
+use dynident_model::{JointCoupling, Model};
+
+/// For one sample.
+#[derive(Debug)]
+pub(crate) struct TreeScratch {
+    pub(crate) q: Vec<f64>,
+    pub(crate) dq: Vec<f64>,
+    pub(crate) ddq: Vec<f64>,
+    pub(crate) tau: Vec<f64>,
+    /// Square matrices over the joints of the tree, row-major.
+    pub(crate) matrices: [Vec<f64>; 3],
+    /// Rows of the joints of the tree, ten columns for each body.
+    pub(crate) regressor: Vec<f64>,
+}
+
+impl TreeScratch {
+    pub(crate) fn new(model: &Model) -> Self {
+        let joints = if model.coupling().is_some() { model.body_count() } else { 0 };
+        let zeros = || vec![0.0; joints];
+        Self {
+            q: zeros(),
+            dq: zeros(),
+            ddq: zeros(),
+            tau: zeros(),
+            matrices: core::array::from_fn(|_| vec![0.0; joints * joints]),
+            regressor: vec![0.0; 10 * joints * joints],
+        }
+    }
+
+    /// The positions of the joints of the tree.
+    pub(crate) fn positions(&mut self, coupling: &JointCoupling, q: &[f64]) -> &[f64] {
+        coupling.positions(q, 1, &mut self.q);
+        &self.q
+    }
+
+    /// Takes one sample of a motion in.
+    pub(crate) fn take_motion(&mut self, coupling: &JointCoupling, q: &[f64], dq: &[f64], ddq: &[f64]) {
+        coupling.positions(q, 1, &mut self.q);
+        coupling.rates(dq, 1, &mut self.dq);
+        coupling.rates(ddq, 1, &mut self.ddq);
+    }
+}
+
+/// For blocks of samples; grows to their size and keeps it.
+#[derive(Debug, Default)]
+pub(crate) struct TreeBatch {
+    /// Positions, velocities, accelerations.
+    pub(crate) motion: [Vec<f64>; 3],
+    /// Torques; or derivatives by the motion.
+    pub(crate) results: [Vec<f64>; 3],
+    /// One panel of the regressor for each joint of the tree.
+    pub(crate) panels: Vec<AlignedBuffer>,
+}
+
+/// The motion of the joints of the tree, in `room`.
+pub(crate) fn expanded<'r>(
+    coupling: &JointCoupling,
+    motion: &JointMotion<'_>,
+    room: &'r mut [Vec<f64>; 3],
+) -> JointMotion<'r> {
+    let samples = motion.samples;
+    let joints = coupling.joints();
+    for (place, (to, from)) in room.iter_mut().zip([motion.q, motion.dq, motion.ddq]).enumerate() {
+        to.resize(joints * samples, 0.0);
+        if place == 0 {
+            coupling.positions(from, samples, to);
+        } else {
+            coupling.rates(from, samples, to);
+        }
+    }
+    let [q, dq, ddq] = room;
+    JointMotion { samples, q, dq, ddq }
+}
