@@ -61,6 +61,7 @@ fn infinite_for_largest<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64
 /// What is checked at each sample.
 enum Probe {
     Band { array: usize, joint: usize, lower: f64, upper: f64 },
+    Follower { array: usize, sources: Vec<(usize, f64)>, offset: f64, range: [f64; 2] },
     Torque { joint: usize, limit: f64 },
     Power { joint: usize, limit: f64 },
     Axis { point: Point, axis: usize, lower: f64, upper: f64 },
@@ -161,6 +162,27 @@ fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, L
             add(LimitKind::Power, name(), Probe::Power { joint, limit });
         }
     }
+    for (index, joint) in model.tree_joints().iter().enumerate() {
+        let Some(coupling) = model.coupling().filter(|coupling| !coupling.driving().contains(&index)) else { continue };
+        let sources = || coupling.row(index).to_vec();
+        if let Some((lower, upper)) = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper)
+        {
+            let (offset, range) = (coupling.offset(index), [lower, upper]);
+            add(
+                LimitKind::Position,
+                joint.name.clone(),
+                Probe::Follower { array: 0, sources: sources(), offset, range },
+            );
+        }
+        if let Some(most) = joint.limits.velocity.filter(|most| *most > 0.0) {
+            let range = [-most, most];
+            add(
+                LimitKind::Speed,
+                joint.name.clone(),
+                Probe::Follower { array: 1, sources: sources(), offset: 0.0, range },
+            );
+        }
+    }
     for limit in &limits.boxes {
         for (name, point) in points(model, &limit.points) {
             for (axis, (letter, ends)) in [("x", limit.x_m), ("y", limit.y_m), ("z", limit.z_m)].into_iter().enumerate()
@@ -213,7 +235,7 @@ fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
     let bodies = |body: usize| -> (Option<usize>, &Body) {
         body.checked_sub(1).map_or((None, model.base()), |index| (Some(index), &model.bodies()[index]))
     };
-    for body in 0..=model.dof() {
+    for body in 0..=model.body_count() {
         let (index, body) = bodies(body);
         if points.is_empty() && index.is_some() {
             let name = body.links[0].name.clone();
@@ -238,15 +260,19 @@ fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
 /// The longest chain of joints and frames from the base, m.
 fn arm_length_m(model: &Model) -> f64 {
     let stroke = |body: usize| {
-        let limits = model.joints()[body].limits;
-        let ends = limits.lower.zip(limits.upper).filter(|_| !model.joints()[body].turns());
+        let limits = model.tree_joints()[body].limits;
+        let ends = limits.lower.zip(limits.upper).filter(|_| !model.tree_joints()[body].turns());
         ends.map_or(0.0, |(lower, upper)| lower.abs().max(upper.abs()))
     };
     let to = |body: usize| -> f64 {
-        model.path(body).iter().map(|&joint| model.joints()[joint].placement.translation.norm() + stroke(joint)).sum()
+        model
+            .path(body)
+            .iter()
+            .map(|&joint| model.tree_joints()[joint].placement.translation.norm() + stroke(joint))
+            .sum()
     };
     let frames = |body: usize| model.bodies()[body].links.iter().map(|link| link.placement.translation.norm());
-    (0..model.dof()).map(|body| to(body) + frames(body).fold(0.0, f64::max)).fold(1e-9, f64::max)
+    (0..model.body_count()).map(|body| to(body) + frames(body).fold(0.0, f64::max)).fold(1e-9, f64::max)
 }
 
 /// Links with shapes, in the order of the description's.
@@ -283,6 +309,10 @@ impl Probe {
         let at = |point: &Point| place(placements, point.body, point.at);
         match self {
             Self::Band { array, joint, lower, upper } => band(state[*array][*joint], *lower, *upper),
+            Self::Follower { array, sources, offset, range: [lower, upper] } => {
+                let followed = sources.iter().map(|&(joint, share)| share * state[*array][joint]);
+                band(*offset + followed.sum::<f64>(), *lower, *upper)
+            }
             Self::Torque { joint, limit } => tau[*joint].abs() / *limit,
             Self::Power { joint, limit } => (tau[*joint] * state[1][*joint]).abs() / *limit,
             Self::Axis { point, axis, lower, upper } => {

@@ -17,7 +17,7 @@ const WORTH_SAYING: f64 = 1e-3;
 /// MuJoCo's MJCF: bodies with their inertials, joints with limits, `armature`, `damping` and `frictionloss`, a motor
 /// for each joint. No shapes.
 pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
-    let (model, dof) = (robot.model(), robot.model().dof());
+    let (model, bodies) = (robot.model(), robot.model().body_count());
     let friction = frictions(robot, "frictionloss", "damping", &mut notes);
     notes.extend(left_out(robot));
     notes.push("MJCF has no velocity limits; shapes are left out.".to_owned());
@@ -29,7 +29,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
         attribute(model.name()),
         comment(&notes)
     );
-    for joint in (0..dof).filter(|&joint| model.joints()[joint].parent.is_none()) {
+    for joint in (0..bodies).filter(|&joint| model.tree_joints()[joint].parent.is_none()) {
         write_body(&mut text, robot, joint, (&friction, &rotors), 2)?;
     }
     text += "  </worldbody>\n  <actuator>\n";
@@ -39,7 +39,9 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
         let name = attribute(&joint.name);
         let _ = writeln!(text, "    <motor name=\"{name}\" joint=\"{name}\"{range}/>");
     }
-    text += "  </actuator>\n</mujoco>\n";
+    text += "  </actuator>\n";
+    write_followers(&mut text, model);
+    text += "</mujoco>\n";
     Ok(Exported { text, notes })
 }
 
@@ -54,10 +56,13 @@ pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     if model.gravity() != STANDARD_GRAVITY {
         notes.push(format!("URDF has no gravity: it is {:?} m/s² in the base frame.", model.gravity().0));
     }
-    let joints = model.joints().iter().zip(&friction).map(|(joint, friction)| Joint {
-        damping: Some(friction.viscous),
-        friction: Some(friction.coulomb),
-        ..joint.clone()
+    let joints = model.tree_joints().iter().enumerate().map(|(index, joint)| {
+        let friction = model.joint_of(index).map(|own| friction[own]);
+        Joint {
+            damping: friction.map(|friction| friction.viscous),
+            friction: friction.map(|friction| friction.coulomb),
+            ..joint.clone()
+        }
     });
     let written = Model::new(model.name(), model.base().clone(), joints.collect(), model.bodies().to_vec())?;
     let text = write_urdf(&written.with_gravity(model.gravity())?);
@@ -132,30 +137,61 @@ fn write_body(
     depth: usize,
 ) -> Result<(), ExportError> {
     let model = robot.model();
-    let (joint, body) = (&model.joints()[index], &model.bodies()[index]);
+    let (joint, body) = (&model.tree_joints()[index], &model.bodies()[index]);
     let pad = "  ".repeat(depth);
     let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", body_name(body.name()), placement(&joint.placement));
     let _ = writeln!(text, "{pad}  {}", inertial(model, index)?);
     let kind = if joint.turns() { "hinge" } else { "slide" };
     let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
     let range = limits.map_or(String::new(), |(lower, upper)| format!(" range=\"{lower:?} {upper:?}\""));
-    let ([x, y, z], found) = (joint.axis.0, &friction[index]);
+    let [x, y, z] = joint.axis.0;
+    let own = model.joint_of(index);
+    let found = own.map_or(NearestFriction::NONE, |own| friction[own]);
     let _ = writeln!(
         text,
         "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\"{range} armature=\"{:?}\" damping=\"{:?}\" frictionloss=\"{:?}\"/>",
         attribute(&joint.name),
-        rotors[index * model.dof() + index],
+        own.map_or(0.0, |own| rotors[own * model.dof() + own]),
         found.viscous,
         found.coulomb
     );
     for link in &body.links[1..] {
         let _ = writeln!(text, "{pad}  <body name=\"{}\"{}/>", body_name(&link.name), placement(&link.placement));
     }
-    for child in (index + 1..model.dof()).filter(|&child| model.joints()[child].parent == Some(index)) {
+    for child in (index + 1..model.body_count()).filter(|&child| model.tree_joints()[child].parent == Some(index)) {
         write_body(text, robot, child, (friction, rotors), depth + 1)?;
     }
     let _ = writeln!(text, "{pad}</body>");
     Ok(())
+}
+
+/// The joints that follow others: an equality of joints, or of a tendon whose length their law keeps.
+fn write_followers(text: &mut String, model: &Model) {
+    let Some(coupling) = model.coupling() else { return };
+    let (mut tendons, mut equalities) = (String::new(), String::new());
+    for (index, joint) in model.tree_joints().iter().enumerate().filter(|(index, _)| model.joint_of(*index).is_none()) {
+        let (name, offset) = (attribute(&joint.name), coupling.offset(index));
+        let source = |dof: usize| attribute(&model.joints()[dof].name);
+        match *coupling.row(index) {
+            [(dof, multiplier)] => {
+                let law = format!("polycoef=\"{offset:?} {multiplier:?} 0 0 0\"");
+                let _ = writeln!(equalities, "    <joint joint1=\"{name}\" joint2=\"{}\" {law}/>", source(dof));
+            }
+            ref sources => {
+                let _ = write!(tendons, "    <fixed name=\"{name}\">\n      <joint joint=\"{name}\" coef=\"1\"/>\n");
+                for &(dof, multiplier) in sources {
+                    let (followed, coefficient) = (source(dof), -multiplier);
+                    let _ = writeln!(tendons, "      <joint joint=\"{followed}\" coef=\"{coefficient:?}\"/>");
+                }
+                tendons += "    </fixed>\n";
+                let _ = writeln!(equalities, "    <tendon tendon1=\"{name}\" polycoef=\"{offset:?} 0 0 0 0\"/>");
+            }
+        }
+    }
+    if !tendons.is_empty() {
+        let _ = write!(text, "  <tendon>\n{tendons}  </tendon>\n");
+    }
+    let _ = write!(text, "  <equality>\n{equalities}  </equality>\n");
 }
 
 /// A link's name, unless it is the one that MuJoCo keeps for what does not move.

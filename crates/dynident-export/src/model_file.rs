@@ -4,7 +4,7 @@ use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::robot_model::RobotModel;
 use dynident_model::terms::{CoulombShape, TermConstant, TorqueTerm};
-use dynident_model::{Body, Joint, Transform};
+use dynident_model::{Body, Joint, Model, Transform};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -28,7 +28,8 @@ pub struct ModelFile {
     pub gravity_m_s2: [f64; 3],
     /// Links that do not move; the first has the frame of the base.
     pub base_links: Vec<ModelLink>,
-    /// Joints in the order of all vectors, parents before children, each with the body that it moves.
+    /// Joints with the body that each moves, parents before children. Those that do not follow others, in this order,
+    /// are what positions, velocities and torques are given for.
     pub joints: Vec<ModelJoint>,
     /// Inertia and friction of drives that turn with two joints.
     pub couplings: Vec<ModelTerm>,
@@ -55,6 +56,28 @@ pub struct ModelJoint {
     pub body: ModelBody,
     /// Friction, offset and drive inertia.
     pub terms: Vec<ModelTerm>,
+    /// What it follows; not there for a joint that moves by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub follows: Option<ModelFollower>,
+}
+
+/// How a joint follows others: its position is the sum of theirs times the multipliers, and the offset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ModelFollower {
+    /// Joints that move by themselves, and the velocity of this joint per velocity of each.
+    pub multipliers: BTreeMap<String, f64>,
+    /// Its position where those stand at zero, rad (m).
+    pub offset: f64,
+}
+
+impl ModelFollower {
+    fn of(model: &Model, joint: usize) -> Option<Self> {
+        let coupling = model.coupling().filter(|_| model.joint_of(joint).is_none())?;
+        let named = |&(source, multiplier): &(usize, f64)| (model.joints()[source].name.clone(), multiplier);
+        let multipliers = coupling.row(joint).iter().map(named).collect();
+        Some(Self { multipliers, offset: coupling.offset(joint) })
+    }
 }
 
 /// Limits of a joint.
@@ -146,11 +169,11 @@ impl ModelFile {
     /// The model with `notes`.
     pub fn of(robot: &RobotModel, notes: &[String]) -> Self {
         let model = robot.model();
-        let joints = model.joints().iter().zip(model.bodies()).zip(model.inertials()).enumerate();
+        let joints = model.tree_joints().iter().zip(model.bodies()).zip(model.inertials()).enumerate();
         let joints = joints.map(|(index, ((joint, body), inertial))| ModelJoint {
             name: joint.name.clone(),
             kind: joint.kind.name().to_owned(),
-            parent: joint.parent.map(|parent| model.joints()[parent].name.clone()),
+            parent: joint.parent.map(|parent| model.tree_joints()[parent].name.clone()),
             placement: ModelPlacement::of(&joint.placement),
             axis: joint.axis.0,
             limits: ModelLimits {
@@ -167,7 +190,8 @@ impl ModelFile {
                 parameters: inertial.0,
                 links: links(body),
             },
-            terms: ModelTerm::of(robot, |term| term.own_joint() == Some(index)),
+            terms: ModelTerm::of(robot, |term| term.own_joint().is_some() && term.own_joint() == model.joint_of(index)),
+            follows: ModelFollower::of(model, index),
         });
         Self {
             schema: MODEL_SCHEMA.to_owned(),

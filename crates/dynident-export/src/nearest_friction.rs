@@ -25,6 +25,9 @@ pub struct NearestFriction {
 }
 
 impl NearestFriction {
+    /// None at all: of a joint that follows others, whose drives are theirs.
+    pub(crate) const NONE: Self = Self { coulomb: 0.0, viscous: 0.0, most_speed: 0.0, rms_error: 0.0, most_error: 0.0 };
+
     /// Least squares over even velocities from `-most_speed` to `most_speed` without rest, neither value negative; the
     /// law is the joint's own friction and offset (at equal velocities of both sides what is even in the velocity, an
     /// offset or a difference of directions, falls out of the fit and stands in the error).

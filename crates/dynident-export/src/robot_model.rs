@@ -64,7 +64,7 @@ impl RobotModel {
         let swept = swept(&self.model)?;
         let rigid = ParametricModel::new(swept.clone(), Vec::new())?;
         let values = rigid.base().values(&self.model.parameter_vector());
-        let mut inertials = vec![InertialParameters::ZERO; swept.dof()];
+        let mut inertials = vec![InertialParameters::ZERO; swept.body_count()];
         for (column, value) in rigid.base().base_columns().into_iter().zip(values) {
             match column {
                 Column::Body { body, parameter } => inertials[body].0[parameter] = value,
@@ -99,7 +99,7 @@ fn swept(model: &Model) -> Result<Model, ExportError> {
         axis: Vec3(joint.axis.0.map(sweep)),
         ..joint.clone()
     };
-    let joints = model.joints().iter().map(joint).collect();
+    let joints = model.tree_joints().iter().map(joint).collect();
     let gravity = model.gravity();
     Ok(Model::new(model.name(), model.base().clone(), joints, model.bodies().to_vec())?.with_gravity(gravity)?)
 }

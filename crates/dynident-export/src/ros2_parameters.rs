@@ -20,6 +20,9 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     for (name, key) in names.iter().zip(&keys).filter(|(name, key)| *name != key) {
         notes.push(format!("Joint {name} stands under dynamics.{key}."));
     }
+    for joint in model.tree_joints().iter().filter(|joint| model.joint_index(&joint.name).is_none()) {
+        notes.push(format!("Joint {} follows others: what it carries is not here; see the format json.", joint.name));
+    }
     let mut text = String::new();
     for note in &notes {
         let _ = writeln!(text, "# {}", plain(note));
@@ -33,8 +36,9 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
         array(&model.gravity().0)
     );
     for (index, (joint, key)) in model.joints().iter().zip(&keys).enumerate() {
-        let body = &model.bodies()[index];
-        let (com, inertia) = about_centre(&model.inertials()[index], body.name())?;
+        let body = &model.bodies()[model.body_of(index)];
+        let inertial = &model.inertials()[model.body_of(index)];
+        let (com, inertia) = about_centre(inertial, body.name())?;
         let terms = ModelTerm::of(robot, |term| term.own_joint() == Some(index));
         let (rotor, moment, damping, force) = if joint.turns() {
             ("drive_inertia_kgm2", "coulomb_nm", "viscous_nm_s_per_rad", "torque")
@@ -46,7 +50,7 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
             text,
             "      {key}:\n        # In the frame of this link; inertia about the centre of mass: xx, xy, xz, yy, yz, zz.\n        link: {}\n        mass_kg: {}\n        com_m: {}\n        inertia_at_com_kgm2: {}\n        {rotor}: {}\n        # {force} = coulomb sign(dq) + viscous dq\n        {moment}: {}\n        {damping}: {}\n",
             string(body.name()),
-            number(model.inertials()[index].mass_kg()),
+            number(inertial.mass_kg()),
             array(&com),
             array(&inertia),
             number(drives.map(|term| term.value).sum()),

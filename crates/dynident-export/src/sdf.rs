@@ -25,10 +25,13 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
             model.gravity().0
         ));
     }
+    for joint in model.tree_joints().iter().filter(|joint| model.joint_index(&joint.name).is_none()) {
+        notes.push(format!("SDF before 1.11 has no followers: joint {} is free in this file.", joint.name));
+    }
     let mut names = Names::default();
     let base = names.of(model.base().name());
     let links: Vec<String> = model.bodies().iter().map(|body| names.of(body.name())).collect();
-    let joints: Vec<String> = model.joints().iter().map(|joint| names.of(&joint.name)).collect();
+    let joints: Vec<String> = model.tree_joints().iter().map(|joint| names.of(&joint.name)).collect();
     let mut text = String::new();
     let _ = write!(
         text,
@@ -37,7 +40,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
         names.of("fixed_to_world")
     );
     write_frames(&mut text, model.base(), &base, &mut names);
-    for (index, (joint, body)) in model.joints().iter().zip(model.bodies()).enumerate() {
+    for (index, (joint, body)) in model.tree_joints().iter().zip(model.bodies()).enumerate() {
         let (mass, com, inertia) = real_inertial(model, index, "libsdformat")?;
         let (link, parent) = (&links[index], joint.parent.map_or(&base, |parent| &links[parent]));
         let [x, y, z] = com.0;
@@ -48,7 +51,8 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
              <inertia>\n          <ixx>{:?}</ixx>\n          <ixy>{:?}</ixy>\n          <ixz>{:?}</ixz>\n          <iyy>{:?}</iyy>\n          <iyz>{:?}</iyz>\n          <izz>{:?}</izz>\n        </inertia>\n      </inertial>\n    </link>\n",
             joints[index], i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]
         );
-        write_joint(&mut text, joint, &friction[index], [&joints[index], parent, link]);
+        let friction = model.joint_of(index).map_or(NearestFriction::NONE, |joint| friction[joint]);
+        write_joint(&mut text, joint, &friction, [&joints[index], parent, link]);
         write_frames(&mut text, body, link, &mut names);
     }
     notes.extend(names.notes());

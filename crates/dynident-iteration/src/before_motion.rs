@@ -41,7 +41,7 @@ pub(crate) fn rehearsed(
         Some(ModelParameters::All(values)) => Some(&values[..]).filter(|_| shown.is_some()),
         Some(ModelParameters::Base(_)) | None => None,
     };
-    let known = robot.nominal()[..10 * robot.dof()].iter().any(|value| *value != 0.0);
+    let known = robot.nominal()[..robot.model().inertial_count()].iter().any(|value| *value != 0.0);
     let typical = with_typical_drives(robot).unwrap_or_else(|| robot.nominal().to_vec());
     let rehearsed = Rehearsed {
         robot,

@@ -350,7 +350,7 @@ fn noise_of(estimate: &RunEstimate, reference: &Reference) -> RunNoise {
 fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, SimulationError> {
     let Some(all) = &known.possible else { return Ok(robot.model().clone()) };
     let of_body = |own: &[f64]| InertialParameters(core::array::from_fn(|k| own[k]));
-    let bodies: Vec<InertialParameters> = all[..10 * robot.dof()].chunks_exact(10).map(of_body).collect();
+    let bodies: Vec<InertialParameters> = all[..robot.model().inertial_count()].chunks_exact(10).map(of_body).collect();
     Ok(robot.model().with_inertials(&bodies)?)
 }
 

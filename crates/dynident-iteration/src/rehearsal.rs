@@ -172,17 +172,18 @@ impl Rehearsed<'_> {
         random: &mut Random,
         shown: &mut Rehearsal,
     ) -> Result<Result<(), RehearsalFailure>, SimulationError> {
-        let (model, dof) = (self.robot.model(), self.robot.dof());
+        let model = self.robot.model();
+        let (of_bodies, of_terms) = believed.split_at(model.inertial_count());
         let off = if number == 0 { 0.0 } else { 0.01 * settings.uncertainty_percent };
         let mut factor = || if random.bits() & 1 == 0 { 1.0 + off } else { 1.0 - off };
-        let bodies: Vec<InertialParameters> = believed[..10 * dof]
+        let bodies: Vec<InertialParameters> = of_bodies
             .chunks_exact(10)
             .map(|own| {
                 let factor = factor();
                 InertialParameters(core::array::from_fn(|k| factor * own[k]))
             })
             .collect();
-        let terms: Vec<f64> = believed[10 * dof..].iter().map(|value| factor() * value).collect();
+        let terms: Vec<f64> = of_terms.iter().map(|value| factor() * value).collect();
         let fastest = highest_speeds(self.legs.iter().map(Leg::reference));
         let laws = with_dry_steps(self.robot.terms(), &fastest);
         let mut plant = Plant::new(&model.with_inertials(&bodies)?, &laws, &terms)?;
@@ -192,7 +193,7 @@ impl Rehearsed<'_> {
         }
         let looped = LoopSettings { limits, ..LoopSettings::default() };
         for leg in self.legs {
-            let mut controller = self.controller.build(dof, self.model)?;
+            let mut controller = self.controller.build(model.dof(), self.model)?;
             let run = closed_loop(&mut plant, controller.as_mut(), leg.reference(), &looped)?;
             let largest = shown.largest_tracking_error_rad.iter_mut().zip(&run.max_error);
             largest.for_each(|(most, error)| *most = most.max(*error));

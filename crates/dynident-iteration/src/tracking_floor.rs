@@ -72,14 +72,13 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
 
 /// A run of the robot that was found with a feedback that is so many samples late.
 fn simulated(reference: &Reference, known: &KnownLoop<'_>, fastest: &[f64], late: usize) -> Option<Run> {
-    let (robot, dof) = (known.robot, known.robot.dof());
-    let bodies: Vec<InertialParameters> = known.parameters[..10 * dof]
-        .chunks_exact(10)
-        .map(|own| InertialParameters(core::array::from_fn(|k| own[k])))
-        .collect();
+    let robot = known.robot;
+    let (of_bodies, of_terms) = known.parameters.split_at(robot.model().inertial_count());
+    let bodies: Vec<InertialParameters> =
+        of_bodies.chunks_exact(10).map(|own| InertialParameters(core::array::from_fn(|k| own[k]))).collect();
     let model = robot.model().with_inertials(&bodies).ok()?;
     let terms = with_dry_steps(robot.terms(), fastest);
-    let mut plant = Plant::new(&model, &terms, &known.parameters[10 * dof..]).ok()?;
+    let mut plant = Plant::new(&model, &terms, of_terms).ok()?;
     let sensors = SensorSettings {
         position_std: known.position_noise.to_vec().into(),
         feedback_delay_samples: late,
@@ -89,7 +88,7 @@ fn simulated(reference: &Reference, known: &KnownLoop<'_>, fastest: &[f64], late
     let settings =
         LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 2 }, sensors, ..LoopSettings::default() };
     let of_controller = ControllerModel::from_parameters(robot.model(), robot.terms(), known.parameters).ok()?;
-    let mut controller = known.controller.build(dof, Some(&of_controller)).ok()?;
+    let mut controller = known.controller.build(robot.dof(), Some(&of_controller)).ok()?;
     let run = closed_loop(&mut plant, controller.as_mut(), reference, &settings).ok()?;
     run.status.is_done().then_some(run)
 }

@@ -16,7 +16,7 @@ const SPEED: f64 = 2.0;
 /// None if nothing was to be filled in.
 pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     let mut parameters = robot.nominal().to_vec();
-    let bodies = 10 * robot.dof();
+    let bodies = robot.model().inertial_count();
     let mut is_filled = false;
     for (place, term) in robot.terms().iter().enumerate() {
         let Some(joint) = term.own_joint().filter(|_| parameters[bodies + place] == 0.0) else { continue };

@@ -87,7 +87,7 @@ impl JointCoupling {
         self.rows.len()
     }
 
-    /// Of each degree of freedom, the joint of the tree that it is.
+    /// Of each degree of freedom, the joint of the tree that it is; ascending.
     pub fn driving(&self) -> &[usize] {
         &self.driving
     }

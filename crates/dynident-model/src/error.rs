@@ -38,6 +38,22 @@ pub enum ModelError {
         /// One of them.
         joint: String,
     },
+    /// A joint that is left without the one that it follows.
+    #[error("joint `{joint}` follows `{source_joint}`, which is dropped: drop both, or neither")]
+    LostSource {
+        /// The joint.
+        joint: String,
+        /// What it follows.
+        source_joint: String,
+    },
+    /// A link that does not exist.
+    #[error("there is no link `{link}`; the links are: {}", known.join(", "))]
+    UnknownLink {
+        /// The name asked for.
+        link: String,
+        /// The names that exist.
+        known: Vec<String>,
+    },
     /// A body with no link at all.
     #[error("a body has no link: every body needs the link that its joint moves")]
     BodyWithoutLink,

@@ -147,9 +147,29 @@ impl Model {
         self.coupling.as_ref().map_or(joint, |coupling| coupling.driving()[joint])
     }
 
+    /// The degrees of freedom that a joint of the tree moves with, and its velocity per velocity of each: its row of `G`.
+    pub fn drivers(&self, tree_joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let itself = self.coupling.is_none().then_some((tree_joint, 1.0));
+        let followed = self.coupling.iter().flat_map(move |coupling| coupling.row(tree_joint).iter().copied());
+        itself.into_iter().chain(followed)
+    }
+
+    /// The degree of freedom that a joint of the tree is; `None` where it follows others.
+    pub fn joint_of(&self, tree_joint: usize) -> Option<usize> {
+        match &self.coupling {
+            Some(coupling) => coupling.driving().binary_search(&tree_joint).ok(),
+            None => Some(tree_joint),
+        }
+    }
+
     /// Number of moving bodies, and of joints of the tree.
     pub fn body_count(&self) -> usize {
         self.tree.len()
+    }
+
+    /// Number of inertial parameters: ten for each moving body.
+    pub fn inertial_count(&self) -> usize {
+        10 * self.body_count()
     }
 
     /// The joints' numbers, prepared for the algorithms; same order as [`tree_joints`](Model::tree_joints).
@@ -197,8 +217,7 @@ impl Model {
     pub fn moves(&self, joint: usize, body: usize) -> bool {
         let mut at = Some(body);
         while let Some(index) = at {
-            let follows = |coupling: &JointCoupling| coupling.row(index).iter().any(|&(dof, _)| dof == joint);
-            if self.coupling.as_ref().map_or(index == joint, follows) {
+            if self.drivers(index).any(|(dof, _)| dof == joint) {
                 return true;
             }
             at = self.tree[index].parent;
@@ -258,6 +277,48 @@ impl Model {
         }
         model.inertials = inertials.to_vec();
         Ok(model)
+    }
+
+    /// The same robot without some links: one that is fixed to another is taken off it; with one that moves with a joint
+    /// goes everything that hangs on it.
+    ///
+    /// # Errors
+    /// If a link is not there, or a joint would follow one that went.
+    pub fn without_links(&self, links: &[String]) -> Result<Self, ModelError> {
+        if links.is_empty() {
+            return Ok(self.clone());
+        }
+        // The base keeps the link that all others hang on.
+        let all = || self.bodies.iter().flat_map(|body| &body.links).chain(self.base.links.iter().skip(1));
+        if let Some(link) = links.iter().find(|name| all().all(|link| link.name != **name)) {
+            let known = all().map(|link| link.name.clone()).collect();
+            return Err(ModelError::UnknownLink { link: link.clone(), known });
+        }
+        let is_kept = |link: &Link| !links.contains(&link.name);
+        let mut base = self.base.clone();
+        base.links.retain(is_kept);
+        // New index of each body that stays.
+        let mut stays: Vec<Option<usize>> = Vec::with_capacity(self.body_count());
+        let (mut joints, mut bodies) = (Vec::new(), Vec::new());
+        for (joint, body) in self.tree.iter().zip(&self.bodies) {
+            let parent = joint.parent.map(|parent| stays[parent]);
+            if parent == Some(None) || !is_kept(&body.links[0]) {
+                stays.push(None);
+                continue;
+            }
+            stays.push(Some(bodies.len()));
+            joints.push(Joint { parent: parent.flatten(), ..joint.clone() });
+            bodies.push(Body { links: body.links.iter().filter(|link| is_kept(link)).cloned().collect() });
+        }
+        let went = |name: &String| !joints.iter().any(|joint: &Joint| joint.name == *name);
+        for joint in joints.iter().filter(|joint| self.joint_index(&joint.name).is_none()) {
+            let sources = joint.mimic.iter().flat_map(|mimic| &mimic.sources);
+            if let Some(source) = sources.map(|source| &source.joint).find(|name| went(name)) {
+                let (joint, source) = (joint.name.clone(), source.clone());
+                return Err(ModelError::LostSource { joint, source_joint: source });
+            }
+        }
+        Self::new(&self.name, base, joints, bodies)?.with_gravity(self.gravity)
     }
 
     /// The same robot with every joint of the tree moving by itself, whatever the description says that it follows.

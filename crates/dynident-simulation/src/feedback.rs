@@ -38,7 +38,7 @@ impl<'a> Feedback<'a> {
         };
         Self {
             settings,
-            turns: plant.model().maps().iter().map(|map| map.turns).collect(),
+            turns: plant.model().joints().iter().map(dynident_model::Joint::turns).collect(),
             random: Random::new(settings.seed ^ STREAM),
             q: vec![0.0; joints * slots],
             dq: vec![0.0; joints * slots],

@@ -86,7 +86,7 @@ impl SensorSettings {
         let (mut q, mut tau) = (Vec::with_capacity(joints * samples), Vec::with_capacity(joints * samples));
         for joint in 0..joints {
             let own = run.of(joint);
-            let turns = model.maps()[joint].turns;
+            let turns = model.joints()[joint].turns();
             let (delay_q, delay_tau) = (self.position_delay_s.of(joint), self.torque_delay_s.of(joint));
             if same_instants && delay_q == 0.0 && self.feedback_delay_samples == 0 {
                 q.extend_from_slice(&run.measured_q[own.clone()]);

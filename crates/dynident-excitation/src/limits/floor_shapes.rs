@@ -39,11 +39,11 @@ impl Term for FloorShapes {
     }
 
     fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
-        let joints = inputs.motion.joints;
+        let bodies = inputs.bodies;
         for ((solid, constraint), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
                 let (_, place) = solid.lowest(&inputs.placement(solid.body, sample));
-                pull.point(solid.body, joints, sample, place, Vec3([0.0, 0.0, -weight / constraint.size]));
+                pull.point(solid.body, bodies, sample, place, Vec3([0.0, 0.0, -weight / constraint.size]));
             }
         }
     }

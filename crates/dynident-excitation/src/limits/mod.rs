@@ -14,6 +14,7 @@ mod diagnose;
 mod error;
 mod feasibility;
 mod floor_shapes;
+mod followers;
 mod hull;
 mod joint_motion;
 mod kind;

@@ -42,8 +42,8 @@ const LEAST_SIZE: f64 = 0.05;
 
 /// The longest chain of joints from the base, m: what lengths of a machine are measured by.
 pub(crate) fn arm_length_m(model: &Model) -> f64 {
-    let mut lengths: Vec<f64> = Vec::with_capacity(model.dof());
-    for joint in model.joints() {
+    let mut lengths: Vec<f64> = Vec::with_capacity(model.body_count());
+    for joint in model.tree_joints() {
         let stroke = if joint.turns() {
             0.0
         } else {
@@ -92,7 +92,7 @@ impl SelfCollision {
         self.validate(model)?;
         let solids = LinkSolid::gather(model, &self.all_shapes(model), "a shape of the self-collision limit")?;
         let is_neighbour = |a: Option<usize>, b: Option<usize>| {
-            let parent = |body: Option<usize>| body.map(|body| model.joints()[body].parent);
+            let parent = |body: Option<usize>| body.map(|body| model.tree_joints()[body].parent);
             a == b || parent(a) == Some(b) || parent(b) == Some(a)
         };
         let is_ignored = |a: &str, b: &str| {
@@ -193,7 +193,7 @@ mod tests {
             fitted.left_out
         );
         for pair in &fitted.pairs {
-            let parent = |index: usize| fitted.solids[index].body.map(|body| model.joints()[body].parent);
+            let parent = |index: usize| fitted.solids[index].body.map(|body| model.tree_joints()[body].parent);
             assert_ne!(parent(pair.of[1]), Some(fitted.solids[pair.of[0]].body), "neighbours are no pair");
         }
     }

@@ -141,12 +141,12 @@ impl Term for PlaceLimits {
                     let (here, next) = way(inputs, point, sample);
                     let (place, share) = room.nearest(here, next);
                     let gradient = room.value(place).1.scale(weight);
-                    let joints = inputs.motion.joints;
+                    let bodies = inputs.bodies;
                     // The nearest place moves with both ends; its own sliding along the way changes nothing to first
                     // order.
-                    pull.point(point.body, joints, sample, here, gradient.scale(1.0 - share));
+                    pull.point(point.body, bodies, sample, here, gradient.scale(1.0 - share));
                     if let Some(next) = next {
-                        pull.point(point.body, joints, sample + 1, next, gradient.scale(share));
+                        pull.point(point.body, bodies, sample + 1, next, gradient.scale(share));
                     }
                 }
             }

@@ -54,7 +54,7 @@ impl Term for SelfCollisionLimits {
         let samples = inputs.motion.samples;
         // Most links are far from each other most of the time: balls about them say so.
         let centre = |solid: &LinkSolid, sample: usize| match solid.body {
-            Some(body) => inputs.placements[sample * inputs.motion.joints + body].point(solid.centre),
+            Some(body) => inputs.placements[sample * inputs.bodies + body].point(solid.centre),
             None => solid.centre,
         };
         let centres: Vec<Vec3> =
@@ -77,7 +77,7 @@ impl Term for SelfCollisionLimits {
     }
 
     fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
-        let joints = inputs.motion.joints;
+        let bodies = inputs.bodies;
         for ((pair, _), row) in self.rows.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate() {
                 if weight == 0.0 {
@@ -90,8 +90,8 @@ impl Term for SelfCollisionLimits {
                 }
                 let gradient = direction.scale(-weight * slope / pair.size_m);
                 let [first, second] = pair.of.map(|place| self.solids[place].body);
-                pull.point(first, joints, sample, points[0], gradient);
-                pull.point(second, joints, sample, points[1], -gradient);
+                pull.point(first, bodies, sample, points[0], gradient);
+                pull.point(second, bodies, sample, points[1], -gradient);
             }
         }
     }

@@ -133,14 +133,14 @@ impl SelfCollision {
 /// Capsules from each body's origin to the origins of the joints it carries; at a tip to the farthest fixed link, or a
 /// sphere. Those of the base begin at its frame.
 pub(crate) fn fitted_capsules(model: &Model, radius_m: f64) -> Vec<LinkShape> {
-    (0..=model.dof()).flat_map(|index| body_capsules(model, index.checked_sub(1), radius_m)).collect()
+    (0..=model.body_count()).flat_map(|index| body_capsules(model, index.checked_sub(1), radius_m)).collect()
 }
 
 /// The fitted capsules of one body, in the frame of its first link.
 pub(crate) fn body_capsules(model: &Model, body: Option<usize>, radius_m: f64) -> Vec<LinkShape> {
     let links = &body.map_or(model.base(), |body| &model.bodies()[body]).links;
     let Some(link) = links.first() else { return Vec::new() };
-    let carried = model.joints().iter().filter(|joint| joint.parent == body);
+    let carried = model.tree_joints().iter().filter(|joint| joint.parent == body);
     let mut far: Vec<Vec3> = carried.map(|joint| joint.placement.translation).collect();
     if far.is_empty() {
         let places = links.iter().map(|link| link.placement.translation);

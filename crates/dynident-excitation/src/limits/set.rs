@@ -3,6 +3,7 @@
 use super::description::Limits;
 use super::error::LimitError;
 use super::floor_shapes::FloorShapes;
+use super::followers::FollowerLimits;
 use super::joint_motion::{JointBand, JointMotionLimits};
 use super::kind::Constraint;
 use super::place::PlaceLimits;
@@ -67,6 +68,7 @@ impl LimitSet {
             Box::new(joint_motion),
             Box::new(TorqueLimits::new(model, &limits.joints)),
             Box::new(PowerLimits::new(model, &limits.joints)),
+            Box::new(FollowerLimits::new(model)),
         ];
         for limit in &limits.boxes {
             terms.push(Box::new(PlaceLimits::boxed(model, limit)?));
@@ -143,7 +145,8 @@ impl LimitSet {
         if samples == 0 {
             return;
         }
-        let inputs = Inputs { motion, tau: &workspace.tau, placements: &workspace.placements, swept: workspace.swept };
+        let LimitWorkspace { tau, placements, swept, .. } = workspace;
+        let inputs = Inputs { motion, tau, placements, bodies: self.model.body_count(), swept: *swept };
         let mut rest = out.as_mut_slice();
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at_mut(rows * samples);
@@ -176,8 +179,9 @@ impl LimitSet {
         by_torque.clear();
         by_torque.resize(if self.torque { dof * samples } else { 0 }, 0.0);
         wrenches.clear();
-        wrenches.resize(if self.placements { dof * samples } else { 0 }, Wrench::ZERO);
-        let inputs = Inputs { motion, tau, placements, swept: *swept };
+        let bodies = self.model.body_count();
+        wrenches.resize(if self.placements { bodies * samples } else { 0 }, Wrench::ZERO);
+        let inputs = Inputs { motion, tau, placements, bodies, swept: *swept };
         let mut rest = weights;
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at(rows * samples);
@@ -191,7 +195,7 @@ impl LimitSet {
         if self.placements {
             by_position.resize(dof, 0.0);
             for sample in 0..samples {
-                let of = sample * dof..(sample + 1) * dof;
+                let of = sample * bodies..(sample + 1) * bodies;
                 if wrenches[of.clone()].iter().all(|wrench| *wrench == Wrench::ZERO) {
                     continue;
                 }
@@ -217,9 +221,10 @@ impl LimitSet {
             inverse_dynamics_batch(&self.model, &mut workspace.batch, &motion.view(), &mut workspace.tau);
         }
         if self.placements {
-            workspace.placements.resize(dof * samples, Transform::IDENTITY);
+            let bodies = self.model.body_count();
+            workspace.placements.resize(bodies * samples, Transform::IDENTITY);
             let LimitWorkspace { single, placements, q, .. } = workspace;
-            for (sample, placements) in placements.chunks_exact_mut(dof.max(1)).enumerate() {
+            for (sample, placements) in placements.chunks_exact_mut(bodies.max(1)).enumerate() {
                 for (joint, q) in q.iter_mut().enumerate() {
                     *q = motion.q[joint * samples + sample];
                 }

@@ -13,6 +13,8 @@ pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
     pub(crate) tau: &'a [f64],
     pub(crate) placements: &'a [Transform],
+    /// Placements of one sample.
+    pub(crate) bodies: usize,
     /// Samples are consecutive times of one motion: obstacles are also looked for between them.
     pub(crate) swept: bool,
 }
@@ -20,7 +22,7 @@ pub(crate) struct Inputs<'a> {
 impl Inputs<'_> {
     /// `base_from_body` at a sample; the identity for the base.
     pub(crate) fn placement(&self, body: Option<usize>, sample: usize) -> Transform {
-        body.map_or(Transform::IDENTITY, |body| self.placements[sample * self.motion.joints + body])
+        body.map_or(Transform::IDENTITY, |body| self.placements[sample * self.bodies + body])
     }
 }
 
@@ -35,9 +37,9 @@ pub(crate) struct Pull<'a> {
 
 impl Pull<'_> {
     /// Adds the derivative of the cost by the place of a point of a body (base frame).
-    pub(crate) fn point(&mut self, body: Option<usize>, joints: usize, sample: usize, place: Vec3, gradient: Vec3) {
+    pub(crate) fn point(&mut self, body: Option<usize>, bodies: usize, sample: usize, place: Vec3, gradient: Vec3) {
         if let Some(body) = body {
-            self.wrenches[sample * joints + body].add(place, gradient);
+            self.wrenches[sample * bodies + body].add(place, gradient);
         }
     }
 }

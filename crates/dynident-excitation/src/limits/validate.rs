@@ -120,7 +120,7 @@ pub(super) fn middle_and_half([lower, upper]: [f64; 2]) -> (f64, f64) {
 }
 
 fn prior_known(model: &Model, joint: usize, kind: LimitKind) -> Result<(), LimitError> {
-    let carried = (joint..model.dof()).filter(|&body| model.moves(joint, body));
+    let carried = (0..model.body_count()).filter(|&body| model.moves(joint, body));
     let bodies: Vec<String> = carried
         .map(|body| &model.bodies()[body])
         .filter(|body| body.prior().is_none())

@@ -21,18 +21,21 @@ impl Wrench {
 }
 
 /// Adds `Jᵀ f` of one sample to `by_position[joint]`: a joint about axis `a` through `o` sees `a · (n - o × f)` of the
-/// wrench on everything it carries, a sliding one `a · f`. One inward sweep; the wrenches are used up.
+/// wrench on everything it carries, a sliding one `a · f`; what a joint that follows others sees is theirs. One inward
+/// sweep; the wrenches are used up.
 pub(crate) fn pull_wrenches(model: &Model, placements: &[Transform], wrenches: &mut [Wrench], by_position: &mut [f64]) {
-    for (joint, map) in model.maps().iter().enumerate().rev() {
-        let Wrench { force, moment } = wrenches[joint];
-        wrenches[joint] = Wrench::ZERO;
+    for (body, map) in model.maps().iter().enumerate().rev() {
+        let Wrench { force, moment } = wrenches[body];
+        wrenches[body] = Wrench::ZERO;
         if force == Vec3::ZERO && moment == Vec3::ZERO {
             continue;
         }
-        let Transform { rotation, translation } = &placements[joint];
+        let Transform { rotation, translation } = &placements[body];
         let axis = rotation.mul_vec(map.axis);
         let along = if map.turns { moment - translation.cross(force) } else { force };
-        by_position[joint] += axis.dot(along);
+        for (joint, share) in model.drivers(body) {
+            by_position[joint] += share * axis.dot(along);
+        }
         if let Some(parent) = map.parent {
             wrenches[parent].force += force;
             wrenches[parent].moment += moment;

@@ -60,7 +60,8 @@ pub fn gravity_across(model: &Model, joint: usize, rest: &[f64]) -> Result<f64, 
         return Err(StepWiseError::Slides { joint: name() });
     }
     let mut workspace = Workspace::new(model);
-    let axis = body_placements(model, &mut workspace, rest)[joint].rotation.mul_vec(model.joints()[joint].axis);
+    let axis =
+        body_placements(model, &mut workspace, rest)[model.body_of(joint)].rotation.mul_vec(model.joints()[joint].axis);
     let gravity = model.gravity();
     let across = (gravity - axis.scale(gravity.dot(axis) / axis.dot(axis))).norm();
     if across > LEAST_GRAVITY * gravity.norm() { Ok(across) } else { Err(StepWiseError::NoGravity { joint: name() }) }

@@ -44,5 +44,6 @@ pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
 
 /// The bodies' share of a full parameter vector.
 pub fn inertials(model: &Model, parameters: &[f64]) -> Vec<InertialParameters> {
-    (0..model.dof()).map(|body| InertialParameters(core::array::from_fn(|k| parameters[10 * body + k]))).collect()
+    let own = |body: usize| InertialParameters(core::array::from_fn(|k| parameters[10 * body + k]));
+    (0..model.body_count()).map(own).collect()
 }

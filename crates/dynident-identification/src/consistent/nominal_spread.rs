@@ -23,10 +23,10 @@ pub fn nominal_covariance(
     problem: &LinearProblem,
     settings: &ConsistencySettings,
 ) -> DMatrix<f64> {
-    let (base, dof) = (robot.base(), robot.model().dof());
+    let (base, bodies) = (robot.base(), robot.model().inertial_count());
     let references = reference_bodies(robot, settings);
     let map = |column: usize| {
-        let mut values = vec![0.0; 10 * dof + robot.terms().len()];
+        let mut values = vec![0.0; bodies + robot.terms().len()];
         values[column] = 1.0;
         base.values(&values)
     };
@@ -42,11 +42,11 @@ pub fn nominal_covariance(
             directions.push((0..base.count()).map(sum).collect());
         }
     }
-    let values = &robot.nominal()[10 * dof..];
+    let values = &robot.nominal()[bodies..];
     let sizes = term_sizes(robot, problem, 1.0);
     for (place, (value, size)) in values.iter().zip(sizes).enumerate() {
         let spread: f64 = (MASS_SHARE * value).hypot(TERM_SHARE * size);
-        directions.push(map(10 * dof + place).iter().map(|x| x * spread).collect());
+        directions.push(map(bodies + place).iter().map(|x| x * spread).collect());
     }
     let spread = DMatrix::from_fn(base.count(), directions.len(), |row, column| directions[column][row]);
     &spread * spread.transpose()

@@ -141,7 +141,7 @@ pub fn consistency_problem(
         }
     });
     let sizes = term_sizes(robot, problem, SILENT_SHARE);
-    let scalars = terms.iter().zip(&prior[10 * model.dof()..]).zip(sizes).map(|((term, &value), size)| {
+    let scalars = terms.iter().zip(&prior[model.inertial_count()..]).zip(sizes).map(|((term, &value), size)| {
         let bounded = term.is_nonnegative();
         let own = settings.terms.get(&term.symbol());
         let scale = if term.is_drive_inertia() { mean_mass * length * length } else { size };
@@ -181,7 +181,7 @@ pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySe
 
 /// The mean of the described masses; a kilogram where there are none.
 fn mean_mass(robot: &ParametricModel) -> f64 {
-    let masses = (0..robot.model().dof()).map(|body| robot.nominal()[10 * body]).filter(|&mass| mass > 0.0);
+    let masses = (0..robot.model().body_count()).map(|body| robot.nominal()[10 * body]).filter(|&mass| mass > 0.0);
     let masses: Vec<f64> = masses.collect();
     if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 }
 }
@@ -191,7 +191,7 @@ fn mean_mass(robot: &ParametricModel) -> f64 {
 /// any units. 1 where the data do not see the term: there it stays where it is. What only noise lets them see has a
 /// column of any size: there it is `silent` times the root mean square of the joint's torque.
 pub(super) fn term_sizes(robot: &ParametricModel, problem: &LinearProblem, silent: f64) -> Vec<f64> {
-    let first = 10 * robot.model().dof();
+    let first = robot.model().inertial_count();
     let size = |(index, _): (usize, &TorqueTerm)| {
         let column = robot.base().independent().iter().position(|&independent| independent == first + index)?;
         let (mut torque, mut norm) = (0.0, 0.0);
@@ -218,7 +218,7 @@ pub fn typical_length_m(model: &Model) -> f64 {
         let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
         (mean > 0.0).then_some(mean)
     };
-    let joints = model.joints().iter().map(|joint| joint.placement.translation.norm());
+    let joints = model.tree_joints().iter().map(|joint| joint.placement.translation.norm());
     let centres = model.inertials().iter().filter_map(|body| Some(body.com_m()?.norm()));
     mean(joints.collect()).or_else(|| mean(centres.collect())).unwrap_or(1.0)
 }

@@ -35,7 +35,7 @@ pub(super) fn unseen_load(robot: &ParametricModel, rows: &MotionRows, log: usize
     let model = robot.model();
     let (dof, count) = (model.dof(), rows.len());
     // Of ten parameters those four that weigh: mass and first moment; a load small beside its lever has little else.
-    let last = dof.checked_sub(1)?;
+    let (last, columns) = (model.body_count().checked_sub(1)?, model.inertial_count());
     let mut workspace = Workspace::new(model);
     let mut matrix = DMatrix::zeros(dof * count, 4);
     let mut rest = DVector::zeros(dof * count);
@@ -46,7 +46,7 @@ pub(super) fn unseen_load(robot: &ParametricModel, rows: &MotionRows, log: usize
         for joint in 0..dof {
             let place = joint * count + row;
             for k in 0..4 {
-                matrix[(place, k)] = regressor[joint * 10 * dof + 10 * last + k];
+                matrix[(place, k)] = regressor[joint * columns + 10 * last + k];
             }
             rest[place] = rows.tau[joint][row] - explained[joint][row];
         }

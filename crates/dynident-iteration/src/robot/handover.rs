@@ -67,19 +67,31 @@ pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
 fn model_json(model: &ControllerModel) -> Value {
     let robot = model.model();
     let joints: Vec<Value> = robot
-        .joints()
+        .tree_joints()
         .iter()
         .zip(robot.inertials())
-        .map(|(joint, inertial)| {
-            json!({
+        .enumerate()
+        .map(|(place, (joint, inertial))| {
+            let mut out = json!({
                 "name": joint.name,
                 "turns": joint.turns(),
-                "parent": joint.parent.map(|parent| &robot.joints()[parent].name),
+                "parent": joint.parent.map(|parent| &robot.tree_joints()[parent].name),
                 "rotation": joint.placement.rotation.0,
                 "translation_m": joint.placement.translation.0,
                 "axis": joint.axis.0,
                 "inertial": inertial.0,
-            })
+            });
+            // Only of a joint that does not move by itself: `q = Σ multiplier q_joint + offset`.
+            if let Some(coupling) = robot.coupling()
+                && !coupling.driving().contains(&place)
+            {
+                let source = |&(dof, multiplier): &(usize, f64)| {
+                    json!({ "joint": robot.joints()[dof].name, "multiplier": multiplier })
+                };
+                let sources: Vec<Value> = coupling.row(place).iter().map(source).collect();
+                out["follows"] = json!({ "joints": sources, "offset": coupling.offset(place) });
+            }
+            out
         })
         .collect();
     let terms: Vec<Value> = model.terms().iter().map(|(term, value)| describe(robot, term, *value)).collect();

@@ -70,7 +70,7 @@ impl ControllerModel {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn from_parameters(model: &Model, terms: &[TorqueTerm], parameters: &[f64]) -> Result<Self, SimulationError> {
-        let bodies = 10 * model.dof();
+        let bodies = model.inertial_count();
         require_length("parameters", bodies + terms.len(), parameters.len())?;
         let inertials: Vec<InertialParameters> = parameters[..bodies]
             .chunks_exact(10)
@@ -87,12 +87,12 @@ impl ControllerModel {
     /// As [`new`](Self::new).
     pub fn from_columns(model: &Model, columns: &[Column], values: &[f64]) -> Result<Self, SimulationError> {
         require_length("values of columns", columns.len(), values.len())?;
-        let mut inertials = vec![InertialParameters::ZERO; model.dof()];
+        let mut inertials = vec![InertialParameters::ZERO; model.body_count()];
         let (mut terms, mut term_parameters) = (Vec::new(), Vec::new());
         for (column, &value) in columns.iter().zip(values) {
             match column {
                 Column::Body { body, parameter } => {
-                    require_length("bodies", model.dof(), model.dof().max(body + 1))?;
+                    require_length("bodies", model.body_count(), model.body_count().max(body + 1))?;
                     inertials[*body].0[*parameter] = value;
                 }
                 Column::Term(term) => {

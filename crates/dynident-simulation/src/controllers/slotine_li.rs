@@ -96,8 +96,8 @@ impl SlotineLi {
     fn fill_regressor(&mut self, target: Target<'_>, measured: Measured<'_>) {
         let Self { start, weightless, workspace, regressor, vectors, memories, .. } = self;
         let [reference_velocity, reference_acceleration, mean, half, _] = vectors;
-        let (joints, columns) = (mean.len(), 10 * mean.len() + start.terms().len());
-        let bodies = 10 * joints;
+        let (joints, bodies) = (mean.len(), start.model().inertial_count());
+        let columns = bodies + start.terms().len();
         for joint in 0..joints {
             mean[joint] = 0.5 * (measured.dq[joint] + reference_velocity[joint]);
             half[joint] = 0.5 * (measured.dq[joint] - reference_velocity[joint]);

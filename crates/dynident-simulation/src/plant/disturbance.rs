@@ -112,16 +112,20 @@ impl JointDisturbance {
                 }
                 let placements = body_placements(model, workspace, q);
                 let force = Vec3(*force_n).scale(share);
-                let point = placements[self.joint].point(Vec3(*point_m));
-                let mut at = Some(self.joint);
-                while let Some(joint) = at {
-                    let map = &model.maps()[joint];
-                    let axis = placements[joint].rotation.mul_vec(map.axis);
-                    torque[joint] += if map.turns {
-                        axis.dot((point + -placements[joint].translation).cross(force))
+                let body = model.body_of(self.joint);
+                let point = placements[body].point(Vec3(*point_m));
+                let mut at = Some(body);
+                while let Some(body) = at {
+                    let map = &model.maps()[body];
+                    let axis = placements[body].rotation.mul_vec(map.axis);
+                    let own = if map.turns {
+                        axis.dot((point + -placements[body].translation).cross(force))
                     } else {
                         axis.dot(force)
                     };
+                    for (joint, share) in model.drivers(body) {
+                        torque[joint] += share * own;
+                    }
                     at = map.parent;
                 }
             }

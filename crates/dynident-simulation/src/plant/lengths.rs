@@ -13,7 +13,7 @@ pub fn with_placements(
     mut change: impl FnMut(usize, Transform) -> Transform,
 ) -> Result<Model, SimulationError> {
     let joints: Vec<Joint> = model
-        .joints()
+        .tree_joints()
         .iter()
         .enumerate()
         .map(|(index, joint)| Joint { placement: change(index, joint.placement), ..joint.clone() })

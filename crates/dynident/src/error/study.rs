@@ -12,7 +12,7 @@ use dynident_identification::estimators::PeriodError;
 use dynident_identification::payload::PayloadError;
 use dynident_identification::rows::ParallelFilterError;
 use dynident_iteration::IterationError;
-use dynident_model::ModelError;
+use dynident_model::{LoopError, ModelError};
 use dynident_recording::FilterError;
 use dynident_simulation::SimulationError;
 use thiserror::Error;
@@ -190,6 +190,9 @@ pub enum StudyError {
     /// A robot that cannot be made of its description.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A closed chain that is not what the study says.
+    #[error("[[robot.loop]]: {0}")]
+    Loop(#[from] LoopError),
     /// Bodies and torque terms that do not fit.
     #[error(transparent)]
     ParametricModel(#[from] ParametricModelError),

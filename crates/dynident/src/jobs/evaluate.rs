@@ -31,7 +31,7 @@ impl Quantity {
         }
     }
 
-    fn header(self, dof: usize) -> Vec<String> {
+    fn header(self, dof: usize, bodies: usize) -> Vec<String> {
         let numbered = |name: &str| (1..=dof).map(|j| format!("{name}{j}")).collect();
         match self {
             Self::InverseDynamics => numbered("tau"),
@@ -40,7 +40,7 @@ impl Quantity {
             Self::MassMatrix => (1..=dof).flat_map(|i| (1..=dof).map(move |j| format!("M{i}_{j}"))).collect(),
             Self::Regressor => (1..=dof)
                 .flat_map(|row| {
-                    (1..=dof).flat_map(move |body| INERTIAL_NAMES.map(|name| format!("tau{row}_{name}{body}")))
+                    (1..=bodies).flat_map(move |body| INERTIAL_NAMES.map(|name| format!("tau{row}_{name}{body}")))
                 })
                 .collect(),
         }
@@ -91,7 +91,7 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
 
     // Row by row.
     let cannot = |source| Error::Output { path: PathBuf::from("standard output"), source };
-    writeln!(out, "{}", quantity.header(dof).join(",")).map_err(cannot)?;
+    writeln!(out, "{}", quantity.header(dof, model.body_count()).join(",")).map_err(cannot)?;
     let mut workspace = Workspace::new(model);
     let (mut record, mut rows, mut state) = (csv::StringRecord::new(), 0, vec![0.0; places.len()]);
     while reader.read_record(&mut record).map_err(|error| table_error(states, &error))? {

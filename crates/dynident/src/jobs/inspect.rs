@@ -73,7 +73,7 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
     let base_settings = BaseParameterSettings::default();
     let base = BaseParameters::new(model, &[], &base_settings);
     let (weakest, strongest) = base.gap();
-    let joints = model.joints().iter().map(|joint| JointSummary {
+    let joints = model.tree_joints().iter().map(|joint| JointSummary {
         name: joint.name.clone(),
         kind: joint.kind.name().to_owned(),
         parent: joint.parent.map(|parent| model.bodies()[parent].name().to_owned()),
@@ -81,7 +81,7 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
         upper: joint.limits.upper,
         velocity: joint.limits.velocity,
         effort: joint.limits.effort,
-        mimic: joint.mimic.as_ref().map(|mimic| mimic.source.clone()),
+        mimic: joint.mimic.as_ref().map(|mimic| mimic.source_names()),
     });
     let bodies = model.bodies().iter().map(|body| {
         let prior = body.prior();

@@ -77,7 +77,7 @@ pub fn simulate_study(
             .map(|(body, own)| BodyTruth { name: body.name().to_owned(), parameters: own.to_vec() })
             .collect(),
         terms: own(
-            &truth.parameters[10 * robot.model().dof()..],
+            &truth.parameters[robot.model().inertial_count()..],
             truth.terms.iter().map(dynident_model::terms::TorqueTerm::symbol).collect(),
             truth.terms.iter().map(dynident_model::terms::TorqueTerm::unit).collect(),
         ),

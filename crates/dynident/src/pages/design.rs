@@ -71,7 +71,7 @@ pub(crate) fn path(file: &DesignFile, limits: &Limits, model: &Model, motion: &M
         paths.iter_mut().zip(places).for_each(|(path, place): (&mut Vec<Place>, _)| path.push(place));
     }
     let pose_at = |[joints, tips]: [Vec<Place>; 2]| {
-        let from_parent = model.joints().iter().zip(&joints).map(|(joint, place)| (joint.parent, *place));
+        let from_parent = model.tree_joints().iter().zip(&joints).map(|(joint, place)| (joint.parent, *place));
         let to_tool = tools.iter().zip(tips).map(|((body, _), tip)| (Some(*body), tip));
         let from = |body: Option<usize>| body.map_or([0.0; 3], |body| joints[body]);
         let rods = from_parent.chain(to_tool).map(|(parent, place)| [from(parent), place]).collect();
@@ -108,11 +108,11 @@ pub(crate) fn fitness(file: &DesignFile, history: &[Generation]) -> Result<Optio
 
 /// Every last body and the place on it of the link frame that stands farthest out.
 fn tools(model: &Model) -> Vec<(usize, Vec3)> {
-    let last = |body: &usize| model.joints().iter().all(|joint| joint.parent != Some(*body));
+    let last = |body: &usize| model.tree_joints().iter().all(|joint| joint.parent != Some(*body));
     let farthest = |body: usize| {
         let places = model.bodies()[body].links.iter().map(|link| link.placement.translation);
         let far = places.fold(Vec3::ZERO, |far, place| if place.norm() >= far.norm() { place } else { far });
         (body, far)
     };
-    (0..model.dof()).filter(last).map(farthest).collect()
+    (0..model.body_count()).filter(last).map(farthest).collect()
 }

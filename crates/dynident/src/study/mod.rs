@@ -33,7 +33,7 @@ pub use iteration::{
 pub use log::LogSection;
 pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;
-pub use robot::RobotSection;
+pub use robot::{FollowSection, LoopSection, RobotSection};
 pub use robot_model::StudyRobot;
 pub use simulated::SimulatedSection;
 pub use simulation::{SimulatedTruth, SimulationSection};

@@ -2,6 +2,7 @@
 
 use super::arrays::exactly;
 use crate::error::StudyError;
+use dynident_model::{LoopClosure, Mimic, MimicSource};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -20,6 +21,15 @@ pub struct RobotSection {
     /// Joints that are held, and where (rad, m).
     #[serde(default)]
     pub lock: BTreeMap<String, f64>,
+    /// Links that are not there: a link fixed to another alone, one that moves with a joint with everything on it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drop: Vec<String>,
+    /// Joints that follow others, beside those of which the description says so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub follow: Vec<FollowSection>,
+    /// Closed chains: where two links of the tree meet.
+    #[serde(default, rename = "loop", skip_serializing_if = "Vec::is_empty")]
+    pub loops: Vec<LoopSection>,
     /// Gravitational acceleration in the world, m/s²; (0, 0, -9.81), or the MJCF's or D-H table's own, by default.
     #[serde(default, deserialize_with = "exactly")]
     pub gravity_m_s2: Option<[f64; 3]>,
@@ -31,8 +41,51 @@ pub struct RobotSection {
     pub base_rpy_deg: Option<[f64; 3]>,
 }
 
+/// `[[robot.follow]]`: a joint without a degree of freedom of its own.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct FollowSection {
+    /// The joint.
+    pub joint: String,
+    /// The joints that it follows, and its velocity per velocity of each.
+    pub joints: BTreeMap<String, f64>,
+    /// Its position where those stand at zero, rad or m.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+/// `[[robot.loop]]`: a closed chain of the parallelogram kind, cut at a joint that the description does not hold.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LoopSection {
+    /// The two links that meet.
+    pub links: [String; 2],
+    /// Where: a point in the frame of each link, m.
+    pub points_m: [[f64; 3]; 2],
+    /// The joints of the chain without drives: what they follow is found from the geometry.
+    pub passive: Vec<String>,
+}
+
 /// Largest component of gravity: beyond it the unit must be wrong, and numbers run away.
 const MAX_GRAVITY_M_S2: f64 = 1000.0;
+
+impl FollowSection {
+    /// What the joint follows.
+    pub(super) fn mimic(&self) -> Mimic {
+        let source =
+            |(joint, multiplier): (&String, &f64)| MimicSource { joint: joint.clone(), multiplier: *multiplier };
+        Mimic { sources: self.joints.iter().map(source).collect(), offset: self.offset }
+    }
+}
+
+impl LoopSection {
+    /// Where the chain is cut.
+    pub(super) fn closure(&self) -> LoopClosure {
+        LoopClosure { links: self.links.clone(), points_m: self.points_m, passive: self.passive.clone() }
+    }
+}
 
 impl RobotSection {
     pub(crate) fn validate(&self) -> Result<(), StudyError> {

@@ -1,11 +1,11 @@
 //! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in
 //! force.
 
-use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, Study};
+use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, Study};
 use crate::error::{Error, StudyError};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
 use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
-use dynident_model::{Model, ModelError, Robot, Vec3, load_robot};
+use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, load_robot, loops};
 use std::path::Path;
 
 /// A study's robot: its description, and what the study makes of it.
@@ -37,6 +37,13 @@ impl StudyRobot {
         if let Some([roll, pitch, yaw]) = radians {
             model = model.with_base_orientation(roll, pitch, yaw).map_err(&in_study)?;
         }
+
+        // What hangs on it, and what its joints follow.
+        model = model.without_links(&study.robot.drop).map_err(&in_study)?;
+        let loops: Vec<LoopClosure> = study.robot.loops.iter().map(LoopSection::closure).collect();
+        let passive = loops::followers(&model, &loops).map_err(Error::study(study_path))?;
+        let stated = study.robot.follow.iter().map(|own| (own.joint.clone(), own.mimic()));
+        model = model.with_followers(&stated.chain(passive).collect::<Vec<_>>()).map_err(&in_study)?;
 
         // Which joints move.
         let known: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();

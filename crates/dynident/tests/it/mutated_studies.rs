@@ -63,7 +63,7 @@ fn try_whole(text: &str) {
             }
             let folders = Folders::new(&study, &path, None);
             if let Ok(robot) = StudyRobot::new(&study, &path, &folders) {
-                assert!(robot.base().count() <= 10 * robot.model().dof() + robot.terms().len());
+                assert!(robot.base().count() <= robot.model().inertial_count() + robot.terms().len());
                 assert!(robot.nominal_base().is_none_or(|prior| prior.iter().all(|value| value.is_finite())));
             }
         }

@@ -30,7 +30,7 @@ impl ShapesOfLinks {
     /// description without any, capsules along the links with a radius of 4 % of the arm's length.
     pub fn of(model: &Model, folder: &Path) -> Self {
         let radius_m = STAND_IN * arm_length_m(model);
-        let bodies = || (0..=model.dof()).map(|index| index.checked_sub(1));
+        let bodies = || (0..=model.body_count()).map(|index| index.checked_sub(1));
         let links = |body: Option<usize>| &body.map_or(model.base(), |body| &model.bodies()[body]).links;
         let described = bodies().any(|body| links(body).iter().any(|link| !link.collision.is_empty()));
         let mut found = Self { described, ..Self::default() };

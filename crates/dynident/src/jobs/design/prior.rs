@@ -81,7 +81,7 @@ fn standard_deviations(robot: &StudyRobot, share: f64) -> Vec<f64> {
     const KINDS: [core::ops::Range<usize>; 3] = [0..1, 1..4, 4..10];
     let values = robot.nominal().to_vec();
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let (bodies, terms) = values.split_at(10 * robot.model().dof());
+    let (bodies, terms) = values.split_at(robot.model().inertial_count());
     let mut std = Vec::with_capacity(values.len());
     for body in bodies.chunks_exact(10) {
         for kind in KINDS {

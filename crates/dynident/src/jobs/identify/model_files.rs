@@ -64,7 +64,7 @@ fn lost_in_urdf(property: Option<JointProperty>) -> bool {
 /// New damping, friction and drive inertia of the joints.
 fn joint_changes(model: &ParametricModel, parameters: &[f64]) -> Vec<JointChange> {
     let mut joints: Vec<JointChange> = Vec::new();
-    let terms = model.terms().iter().zip(&parameters[10 * model.model().dof()..]);
+    let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
     for (term, &value) in terms {
         let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
         let name = &model.model().joints()[joint].name;
@@ -113,7 +113,7 @@ fn keeping_locked(
         let names: Vec<String> = behind.into_iter().map(|link| link.name).collect();
         kept.push(names);
     }
-    let reduced = Model::new(model.name(), model.base().clone(), model.joints().to_vec(), bodies);
+    let reduced = Model::new(model.name(), model.base().clone(), model.tree_joints().to_vec(), bodies);
     let reduced = reduced.map_err(|error| error.to_string())?;
     let mut links = link_changes(&reduced, &rest).map_err(|error| error.to_string())?;
     for (body, kept) in model.bodies().iter().zip(kept).filter(|(_, kept)| !kept.is_empty()) {
@@ -149,7 +149,7 @@ fn note_sources(
             of(ValueSource::Partly),
             of(ValueSource::Nominal)
         );
-        let terms = model.terms().iter().zip(&parameters[10 * model.dof()..]);
+        let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
         let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && lost(term.property()));
         let lost: Vec<String> =
             lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();

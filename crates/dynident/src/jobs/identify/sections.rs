@@ -98,7 +98,7 @@ pub(super) fn sources(model: &RegressorModel, estimate: &Estimate) -> Vec<[Value
         Determination::Partly => ValueSource::Partly,
         Determination::Nominal => ValueSource::Nominal,
     };
-    (0..model.dof()).map(|body| core::array::from_fn(|k| source(all[10 * body + k]))).collect()
+    (0..model.model().body_count()).map(|body| core::array::from_fn(|k| source(all[10 * body + k]))).collect()
 }
 
 pub(super) fn bodies(
@@ -132,7 +132,7 @@ pub(super) fn term_results(
     parameters: &[f64],
     wanted: impl Fn(&TorqueTerm) -> bool,
 ) -> Vec<TermResult> {
-    let first_term = 10 * model.model().dof();
+    let first_term = model.model().inertial_count();
     let expressions = model.base().expressions();
     let of_term = |(x, term): (usize, &TorqueTerm)| {
         let column = first_term + x;
@@ -269,7 +269,7 @@ pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], 
                 .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
         }
     }
-    for (term, value) in model.terms().iter().zip(&parameters[10 * model.model().dof()..]) {
+    for (term, value) in model.terms().iter().zip(&parameters[model.model().inertial_count()..]) {
         if *value < 0.0 && term.is_nonnegative() {
             violations.push(format!("{} = {value:.4} {}", term.symbol(), term.unit()));
         }

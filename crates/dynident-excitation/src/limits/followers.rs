@@ -1,0 +1,100 @@
+//! Position and velocity of joints that follow others, within the description's limits: bands on sums of the motion.
+
+use super::kind::{Constraint, LimitKind};
+use super::term::{Inputs, Pull, Term};
+use super::validate::middle_and_half;
+use dynident_model::Model;
+
+/// `|Σ multiplier x + offset - middle| / half - 1`, where `x` are positions or velocities of the followed joints.
+#[derive(Clone, Debug)]
+struct FollowerBand {
+    /// Degree of freedom, multiplier.
+    sources: Vec<(usize, f64)>,
+    kind: LimitKind,
+    offset: f64,
+    range: [f64; 2],
+    joint: String,
+    unit: &'static str,
+}
+
+/// What the description limits of the joints that follow others. Joints that move by themselves have limits of their
+/// own, which may be stated.
+fn follower_bands(model: &Model) -> Vec<FollowerBand> {
+    let Some(coupling) = model.coupling() else { return Vec::new() };
+    let mut bands = Vec::new();
+    for (index, joint) in model.tree_joints().iter().enumerate() {
+        let sources = coupling.row(index).to_vec();
+        if coupling.driving().contains(&index) || sources.is_empty() {
+            continue;
+        }
+        let limits = &joint.limits;
+        let stops = limits.lower.zip(limits.upper).map(|(lower, upper)| [lower, upper]);
+        let units = if joint.turns() { ["rad", "rad/s"] } else { ["m", "m/s"] };
+        let of_kind = [
+            (LimitKind::Position, coupling.offset(index), stops, units[0]),
+            (LimitKind::Speed, 0.0, limits.velocity.map(|most| [-most, most]), units[1]),
+        ];
+        for (kind, offset, range, unit) in of_kind {
+            if let Some(range) = range.filter(|[lower, upper]| lower < upper) {
+                let (joint, sources) = (joint.name.clone(), sources.clone());
+                bands.push(FollowerBand { sources, kind, offset, range, joint, unit });
+            }
+        }
+    }
+    bands
+}
+
+/// All bands.
+#[derive(Clone, Debug)]
+pub(crate) struct FollowerLimits(Vec<FollowerBand>);
+
+impl FollowerLimits {
+    pub(crate) fn new(model: &Model) -> Self {
+        Self(follower_bands(model))
+    }
+}
+
+impl Term for FollowerLimits {
+    fn constraints(&self) -> Vec<Constraint> {
+        let constraint = |band: &FollowerBand| {
+            let (middle, size) = middle_and_half(band.range);
+            Constraint { kind: band.kind, subject: band.joint.clone(), middle, size, unit: band.unit }
+        };
+        self.0.iter().map(constraint).collect()
+    }
+
+    fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
+        let motion = inputs.motion;
+        for (band, row) in self.0.iter().zip(out.chunks_exact_mut(motion.samples)) {
+            let (middle, half) = middle_and_half(band.range);
+            let from = if band.kind == LimitKind::Position { &motion.q } else { &motion.dq };
+            row.fill(band.offset - middle);
+            for &(joint, share) in &band.sources {
+                for (c, x) in row.iter_mut().zip(&from[motion.of(joint)]) {
+                    *c += share * x;
+                }
+            }
+            for c in row {
+                *c = c.abs() / half - 1.0;
+            }
+        }
+    }
+
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+        let motion = inputs.motion;
+        for (band, row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
+            let (middle, half) = middle_and_half(band.range);
+            let is_position = band.kind == LimitKind::Position;
+            let from = if is_position { &motion.q } else { &motion.dq };
+            let to = if is_position { &mut pull.motion.q } else { &mut pull.motion.dq };
+            for (sample, weight) in row.iter().enumerate() {
+                let at = |joint: usize| motion.of(joint).start + sample;
+                let x: f64 = band.sources.iter().map(|&(joint, share)| share * from[at(joint)]).sum();
+                let slope = weight * (x + band.offset - middle).signum() / half;
+                for &(joint, share) in &band.sources {
+                    to[at(joint)] += share * slope;
+                }
+            }
+        }
+    }
+}

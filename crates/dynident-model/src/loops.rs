@@ -1,0 +1,251 @@
+//! Closed chains of the parallelogram kind, as palletising arms have them: what the joints without drives follow.
+//!
+//! A description is a tree, so one joint of every loop is cut. There two links meet in a point, `p_1(q) = p_2(q)`. In a
+//! parallelogram the passive joints that keep them together follow linearly, `q_p = C q_a + c`, with `C` the same in
+//! every posture: `C = -J_p⁺ J_a` of the distance's Jacobian (Khalil and Dombre, *Modeling, Identification and Control
+//! of Robots*, 2004, section 7.3). [`followers`] finds `C` and `c`, and refuses what is no parallelogram.
+
+use crate::joint::{Mimic, MimicSource};
+use crate::sample::Random;
+use crate::spatial::{Transform, Vec3};
+use crate::tree::Model;
+use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
+
+/// How well loops have to close, as a share of their size: lengths of descriptions have seven digits and more.
+const CLOSES: f64 = 1e-6;
+/// Postures at which a loop is tried: `±TRIED_RAD` about zero (a fifth of that in metres).
+const POSTURES: usize = 50;
+const TRIED_RAD: f64 = 1.5;
+/// Steps of Newton's method from the description's zero: it halves the number of wrong digits, or the loop is open.
+const STEPS: usize = 30;
+/// Multipliers this near to an integer are that integer: those of parallelograms are.
+const WHOLE: f64 = 1e-7;
+
+/// Where a loop is cut: a point of one link that stays on a point of another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopClosure {
+    /// The two links.
+    pub links: [String; 2],
+    /// The points in the frames of the links, m.
+    pub points_m: [[f64; 3]; 2],
+    /// The joints of the tree that the loop moves: those without drives.
+    pub passive: Vec<String>,
+}
+
+/// Why the passive joints of loops could not be found to follow others.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum LoopError {
+    /// A link that is not there.
+    #[error("there is no link `{link}` to close a loop at")]
+    UnknownLink {
+        /// The name.
+        link: String,
+    },
+    /// A joint that is not there.
+    #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
+    UnknownJoint {
+        /// The name.
+        joint: String,
+        /// Those that are.
+        known: Vec<String>,
+    },
+    /// A point that is not finite.
+    #[error("points_m of the loop at `{link}`: give finite numbers, m")]
+    NotFinite {
+        /// The link.
+        link: String,
+    },
+    /// A loop that stays open near the description's zero.
+    #[error(
+        "the loop between `{first}` and `{second}` does not close: with the other joints at zero its points stay {gap_m:.3e} m apart; check links, points_m and which joints are passive"
+    )]
+    Open {
+        /// One link.
+        first: String,
+        /// The other link.
+        second: String,
+        /// The distance, m.
+        gap_m: f64,
+    },
+    /// Passive joints that the loops do not hold.
+    #[error("the loops leave the passive joints {} free to move: name only joints that a loop holds", joints.join(", "))]
+    Undetermined {
+        /// The joints.
+        joints: Vec<String>,
+    },
+    /// A loop whose passive joints do not follow linearly.
+    #[error(
+        "the loop between `{first}` and `{second}` is no parallelogram: passive joints that follow linearly leave a gap of {gap_m:.3e} m in some posture"
+    )]
+    NotLinear {
+        /// One link.
+        first: String,
+        /// The other link.
+        second: String,
+        /// The largest distance, m.
+        gap_m: f64,
+    },
+}
+
+/// What the passive joints of the loops follow: for [`Model::with_followers`]. Joints that already follow others count
+/// as the loops' own where they are passive, and as what they are elsewhere.
+///
+/// # Errors
+/// Names that are not there, a loop that does not close or is no parallelogram, passive joints that it does not hold.
+pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mimic)>, LoopError> {
+    let tree = model.tree_joints();
+    let known = || tree.iter().map(|joint| joint.name.clone()).collect();
+    let place = |name: &String| {
+        let found = tree.iter().position(|joint| joint.name == *name);
+        found.ok_or_else(|| LoopError::UnknownJoint { joint: name.clone(), known: known() })
+    };
+    let mut passive = loops.iter().flat_map(|one| &one.passive).map(place).collect::<Result<Vec<usize>, _>>()?;
+    passive.sort_unstable();
+    passive.dedup();
+    let cuts = loops.iter().map(|one| Cut::of(model, one)).collect::<Result<Vec<Cut>, _>>()?;
+    if passive.is_empty() {
+        return Ok(Vec::new());
+    }
+    // Only what moves a loop's points is followed.
+    let on_loop = |joint: usize| cuts.iter().any(|cut| cut.ends.iter().any(|(path, _)| path.contains(&joint)));
+    let active: Vec<usize> = (0..tree.len()).filter(|joint| !passive.contains(joint) && on_loop(*joint)).collect();
+    let open = |q: &[f64]| worst(model, &cuts, q);
+    let named = |cut: &Cut| (cut.links[0].clone(), cut.links[1].clone());
+
+    // Closed at the description's zero, or near it.
+    let mut q = vec![0.0; tree.len()];
+    for _ in 0..STEPS {
+        let (gap, jacobian) = (gaps(model, &cuts, &q), jacobian(model, &cuts, &q, &passive));
+        let Ok(step) = jacobian.svd(true, true).solve(&gap, 1e-9) else { break };
+        for (&joint, step) in passive.iter().zip(step.iter()) {
+            q[joint] -= step;
+        }
+    }
+    let (gap_m, cut) = open(&q);
+    if !(gap_m <= CLOSES * cut.size_m) {
+        let (first, second) = named(cut);
+        return Err(LoopError::Open { first, second, gap_m });
+    }
+
+    // C and c.
+    let of_passive = jacobian(model, &cuts, &q, &passive).svd(true, true);
+    let largest = of_passive.singular_values.max();
+    if of_passive.rank(1e-6 * largest) < passive.len() {
+        let joints = passive.iter().map(|&joint| tree[joint].name.clone()).collect();
+        return Err(LoopError::Undetermined { joints });
+    }
+    let of_active = jacobian(model, &cuts, &q, &active);
+    let solved = of_passive.solve(&of_active, 1e-9 * largest).unwrap_or_else(|_| of_active.map(|_| f64::NAN));
+    let whole = |x: f64| if (x - x.round()).abs() < WHOLE { x.round() + 0.0 } else { x };
+    let law = (-solved).map(whole);
+    let offsets: Vec<f64> = passive.iter().map(|&joint| whole(q[joint])).collect();
+
+    // The same everywhere.
+    let mut random = Random::new(1);
+    for _ in 0..POSTURES {
+        for &joint in &active {
+            let reach = if tree[joint].turns() { TRIED_RAD } else { 0.2 * TRIED_RAD };
+            q[joint] = random.uniform(-reach, reach);
+        }
+        for (row, &joint) in passive.iter().enumerate() {
+            let followed = active.iter().enumerate().map(|(column, &source)| law[(row, column)] * q[source]);
+            q[joint] = offsets[row] + followed.sum::<f64>();
+        }
+        let (gap_m, cut) = open(&q);
+        // The multipliers are as exact as the description's lengths, and postures far from zero lever them.
+        if !(gap_m <= 10.0 * CLOSES * cut.size_m) {
+            let (first, second) = named(cut);
+            return Err(LoopError::NotLinear { first, second, gap_m });
+        }
+    }
+    let follower = |(row, &joint): (usize, &usize)| {
+        let source = |(column, &source): (usize, &usize)| {
+            let multiplier = law[(row, column)];
+            (multiplier != 0.0).then(|| MimicSource { joint: tree[source].name.clone(), multiplier })
+        };
+        let sources = active.iter().enumerate().filter_map(source).collect();
+        (tree[joint].name.clone(), Mimic { sources, offset: offsets[row] })
+    };
+    Ok(passive.iter().enumerate().map(follower).collect())
+}
+
+/// A loop with its names looked up.
+struct Cut {
+    links: [String; 2],
+    /// Of both ends: the joints of the tree on the way to it, and the point in the frame of the last one's body (of the
+    /// base where there is none).
+    ends: [(Vec<usize>, Vec3); 2],
+    size_m: f64,
+}
+
+impl Cut {
+    fn of(model: &Model, closure: &LoopClosure) -> Result<Self, LoopError> {
+        let end = |k: usize| {
+            let link = &closure.links[k];
+            if closure.points_m[k].iter().any(|x| !x.is_finite()) {
+                return Err(LoopError::NotFinite { link: link.clone() });
+            }
+            let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
+            let mut all = core::iter::once((None, model.base())).chain(bodies);
+            let found = all.find_map(|(body, of)| Some((body, of.links.iter().find(|own| own.name == *link)?)));
+            let (body, own) = found.ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
+            let path = body.map_or_else(Vec::new, |body| model.path(body));
+            Ok((path, own.placement.point(Vec3(closure.points_m[k]))))
+        };
+        let ends = [end(0)?, end(1)?];
+        let length = |(path, point): &(Vec<usize>, Vec3)| {
+            point.norm()
+                + path.iter().map(|&joint| model.tree_joints()[joint].placement.translation.norm()).sum::<f64>()
+        };
+        let size_m = ends.iter().map(length).fold(f64::MIN_POSITIVE, f64::max);
+        Ok(Self { links: closure.links.clone(), ends, size_m })
+    }
+
+    /// Where an end stands in the base frame, and the place and axis of every joint on the way.
+    fn end(&self, model: &Model, k: usize, q: &[f64]) -> (Vec3, Vec<(usize, Transform)>) {
+        let (path, point) = &self.ends[k];
+        let mut placement = Transform::IDENTITY;
+        let mut joints = Vec::with_capacity(path.len());
+        for &joint in path {
+            placement = placement.then(&model.tree_joints()[joint].transform(q[joint]));
+            joints.push((joint, placement));
+        }
+        (placement.point(*point), joints)
+    }
+}
+
+/// `p_1 - p_2` of every loop, m.
+fn gaps(model: &Model, cuts: &[Cut], q: &[f64]) -> DVector<f64> {
+    let gap = |cut: &Cut| cut.end(model, 0, q).0 - cut.end(model, 1, q).0;
+    DVector::from_iterator(3 * cuts.len(), cuts.iter().flat_map(|cut| gap(cut).0))
+}
+
+/// The widest loop beside its size.
+fn worst<'c>(model: &Model, cuts: &'c [Cut], q: &[f64]) -> (f64, &'c Cut) {
+    let gap = |cut: &Cut| (cut.end(model, 0, q).0 - cut.end(model, 1, q).0).norm();
+    let of_size = |cut: &&Cut| gap(cut) / cut.size_m;
+    let widest = cuts.iter().max_by(|a, b| of_size(a).total_cmp(&of_size(b))).unwrap_or(&cuts[0]);
+    (gap(widest), widest)
+}
+
+/// Derivatives of the gaps by some joints of the tree.
+fn jacobian(model: &Model, cuts: &[Cut], q: &[f64], by: &[usize]) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(3 * cuts.len(), by.len());
+    for (number, cut) in cuts.iter().enumerate() {
+        for (k, sign) in [(0, 1.0), (1, -1.0)] {
+            let (point, joints) = cut.end(model, k, q);
+            for (joint, placement) in joints {
+                let Some(column) = by.iter().position(|own| *own == joint) else { continue };
+                let own = &model.tree_joints()[joint];
+                let axis = placement.rotation.mul_vec(own.axis);
+                let moves = if own.turns() { axis.cross(point - placement.translation) } else { axis };
+                for (row, x) in moves.0.into_iter().enumerate() {
+                    all[(3 * number + row, column)] += sign * x;
+                }
+            }
+        }
+    }
+    all
+}
