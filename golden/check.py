@@ -23,6 +23,7 @@ GENERATORS = {
     "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
     "mujoco-closed-loop": ("mujoco_closed_loop.py", "mujoco_closed_loop.json"),
+    "coupled": ("coupled_joints.py", "coupled_joints.json"),
     "mjcf": ("mjcf.py", "mjcf.json"),
     "sdf": ("sdf.py", "sdf.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),

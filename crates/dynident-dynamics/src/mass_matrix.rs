@@ -20,7 +20,7 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
         let TreeScratch { q: tree_q, matrices: [out, ..], .. } = tree;
         coupling.positions(q, 1, tree_q);
         dispatch_single(*level, Single { model, scratch, q: tree_q, out });
-        coupling.project_matrix(out, &mut matrices[0]);
+        coupling.project_symmetric(out, &mut matrices[0]);
     } else {
         dispatch_single(*level, Single { model, scratch, q, out: &mut matrices[0] });
     }

@@ -30,7 +30,7 @@ pub fn mass_matrix_and_bias<'w>(
         coupling.positions(q, 1, tree_q);
         coupling.rates(dq, 1, tree_dq);
         dispatch_single(*level, Single { model, scratch, q: tree_q, dq: tree_dq, matrix: tree_matrix, bias: tau });
-        coupling.project_matrix(tree_matrix, matrix);
+        coupling.project_symmetric(tree_matrix, matrix);
         vector.fill(0.0);
         coupling.add_projected(tau, 1, vector);
     } else {

@@ -44,6 +44,6 @@ pub fn mass_matrix_over<T: Scalar>(model: &Model, q: &[T]) -> Vec<T> {
     coupling.positions(q, 1, &mut scratch.q);
     composite_rigid_bodies(model, &mut scratch);
     let mut matrix = vec![T::ZERO; model.dof() * model.dof()];
-    coupling.project_matrix(&scratch.matrices[0], &mut matrix);
+    coupling.project_symmetric(&scratch.matrices[0], &mut matrix);
     matrix
 }

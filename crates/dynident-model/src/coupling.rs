@@ -147,6 +147,19 @@ impl JointCoupling {
         }
     }
 
+    /// [`project_matrix`](Self::project_matrix) of a symmetric matrix: exactly symmetric again.
+    ///
+    /// # Panics
+    /// If a matrix is not square over its joints.
+    pub fn project_symmetric<T: Scalar>(&self, tree: &[T], out: &mut [T]) {
+        self.project_matrix(tree, out);
+        for row in 0..self.dof() {
+            for column in 0..row {
+                out[column * self.dof() + row] = out[row * self.dof() + column];
+            }
+        }
+    }
+
     /// `Gᵀ A G` of a square matrix over the joints of the tree, row-major.
     ///
     /// # Panics

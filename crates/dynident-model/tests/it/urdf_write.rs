@@ -58,9 +58,9 @@ fn identified_bodies_are_read_back_and_nothing_else_changes() {
     texts.extend(foreign_urdfs().iter().map(|path| load_robot(path).unwrap().text));
     for (seed, text) in texts.iter().enumerate() {
         let model = read_urdf(text).unwrap().model;
-        let new = bodies(seed as u64, model.dof());
+        let new = bodies(seed as u64, model.body_count());
         let joints: Vec<JointChange> = model
-            .joints()
+            .tree_joints()
             .iter()
             .map(|joint| JointChange {
                 joint: joint.name.clone(),
@@ -72,7 +72,7 @@ fn identified_bodies_are_read_back_and_nothing_else_changes() {
         let written = rewrite_urdf(text, &link_changes(&model, &new).unwrap(), &joints).unwrap();
         let again = read_urdf(&written).unwrap().model;
         assert_same_inertials(&again, &new);
-        for (old, new) in model.joints().iter().zip(again.joints()) {
+        for (old, new) in model.tree_joints().iter().zip(again.tree_joints()) {
             assert_eq!((new.damping, new.friction), (Some(0.125), Some(1.0 / 3.0)));
             assert_eq!((&old.placement, old.axis, old.limits), (&new.placement, new.axis, new.limits));
         }

@@ -12,9 +12,9 @@ pub(crate) const ROBOTS: [&str; 8] =
 /// Those with at most nine joints, whose files hold full regressors, derivatives and base parameters.
 pub(crate) const ARMS: [&str; 5] = ["planar2r", "ur10", "panda", "panda_arm7", "iiwa14"];
 
-/// A robot as Dynident reads it.
+/// A robot as Dynident reads it, every joint moving by itself as in the files of the other programs.
 pub(crate) fn robot(name: &str) -> Model {
-    load_robot(repository(&format!("robots/{name}.urdf"))).unwrap().model
+    load_robot(repository(&format!("robots/{name}.urdf"))).unwrap().model.without_followers()
 }
 
 /// A robot and what another program says about it.

@@ -1,0 +1,233 @@
+//! Robots whose joints follow others, held against Pinocchio (`golden/coupled_joints.py`): mimic joints as Pinocchio
+//! itself has them, and a palletising arm whose closed chains Pinocchio's tree is held together by.
+
+use crate::golden::{close, numbers, text};
+use dynident_dynamics::{
+    BaseParameterSettings, BaseParameters, BatchWorkspace, MotionGradient, PanelLayout, Panels, Workspace,
+    body_placements, forward_dynamics, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives,
+    mass_matrix, numerical_rank, regressor_panels, regressor_panels_adjoint,
+};
+use dynident_model::sample::Random;
+use dynident_model::terms::{DriveChoice, JointMotion, terms_per_joint};
+use dynident_model::{LoopClosure, LoopError, Model, load_robot, loops};
+use dynident_testing::repository;
+use serde_json::Value;
+
+/// The same sums in double precision, over ten bodies.
+const ROUNDING: f64 = 1e-12;
+
+fn golden() -> Value {
+    serde_json::from_str(&std::fs::read_to_string(repository("golden/coupled_joints.json")).unwrap()).unwrap()
+}
+
+fn cuts() -> Vec<LoopClosure> {
+    let cut = |first: &str, second: &str, passive: [&str; 2]| LoopClosure {
+        links: [first.to_owned(), second.to_owned()],
+        points_m: [[0.0; 3]; 2],
+        passive: passive.map(str::to_owned).to_vec(),
+    };
+    vec![
+        cut("rod_end", "forearm_back", ["elbow_joint", "rod_joint"]),
+        cut("strut_end", "plate_back", ["strut_joint", "plate_joint"]),
+    ]
+}
+
+fn palletizer() -> Model {
+    let tree = load_robot(repository("golden/coupled/palletizer.urdf")).unwrap().model;
+    let followers = loops::followers(&tree, &cuts()).unwrap();
+    tree.with_followers(&followers).unwrap()
+}
+
+/// Joint vectors of the file in the order of the model.
+fn order(model: &Model, file: &Value) -> Vec<usize> {
+    let names: Vec<&str> = file["joints"].as_array().unwrap().iter().map(text).collect();
+    assert_eq!(names.len(), model.dof());
+    let place = |name: &str| names.iter().position(|own| *own == name).unwrap();
+    model.joints().iter().map(|joint| place(&joint.name)).collect()
+}
+
+fn ordered(order: &[usize], value: &Value) -> Vec<f64> {
+    let theirs = numbers(value);
+    order.iter().map(|&k| theirs[k]).collect()
+}
+
+#[test]
+fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
+    let golden = golden();
+    for (name, path) in [("followers", "golden/coupled/followers.urdf"), ("panda", "robots/panda.urdf")] {
+        let (model, file) = (load_robot(repository(path)).unwrap().model, &golden["mimic"][name]);
+        let order = order(&model, file);
+        assert_eq!(model.body_count() as u64, file["bodies"].as_u64().unwrap());
+        let mut workspace = Workspace::new(&model);
+        for state in file["states"].as_array().unwrap() {
+            let [q, dq, ddq, tau] = ["q", "dq", "ddq", "tau"].map(|key| ordered(&order, &state[key]));
+            close(ROUNDING, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, name);
+            let rows: Vec<Vec<f64>> = state["mass_matrix"].as_array().unwrap().iter().map(numbers).collect();
+            let theirs: Vec<f64> =
+                order.iter().flat_map(|&i| order.iter().map(|&j| rows[i][j]).collect::<Vec<_>>()).collect();
+            close(ROUNDING, mass_matrix(&model, &mut workspace, &q), &theirs, name);
+            // Of a finger of 15 g beside an arm, what is left of 50 Nm has a digit or two fewer.
+            close(1e-9, forward_dynamics(&model, &mut workspace, &q, &dq, &tau), &ddq, name);
+            let placements = body_placements(&model, &mut workspace, &q).to_vec();
+            for (joint, placement) in model.tree_joints().iter().zip(placements) {
+                close(ROUNDING, &placement.translation.0, &numbers(&state["placements_m"][&joint.name]), &joint.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_palletising_arm_is_its_tree_held_together() {
+    let (model, golden) = (palletizer(), golden());
+    let file = &golden["loops"];
+    let order = order(&model, file);
+    let passive: Vec<&str> = file["passive"].as_array().unwrap().iter().map(text).collect();
+    let coupling = model.coupling().unwrap();
+    let mut workspace = Workspace::new(&model);
+    for state in file["states"].as_array().unwrap() {
+        let [q, dq, ddq, tau, applied] =
+            ["q", "dq", "ddq", "tau", "applied_tau"].map(|key| ordered(&order, &state[key]));
+        // The chains close where Newton's method closed them.
+        let mut tree = vec![0.0; model.body_count()];
+        coupling.positions(&q, 1, &mut tree);
+        for (name, theirs) in passive.iter().zip(numbers(&state["passive_q"])) {
+            let place = model.tree_joints().iter().position(|joint| joint.name == *name).unwrap();
+            assert!((tree[place] - theirs).abs() < 1e-11, "{name}: {} against {theirs}", tree[place]);
+        }
+        // Asked of closed chains: 1e-8. Least squares of redundant equations leave about 1e-11.
+        close(1e-9, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, "torque");
+        let expected = ordered(&order, &state["forward_ddq"]);
+        close(1e-9, forward_dynamics(&model, &mut workspace, &q, &dq, &applied), &expected, "acceleration");
+    }
+    // What torque tells: as many as the regressors of the closed chains have directions.
+    let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
+    assert_eq!(base.count() as u64, file["base_parameters"].as_u64().unwrap());
+}
+
+#[test]
+fn what_a_loop_is_not_is_said() {
+    let tree = load_robot(repository("golden/coupled/palletizer.urdf")).unwrap().model;
+    let changed = |change: &dyn Fn(&mut LoopClosure)| {
+        let mut all = cuts();
+        change(&mut all[0]);
+        loops::followers(&tree, &all).unwrap_err()
+    };
+    assert!(matches!(changed(&|cut| cut.links[0] = "tail".into()), LoopError::UnknownLink { link } if link == "tail"));
+    assert!(matches!(changed(&|cut| cut.passive[0] = "knee".into()), LoopError::UnknownJoint { .. }));
+    assert!(matches!(changed(&|cut| cut.points_m[0][1] = f64::NAN), LoopError::NotFinite { .. }));
+    // Out of the plane of the chain no passive joint reaches.
+    assert!(matches!(changed(&|cut| cut.points_m[0][1] = 0.05), LoopError::Open { gap_m, .. } if gap_m > 0.04));
+    // A rod 3 cm longer still closes, but is no parallelogram.
+    assert!(matches!(changed(&|cut| cut.points_m[0][2] = 0.03), LoopError::NotLinear { .. }));
+    assert!(matches!(changed(&|cut| cut.passive.push("wrist_joint".into())), LoopError::Undetermined { .. }));
+}
+
+#[test]
+fn base_parameters_of_coupled_joints_carry_the_torque_and_no_more() {
+    let followers = load_robot(repository("golden/coupled/followers.urdf")).unwrap().model;
+    for model in [palletizer(), followers] {
+        let choice = DriveChoice { drive_inertia: true, viscous: true, offset: true, ..DriveChoice::default() };
+        let terms = terms_per_joint(&model, |_| choice);
+        let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
+        // Other states than those it was found at.
+        let rank = numerical_rank(&model, &terms, 99, 2e-5);
+        assert_eq!(rank.independent, base.independent(), "{}", model.name());
+        let mut random = Random::new(5);
+        let all: Vec<f64> = (0..base.all_columns().len()).map(|_| random.uniform(-3.0, 3.0)).collect();
+        let theta = base.values(&all);
+        let (dof, samples) = (model.dof(), 20);
+        let mut motion = || (0..dof * samples).map(|_| random.uniform(-2.0, 2.0)).collect::<Vec<f64>>();
+        let (q, dq, ddq) = (motion(), motion(), motion());
+        let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
+        let torque = |layout: &PanelLayout, values: &[f64]| {
+            let mut panels = Panels::default();
+            regressor_panels(&model, &mut BatchWorkspace::new(&model), layout, &motion, &mut panels);
+            let mut tau = vec![0.0; dof * samples];
+            for joint in 0..dof {
+                for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+                    let entries = &panels.joint(joint)[place * samples..(place + 1) * samples];
+                    for (to, entry) in tau[joint * samples..(joint + 1) * samples].iter_mut().zip(entries) {
+                        *to += entry * values[column];
+                    }
+                }
+            }
+            tau
+        };
+        let full = torque(&PanelLayout::new(&model, base.all_columns().to_vec()), &all);
+        let short = torque(&PanelLayout::new(&model, base.base_columns()), &theta);
+        // Dependencies are found to rounding, beside columns that lengths of a metre weigh differently.
+        close(1e-9, &short, &full, model.name());
+        // And the bodies' part is the inverse dynamics.
+        let mut own = all;
+        own[..model.inertial_count()].copy_from_slice(&model.parameter_vector());
+        own[model.inertial_count()..].fill(0.0);
+        let mut tau = vec![0.0; dof * samples];
+        inverse_dynamics_batch(&model, &mut BatchWorkspace::new(&model), &motion, &mut tau);
+        close(ROUNDING, &torque(&PanelLayout::new(&model, base.all_columns().to_vec()), &own), &tau, model.name());
+    }
+}
+
+#[test]
+fn derivatives_of_torque_and_regressor_are_those_of_differences() {
+    let model = palletizer();
+    let (dof, samples, step) = (model.dof(), 5, 1e-6);
+    let mut random = Random::new(3);
+    let mut vector = |count: usize| (0..count).map(|_| random.uniform(-0.8, 0.8)).collect::<Vec<f64>>();
+    let state = [vector(dof), vector(dof), vector(dof)];
+    let mut workspace = Workspace::new(&model);
+    let found = inverse_dynamics_derivatives(&model, &mut workspace, &state[0], &state[1], &state[2]);
+    let found = [found.by_position, found.by_velocity, found.by_acceleration].map(<[f64]>::to_vec);
+    let mut torque =
+        |state: &[Vec<f64>; 3]| inverse_dynamics(&model, &mut workspace, &state[0], &state[1], &state[2]).to_vec();
+    for (which, matrix) in found.iter().enumerate() {
+        for joint in 0..dof {
+            let [mut up, mut down] = [state.clone(), state.clone()];
+            up[which][joint] += step;
+            down[which][joint] -= step;
+            let slope: Vec<f64> = torque(&up).iter().zip(torque(&down)).map(|(a, b)| (a - b) / (2.0 * step)).collect();
+            let column: Vec<f64> = (0..dof).map(|row| matrix[row * dof + joint]).collect();
+            // Central differences of 1e-6 of torques of some 100 Nm.
+            let scale = slope.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
+            assert!(
+                column.iter().zip(&slope).all(|(a, b)| (a - b).abs() < 1e-7 * scale + 1e-6),
+                "{column:?} {slope:?}"
+            );
+        }
+    }
+
+    // A cost with random derivatives by every entry of the panels.
+    let layout =
+        PanelLayout::new(&model, BaseParameters::new(&model, &[], &BaseParameterSettings::default()).base_columns());
+    let motion: Vec<Vec<f64>> = (0..3).map(|_| vector(dof * samples)).collect();
+    let mut batch = BatchWorkspace::new(&model);
+    let mut weights = Panels::default();
+    weights.resize(&layout, samples);
+    for joint in 0..dof {
+        let count = weights.joint(joint).len();
+        weights.joint_mut(joint).copy_from_slice(&vector(count));
+    }
+    let mut cost = |motion: &[Vec<f64>]| -> f64 {
+        let mut panels = Panels::default();
+        let motion = JointMotion { samples, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
+        regressor_panels(&model, &mut batch, &layout, &motion, &mut panels);
+        let row = |joint: usize| {
+            let entries = layout.joint_columns(joint).len() * samples;
+            panels.joint(joint)[..entries].iter().zip(weights.joint(joint)).map(|(a, b)| a * b).sum::<f64>()
+        };
+        (0..dof).map(row).sum()
+    };
+    let mut gradient = [(); 3].map(|()| vec![0.0; dof * samples]);
+    let [by_q, by_dq, by_ddq] = &mut gradient;
+    let view = JointMotion { samples, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
+    let mut to = MotionGradient { by_q, by_dq, by_ddq };
+    regressor_panels_adjoint(&model, &mut BatchWorkspace::new(&model), &layout, &view, &weights, &mut to);
+    for (which, found) in gradient.iter().enumerate() {
+        for (place, found) in found.iter().enumerate() {
+            let [mut up, mut down] = [motion.clone(), motion.clone()];
+            up[which][place] += step;
+            down[which][place] -= step;
+            let slope = (cost(&up) - cost(&down)) / (2.0 * step);
+            assert!((slope - found).abs() < 1e-6 * (1.0 + slope.abs()), "{which} {place}: {found} against {slope}");
+        }
+    }
+}
