@@ -44,6 +44,10 @@ for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json; do
 done
 run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export" "$examples/description"
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
+# Joints that follow others: two closed chains, found, exported and held against MuJoCo.
+run 0 "$dynident" simulate examples/palletizer.toml --out "$out/palletizer_run"
+run 0 "$dynident" check examples/palletizer.toml
+run 0 "$venv/bin/python" .ci/coupled.py "$dynident" "$out/palletizer"
 
 # A designed motion, looked at again, and its torques.
 run 0 "$dynident" design examples/design_ur10.toml --out "$out/motion" --to ros2

@@ -3,7 +3,7 @@
     python golden/coupled_joints.py [--out DIR]
 
 Writes DIR/coupled_joints.json (default: this script's folder). `mimic`: robots with mimic tags, read by Pinocchio with
-them. `loops`: `golden/coupled/palletizer.urdf` with its two closed chains, by Pinocchio's mass matrix, bias and frame
+them. `loops`: `examples/robots/palletizer.urdf` with its two closed chains, by Pinocchio's mass matrix, bias and frame
 Jacobians of the **tree** and the constraint that the cut points stay together: M ddq + h = tau + J' lambda, J ddq =
 -dJ dq, solved by least squares (the chains are plane, so three equations a point hold one too many). Where the passive
 joints stand is found by Newton's method along the way from zero, not from how they follow.
@@ -153,7 +153,7 @@ def main():
     found = {
         "versions": {"pinocchio": pin.__version__, "seed": SEED},
         "mimic": {name: mimic(root / path, rng) for name, path in MIMIC.items()},
-        "loops": loops(HERE / "coupled" / "palletizer.urdf", rng),
+        "loops": loops(root / "examples" / "robots" / "palletizer.urdf", rng),
     }
     write(out / "coupled_joints.json", found)
 

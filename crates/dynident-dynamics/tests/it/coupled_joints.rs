@@ -33,7 +33,7 @@ fn cuts() -> Vec<LoopClosure> {
 }
 
 fn palletizer() -> Model {
-    let tree = load_robot(repository("golden/coupled/palletizer.urdf")).unwrap().model;
+    let tree = load_robot(repository("examples/robots/palletizer.urdf")).unwrap().model;
     let followers = loops::followers(&tree, &cuts()).unwrap();
     tree.with_followers(&followers).unwrap()
 }
@@ -106,7 +106,7 @@ fn a_palletising_arm_is_its_tree_held_together() {
 
 #[test]
 fn what_a_loop_is_not_is_said() {
-    let tree = load_robot(repository("golden/coupled/palletizer.urdf")).unwrap().model;
+    let tree = load_robot(repository("examples/robots/palletizer.urdf")).unwrap().model;
     let changed = |change: &dyn Fn(&mut LoopClosure)| {
         let mut all = cuts();
         change(&mut all[0]);

@@ -22,7 +22,8 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
             let message = format!("stands {offset:.4} m from its parent joint: if that is millimetres, divide by 1000");
             findings.add(Problem, "length-unit", place(), message);
         }
-        limits(joint, findings);
+        let follows = model.joint_index(&joint.name).is_none();
+        limits(joint, follows, findings);
         for (what, value) in [("damping", joint.damping), ("friction", joint.friction)] {
             if value.is_some_and(|value| value < 0.0) {
                 let message = format!("has a negative {what}, which would drive the joint: fix the sign");
@@ -30,7 +31,6 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
             }
         }
         if let Some(mimic) = &joint.mimic {
-            let follows = model.joint_index(&joint.name).is_none();
             let rest = if follows {
                 ": it is no degree of freedom, and what it carries is felt by what it follows"
             } else {
@@ -46,7 +46,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     }
 }
 
-fn limits(joint: &Joint, findings: &mut Findings) {
+fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
     let mut add = |level, check, message: String| findings.add(level, check, format!("joint {}", joint.name), message);
     let limits = &joint.limits;
     let turns = joint.turns();
@@ -63,6 +63,8 @@ fn limits(joint: &Joint, findings: &mut Findings) {
                 add(Warning, "limit-range", cannot);
             }
             (Some(_), Some(_)) => {}
+            // What it follows has limits of its own.
+            _ if follows => {}
             _ => {
                 let has = "has no position limits: no excitation can be designed until they are given";
                 add(Warning, "limit-missing", has.to_owned());
@@ -90,12 +92,15 @@ fn limits(joint: &Joint, findings: &mut Findings) {
             add(Warning, "limit-unit", has);
         }
         Some(_) => {}
+        None if follows => {}
         None => {
             let has = "has no velocity limit: give one before designing an excitation";
             add(Info, "velocity-limit", has.to_owned());
         }
     }
     match limits.effort {
+        // A joint that follows others has no drive.
+        _ if follows => {}
         Some(effort) if effort <= 0.0 => {
             let has = format!("has an effort limit of {effort}, so that it could carry nothing: give the real one");
             add(Warning, "effort-limit", has);
