@@ -168,7 +168,7 @@ pub(super) struct TermLabel<'a> {
 /// What a kind of torque term says of itself.
 pub(super) trait TermKind: Debug {
     /// What it is called.
-    fn label(&self) -> TermLabel;
+    fn label(&self) -> TermLabel<'_>;
 
     /// The joints that feel it.
     fn joints(&self) -> TermJoints;
