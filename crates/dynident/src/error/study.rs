@@ -13,6 +13,7 @@ use dynident_identification::payload::PayloadError;
 use dynident_identification::rows::ParallelFilterError;
 use dynident_iteration::IterationError;
 use dynident_model::ModelError;
+use dynident_model::terms::{ExpressionError, TorqueTableError};
 use dynident_recording::FilterError;
 use dynident_simulation::SimulationError;
 use thiserror::Error;
@@ -190,6 +191,12 @@ pub enum StudyError {
     /// A robot that cannot be made of its description.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// An expression that cannot be read.
+    #[error("expression {0}")]
+    Expression(#[from] ExpressionError),
+    /// A table that says no torque.
+    #[error("table: {0}")]
+    Table(#[from] TorqueTableError),
     /// Bodies and torque terms that do not fit.
     #[error(transparent)]
     ParametricModel(#[from] ParametricModelError),
