@@ -190,7 +190,8 @@ impl SimulationSection {
                 });
                 let value = self.terms.get(symbol).copied().or(by_kind);
                 value.ok_or_else(|| {
-                    StudyError::missing(format!("laws.{symbol}"), format!("give its value, {symbol} = ..."))
+                    let nominal = if term.is_declared() { ", or its nominal in [[torque]]" } else { "" };
+                    StudyError::missing(format!("laws.{symbol}"), format!("give its value, {symbol} = ...{nominal}"))
                 })
             })
             .collect::<Result<Vec<f64>, StudyError>>()?;

@@ -7,6 +7,7 @@ mod check_mistakes;
 mod common;
 mod consistent_intervals;
 mod consistent_parameters;
+mod declared_torque;
 mod design_contact;
 mod design_messages;
 mod design_tasks;
