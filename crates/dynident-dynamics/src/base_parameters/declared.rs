@@ -75,18 +75,15 @@ pub(super) fn regrouped(
     for (to, column) in dependent.iter().enumerate() {
         for (row, base) in independent.iter().enumerate() {
             let known = split.dependent.iter().position(|other| other == column);
-            regrouping[(row, to)] = match known {
+            regrouping[(row, to)] = if let Some(from) = known {
                 // No structural column depends on a declared one.
-                Some(from) => {
-                    let own = split.independent.iter().position(|other| other == base);
-                    own.map_or(0.0, |own| split.regrouping[(own, from)])
-                }
-                None => {
-                    let place = |of: usize| order.iter().position(|other| *other == of);
-                    let from = place(*column).and_then(|p| found.dependent.iter().position(|other| *other == p));
-                    let own = place(*base).and_then(|p| found.independent.iter().position(|other| *other == p));
-                    from.zip(own).map_or(0.0, |(from, own)| found.regrouping[(own, from)])
-                }
+                let own = split.independent.iter().position(|other| other == base);
+                own.map_or(0.0, |own| split.regrouping[(own, from)])
+            } else {
+                let place = |of: usize| order.iter().position(|other| *other == of);
+                let from = place(*column).and_then(|p| found.dependent.iter().position(|other| *other == p));
+                let own = place(*base).and_then(|p| found.independent.iter().position(|other| *other == p));
+                from.zip(own).map_or(0.0, |(from, own)| found.regrouping[(own, from)])
             };
         }
     }

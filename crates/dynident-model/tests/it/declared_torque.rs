@@ -66,6 +66,10 @@ fn broken_expressions_name_the_place() {
         let error = Expression::parse(text, &JointNames { own: Some(0), names: &names }).unwrap_err();
         assert!(matches!(error.problem, ExpressionProblem::TooLong { .. }), "{error}");
     }
+    // As deep as may be reads back.
+    let signs = format!("{}q", "-".repeat(60));
+    let read = Expression::parse(&signs, &JointNames { own: Some(0), names: &names }).unwrap();
+    assert_eq!(Expression::try_from(read.to_string()), Ok(read));
     let whose = Expression::parse("q", &JointNames { own: None, names: &[] }).unwrap_err();
     assert!(matches!(whose.problem, ExpressionProblem::WhichJoint { .. }));
 }

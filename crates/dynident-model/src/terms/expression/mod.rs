@@ -49,7 +49,7 @@ impl Expression {
     /// third joint, `q(elbow)` or `q("elbow joint")` those of a joint by its name. An exponent is a number.
     ///
     /// # Errors
-    /// With the character and what belongs there. At most 2000 characters and 256 operations.
+    /// With the character and what belongs there. At most 10 000 characters and 256 operations.
     pub fn parse(text: &str, joints: &JointNames<'_>) -> Result<Self, ExpressionError> {
         parse::parse(text, joints).map(|nodes| Self { nodes })
     }

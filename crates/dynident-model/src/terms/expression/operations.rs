@@ -182,7 +182,10 @@ pub(super) fn value(node: ExpressionNode, values: &[f64]) -> f64 {
 /// Hands the derivatives of an operation by its parts to `add(part, slope)`.
 pub(super) fn slopes(node: ExpressionNode, values: &[f64], mut add: impl FnMut(usize, f64)) {
     match node {
-        ExpressionNode::Number(_) | ExpressionNode::Position(_) | ExpressionNode::Velocity(_) => {}
+        ExpressionNode::Number(_)
+        | ExpressionNode::Position(_)
+        | ExpressionNode::Velocity(_)
+        | ExpressionNode::WholePower(_, 0) => {}
         ExpressionNode::Add(a, b) => {
             add(a, 1.0);
             add(b, 1.0);
@@ -200,7 +203,6 @@ pub(super) fn slopes(node: ExpressionNode, values: &[f64], mut add: impl FnMut(u
             add(b, -values[a] / (values[b] * values[b]));
         }
         ExpressionNode::Negate(a) => add(a, -1.0),
-        ExpressionNode::WholePower(_, 0) => {}
         ExpressionNode::WholePower(a, exponent) => add(a, f64::from(exponent) * values[a].powi(exponent - 1)),
         ExpressionNode::Power(a, exponent) => add(a, exponent * values[a].powf(exponent - 1.0)),
         ExpressionNode::Call(function, a) => add(a, function.slope(values[a])),

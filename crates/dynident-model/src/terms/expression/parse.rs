@@ -4,8 +4,10 @@ use super::operations::{ExpressionFunction, ExpressionFunction2, ExpressionNode,
 use super::{LARGEST, MOST_NODES};
 use thiserror::Error;
 
-/// The longest text, in characters.
-const MOST_CHARACTERS: usize = 2000;
+/// The longest text, in characters: that of the most operations, with all digits of their numbers, is shorter.
+const MOST_CHARACTERS: usize = 10_000;
+/// So many characters of it stand in a message.
+const MOST_SHOWN: usize = 2000;
 /// The deepest nesting of parentheses, functions and signs: each takes a frame of the stack.
 const MOST_DEPTH: usize = 64;
 /// Whole exponents up to this are products; beyond, powers of what is not negative.
@@ -92,7 +94,7 @@ fn functions() -> String {
 }
 
 pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<ExpressionNode>, ExpressionError> {
-    let shown: String = text.chars().take(MOST_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let shown: String = text.chars().take(MOST_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect();
     let mut parser = Parser { characters: text.chars().take(MOST_CHARACTERS + 1).collect(), ..Parser::new(joints) };
     let parsed = if parser.characters.len() > MOST_CHARACTERS {
         Err(ExpressionProblem::TooLong { most: MOST_CHARACTERS, of: "characters" })
@@ -306,9 +308,7 @@ impl<'a> Parser<'a> {
             self.need(')', "`)` of a function of two values")?;
             return self.push(ExpressionNode::Call2(function, first, second));
         }
-        let quantities: [(&'static str, fn(usize) -> ExpressionNode); 2] =
-            [("dq", ExpressionNode::Velocity), ("q", ExpressionNode::Position)];
-        for (quantity, node) in quantities {
+        for quantity in ["dq", "q"] {
             let Some(rest) = name.strip_prefix(quantity) else { continue };
             let joint = if rest.is_empty() {
                 if self.take('(') {
@@ -323,7 +323,11 @@ impl<'a> Parser<'a> {
             } else {
                 continue;
             };
-            return self.push(node(joint));
+            return self.push(if quantity == "q" {
+                ExpressionNode::Position(joint)
+            } else {
+                ExpressionNode::Velocity(joint)
+            });
         }
         self.begin = begin;
         Err(ExpressionProblem::Name { name })

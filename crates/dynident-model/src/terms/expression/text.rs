@@ -49,7 +49,7 @@ fn written(node: ExpressionNode, texts: &mut [(String, Strength)]) -> (String, S
         ExpressionNode::Divide(a, b) => {
             (format!("{} / {}", part(a, Strength::Product), part(b, Strength::Sign)), Strength::Product)
         }
-        ExpressionNode::Negate(a) => (format!("-{}", part(a, Strength::Power)), Strength::Sign),
+        ExpressionNode::Negate(a) => (format!("-{}", part(a, Strength::Sign)), Strength::Sign),
         ExpressionNode::WholePower(a, exponent) => {
             (format!("{}^{:?}", part(a, Strength::Atom), f64::from(exponent)), Strength::Power)
         }
