@@ -1,9 +1,9 @@
 //! The one noun of identification: a robot as a function of its parameters.
 
-use crate::base_parameters::{BaseParameterSettings, BaseParameters};
+use crate::base_parameters::{BaseParameterSettings, BaseParameters, DeclaredFault, fault};
 use crate::regressor_panels::{Column, PanelLayout};
-use dynident_model::Model;
-use dynident_model::terms::{Coupling, TorqueTerm};
+use dynident_model::terms::{Coupling, Declared, TorqueTerm};
+use dynident_model::{INERTIAL_NAMES, Model};
 use thiserror::Error;
 
 /// Why a parametric model could not be put together.
@@ -25,6 +25,44 @@ pub enum ParametricModelError {
         term: String,
         /// The ratio.
         ratio: f64,
+    },
+    /// A declared torque of an expression that follows joints which the model does not have.
+    #[error("torque {term} follows joint number {joint}, and the model has {joints}")]
+    FollowsNoJoint {
+        /// The term's symbol.
+        term: String,
+        /// The joint's number, from 1.
+        joint: usize,
+        /// Joints of the model.
+        joints: usize,
+    },
+    /// A declared torque without a value inside the joints' limits.
+    #[error(
+        "torque {term} = {law}: no value at {at}, which is inside the joints' limits: keep roots, logarithms and divisions from what they do not take with max(.., 0) or the like, or narrow the limits"
+    )]
+    Undefined {
+        /// The term's symbol.
+        term: String,
+        /// What it follows.
+        law: String,
+        /// Positions and velocities.
+        at: String,
+    },
+    /// A declared torque that is no torque.
+    #[error("torque {term} = {law}: it is zero (below 1e-9) wherever the joints may go: leave it out")]
+    Nothing {
+        /// The term's symbol.
+        term: String,
+        /// What it follows.
+        law: String,
+    },
+    /// A declared torque with a name that is none, or that another parameter has.
+    #[error(
+        "torque {term}: the name stands among the parameters' symbols: give it one of its own, a letter and then letters, digits and `_`, at most 60"
+    )]
+    Symbol {
+        /// The name.
+        term: String,
     },
     /// Nominal values of another number than there are parameters.
     #[error("parameters of the prior: {found} entries where {expected} are needed")]
@@ -79,7 +117,8 @@ impl ParametricModel {
     /// Coulomb friction where it has them, zero for all other terms.
     ///
     /// # Errors
-    /// A term of a joint that the model does not have.
+    /// A term of a joint that the model does not have; a declared torque whose name is taken, that is zero everywhere,
+    /// or that has no value inside the joints' limits.
     pub fn new(model: Model, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
         if let Some(term) = terms.iter().find(|term| term.joints().iter().any(|&joint| joint >= model.dof())) {
             return Err(ParametricModelError::NoSuchJoint { term: term.symbol(), joints: model.dof() });
@@ -91,6 +130,7 @@ impl ParametricModel {
                 return Err(ParametricModelError::Ratio { term: term.symbol(), ratio });
             }
         }
+        check_declared(&model, &terms)?;
         let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());
         let nominal = described(&model, &terms);
@@ -187,6 +227,39 @@ impl ParametricModel {
     pub fn joint_names(&self) -> Vec<String> {
         self.model.joints().iter().map(|joint| joint.name.clone()).collect()
     }
+}
+
+/// That declared torques have names of their own, and values wherever the joints may go.
+fn check_declared(model: &Model, terms: &[TorqueTerm]) -> Result<(), ParametricModelError> {
+    for (place, term) in terms.iter().enumerate() {
+        let TorqueTerm::Declared(declared) = term else { continue };
+        let symbol = || declared.name.clone();
+        let of_bodies = (0..model.dof())
+            .any(|body| INERTIAL_NAMES.iter().any(|name| declared.name == format!("{name}{}", body + 1)));
+        let of_terms = terms.iter().enumerate().any(|(other, one)| other != place && one.symbol() == declared.name);
+        if !Declared::is_symbol(&declared.name) || of_bodies || of_terms {
+            return Err(ParametricModelError::Symbol { term: symbol() });
+        }
+        let Some(function) = term.state_function() else { continue };
+        if let Some(joint) = function.follows().into_iter().find(|&joint| joint >= model.dof()) {
+            let (joint, joints) = (joint + 1, model.dof());
+            return Err(ParametricModelError::FollowsNoJoint { term: symbol(), joint, joints });
+        }
+        if let Some(value) = declared.nominal.filter(|value| !value.is_finite()) {
+            return Err(ParametricModelError::NominalNotFinite { value });
+        }
+        let law = function.description();
+        match fault(model, term) {
+            None => {}
+            Some(DeclaredFault::Nothing) => return Err(ParametricModelError::Nothing { term: symbol(), law }),
+            Some(DeclaredFault::Undefined(states)) => {
+                let at = states.iter().map(|(joint, q, dq)| format!("q{0} = {q:.4}, dq{0} = {dq:.4}", joint + 1));
+                let at = at.collect::<Vec<_>>().join(", ");
+                return Err(ParametricModelError::Undefined { term: symbol(), law, at });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// All parameters by the description: inertials, and what it says of damping and friction.

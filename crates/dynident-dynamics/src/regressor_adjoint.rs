@@ -76,7 +76,7 @@ pub fn regressor_panels_adjoint(
         for (place, &global) in layout.joint_columns(joint).iter().enumerate() {
             if let Column::Term(term) = &layout.columns()[global] {
                 let weights = &adjoint.joint(joint)[place * samples..(place + 1) * samples];
-                term.apply_adjoint(joint, motion, weights, by_dq, by_ddq);
+                term.apply_adjoint(joint, motion, weights, [&mut **by_q, &mut **by_dq, &mut **by_ddq]);
             }
         }
     }

@@ -35,7 +35,7 @@ impl Column {
     }
 
     /// Unit of the parameter.
-    pub fn unit(&self) -> &'static str {
+    pub fn unit(&self) -> &str {
         match self {
             Self::Body { parameter: 0, .. } => "kg",
             Self::Body { parameter: 1..=3, .. } => "kg m",

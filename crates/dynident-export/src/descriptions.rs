@@ -110,6 +110,10 @@ pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
                     "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
                 ));
             }
+            TorqueTerm::Declared(_) => {
+                let law = term.state_function().map_or_else(String::new, |function| function.description());
+                notes.push(format!("Torque {symbol} of joint {}, {value:?} {unit} times {law}, is left out: add it to the simulator's control.", joint_name(robot, term)));
+            }
             TorqueTerm::Load(_) | TorqueTerm::MaxwellSlip(_) => {
                 notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
             }
@@ -127,6 +131,10 @@ pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
         }
     }
     notes
+}
+
+fn joint_name<'a>(robot: &'a RobotModel, term: &TorqueTerm) -> &'a str {
+    term.own_joint().map_or("", |joint| &robot.model().joints()[joint].name)
 }
 
 fn write_body(

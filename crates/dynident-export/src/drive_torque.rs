@@ -68,7 +68,10 @@ pub(crate) fn friction(robot: &RobotModel, dq: &[Symbol]) -> Result<Vec<Symbol>,
                     }
                 }
             }
-            TorqueTerm::DriveInertia(_) | TorqueTerm::TemperatureViscous(_) | TorqueTerm::TemperatureCoulomb(_) => {}
+            TorqueTerm::DriveInertia(_)
+            | TorqueTerm::TemperatureViscous(_)
+            | TorqueTerm::TemperatureCoulomb(_)
+            | TorqueTerm::Declared(_) => {}
             TorqueTerm::Load(_) => return Err(needs("the torque that the gear carries")),
             TorqueTerm::MaxwellSlip(_) => return Err(needs("the motion before")),
         }
@@ -131,7 +134,8 @@ pub(crate) fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
     let mut velocities = zeros.clone();
     velocities[joint] = dq;
     let motion = JointMotion { samples: 1, q: &zeros, dq: &velocities, ddq: &zeros };
-    let own = robot.terms().filter(|(term, _)| term.own_joint() == Some(joint) && !term.is_drive_inertia());
+    let is_own = |term: &TorqueTerm| term.own_joint() == Some(joint) && !term.is_drive_inertia() && !term.is_declared();
+    let own = robot.terms().filter(|(term, _)| is_own(term));
     own.map(|(term, value)| {
         let mut column = [0.0];
         term.column(joint, &motion, &mut column);

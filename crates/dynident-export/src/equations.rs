@@ -1,6 +1,7 @@
 //! The functions that every language gets, as graphs: the recursive Newton-Euler and composite-rigid-body algorithms
 //! run over symbols.
 
+use crate::declared_torque::declared_torque;
 use crate::drive_torque::{drive_inertia, friction};
 use crate::error::ExportError;
 use crate::graph::{Graph, Input};
@@ -50,6 +51,14 @@ impl Equations {
             let rest = vec![Symbol::ZERO; dof];
             let rotors = drive_inertia(robot);
             let friction = friction(robot, &dq)?;
+            let declared = declared_torque(robot, &q, &dq);
+            // Other than rigid bodies and inertia of drives.
+            let beside: Vec<Symbol> = match &declared {
+                Some(declared) => {
+                    friction.iter().zip(declared).map(|(&friction, &declared)| friction + declared).collect()
+                }
+                None => friction.clone(),
+            };
 
             let mut mass_matrix = mass_matrix_over(&reduced, &q);
             for (entry, &rotor) in mass_matrix.iter_mut().zip(&rotors) {
@@ -60,10 +69,10 @@ impl Equations {
                 for (column, &ddq) in ddq.iter().enumerate() {
                     *torque += Symbol::splat(rotors[row * dof + column]) * ddq;
                 }
-                *torque += friction[row];
+                *torque += beside[row];
             }
             let bias = inverse_dynamics_over(&reduced, &q, &dq, &rest);
-            let left = (0..dof).map(|joint| tau[joint] - (bias[joint] + friction[joint])).collect();
+            let left = (0..dof).map(|joint| tau[joint] - (bias[joint] + beside[joint])).collect();
             let forward = solved(mass_matrix.clone(), left)
                 .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })?;
             let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
@@ -74,7 +83,7 @@ impl Equations {
                 is_matrix: name == "mass_matrix",
                 values,
             };
-            Ok::<_, ExportError>(vec![
+            let mut functions = vec![
                 function(
                     "inverse_dynamics",
                     "Torque of a motion: tau = M(q) ddq + C(q, dq) dq + g(q) + friction(dq).",
@@ -117,7 +126,17 @@ impl Equations {
                     "ddq",
                     forward,
                 ),
-            ])
+            ];
+            if let Some(declared) = declared {
+                functions.push(function(
+                    "declared",
+                    "Torque that the study declares, of springs and the like; inverse_dynamics and forward_dynamics have it in them.",
+                    &[Input::Position, Input::Velocity],
+                    "tau",
+                    declared,
+                ));
+            }
+            Ok::<_, ExportError>(functions)
         });
         Ok(Self { dof, graph, functions: functions? })
     }

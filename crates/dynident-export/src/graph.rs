@@ -35,9 +35,24 @@ impl Input {
 pub(crate) enum Function {
     Sin,
     Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
     Tanh,
     Exp,
+    Ln,
     Abs,
+}
+
+/// Functions of two values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Function2 {
+    Atan2,
+    Min,
+    Max,
 }
 
 impl Function {
@@ -46,8 +61,15 @@ impl Function {
         match self {
             Self::Sin => "sin",
             Self::Cos => "cos",
+            Self::Tan => "tan",
+            Self::Asin => "asin",
+            Self::Acos => "acos",
+            Self::Atan => "atan",
+            Self::Sinh => "sinh",
+            Self::Cosh => "cosh",
             Self::Tanh => "tanh",
             Self::Exp => "exp",
+            Self::Ln => "log",
             Self::Abs => "abs",
         }
     }
@@ -65,6 +87,7 @@ pub(crate) enum Node {
     /// `1 / x`.
     Recip(Id),
     Call(Function, Id),
+    Call2(Function2, Id, Id),
     /// `x^p` of a positive x.
     Power(Id, u64),
     /// The sign of x, zero while `|x|` is at most the band.
@@ -76,7 +99,7 @@ impl Node {
     pub(crate) fn parts(self) -> impl Iterator<Item = Id> {
         let (a, b) = match self {
             Self::Constant(_) | Self::Input(..) => (None, None),
-            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) => (Some(a), Some(b)),
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Call2(_, a, b) => (Some(a), Some(b)),
             Self::Neg(a) | Self::Recip(a) | Self::Call(_, a) | Self::Power(a, _) | Self::Step(a, _) => (Some(a), None),
         };
         a.into_iter().chain(b)
@@ -233,11 +256,29 @@ impl Graph {
             Some(value) => self.constant(match function {
                 Function::Sin => value.sin(),
                 Function::Cos => value.cos(),
+                Function::Tan => value.tan(),
+                Function::Asin => value.asin(),
+                Function::Acos => value.acos(),
+                Function::Atan => value.atan(),
+                Function::Sinh => value.sinh(),
+                Function::Cosh => value.cosh(),
                 Function::Tanh => value.tanh(),
                 Function::Exp => value.exp(),
+                Function::Ln => value.ln(),
                 Function::Abs => value.abs(),
             }),
             None => self.place(Node::Call(function, a)),
+        }
+    }
+
+    pub(crate) fn call2(&mut self, function: Function2, a: Id, b: Id) -> Id {
+        match (self.number(a), self.number(b)) {
+            (Some(a), Some(b)) => self.constant(match function {
+                Function2::Atan2 => a.atan2(b),
+                Function2::Min => a.min(b),
+                Function2::Max => a.max(b),
+            }),
+            _ => self.place(Node::Call2(function, a, b)),
         }
     }
 

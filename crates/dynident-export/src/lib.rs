@@ -24,6 +24,7 @@
 
 #![forbid(unsafe_code)]
 
+mod declared_torque;
 mod descriptions;
 mod drive_torque;
 mod equations;

@@ -161,7 +161,9 @@ pub enum ModelConstant {
     Number(f64),
     /// A number for each joint.
     Numbers([f64; 2]),
-    /// A word.
+    /// Numbers.
+    List(Vec<f64>),
+    /// A word, or an expression.
     Word(String),
 }
 
@@ -260,6 +262,12 @@ fn constants((name, value): (&'static str, TermConstant), turns: bool) -> Vec<(S
         TermConstant::Nothing => Vec::new(),
         TermConstant::Word(word) => vec![(name.to_owned(), ModelConstant::Word(word.to_owned()))],
         TermConstant::Numbers(values) => vec![(name.to_owned(), ModelConstant::Numbers(values))],
+        TermConstant::Text(text) => vec![(name.to_owned(), ModelConstant::Word(text))],
+        TermConstant::Points(points) => {
+            let column = |of: usize| ModelConstant::List(points.iter().map(|point| point[of]).collect());
+            let position = with_unit(&format!("{name}_position"), "_rad");
+            vec![(position, column(0)), (format!("{name}_torque"), column(1))]
+        }
         TermConstant::Number(value) => {
             let at_revolute = match name {
                 "speed" | "offset_speed" | "rounding" => "_rad_s",

@@ -86,6 +86,7 @@ fn write_terms(text: &mut String, key: &str, terms: &[ModelTerm], depth: usize) 
             let value = match value {
                 ModelConstant::Number(value) => number(*value),
                 ModelConstant::Numbers(values) => array(values),
+                ModelConstant::List(values) => array(values),
                 ModelConstant::Word(word) => string(word),
             };
             let _ = writeln!(text, "{pad}    {constant}: {value}");

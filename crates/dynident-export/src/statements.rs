@@ -1,7 +1,7 @@
 //! From a graph to the lines of a function: only what its outputs need, each value in a line of its own or, if it is
 //! short and used once, where it is used.
 
-use crate::graph::{Function, Graph, Id, Input, Node};
+use crate::graph::{Function, Function2, Graph, Id, Input, Node};
 use crate::symbol::Symbol;
 
 /// Longest text that is written where it is used, in characters.
@@ -14,6 +14,9 @@ pub(crate) trait Syntax {
 
     /// A function of one value.
     fn call(&self, function: Function, of: &str) -> String;
+
+    /// A function of two values.
+    fn call2(&self, function: Function2, first: &str, second: &str) -> String;
 
     /// `of^exponent`.
     fn power(&self, of: &str, exponent: f64) -> String;
@@ -104,6 +107,7 @@ fn written(node: Node, texts: &[Option<(String, Strength)>], syntax: &dyn Syntax
         Node::Neg(a) => (format!("-{}", part(a, Strength::Atom)), Strength::Sum),
         Node::Recip(a) => (format!("{} / {}", syntax.number(1.0), part(a, Strength::Atom)), Strength::Product),
         Node::Call(function, a) => (syntax.call(function, &whole(a)), Strength::Atom),
+        Node::Call2(function, a, b) => (syntax.call2(function, &whole(a), &whole(b)), Strength::Atom),
         Node::Power(a, exponent) => (syntax.power(&whole(a), f64::from_bits(exponent)), Strength::Atom),
         Node::Step(a, dead_band) => (syntax.step(&whole(a), f64::from_bits(dead_band)), Strength::Atom),
     }

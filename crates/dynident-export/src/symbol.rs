@@ -1,6 +1,6 @@
 //! A number that is not known yet: the scalar with which the algorithms of dynamics write the graph of their result.
 
-use crate::graph::{Function, Graph, Id, Input};
+use crate::graph::{Function, Function2, Graph, Id, Input};
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 use dynident_lanes::Scalar;
 use std::cell::RefCell;
@@ -46,6 +46,10 @@ impl Symbol {
 
     pub(crate) fn call(self, function: Function) -> Self {
         in_graph(|graph| graph.call(function, self.0))
+    }
+
+    pub(crate) fn call2(self, function: Function2, other: Self) -> Self {
+        in_graph(|graph| graph.call2(function, self.0, other.0))
     }
 
     /// `self^exponent`, for positive values.

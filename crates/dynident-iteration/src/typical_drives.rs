@@ -33,7 +33,8 @@ pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
                 | TermAction::Friction(_)
                 | TermAction::Hysteresis
                 | TermAction::Temperature
-                | TermAction::Constant,
+                | TermAction::Constant
+                | TermAction::State(_),
             ) => continue,
         };
         parameters[bodies + place] = typical;

@@ -23,12 +23,13 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 17] = [
+pub(crate) const TARGETS: [Target; 18] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
     Target { name: "sdf", repetitions: 20, new: parsers::sdf },
     Target { name: "dh", repetitions: 20, new: parsers::dh },
     Target { name: "study", repetitions: 20, new: parsers::study },
+    Target { name: "expression", repetitions: 100, new: parsers::expression },
     Target { name: "log", repetitions: 10, new: parsers::log },
     Target { name: "packed_text", repetitions: 4, new: formats::any },
     Target { name: "numpy", repetitions: 10, new: formats::any },

@@ -3,6 +3,7 @@
 use super::Run;
 use dynident::iteration::IterationStore;
 use dynident::iteration::robot::{ToHost, read_log_table};
+use dynident::model::terms::{Expression, JointNames};
 use dynident::model::{
     AuditFinding, Model, audit, link_changes, read_dh, read_mjcf_with, read_sdf, read_urdf, rewrite_inertials,
     rewrite_mjcf, rewrite_urdf, slips, write_urdf,
@@ -214,6 +215,26 @@ pub(crate) fn states() -> io::Result<Box<dyn Run>> {
             }
         }
         accepted
+    })
+}
+
+/// An expression of a declared torque: its values and slopes are numbers, and its text reads back.
+pub(crate) fn expression() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let text = String::from_utf8_lossy(input);
+        let names = ["shoulder".to_owned(), "upper arm".to_owned()];
+        match Expression::parse(&text, &JointNames { own: Some(0), names: &names }) {
+            Ok(expression) => {
+                let (q, dq) = ([0.7, -1.3], [0.4, 2.1]);
+                let value = expression.value(|joint| q[joint], |joint| dq[joint]);
+                assert!(value.is_none_or(f64::is_finite), "{expression}: {value:?}");
+                let slope = |_, _, slope: f64| assert!(slope.is_finite(), "{expression}: {slope}");
+                expression.slopes(|joint| q[joint], |joint| dq[joint], slope);
+                assert_eq!(Expression::try_from(expression.to_string()).as_ref(), Ok(&expression));
+                true
+            }
+            Err(error) => said(&error),
+        }
     })
 }
 

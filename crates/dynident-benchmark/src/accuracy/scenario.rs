@@ -184,7 +184,7 @@ fn drive_value(term: &TorqueTerm, motion: &Motion, bodies: &[f64], joint: usize)
         TermAction::Damping { .. } => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
         TermAction::Inertia { .. } => 0.20 * torque / rms(&motion.ddq[motion.of(joint)]),
         TermAction::Friction(_) | TermAction::Hysteresis => 0.15 * torque,
-        TermAction::Constant | TermAction::Temperature => 0.03 * torque,
+        TermAction::Constant | TermAction::Temperature | TermAction::State(_) => 0.03 * torque,
     }
 }
 

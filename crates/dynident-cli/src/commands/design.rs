@@ -86,8 +86,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let given = options.check.is_some() || options.check_log.is_some();
     let names: Vec<&str> = FILES.into_iter().filter(|name| !(given && *name == TRAJECTORY)).collect();
-    let sections: &[&str] =
-        if options.check_log.is_some() { &["robot", "design", "log"] } else { &["robot", "design"] };
+    let sections: &[&str] = if options.check_log.is_some() {
+        &["robot", "torque", "design", "log"]
+    } else {
+        &["robot", "torque", "design"]
+    };
     let further: Vec<PathBuf> = options.check.iter().cloned().collect();
     let of_study = (&study, &*options.study, options.data.as_deref());
     refuse_overwriting((&options.out, &names), of_study, sections, &further)?;

@@ -89,7 +89,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let study = options.study.as_deref().map(|path| Study::load(path).map(|study| (study, path)));
     let study = study.transpose().map_err(message_of)?;
     if let Some(out) = &options.out {
-        let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "log"]));
+        let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "torque", "log"]));
         let mut inputs = named.unwrap_or_default();
         inputs.push(options.result.clone());
         dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;

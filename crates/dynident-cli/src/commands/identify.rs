@@ -35,7 +35,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let study = Study::load(&options.study).map_err(message_of)?;
     let out = (&*options.out, &[URDF, TABLE, MJCF, "report.html", "result.json"][..]);
     let of_study = (&study, &*options.study, options.data.as_deref());
-    refuse_overwriting(out, of_study, &["robot", "log", "arm", "format", "motion", "estimator"], &[])?;
+    refuse_overwriting(out, of_study, &["robot", "torque", "log", "arm", "format", "motion", "estimator"], &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };

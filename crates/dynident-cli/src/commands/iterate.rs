@@ -63,7 +63,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     ]);
     names.extend(legs.iter().map(String::as_str));
     let of_study = (&study, &*options.study, options.data.as_deref());
-    let sections = ["robot", "design", "iteration", "simulation", "controller"];
+    let sections = ["robot", "torque", "design", "iteration", "simulation", "controller"];
     refuse_overwriting((&options.out, &names), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     permission::for_command(&study, options.allow_command)?;

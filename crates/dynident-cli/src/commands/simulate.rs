@@ -28,7 +28,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
     let of_study = (&study, &*options.study, options.data.as_deref());
-    let sections = ["robot", "design", "iteration", "simulation", "controller"];
+    let sections = ["robot", "torque", "design", "iteration", "simulation", "controller"];
     refuse_overwriting((&options.out, &["log.csv", "truth.json"]), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();

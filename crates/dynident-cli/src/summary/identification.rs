@@ -294,6 +294,9 @@ fn parameters(r: &ResultFile) -> String {
             2,
         );
     }
+    for sentence in &r.method.coincident {
+        text += &wrapped(sentence, 2);
+    }
     if !r.method.not_excited.is_empty() {
         let names: Vec<&str> = r.method.not_excited.iter().map(String::as_str).collect();
         let held = format!("not excited by these logs, held at the prior: {}", listed(&names, 2 * SHOWN));

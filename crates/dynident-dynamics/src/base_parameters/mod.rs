@@ -3,15 +3,18 @@
 //! One choice for one robot: the columns of the regressor from base to tip in the order of
 //! [`all_columns`](crate::all_columns); a column that depends on earlier ones is regrouped into them (Gautier and
 //! Khalil 1990; Gautier 1991). The dependencies come from the robot's structure ([`structural`]); the rank of
-//! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
+//! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check. Declared torques,
+//! which have no structure, and robots whose joints follow others are judged by random states.
 
 mod coupled;
+mod declared;
 mod determination;
 mod expression;
 mod numerical;
 mod one_joint_motions;
 mod structural;
 
+pub(crate) use declared::{DeclaredFault, fault};
 pub use determination::Determination;
 pub use numerical::{NumericalRank, numerical_rank};
 pub use one_joint_motions::numerical_rank_by_body;
@@ -47,16 +50,17 @@ pub struct BaseParameters {
 }
 
 impl BaseParameters {
-    /// Base parameters from the robot's structure: no data, no random numbers. Where joints follow others, from
-    /// regressors at states that are the same every time.
+    /// Base parameters from the robot's structure: no data, and no random numbers but where joints follow others and
+    /// for declared torques, at states that are the same every time.
     pub fn new(model: &Model, terms: &[TorqueTerm], settings: &BaseParameterSettings) -> Self {
         let columns = all_columns(model, terms);
-        if model.coupling().is_some() {
-            let split = coupled::independent_columns(model, terms, settings.tolerance);
-            return Self { columns, split };
-        }
-        let directions = structural::identifiable_directions(model, terms, settings.tolerance);
-        let split = split_columns(&directions, settings.tolerance);
+        let split = if model.coupling().is_some() {
+            coupled::independent_columns(model, terms, settings.tolerance)
+        } else {
+            let directions = structural::identifiable_directions(model, terms, settings.tolerance);
+            split_columns(&directions, settings.tolerance)
+        };
+        let split = declared::regrouped(model, &columns, split, settings.tolerance);
         Self { columns, split }
     }
 
@@ -111,6 +115,21 @@ impl BaseParameters {
         let k = &self.split.regrouping;
         let dependent = self.split.dependent.iter().enumerate();
         dependent.filter(|(d, _)| k.column(*d).amax() < expression::NEGLIGIBLE).map(|(_, &column)| column).collect()
+    }
+
+    /// The declared torques that cannot be told from other parameters, with the symbols of the base columns whose sum
+    /// they are: their coefficients keep their nominal values, and these base parameters hold them.
+    pub fn coincident(&self) -> Vec<(&TorqueTerm, Vec<String>)> {
+        let dependent = self.split.dependent.iter().zip(self.split.regrouping.column_iter());
+        let of_declared = dependent.filter_map(|(&column, factors)| match &self.columns[column] {
+            Column::Term(term) if term.is_declared() => {
+                let shares = self.split.independent.iter().zip(factors.iter());
+                let felt = shares.filter(|(_, factor)| factor.abs() >= expression::NEGLIGIBLE);
+                Some((term, felt.map(|(&base, _)| self.columns[base].symbol()).collect()))
+            }
+            Column::Term(_) | Column::Body { .. } => None,
+        });
+        of_declared.collect()
     }
 
     /// Readable sums, one per base parameter: `Izz1 + 0.49 m2`. Factors have six digits, so that the sums can serve as

@@ -4,7 +4,9 @@ use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::{Information, Motion};
 use dynident_model::sample::{Random, random_tree};
-use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
+use dynident_model::terms::{
+    CoulombShape, Declared, DeclaredLaw, DriveChoice, Expression, JointNames, TorqueTerm, terms_per_joint,
+};
 
 #[test]
 fn derivatives_by_the_motion_equal_differences() {
@@ -17,12 +19,18 @@ fn derivatives_by_the_motion_equal_differences() {
     ];
     for seed in 0..6 {
         let model = random_tree(seed, 3);
-        let terms = terms_per_joint(&model, |_| DriveChoice {
+        let mut terms = terms_per_joint(&model, |_| DriveChoice {
             drive_inertia: true,
             viscous: true,
             coulomb: Some(CoulombShape::Smooth { width: 0.5 }),
             offset: true,
         });
+        // Positions and velocities of other joints, in a column of one.
+        for (joint, text) in [(0, "sin(2 * q) * cos(q3) + q2"), (2, "exp(-q^2 / 4) * dq1 + q * dq")] {
+            let expression = Expression::parse(text, &JointNames { own: Some(joint), names: &[] }).unwrap();
+            let (name, law) = (format!("declared{joint}"), DeclaredLaw::Expression(expression));
+            terms.push(TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None }));
+        }
         let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());
         let mut information = Information::new(&model, &layout, &[0.5, 1.0, 2.0], None);

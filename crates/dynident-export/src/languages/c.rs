@@ -1,7 +1,7 @@
 //! C99 in one header: functions of fixed size, no allocation, nothing but math.h.
 
 use super::{Source, unused};
-use crate::graph::{Function, Input, Node};
+use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;
 
@@ -21,6 +21,15 @@ impl Syntax for CSyntax {
     fn call(&self, function: Function, of: &str) -> String {
         let name = if function == Function::Abs { "fabs" } else { function.name() };
         format!("{}{name}({of})", self.functions)
+    }
+
+    fn call2(&self, function: Function2, first: &str, second: &str) -> String {
+        let name = match function {
+            Function2::Atan2 => "atan2",
+            Function2::Min => "fmin",
+            Function2::Max => "fmax",
+        };
+        format!("{}{name}({first}, {second})", self.functions)
     }
 
     fn power(&self, of: &str, exponent: f64) -> String {

@@ -1,7 +1,7 @@
 //! A function file for MATLAB and Octave: the first argument names the quantity, for a file shows one function only.
 
 use super::Source;
-use crate::graph::{Function, Input, Node};
+use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;
 
@@ -14,6 +14,15 @@ impl Syntax for MatlabSyntax {
 
     fn call(&self, function: Function, of: &str) -> String {
         format!("{}({of})", function.name())
+    }
+
+    fn call2(&self, function: Function2, first: &str, second: &str) -> String {
+        let name = match function {
+            Function2::Atan2 => "atan2",
+            Function2::Min => "min",
+            Function2::Max => "max",
+        };
+        format!("{name}({first}, {second})")
     }
 
     fn power(&self, of: &str, exponent: f64) -> String {

@@ -1,7 +1,7 @@
 //! Python with NumPy: one state or many at once, the last axis being joints.
 
 use super::Source;
-use crate::graph::{Function, Input, Node};
+use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;
 
@@ -13,7 +13,22 @@ impl Syntax for PythonSyntax {
     }
 
     fn call(&self, function: Function, of: &str) -> String {
-        format!("np.{}({of})", function.name())
+        let name = match function {
+            Function::Asin => "arcsin",
+            Function::Acos => "arccos",
+            Function::Atan => "arctan",
+            other => other.name(),
+        };
+        format!("np.{name}({of})")
+    }
+
+    fn call2(&self, function: Function2, first: &str, second: &str) -> String {
+        let name = match function {
+            Function2::Atan2 => "arctan2",
+            Function2::Min => "minimum",
+            Function2::Max => "maximum",
+        };
+        format!("np.{name}({first}, {second})")
     }
 
     fn power(&self, of: &str, exponent: f64) -> String {

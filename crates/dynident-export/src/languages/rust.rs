@@ -1,7 +1,7 @@
 //! Rust without `std` and without dependencies: `core` has no sine, so who calls says where sines come from.
 
 use super::{Source, unused};
-use crate::graph::{Function, Input, Node};
+use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;
 
@@ -16,7 +16,16 @@ impl Syntax for RustSyntax {
         match function {
             // The only one that `core` has.
             Function::Abs => format!("({of}).abs()"),
-            Function::Sin | Function::Cos | Function::Tanh | Function::Exp => format!("M::{}({of})", function.name()),
+            Function::Ln => format!("M::ln({of})"),
+            other => format!("M::{}({of})", other.name()),
+        }
+    }
+
+    fn call2(&self, function: Function2, first: &str, second: &str) -> String {
+        match function {
+            Function2::Atan2 => format!("M::atan2({first}, {second})"),
+            Function2::Min => format!("({first}).min({second})"),
+            Function2::Max => format!("({first}).max({second})"),
         }
     }
 
@@ -33,12 +42,22 @@ impl Syntax for RustSyntax {
 pub(crate) fn rust_module(source: &Source<'_>) -> String {
     let dof = source.dof();
     let graph = &source.equations.graph;
+    let of_one =
+        |name, function| (name, "x: f64", "x", graph.has(|node| matches!(node, Node::Call(f, _) if f == function)));
     let needed = [
-        ("sin", "x: f64", graph.has(|node| matches!(node, Node::Call(Function::Sin, _)))),
-        ("cos", "x: f64", graph.has(|node| matches!(node, Node::Call(Function::Cos, _)))),
-        ("tanh", "x: f64", graph.has(|node| matches!(node, Node::Call(Function::Tanh, _)))),
-        ("exp", "x: f64", graph.has(|node| matches!(node, Node::Call(Function::Exp, _)))),
-        ("powf", "x: f64, exponent: f64", graph.has(|node| matches!(node, Node::Power(..)))),
+        of_one("sin", Function::Sin),
+        of_one("cos", Function::Cos),
+        of_one("tan", Function::Tan),
+        of_one("asin", Function::Asin),
+        of_one("acos", Function::Acos),
+        of_one("atan", Function::Atan),
+        of_one("sinh", Function::Sinh),
+        of_one("cosh", Function::Cosh),
+        of_one("tanh", Function::Tanh),
+        of_one("exp", Function::Exp),
+        of_one("ln", Function::Ln),
+        ("atan2", "y: f64, x: f64", "y, x", graph.has(|node| matches!(node, Node::Call2(Function2::Atan2, ..)))),
+        ("powf", "x: f64, exponent: f64", "x, exponent", graph.has(|node| matches!(node, Node::Power(..)))),
     ];
     let mut text = source.comment("//");
     let _ = write!(
@@ -46,8 +65,7 @@ pub(crate) fn rust_module(source: &Source<'_>) -> String {
         "\n// No std, no dependency, no allocation, Rust 1.85 or later: `core` has no sine, so the caller names where it comes from, once:\n//\n\
          //     struct Std;\n//     impl Math for Std {{\n"
     );
-    for (name, arguments, _) in needed.iter().filter(|(.., used)| *used) {
-        let values = if arguments.contains("exponent") { "x, exponent" } else { "x" };
+    for (name, arguments, values, _) in needed.iter().filter(|(.., used)| *used) {
         let _ = writeln!(text, "//         fn {name}({arguments}) -> f64 {{ f64::{name}({values}) }}");
     }
     let _ = write!(
@@ -57,7 +75,7 @@ pub(crate) fn rust_module(source: &Source<'_>) -> String {
          /// Number of joints.\n#[allow(dead_code)]\npub const DOF: usize = {dof};\n\n\
          /// The elementary functions that this robot needs.\npub trait Math {{\n"
     );
-    for (name, arguments, _) in needed.iter().filter(|(.., used)| *used) {
+    for (name, arguments, ..) in needed.iter().filter(|(.., used)| *used) {
         let _ = writeln!(text, "    #[allow(missing_docs)]\n    fn {name}({arguments}) -> f64;");
     }
     text.push_str("}\n");

@@ -5,8 +5,9 @@ use dynident_dynamics::{Workspace, forward_dynamics, gravity_torque, inverse_dyn
 use dynident_export::RobotModel;
 use dynident_model::sample::Random;
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
-    JointMotion, Offset, Power, PowerExponent, Sigmoid, Stribeck, TemperatureViscous, TorqueTerm, Viscous,
+    Coulomb, CoulombShape, Coupling, CouplingEffect, Declared, DeclaredLaw, Direction, DirectionalCoulomb,
+    DirectionalViscous, DriveInertia, Expression, JointMotion, JointNames, Offset, Power, PowerExponent, Sigmoid,
+    Stribeck, TemperatureViscous, TorqueTable, TorqueTerm, Viscous,
 };
 use dynident_model::{Model, Vec3, load_robot, read_urdf};
 use dynident_testing::repository;
@@ -25,6 +26,11 @@ pub(crate) fn all_terms(name: &str) -> RobotModel {
     with_all_terms(model)
 }
 
+/// An expression with every function and operation, defined at all states and inside all limits.
+const ALL_FUNCTIONS: &str = "atan2(sin(q), 2 + cos(q2)) * sqrt(1 + q^2) + min(q, 0.5) * max(dq, -0.3)^3 + exp(-q^2) \
+    + ln(8 + q) + asin(q / 8) * acos(dq2 / 8) - atan(q) + sinh(q / 2) - cosh(q / 3) + tanh(dq) + abs(q) + (8 + q)^1.5 \
+    + tan(q / 8) + 1 / (8 + q)^2";
+
 pub(crate) fn with_all_terms(model: Model) -> RobotModel {
     let last = model.dof() - 1;
     let smooth = CoulombShape::Smooth { width: 0.05 };
@@ -33,6 +39,16 @@ pub(crate) fn with_all_terms(model: Model) -> RobotModel {
         TorqueTerm::Coupling(Coupling { name: name.to_owned(), first: 0, second: last, ratios: [1.0, -0.5], effect })
     };
     let power = |exponent| TorqueTerm::Power(Power { joint: last, exponent, rounding: 1e-3 });
+    let declared = |name: &str, joint, law| {
+        let (name, unit) = (name.to_owned(), "Nm".to_owned());
+        TorqueTerm::Declared(Declared { name, joint, law, unit, nominal: None })
+    };
+    let expression = |own, text: &str| {
+        DeclaredLaw::Expression(Expression::parse(text, &JointNames { own: Some(own), names: &[] }).unwrap())
+    };
+    // States go beyond both ends.
+    let points = vec![[-2.0, -3.0], [-1.1, -2.0], [-1.0, 0.5], [0.3, 0.5], [1.2, 2.0], [2.5, 1.0]];
+    let table = TorqueTable::new(points).unwrap();
     let mut terms: Vec<(TorqueTerm, f64)> =
         (0..=last).map(|joint| (TorqueTerm::DriveInertia(DriveInertia { joint }), 0.7 + 0.1 * joint as f64)).collect();
     terms.extend((0..=last).map(|joint| (TorqueTerm::Offset(Offset { joint }), 0.3 - 0.2 * joint as f64)));
@@ -67,6 +83,9 @@ pub(crate) fn with_all_terms(model: Model) -> RobotModel {
         (coupling("a", CouplingEffect::Inertia), 0.2),
         (coupling("b", CouplingEffect::Viscous), 0.4),
         (coupling("c", CouplingEffect::Coulomb(sign)), 0.7),
+        (declared("all_functions", 0, expression(0, ALL_FUNCTIONS)), 1.2),
+        (declared("counterbalance", 1, expression(1, "sin(q - 0.3) + 0.2 * cos(q1)^2 - tanh(3 * q1) * dq / 2")), -2.5),
+        (declared("spring", last, DeclaredLaw::Table(table)), 1.4),
     ]);
     let (terms, values) = terms.into_iter().unzip();
     RobotModel::new(model, terms, values).unwrap()
@@ -113,15 +132,15 @@ pub(crate) struct Expected {
     pub(crate) dq: Vec<f64>,
     pub(crate) ddq: Vec<f64>,
     pub(crate) tau: Vec<f64>,
-    /// Inverse dynamics, gravity, Coriolis, friction, mass matrix, forward dynamics under `tau`.
-    pub(crate) outputs: [Vec<f64>; 6],
+    /// Inverse dynamics, gravity, Coriolis, friction, mass matrix, forward dynamics under `tau`, declared torques.
+    pub(crate) outputs: [Vec<f64>; 7],
 }
 
 /// Torque of the terms, by their regressor columns.
-fn terms_torque(robot: &RobotModel, [q, dq, ddq]: [&[f64]; 3]) -> Vec<f64> {
+fn terms_torque(robot: &RobotModel, [q, dq, ddq]: [&[f64]; 3], wanted: impl Fn(&TorqueTerm) -> bool) -> Vec<f64> {
     let mut torque = vec![0.0; robot.model().dof()];
     let motion = JointMotion { samples: 1, q, dq, ddq };
-    for (term, value) in robot.terms() {
+    for (term, value) in robot.terms().filter(|(term, _)| wanted(term)) {
         for joint in term.joints() {
             let mut column = [0.0];
             term.column(joint, &motion, &mut column);
@@ -150,8 +169,8 @@ pub(crate) fn expected(robot: &RobotModel) -> Vec<Expected> {
             let rigid = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq).to_vec();
             let gravity = gravity_torque(model, &mut workspace, &q).to_vec();
             let bias = inverse_dynamics(model, &mut workspace, &q, &dq, &rest).to_vec();
-            let terms = terms_torque(robot, [&q, &dq, &ddq]);
-            let friction = terms_torque(robot, [&q, &dq, &rest]);
+            let terms = terms_torque(robot, [&q, &dq, &ddq], |_| true);
+            let friction = terms_torque(robot, [&q, &dq, &rest], |term| !term.is_declared());
             let mut mass = mass_matrix(model, &mut workspace, &q).to_vec();
             for (term, value) in robot.terms() {
                 for row in 0..dof {
@@ -162,7 +181,8 @@ pub(crate) fn expected(robot: &RobotModel) -> Vec<Expected> {
             }
             let tau: Vec<f64> = rigid.iter().zip(&terms).map(|(rigid, terms)| rigid + terms).collect();
             let coriolis = bias.iter().zip(&gravity).map(|(bias, gravity)| bias - gravity).collect();
-            let outputs = [tau.clone(), gravity, coriolis, friction, mass, ddq.clone()];
+            let declared = terms_torque(robot, [&q, &dq, &rest], TorqueTerm::is_declared);
+            let outputs = [tau.clone(), gravity, coriolis, friction, mass, ddq.clone(), declared];
             Expected { q, dq, ddq, tau, outputs }
         })
         .collect()
@@ -194,7 +214,7 @@ pub(crate) fn compare(program: &mut Command, robot: &RobotModel, states: &[Expec
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(text.lines().count(), states.len());
-    let names = ["inverse_dynamics", "gravity", "coriolis", "friction", "mass_matrix", "forward_dynamics"];
+    let names = ["inverse_dynamics", "gravity", "coriolis", "friction", "mass_matrix", "forward_dynamics", "declared"];
     // A moving state's torque is the scale of all torques; accelerations are those torques through the inverse mass
     // matrix, whose condition (some thousand for six joints with drives) the rounding grows by.
     for (number, (line, state)) in text.lines().zip(states).enumerate() {

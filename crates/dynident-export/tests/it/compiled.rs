@@ -6,13 +6,14 @@ use dynident_export::{RobotModel, Target, export};
 use std::path::Path;
 use std::process::Command;
 
-const FUNCTIONS: [(&str, &[&str]); 6] = [
+const FUNCTIONS: [(&str, &[&str]); 7] = [
     ("inverse_dynamics", &["q", "dq", "ddq"]),
     ("gravity", &["q"]),
     ("coriolis", &["q", "dq"]),
     ("friction", &["dq"]),
     ("mass_matrix", &["q"]),
     ("forward_dynamics", &["q", "dq", "tau"]),
+    ("declared", &["q", "dq"]),
 ];
 
 fn robots() -> Vec<RobotModel> {
@@ -123,6 +124,7 @@ fn rust_computes_what_the_core_computes() {
         let calls = calls.concat();
         let program = format!(
             "mod robot;\nstruct Std;\nimpl robot::Math for Std {{\n    fn sin(x: f64) -> f64 {{ x.sin() }}\n    fn cos(x: f64) -> f64 {{ x.cos() }}\n    \
+             fn tan(x: f64) -> f64 {{ x.tan() }}\n    fn asin(x: f64) -> f64 {{ x.asin() }}\n    fn acos(x: f64) -> f64 {{ x.acos() }}\n    fn atan(x: f64) -> f64 {{ x.atan() }}\n    fn sinh(x: f64) -> f64 {{ x.sinh() }}\n    fn cosh(x: f64) -> f64 {{ x.cosh() }}\n    fn ln(x: f64) -> f64 {{ x.ln() }}\n    fn atan2(y: f64, x: f64) -> f64 {{ y.atan2(x) }}\n    \
              fn tanh(x: f64) -> f64 {{ x.tanh() }}\n    fn exp(x: f64) -> f64 {{ x.exp() }}\n    fn powf(x: f64, exponent: f64) -> f64 {{ x.powf(exponent) }}\n}}\n\
              fn main() {{\n    for line in std::io::stdin().lines() {{\n        let v: Vec<f64> = line.unwrap().split(' ').map(|x| x.parse().unwrap()).collect();\n        \
              let part = |k: usize| -> [f64; {dof}] {{ v[k * {dof}..(k + 1) * {dof}].try_into().unwrap() }};\n        \

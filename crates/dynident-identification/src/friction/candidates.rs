@@ -80,7 +80,8 @@ impl FrictionKind {
             | TorqueTerm::TemperatureCoulomb(_)
             | TorqueTerm::Offset(_)
             | TorqueTerm::DriveInertia(_)
-            | TorqueTerm::Coupling(_) => None,
+            | TorqueTerm::Coupling(_)
+            | TorqueTerm::Declared(_) => None,
         }
     }
 

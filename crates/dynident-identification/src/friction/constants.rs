@@ -25,7 +25,8 @@ pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
         | TorqueTerm::TemperatureCoulomb(_)
         | TorqueTerm::Offset(_)
         | TorqueTerm::DriveInertia(_)
-        | TorqueTerm::Coupling(_) => Vec::new(),
+        | TorqueTerm::Coupling(_)
+        | TorqueTerm::Declared(_) => Vec::new(),
     }
 }
 

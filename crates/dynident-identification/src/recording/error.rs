@@ -50,6 +50,22 @@ pub enum LogError {
         /// The first joint that needs it.
         joint: String,
     },
+    /// A log that goes where a declared torque says nothing.
+    #[error(
+        "log `{log}`, {time_s:.3} s: torque {torque} = {law} says nothing of {at}; widen the table, keep the expression defined with max(.., 0) or the like, or leave these rows out with drop_time_s"
+    )]
+    Undeclared {
+        /// The log.
+        log: String,
+        /// When, in seconds after its first row.
+        time_s: f64,
+        /// The torque.
+        torque: String,
+        /// What it follows.
+        law: String,
+        /// Positions and velocities there.
+        at: String,
+    },
     /// A log that leaves no rows after filtering.
     #[error(
         "log `{log}`: {rows} samples leave nothing behind the parallel filter, which needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"

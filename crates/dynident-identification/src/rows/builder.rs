@@ -80,6 +80,11 @@ impl<'a> RowBuilder<'a> {
         self
     }
 
+    /// Where the model's joints stand in the motion.
+    pub(crate) fn places(&self) -> &[usize] {
+        &self.places
+    }
+
     /// Samples to either side of a filtered row that it is made from.
     pub(crate) fn reach(&self) -> usize {
         self.filters.reach()

@@ -5,6 +5,7 @@
 
 mod builder;
 mod coverage;
+mod declared;
 mod filter;
 mod joint_filters;
 mod mask;

@@ -2,6 +2,7 @@
 
 use super::RowConsumer;
 use super::builder::RowBuilder;
+use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
 use super::mask::RowMask;
 use super::reader::read_beside;
@@ -75,7 +76,8 @@ impl LogPass<'_> {
     /// Sends the recording's rows to `consumer`.
     ///
     /// # Errors
-    /// A recording that cannot be read, lacks a temperature that friction needs, or leaves no rows behind the filter;
+    /// A recording that cannot be read, lacks a temperature that friction needs, goes where a declared torque says
+    /// nothing, or leaves no rows behind the filter;
     /// and what the consumer returns.
     pub fn run(&self, consumer: &mut dyn RowConsumer) -> Result<LogStatistics, LogError> {
         let Recording { name, samples, .. } = self.recording;
@@ -222,6 +224,7 @@ impl LogPass<'_> {
         builder: &mut RowBuilder<'_>,
         consumer: &mut dyn RowConsumer,
     ) -> Result<(), LogError> {
+        require_declared(self.model, &self.recording.name, block, builder.places())?;
         builder.take(block, consumer)?;
         self.progress.advance(block.rows as u64);
         Ok(())

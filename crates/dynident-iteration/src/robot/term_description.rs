@@ -13,6 +13,8 @@ pub(super) fn describe(model: &Model, term: &TorqueTerm, value: f64) -> Value {
             TermConstant::Number(number) => json!(number),
             TermConstant::Numbers(numbers) => json!(numbers),
             TermConstant::Word(word) => json!(word),
+            TermConstant::Text(text) => json!(text),
+            TermConstant::Points(points) => json!(points),
             TermConstant::Step(step) => shape(step),
             TermConstant::Nothing => Value::Null,
         };

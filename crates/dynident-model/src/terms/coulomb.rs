@@ -76,7 +76,7 @@ pub struct Coulomb {
 }
 
 impl TermKind for Coulomb {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "coulomb", symbol: format!("fc{}", self.joint + 1), unit: "Nm" }
     }
 

@@ -45,7 +45,7 @@ impl Coupling {
 }
 
 impl TermKind for Coupling {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         let (letters, unit) = match self.effect {
             CouplingEffect::Inertia => ("Ia", "kg m^2"),
             CouplingEffect::Viscous => ("fv", "Nm s/rad"),
@@ -112,8 +112,7 @@ impl TermKind for Coupling {
         row: usize,
         motion: &JointMotion<'_>,
         weights: &[f64],
-        by_dq: &mut [f64],
-        by_ddq: &mut [f64],
+        [_, by_dq, by_ddq]: [&mut [f64]; 3],
     ) {
         let (other, own_ratio) =
             if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };

@@ -85,7 +85,7 @@ impl VelocityFunction for DirectionalViscous {
 }
 
 impl TermKind for DirectionalViscous {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel {
             kind: "directional-viscous",
             symbol: format!("fv{}{}", self.joint + 1, self.direction.sign()),
@@ -129,7 +129,7 @@ impl VelocityFunction for DirectionalCoulomb {
 }
 
 impl TermKind for DirectionalCoulomb {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel {
             kind: "directional-coulomb",
             symbol: format!("fc{}{}", self.joint + 1, self.direction.sign()),

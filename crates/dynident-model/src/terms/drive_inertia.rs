@@ -14,7 +14,7 @@ pub struct DriveInertia {
 }
 
 impl TermKind for DriveInertia {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "drive-inertia", symbol: format!("Ia{}", self.joint + 1), unit: "kg m^2" }
     }
 
@@ -42,7 +42,7 @@ impl TermKind for DriveInertia {
         out.copy_from_slice(motion.ddq_of(self.joint));
     }
 
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], _: &mut [f64], by_ddq: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], [_, _, by_ddq]: [&mut [f64]; 3]) {
         let range = self.joint * motion.samples..(self.joint + 1) * motion.samples;
         by_ddq[range].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
     }

@@ -35,6 +35,24 @@ pub enum TermAction<'a> {
     Hysteresis,
     /// Friction's change with the temperature: nothing at its reference.
     Temperature,
+    /// A torque of one joint that follows the positions and velocities of any joints.
+    State(&'a dyn StateFunction),
+}
+
+/// A function of positions and velocities that a user declares.
+pub trait StateFunction: Debug {
+    /// Its value at sample `sample` of a motion; `None` where it has none. Allocates nothing.
+    fn value(&self, motion: &JointMotion<'_>, sample: usize) -> Option<f64>;
+
+    /// Whether it says something of the state at sample `sample`: an expression with a value, a table that reaches so
+    /// far.
+    fn is_inside(&self, motion: &JointMotion<'_>, sample: usize) -> bool;
+
+    /// The joints whose motion it follows, ascending.
+    fn follows(&self) -> Vec<usize>;
+
+    /// It, in a few words.
+    fn description(&self) -> String;
 }
 
 /// Friction that follows one velocity `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
@@ -119,7 +137,7 @@ pub enum JointProperty {
 }
 
 /// A constant of a term, such as a velocity or an exponent, for programs that are not this one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum TermConstant {
     /// A number.
     Number(f64),
@@ -129,24 +147,28 @@ pub enum TermConstant {
     Word(&'static str),
     /// A step near zero velocity.
     Step(CoulombShape),
+    /// A text that the user wrote.
+    Text(String),
+    /// Points of a curve.
+    Points(Vec<[f64; 2]>),
     /// Not there for this term.
     Nothing,
 }
 
 /// What a term is called.
-pub(super) struct TermLabel {
+pub(super) struct TermLabel<'a> {
     /// Name of the kind.
     pub(super) kind: &'static str,
     /// Symbol of the parameter with the joint's number from 1.
     pub(super) symbol: String,
     /// Unit of the parameter at a revolute joint.
-    pub(super) unit: &'static str,
+    pub(super) unit: &'a str,
 }
 
 /// What a kind of torque term says of itself.
 pub(super) trait TermKind: Debug {
     /// What it is called.
-    fn label(&self) -> TermLabel;
+    fn label(&self) -> TermLabel<'_>;
 
     /// The joints that feel it.
     fn joints(&self) -> TermJoints;
@@ -163,15 +185,9 @@ pub(super) trait TermKind: Debug {
     /// The regressor column in the row of joint `row`.
     fn column(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]);
 
-    /// Adds what `Σ weights · column` in the row of joint `row` changes with velocities and accelerations.
-    fn apply_adjoint(
-        &self,
-        row: usize,
-        motion: &JointMotion<'_>,
-        weights: &[f64],
-        by_dq: &mut [f64],
-        by_ddq: &mut [f64],
-    );
+    /// Adds what `Σ weights · column` in the row of joint `row` changes with positions, velocities and accelerations to
+    /// the three parts of `gradient`.
+    fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], gradient: [&mut [f64]; 3]);
 
     /// The functions of the motion that friction adds. What shares no function with another kind is one of its own.
     fn functions(&self) -> Vec<MotionFunction> {
@@ -225,8 +241,7 @@ macro_rules! column_of_velocity {
             _: usize,
             motion: &super::JointMotion<'_>,
             weights: &[f64],
-            by_dq: &mut [f64],
-            _: &mut [f64],
+            [_, by_dq, _]: [&mut [f64]; 3],
         ) {
             self$(.$field)?.add_slopes(self.joint, motion, weights, by_dq);
         }

@@ -19,7 +19,7 @@ pub struct LoadFriction {
 }
 
 impl TermKind for LoadFriction {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "load", symbol: format!("fl{}", self.joint + 1), unit: "1" }
     }
 
@@ -47,7 +47,7 @@ impl TermKind for LoadFriction {
         }
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
         // Without a load the column is zero.
     }
 }

@@ -1,11 +1,13 @@
-//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings. Each term is one parameter and one regressor
+//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each term is one parameter and one regressor
 //! column per joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of
 //! [`TorqueTerm`] and a line in its `kind`.
 
 mod coulomb;
 mod coupling;
+mod declared;
 mod directional;
 mod drive_inertia;
+mod expression;
 mod kind;
 mod load;
 mod offset;
@@ -15,15 +17,20 @@ mod sigmoid;
 mod slip;
 mod stribeck;
 mod temperature;
+mod torque_table;
 mod viscous;
 
 pub use coulomb::{Coulomb, CoulombShape};
 pub use coupling::{Coupling, CouplingEffect};
+pub use declared::{Declared, DeclaredLaw};
 pub use directional::{Direction, DirectionalCoulomb, DirectionalViscous};
 pub use drive_inertia::DriveInertia;
+pub use expression::{
+    Expression, ExpressionError, ExpressionFunction, ExpressionFunction2, ExpressionNode, ExpressionProblem, JointNames,
+};
 pub use kind::{
-    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, VelocityCurve, VelocityFriction,
-    VelocityFunction,
+    JointProperty, MotionFunction, StateFunction, TermAction, TermConstant, TermJoints, VelocityCurve,
+    VelocityFriction, VelocityFunction,
 };
 pub use load::LoadFriction;
 pub use offset::Offset;
@@ -33,6 +40,7 @@ pub use sigmoid::Sigmoid;
 pub use slip::{HysteresisState, MaxwellSlip};
 pub use stribeck::Stribeck;
 pub use temperature::{TemperatureCoulomb, TemperatureViscous};
+pub use torque_table::{TablePiece, TorqueTable, TorqueTableError};
 pub use viscous::Viscous;
 
 use crate::tree::Model;
@@ -114,6 +122,8 @@ pub enum TorqueTerm {
     DriveInertia(DriveInertia),
     /// Inertia or friction of a drive that turns with two joints.
     Coupling(Coupling),
+    /// A torque of positions and velocities that the user declares.
+    Declared(Declared),
 }
 
 impl TorqueTerm {
@@ -134,6 +144,7 @@ impl TorqueTerm {
             Self::Offset(term) => term,
             Self::DriveInertia(term) => term,
             Self::Coupling(term) => term,
+            Self::Declared(term) => term,
         }
     }
 
@@ -148,7 +159,7 @@ impl TorqueTerm {
     }
 
     /// Unit of the parameter at a revolute joint.
-    pub fn unit(&self) -> &'static str {
+    pub fn unit(&self) -> &str {
         self.kind().label().unit
     }
 
@@ -182,7 +193,8 @@ impl TorqueTerm {
             | Self::TemperatureViscous(_)
             | Self::Offset(_)
             | Self::DriveInertia(_)
-            | Self::Coupling(_) => self,
+            | Self::Coupling(_)
+            | Self::Declared(_) => self,
         }
     }
 
@@ -215,7 +227,7 @@ impl TorqueTerm {
         self.kind().action()
     }
 
-    /// The functions of the motion that friction adds to torques; none for inertia and offset.
+    /// The functions of the motion that friction and declared torques add; none for inertia and offset.
     pub fn functions(&self) -> Vec<MotionFunction> {
         self.kind().functions()
     }
@@ -225,11 +237,15 @@ impl TorqueTerm {
         self.kind().property()
     }
 
-    /// The parameter by the description of `model`, where that says anything of it.
+    /// The parameter by the description of `model`, where that says anything of it; that of a declared torque by who
+    /// declared it.
     ///
     /// # Panics
     /// If the model does not have its joints.
     pub fn described(&self, model: &Model) -> Option<f64> {
+        if let Self::Declared(term) = self {
+            return term.nominal;
+        }
         let joint = &model.joints()[self.own_joint()?];
         match self.property()? {
             JointProperty::Damping => joint.damping,
@@ -253,7 +269,8 @@ impl TorqueTerm {
             | TermAction::Damping { .. }
             | TermAction::Constant
             | TermAction::Friction(_)
-            | TermAction::Hysteresis => false,
+            | TermAction::Hysteresis
+            | TermAction::State(_) => false,
         }
     }
 
@@ -265,8 +282,34 @@ impl TorqueTerm {
             | TermAction::Damping { .. }
             | TermAction::Constant
             | TermAction::Hysteresis
-            | TermAction::Temperature => false,
+            | TermAction::Temperature
+            | TermAction::State(_) => false,
         }
+    }
+
+    /// True for a torque that the user declares.
+    pub fn is_declared(&self) -> bool {
+        self.state_function().is_some()
+    }
+
+    /// The function of positions and velocities that a declared torque follows; none of all other terms.
+    pub fn state_function(&self) -> Option<&dyn StateFunction> {
+        match self.action() {
+            TermAction::State(function) => Some(function),
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::Temperature => None,
+        }
+    }
+
+    /// The first sample of a motion of which a declared torque says nothing: its expression has no value there, or its
+    /// table does not reach so far. Its column is zero there, or what the table's end says.
+    pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
+        let function = self.state_function()?;
+        (0..motion.samples).find(|&sample| !function.is_inside(motion, sample))
     }
 
     /// True when the column depends on earlier samples.
@@ -277,21 +320,22 @@ impl TorqueTerm {
             | TermAction::Damping { .. }
             | TermAction::Constant
             | TermAction::Friction(_)
-            | TermAction::Temperature => false,
+            | TermAction::Temperature
+            | TermAction::State(_) => false,
         }
     }
 
-    /// True for friction, of one joint or of a shared drive: all but inertia and offset.
+    /// True for friction, of one joint or of a shared drive: all but inertia, offset and declared torques.
     pub fn is_friction(&self) -> bool {
         match self.action() {
-            TermAction::Inertia { .. } | TermAction::Constant => false,
+            TermAction::Inertia { .. } | TermAction::Constant | TermAction::State(_) => false,
             TermAction::Damping { .. } | TermAction::Friction(_) | TermAction::Hysteresis | TermAction::Temperature => {
                 true
             }
         }
     }
 
-    /// True for friction of one joint: all but offset, drive inertia and couplings.
+    /// True for friction of one joint: all but offset, drive inertia, couplings and declared torques.
     pub fn is_joint_friction(&self) -> bool {
         self.is_friction() && self.own_joint().is_some()
     }
@@ -308,7 +352,8 @@ impl TorqueTerm {
             | TermAction::Constant
             | TermAction::Friction(_)
             | TermAction::Hysteresis
-            | TermAction::Temperature => None,
+            | TermAction::Temperature
+            | TermAction::State(_) => None,
         }
     }
 
@@ -336,22 +381,15 @@ impl TorqueTerm {
         self.kind().column(row, motion, input, out);
     }
 
-    /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the velocities and
-    /// accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint `row`. The sign step
-    /// counts as constant, and so does the deflection of a Maxwell-slip element, which follows positions.
+    /// Adds to the three parts of `gradient` (joint-major) the derivatives of `Σ weights[s] · column[s]` by positions,
+    /// velocities and accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint
+    /// `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element.
     ///
     /// # Panics
     /// If lengths differ.
-    pub fn apply_adjoint(
-        &self,
-        row: usize,
-        motion: &JointMotion<'_>,
-        weights: &[f64],
-        by_dq: &mut [f64],
-        by_ddq: &mut [f64],
-    ) {
+    pub fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], gradient: [&mut [f64]; 3]) {
         assert_eq!(weights.len(), motion.samples);
-        self.kind().apply_adjoint(row, motion, weights, by_dq, by_ddq);
+        self.kind().apply_adjoint(row, motion, weights, gradient);
     }
 
     /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
@@ -371,7 +409,8 @@ impl TorqueTerm {
             | TermAction::Damping { .. }
             | TermAction::Friction(_)
             | TermAction::Hysteresis
-            | TermAction::Temperature => 0.0,
+            | TermAction::Temperature
+            | TermAction::State(_) => 0.0,
         }
     }
 }

@@ -13,7 +13,7 @@ pub struct Offset {
 }
 
 impl TermKind for Offset {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "offset", symbol: format!("off{}", self.joint + 1), unit: "Nm" }
     }
 
@@ -37,7 +37,7 @@ impl TermKind for Offset {
         out.fill(1.0);
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
         // It does not change.
     }
 }

@@ -3,9 +3,10 @@
 use super::{JointProperty, TermAction, TorqueTerm};
 
 /// Sorts terms into the project's order: joint by joint drive inertia, viscous, Coulomb and offset; then, joint by
-/// joint, further friction as it stands; then couplings.
+/// joint, further friction as it stands; then couplings; then what the user declares, as it stands.
 pub fn sort_terms(terms: &mut [TorqueTerm]) {
     terms.sort_by_key(|term| match (term.own_joint(), term.property(), term.action()) {
+        (_, _, TermAction::State(_)) => (3, 0, 0),
         (None, _, _) => (2, 0, 0),
         (Some(joint), _, TermAction::Inertia { .. }) => (0, joint, 0),
         (Some(joint), Some(JointProperty::Damping), _) => (0, joint, 1),

@@ -60,7 +60,7 @@ impl VelocityFunction for Power {
 }
 
 impl TermKind for Power {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         let (letters, unit) = match self.exponent {
             PowerExponent::CubeRoot => ("fr", "Nm (s/rad)^(1/3)"),
             PowerExponent::Quadratic => ("fq", "Nm (s/rad)^2"),

@@ -39,7 +39,7 @@ impl VelocityFunction for Sigmoid {
 }
 
 impl TermKind for Sigmoid {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "sigmoid", symbol: format!("sig{}", self.joint + 1), unit: "Nm" }
     }
 

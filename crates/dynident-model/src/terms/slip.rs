@@ -36,7 +36,7 @@ impl HysteresisState {
 }
 
 impl TermKind for MaxwellSlip {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel {
             kind: "maxwell-slip",
             symbol: format!("slip{}_{}", self.joint + 1, self.yield_displacement),
@@ -70,7 +70,7 @@ impl TermKind for MaxwellSlip {
         }
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
         // The deflection follows positions.
     }
 }

@@ -43,7 +43,7 @@ impl VelocityFunction for Stribeck {
 }
 
 impl TermKind for Stribeck {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "stribeck", symbol: format!("fs{}", self.joint + 1), unit: "Nm" }
     }
 

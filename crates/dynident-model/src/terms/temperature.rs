@@ -58,7 +58,7 @@ impl TemperatureCoulomb {
 }
 
 impl TermKind for TemperatureViscous {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "temperature-viscous", symbol: format!("fvT{}", self.joint + 1), unit: "Nm s/(rad K)" }
     }
 
@@ -82,13 +82,13 @@ impl TermKind for TemperatureViscous {
         by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
         // Without a temperature the column is zero.
     }
 }
 
 impl TermKind for TemperatureCoulomb {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "temperature-coulomb", symbol: format!("fcT{}", self.joint + 1), unit: "Nm/K" }
     }
 
@@ -112,7 +112,7 @@ impl TermKind for TemperatureCoulomb {
         by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
         // Without a temperature the column is zero.
     }
 }

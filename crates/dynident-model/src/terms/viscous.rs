@@ -25,7 +25,7 @@ impl VelocityFunction for Viscous {
 }
 
 impl TermKind for Viscous {
-    fn label(&self) -> TermLabel {
+    fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "viscous", symbol: format!("fv{}", self.joint + 1), unit: "Nm s/rad" }
     }
 

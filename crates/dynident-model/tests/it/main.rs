@@ -4,6 +4,7 @@
 mod audit;
 mod broken;
 mod common;
+mod declared_torque;
 mod dh;
 mod dh_write;
 mod friction_laws;

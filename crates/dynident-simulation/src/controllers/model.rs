@@ -149,8 +149,8 @@ impl ControllerModel {
         self.memories.iter_mut().for_each(HysteresisState::restart);
     }
 
-    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the terms: inertia
-    /// and offset always, friction as asked.
+    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the terms: inertia,
+    /// offset and declared torques always, these at the measured motion as the bodies', friction as asked.
     pub fn torque(
         &mut self,
         measured: Measured<'_>,
@@ -169,11 +169,13 @@ impl ControllerModel {
             FrictionCompensation::Measured => [measured.q, measured.dq],
             _ => [target.q, target.dq],
         };
-        let motion = JointMotion { samples: 1, q, dq, ddq: acceleration };
+        let for_friction = JointMotion { samples: 1, q, dq, ddq: acceleration };
+        let as_measured = JointMotion { samples: 1, q: measured.q, dq: measured.dq, ddq: acceleration };
         for ((term, value), memory) in terms.iter().zip(memories) {
             if friction == FrictionCompensation::None && term.is_friction() {
                 continue;
             }
+            let motion = if term.is_declared() { as_measured } else { for_friction };
             for joint in 0..tau.len() {
                 if term.acts_on(joint) {
                     let mut column = [0.0];
@@ -192,12 +194,16 @@ impl ControllerModel {
         self.torque(measured, target, ddq, FrictionCompensation::Reference, tau);
     }
 
-    /// `ĝ(q)` and constant torques.
+    /// `ĝ(q)`, constant torques, and declared ones at rest.
     pub(crate) fn gravity(&mut self, q: &[f64], out: &mut [f64]) {
         out.copy_from_slice(gravity_torque(&self.model, &mut self.workspace, q));
+        let motion = JointMotion { samples: 1, q, dq: &self.zeros, ddq: &self.zeros };
         for (term, value) in &self.terms {
             for (joint, out) in out.iter_mut().enumerate() {
                 *out += value * term.constant_torque(joint);
+            }
+            if let (Some(joint), Some(function)) = (term.own_joint(), term.state_function()) {
+                out[joint] += value * function.value(&motion, 0).unwrap_or(0.0);
             }
         }
     }

@@ -119,12 +119,14 @@ impl SlotineLi {
             FrictionCompensation::Measured => [measured.q, measured.dq],
             _ => [target.q, target.dq],
         };
-        let motion = JointMotion { samples: 1, q, dq, ddq: reference_acceleration };
+        let for_friction = JointMotion { samples: 1, q, dq, ddq: reference_acceleration };
+        let as_measured = JointMotion { samples: 1, q: measured.q, dq: measured.dq, ddq: reference_acceleration };
         for (place, ((term, _), memory)) in start.terms().iter().zip(memories).enumerate() {
             // A load would make the column depend on the other parameters.
             if self.friction == FrictionCompensation::None && term.is_friction() || term.needs_load() {
                 continue;
             }
+            let motion = if term.is_declared() { as_measured } else { for_friction };
             for joint in 0..joints {
                 if term.acts_on(joint) {
                     let entry = &mut regressor[joint * columns + bodies + place..][..1];

@@ -5,8 +5,8 @@ use crate::error::{SimulationError, require, require_length};
 use dynident_model::Model;
 use dynident_model::terms::{HysteresisState, JointMotion, TermAction, TermInput, TorqueTerm};
 
-/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and
-/// friction that follows a velocity.
+/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip,
+/// declared torques, and friction that follows a velocity.
 #[derive(Clone, Debug)]
 pub(super) struct Drives {
     /// Entries (row, column, value) that drives add to the mass matrix.
@@ -18,6 +18,7 @@ pub(super) struct Drives {
     /// Friction by velocities.
     pub(super) units: Vec<FrictionUnit>,
     slips: Vec<Slip>,
+    states: Vec<StateTorque>,
     pub(super) by_load: bool,
 }
 
@@ -27,6 +28,14 @@ struct Slip {
     term: TorqueTerm,
     value: f64,
     memory: HysteresisState,
+}
+
+/// A torque of one joint that follows positions and velocities.
+#[derive(Clone, Debug)]
+struct StateTorque {
+    joint: usize,
+    term: TorqueTerm,
+    value: f64,
 }
 
 impl Drives {
@@ -39,6 +48,7 @@ impl Drives {
             viscous: Vec::new(),
             units: Vec::new(),
             slips: Vec::new(),
+            states: Vec::new(),
             by_load: false,
         };
         // One unit for each joint, then those of drives that turn with two.
@@ -65,6 +75,9 @@ impl Drives {
                     let slip =
                         |&joint: &usize| Slip { joint, term: term.clone(), value, memory: HysteresisState::default() };
                     drives.slips.extend(joints.iter().map(slip));
+                }
+                TermAction::State(_) => {
+                    drives.states.extend(joints.iter().map(|&joint| StateTorque { joint, term: term.clone(), value }));
                 }
                 // Simulated drives are at their reference temperature.
                 TermAction::Temperature => {}
@@ -94,6 +107,16 @@ impl Drives {
     pub(super) fn subtract_slips(&self, q: &[f64], torque: &mut [f64]) {
         for slip in &self.slips {
             torque[slip.joint] -= slip.value * deflection(&slip.term, slip.joint, q, &mut slip.memory.clone());
+        }
+    }
+
+    /// Takes declared torques at positions `q` and velocities `dq` off `torque`. One without a value is not a number:
+    /// the motion cannot be continued.
+    pub(super) fn subtract_declared(&self, q: &[f64], dq: &[f64], torque: &mut [f64]) {
+        let motion = JointMotion { samples: 1, q, dq, ddq: dq };
+        for state in &self.states {
+            let unit = state.term.state_function().and_then(|function| function.value(&motion, 0));
+            torque[state.joint] -= state.value * unit.unwrap_or(f64::NAN);
         }
     }
 

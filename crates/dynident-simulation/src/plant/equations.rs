@@ -1,5 +1,5 @@
 //! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs -
-//! F_v q̇ - Cᵀ f`.
+//! k f(q, q̇) - F_v q̇ - Cᵀ f`.
 
 use super::PlantFault;
 use super::disturbance::JointDisturbance;
@@ -107,6 +107,7 @@ impl Equations {
             acceleration[row] -= value * at.dq[column];
         }
         drives.subtract_slips(at.q, acceleration);
+        drives.subtract_declared(at.q, at.dq, acceleration);
         for disturbance in &self.disturbances {
             disturbance.add(model, workspace, at.time_s, at.q, acceleration);
         }

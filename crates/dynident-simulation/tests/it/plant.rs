@@ -3,11 +3,13 @@
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::sample::{Random, planar_2r, random_tree};
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
-    JointMotion, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
+    Coulomb, CoulombShape, Coupling, CouplingEffect, Declared, DeclaredLaw, Direction, DirectionalCoulomb,
+    DirectionalViscous, DriveInertia, Expression, JointMotion, JointNames, LoadFriction, MaxwellSlip, Offset, Power,
+    PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
 };
 use dynident_model::{InertialParameters, Mat3, Model, Vec3};
-use dynident_simulation::{Disturbance, Integrator, Plant, TimeCourse};
+use dynident_simulation::controllers::ControllerModel;
+use dynident_simulation::{Disturbance, Integrator, Plant, PlantFault, TimeCourse};
 
 const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
@@ -253,6 +255,8 @@ fn forward_after_inverse_with_every_term() {
         couple("b", CouplingEffect::Viscous),
         couple("c", CouplingEffect::Coulomb(SIGN)),
         couple("d", CouplingEffect::Coulomb(CoulombShape::Smooth { width: 0.3 })),
+        declared("e", 0, "sin(q - 0.3) * cos(q3) - dq2 * abs(dq)"),
+        declared("f", 2, "q^3 + max(q, 0) * q1"),
     ];
     let mut random = Random::new(2);
     let parameters: Vec<f64> = terms.iter().map(|_| random.uniform(0.1, 1.0)).collect();
@@ -276,6 +280,43 @@ fn forward_after_inverse_with_every_term() {
             assert!((found[joint] - ddq[joint]).abs() < 1e-10, "{seed}: {found:?} {ddq:?}");
         }
     }
+}
+
+fn declared(name: &str, joint: usize, text: &str) -> TorqueTerm {
+    let expression = Expression::parse(text, &JointNames { own: Some(joint), names: &[] }).unwrap();
+    let (name, law) = (name.to_owned(), DeclaredLaw::Expression(expression));
+    TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None })
+}
+
+/// An undamped spring keeps its energy, `k q²/2` beside that of the bodies; the controller's model holds the robot where
+/// it stands, spring and weight together.
+#[test]
+fn a_spring_keeps_its_energy_and_the_model_holds_it() {
+    let model = random_tree(6, 2);
+    let (stiffness, rest) = (30.0, 0.4);
+    let terms = [declared("spring", 1, "q - 0.4")];
+    let mut plant = Plant::new(&model, &terms, &[stiffness]).unwrap();
+    plant.set_state(0.0, &[0.2, -0.5], &[0.0, 1.0]);
+    let energy = |plant: &mut Plant| plant.energy_j() + 0.5 * stiffness * (plant.q()[1] - rest).powi(2);
+    let before = energy(&mut plant);
+    for _ in 0..2000 {
+        plant.advance(&[0.0; 2], 1e-3, Integrator::Rk4 { steps_per_sample: 1 }).unwrap();
+    }
+    // Runge-Kutta's error of order h⁴ over two seconds, of some joules.
+    assert!((energy(&mut plant) - before).abs() < 1e-7 * (1.0 + before.abs()), "{} {before}", energy(&mut plant));
+
+    let mut controller = ControllerModel::new(&model, &terms, &[stiffness]).unwrap();
+    let (q, still) = ([0.9, -1.1], [0.0; 2]);
+    let mut tau = [0.0; 2];
+    controller.reference_torque(&q, &still, &still, &mut tau);
+    plant.set_state(0.0, &q, &still);
+    let mut accelerations = [1.0; 2];
+    plant.accelerations(&tau, &mut accelerations).unwrap();
+    assert!(accelerations.iter().all(|a| a.abs() < 1e-10), "{accelerations:?}");
+    // Where the expression has no value the motion ends, and no number is made up.
+    let mut plant = Plant::new(&model, &[declared("root", 1, "sqrt(q + 1)")], &[1.0]).unwrap();
+    plant.set_state(0.0, &[0.0, -2.0], &still);
+    assert_eq!(plant.accelerations(&[0.0; 2], &mut accelerations), Err(PlantFault::NotFinite));
 }
 
 /// A locked joint is a joint less: the others move as in the reduced model.

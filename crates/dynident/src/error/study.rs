@@ -12,6 +12,7 @@ use dynident_identification::estimators::PeriodError;
 use dynident_identification::payload::PayloadError;
 use dynident_identification::rows::ParallelFilterError;
 use dynident_iteration::IterationError;
+use dynident_model::terms::{ExpressionError, TorqueTableError};
 use dynident_model::{LoopError, ModelError};
 use dynident_recording::FilterError;
 use dynident_simulation::SimulationError;
@@ -193,6 +194,12 @@ pub enum StudyError {
     /// A closed chain that is not what the study says.
     #[error("[[robot.loop]]: {0}")]
     Loop(#[from] LoopError),
+    /// An expression that cannot be read.
+    #[error("expression {0}")]
+    Expression(#[from] ExpressionError),
+    /// A table that says no torque.
+    #[error("table: {0}")]
+    Table(#[from] TorqueTableError),
     /// Bodies and torque terms that do not fit.
     #[error(transparent)]
     ParametricModel(#[from] ParametricModelError),

@@ -52,9 +52,9 @@ pub fn simulate_study(
     let run = truth.robot.run(&request).map_err(Error::section(study_path, "simulation"))?;
 
     // The truth beside it.
-    let own = |values: &[f64], expressions: Vec<String>, units: Vec<&'static str>| {
+    let own = |values: &[f64], expressions: Vec<String>, units: Vec<String>| {
         let named = expressions.into_iter().zip(units).zip(values);
-        named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit: unit.to_owned() }).collect()
+        named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit }).collect()
     };
     let bodies = robot.model().bodies().iter().zip(truth.parameters.chunks_exact(10));
     let (max_error, saturated) = run
@@ -79,12 +79,12 @@ pub fn simulate_study(
         terms: own(
             &truth.parameters[robot.model().inertial_count()..],
             truth.terms.iter().map(dynident_model::terms::TorqueTerm::symbol).collect(),
-            truth.terms.iter().map(dynident_model::terms::TorqueTerm::unit).collect(),
+            truth.terms.iter().map(|term| term.unit().to_owned()).collect(),
         ),
         base_parameters: own(
             &truth.base_values,
             robot.base().expressions(),
-            robot.layout().columns().iter().map(dynident_dynamics::Column::unit).collect(),
+            robot.layout().columns().iter().map(|column| column.unit().to_owned()).collect(),
         ),
     };
     Ok(Simulation { file, log: run.record.csv() })

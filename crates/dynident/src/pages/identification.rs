@@ -259,6 +259,10 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     };
     let columns = ["expression", "free fit", "± (95 %)", "± in %", "consistent set", "description", "unit"];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
+    if !r.method.coincident.is_empty() {
+        let points = r.method.coincident.iter().map(|sentence| (Tone::Warning, sentence.clone())).collect();
+        page.add(Text { paragraphs: Vec::new(), points });
+    }
     if !r.method.not_excited.is_empty() {
         let mut points = vec![(
             Tone::Warning,

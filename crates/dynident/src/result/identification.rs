@@ -182,6 +182,10 @@ pub struct MethodSummary {
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
     #[serde(default)]
     pub not_excited: Vec<String>,
+    /// Declared torques that the other parameters' torques are already, in words: their coefficients stay at the nominal
+    /// values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coincident: Vec<String>,
     /// Joints that no training log moves above the noise of their positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resting_joints: Vec<String>,
@@ -311,6 +315,9 @@ pub struct TermResult {
     pub std: Option<f64>,
     /// The base parameter that it stands in.
     pub base_parameter: Option<String>,
+    /// What a declared torque follows, with joints by their numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<String>,
 }
 
 /// Friction and drive of one joint.

@@ -147,7 +147,8 @@ impl FrictionTerm {
             | TorqueTerm::Coulomb(_)
             | TorqueTerm::Offset(_)
             | TorqueTerm::DriveInertia(_)
-            | TorqueTerm::Coupling(_) => None,
+            | TorqueTerm::Coupling(_)
+            | TorqueTerm::Declared(_) => None,
             TorqueTerm::DirectionalViscous(_) => Some(Self::AsymmetricViscous {}),
             TorqueTerm::DirectionalCoulomb(_) => Some(Self::AsymmetricCoulomb {}),
             TorqueTerm::Stribeck(Stribeck { speed, exponent, shape, .. }) => {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 impl Study {
     /// What a motion is designed, simulated or iterated from, with what each file is: the robot's description, the
-    /// result behind a prior, trajectories.
+    /// result behind a prior, tables of torque, trajectories.
     pub(crate) fn motion_inputs(&self, folders: &Folders) -> Vec<(&'static str, PathBuf)> {
         let iteration = self.iteration.as_ref();
         let trajectories = iteration.and_then(|section| section.trajectory.as_ref()).into_iter();
@@ -15,6 +15,15 @@ impl Study {
         let named = robot
             .chain(prior.map(|file| ("result", file)))
             .chain(trajectories.chain(legs).map(|file| ("trajectory", file)));
-        named.filter_map(|(what, file)| Some((what, folders.find(file, None).ok()?))).collect()
+        named
+            .filter_map(|(what, file)| Some((what, folders.find(file, None).ok()?)))
+            .chain(self.table_inputs(folders))
+            .collect()
+    }
+
+    /// The tables of torque that a model is made with, as far as they exist.
+    pub(crate) fn table_inputs(&self, folders: &Folders) -> Vec<(&'static str, PathBuf)> {
+        let files = self.torque.iter().filter_map(|torque| torque.table_file.as_ref());
+        files.filter_map(|file| Some(("torque", folders.find(file, None).ok()?))).collect()
     }
 }

@@ -18,6 +18,7 @@ mod robot_model;
 mod simulated;
 mod simulation;
 mod task;
+mod torque;
 
 pub use design::{
     CriterionChoice, DesignSection, FamilyChoice, GivenStroke, JoinedChoice, OptimiserChoice, PriorSection,
@@ -37,6 +38,7 @@ pub use robot::{FollowSection, LoopSection, RobotSection};
 pub use robot_model::StudyRobot;
 pub use simulated::SimulatedSection;
 pub use simulation::{SimulatedTruth, SimulationSection};
+pub use torque::TorqueSection;
 
 use crate::error::{Error, StudyError};
 use dynident_identification::Role;
@@ -93,6 +95,9 @@ pub struct Study {
     /// Drives that turn with two joints.
     #[serde(default)]
     pub coupling: Vec<CouplingSection>,
+    /// Springs, counterbalances, cables: torques by positions and velocities.
+    #[serde(default)]
+    pub torque: Vec<TorqueSection>,
     /// What logs were recorded with.
     #[serde(default)]
     pub payload: Vec<PayloadSection>,
@@ -216,6 +221,16 @@ impl Study {
                 });
             }
             coupling.validate().map_err(StudyError::at(format!("coupling `{}`", coupling.name)))?;
+        }
+        for (index, torque) in self.torque.iter().enumerate() {
+            if self.torque[..index].iter().any(|other| other.name == torque.name) {
+                return Err(StudyError::Twice {
+                    what: "torque".to_owned(),
+                    name: torque.name.clone(),
+                    fix: "give each a name of its own",
+                });
+            }
+            torque.validate().map_err(StudyError::at(format!("torque `{}`", torque.name)))?;
         }
         for (index, payload) in self.payload.iter().enumerate() {
             if self.payload[..index].iter().any(|other| other.name == payload.name) {

@@ -1,6 +1,7 @@
 //! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in
 //! force.
 
+use super::torque::declared_terms;
 use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, Study};
 use crate::error::{Error, StudyError};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
@@ -80,7 +81,8 @@ impl StudyRobot {
         if let Some(joint) = model.joints().iter().find(|joint| !log_joints.contains(&joint.name)) {
             return Err(unknown(&joint.name));
         }
-        let terms = torque_terms(&study.drive, &study.coupling, &model).map_err(&in_study)?;
+        let mut terms = torque_terms(&study.drive, &study.coupling, &model).map_err(&in_study)?;
+        terms.extend(declared_terms(study, study_path, folders, &model)?);
         let parametric = ParametricModel::new(model, terms).map_err(Error::study(study_path))?;
         Ok(Self { robot, parametric, log_joints })
     }

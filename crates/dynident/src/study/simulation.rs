@@ -149,7 +149,8 @@ impl SimulationSection {
         let terms = match &self.drive {
             Some(drive) => {
                 drive.validate()?;
-                torque_terms(drive, coupling, described)?
+                let declared = robot.terms().iter().filter(|term| term.is_declared()).cloned();
+                torque_terms(drive, coupling, described)?.into_iter().chain(declared).collect()
             }
             None => robot.terms().to_vec(),
         };
@@ -170,23 +171,27 @@ impl SimulationSection {
             .iter()
             .zip(&symbols)
             .map(|(term, symbol)| {
-                let by_kind = term.own_joint().and_then(|joint| match (term.property(), term.action()) {
-                    (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
-                    (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
-                    (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
-                    (None, TermAction::Constant) => Some(self.offset.of(joint)),
-                    (
-                        None,
-                        TermAction::Inertia { .. }
-                        | TermAction::Damping { .. }
-                        | TermAction::Friction(_)
-                        | TermAction::Hysteresis
-                        | TermAction::Temperature,
-                    ) => None,
+                let by_kind = term.described(described).filter(|_| term.is_declared()).or_else(|| {
+                    term.own_joint().and_then(|joint| match (term.property(), term.action()) {
+                        (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
+                        (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
+                        (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
+                        (None, TermAction::Constant) => Some(self.offset.of(joint)),
+                        (
+                            None,
+                            TermAction::Inertia { .. }
+                            | TermAction::Damping { .. }
+                            | TermAction::Friction(_)
+                            | TermAction::Hysteresis
+                            | TermAction::Temperature
+                            | TermAction::State(_),
+                        ) => None,
+                    })
                 });
                 let value = self.terms.get(symbol).copied().or(by_kind);
                 value.ok_or_else(|| {
-                    StudyError::missing(format!("laws.{symbol}"), format!("give its value, {symbol} = ..."))
+                    let nominal = if term.is_declared() { ", or its nominal in [[torque]]" } else { "" };
+                    StudyError::missing(format!("laws.{symbol}"), format!("give its value, {symbol} = ...{nominal}"))
                 })
             })
             .collect::<Result<Vec<f64>, StudyError>>()?;

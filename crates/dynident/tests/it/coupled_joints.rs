@@ -15,7 +15,7 @@ fn example() -> (Study, PathBuf) {
 #[test]
 fn a_palletising_arm_is_identified_from_the_logs_of_its_drives() {
     let (study, path) = example();
-    let found = identify(&study, &path, &RunOptions { data: None, threads: 0, progress: &Silent }).unwrap();
+    let found = identify(&study, &path, &RunOptions { data: None, threads: 2, progress: &Silent }).unwrap();
     let result = &found.result;
     assert_eq!((result.joints.len(), result.bodies.len()), (4, 8));
     // 1 Nm of noise on torques of about 180 Nm is 0.6 %; friction by a sign and 125 Hz leave about as much again.

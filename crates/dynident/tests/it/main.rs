@@ -8,6 +8,7 @@ mod common;
 mod consistent_intervals;
 mod consistent_parameters;
 mod coupled_joints;
+mod declared_torque;
 mod design_contact;
 mod design_messages;
 mod design_tasks;

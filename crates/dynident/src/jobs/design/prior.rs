@@ -92,9 +92,9 @@ fn standard_deviations(robot: &StudyRobot, share: f64) -> Vec<f64> {
             std.extend(body[kind].iter().map(|value| share * value.abs().max(FLOOR * scale)));
         }
     }
-    std.extend(robot.terms().iter().zip(terms).map(|(term, value)| match term.property() {
-        Some(_) if *value != 0.0 => share * value.abs(),
-        _ => UNKNOWN,
+    std.extend(robot.terms().iter().zip(terms).map(|(term, value)| {
+        let is_stated = term.property().is_some() || term.is_declared();
+        if is_stated && *value != 0.0 { share * value.abs() } else { UNKNOWN }
     }));
     std
 }

@@ -119,6 +119,7 @@ fn identified(
     let files = study.log_files(&folders)?;
     study.check_overlap(&files).map_err(Error::study(study_path))?;
     let mut read = vec![("robot", robot.robot.path.clone())];
+    read.extend(study.table_inputs(&folders));
     read.extend(files.into_iter().map(|file| ("log", file)));
     read.extend(arm.iter().map(|(path, _)| ("result", path.clone())));
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };

@@ -56,10 +56,27 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
             .to_owned(),
         base_gap: [weakest, strongest],
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
+        coincident: coincident(model),
         resting_joints: resting_joints(&identification.training).into_iter().map(|joint| model.joint_names()[joint].clone()).collect(),
         gain_std_percent: None,
         load_parameters: model.load_parameters.clone(),
     }
+}
+
+/// Sentences on declared torques that cannot be told from other parameters.
+fn coincident(model: &RegressorModel) -> Vec<String> {
+    let of_term = |(term, others): (&TorqueTerm, Vec<String>)| {
+        let joint = term.own_joint().map_or("", |joint| &model.model().joints()[joint].name);
+        let nominal = term.described(model.model());
+        let held =
+            nominal.map_or("0, for the study gives no nominal".to_owned(), |value| format!("its nominal {value}"));
+        format!(
+            "torque {} of joint {joint} is the torque of {} already: no motion tells its coefficient, which is held at {held}; the sum is known",
+            term.symbol(),
+            others.join(", ")
+        )
+    };
+    model.base().coincident().into_iter().map(of_term).collect()
 }
 
 pub(super) fn base_parameters(
@@ -150,6 +167,7 @@ pub(super) fn term_results(
             value: parameters[column],
             std: alone.map(|place| estimate.std[place]),
             base_parameter: home.map(|place| expressions[place].clone()),
+            law: term.state_function().map(|function| function.description()),
         }
     };
     model.terms().iter().enumerate().filter(|(_, term)| wanted(term)).map(of_term).collect()

@@ -1,0 +1,152 @@
+//! Declared torques among the base parameters: what a user writes may be what gravity says already (`sin(q)` is the
+//! weight of a link), and no structure tells. So their columns are compared with all others at random states.
+//!
+//! A declared column that the other columns give, in the rows of all joints, is regrouped into them like any dependent
+//! column: its coefficient keeps its nominal value, and base parameters name it.
+
+use crate::independent_columns::{IndependentColumns, independent_regressor_columns};
+use crate::regressor_panels::{Column, PanelLayout, Panels, regressor_panels};
+use crate::workspace::BatchWorkspace;
+use dynident_model::Model;
+use dynident_model::sample::Random;
+use dynident_model::terms::{JointMotion, TorqueTerm};
+use nalgebra::DMatrix;
+
+/// Seed of the states: the same for every call, so that the choice is.
+const SEED: u64 = 27;
+/// States at which a declared torque is tried on its own.
+const TRIALS: usize = 2000;
+/// The largest value of a declared torque's function below which it is nothing.
+const NOTHING: f64 = 1e-9;
+
+/// What is wrong with a declared torque inside its joints' limits.
+pub(crate) enum DeclaredFault {
+    /// It has no value at these positions and velocities of the joints that it follows.
+    Undefined(Vec<(usize, f64, f64)>),
+    /// It is zero everywhere.
+    Nothing,
+}
+
+/// Looks for a fault of a declared torque at random states inside the joints' limits, their ends among them. A table
+/// need not reach so far.
+pub(crate) fn fault(model: &Model, term: &TorqueTerm) -> Option<DeclaredFault> {
+    let function = term.state_function()?;
+    let states = States::inside_limits(model, TRIALS);
+    let motion = states.motion();
+    let mut largest = 0.0_f64;
+    for sample in 0..states.samples {
+        let Some(value) = function.value(&motion, sample) else {
+            let at = |joint: usize| (joint, motion.q_of(joint)[sample], motion.dq_of(joint)[sample]);
+            return Some(DeclaredFault::Undefined(function.follows().into_iter().map(at).collect()));
+        };
+        largest = largest.max(value.abs());
+    }
+    (largest < NOTHING).then_some(DeclaredFault::Nothing)
+}
+
+/// `split` with the declared columns that depend on others regrouped into them. The structural split has each as a base
+/// column of its own.
+pub(super) fn regrouped(
+    model: &Model,
+    columns: &[Column],
+    split: IndependentColumns,
+    tolerance: f64,
+) -> IndependentColumns {
+    let is_declared = |column: usize| matches!(&columns[column], Column::Term(term) if term.is_declared());
+    let (declared, others): (Vec<usize>, Vec<usize>) =
+        split.independent.iter().partition(|&&column| is_declared(column));
+    if declared.is_empty() {
+        return split;
+    }
+    // The declared ones behind all others: a column is tried against those before it.
+    let order = [others, declared].concat();
+    let values = stacked(model, order.iter().map(|&column| columns[column].clone()).collect());
+    let found = independent_regressor_columns(&values, tolerance);
+    let lost: Vec<usize> =
+        (0..order.len()).filter(|place| found.dependent.contains(place) && is_declared(order[*place])).collect();
+    if lost.is_empty() {
+        return split;
+    }
+    let independent: Vec<usize> =
+        split.independent.iter().copied().filter(|column| !lost.iter().any(|&place| order[place] == *column)).collect();
+    let mut dependent: Vec<usize> = split.dependent.iter().copied().chain(lost.iter().map(|&p| order[p])).collect();
+    dependent.sort_unstable();
+    let mut regrouping = DMatrix::zeros(independent.len(), dependent.len());
+    for (to, column) in dependent.iter().enumerate() {
+        for (row, base) in independent.iter().enumerate() {
+            let known = split.dependent.iter().position(|other| other == column);
+            regrouping[(row, to)] = if let Some(from) = known {
+                // No structural column depends on a declared one.
+                let own = split.independent.iter().position(|other| other == base);
+                own.map_or(0.0, |own| split.regrouping[(own, from)])
+            } else {
+                let place = |of: usize| order.iter().position(|other| *other == of);
+                let from = place(*column).and_then(|p| found.dependent.iter().position(|other| *other == p));
+                let own = place(*base).and_then(|p| found.independent.iter().position(|other| *other == p));
+                from.zip(own).map_or(0.0, |(from, own)| found.regrouping[(own, from)])
+            };
+        }
+    }
+    IndependentColumns {
+        independent,
+        dependent,
+        regrouping,
+        weakest_independent: split.weakest_independent,
+        strongest_dependent: split.strongest_dependent,
+    }
+}
+
+/// The columns in the rows of all joints at random states inside the limits.
+fn stacked(model: &Model, columns: Vec<Column>) -> DMatrix<f64> {
+    let (dof, count) = (model.dof(), columns.len());
+    let states = States::inside_limits(model, 4 * count / dof.max(1) + 20);
+    let layout = PanelLayout::new(model, columns);
+    let mut panels = Panels::default();
+    regressor_panels(model, &mut BatchWorkspace::new(model), &layout, &states.motion(), &mut panels);
+    let samples = states.samples;
+    let mut stacked = DMatrix::zeros(dof * samples, count);
+    for joint in 0..dof {
+        for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+            let values = &panels.joint(joint)[place * samples..(place + 1) * samples];
+            stacked.view_mut((joint * samples, column), (samples, 1)).copy_from_slice(values);
+        }
+    }
+    stacked
+}
+
+/// Random states, joint-major.
+struct States {
+    samples: usize,
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    ddq: Vec<f64>,
+}
+
+impl States {
+    /// Positions inside the limits of every joint (without: ±π or ±1 m), one in four at an end; velocities as far as
+    /// they go (without: ±2), accelerations within ±5.
+    fn inside_limits(model: &Model, samples: usize) -> Self {
+        let mut random = Random::new(SEED);
+        let mut states = Self { samples, q: Vec::new(), dq: Vec::new(), ddq: Vec::new() };
+        for joint in model.joints() {
+            let usual = if joint.turns() { core::f64::consts::PI } else { 1.0 };
+            let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
+            let (lower, upper) = limits.unwrap_or((-usual, usual));
+            let most = joint.limits.velocity.filter(|most| *most > 0.0 && most.is_finite()).unwrap_or(2.0);
+            for _ in 0..samples {
+                states.q.push(match random.uniform(0.0, 8.0) as usize {
+                    0 => lower,
+                    1 => upper,
+                    _ => random.uniform(lower, upper),
+                });
+                states.dq.push(random.uniform(-most, most));
+                states.ddq.push(random.uniform(-5.0, 5.0));
+            }
+        }
+        states
+    }
+
+    fn motion(&self) -> JointMotion<'_> {
+        JointMotion { samples: self.samples, q: &self.q, dq: &self.dq, ddq: &self.ddq }
+    }
+}

@@ -1,0 +1,99 @@
+//! Declared torques as symbols: expressions operation by operation, tables piece by piece.
+
+use crate::graph::{Function, Function2};
+use crate::robot_model::RobotModel;
+use crate::symbol::Symbol;
+use dynident_lanes::Scalar;
+use dynident_model::terms::{
+    DeclaredLaw, Expression, ExpressionFunction, ExpressionFunction2, ExpressionNode, TorqueTable, TorqueTerm,
+};
+
+/// Torque of every joint by what the user declared; none if nothing was.
+pub(crate) fn declared_torque(robot: &RobotModel, q: &[Symbol], dq: &[Symbol]) -> Option<Vec<Symbol>> {
+    let mut torque = vec![Symbol::ZERO; robot.model().dof()];
+    let mut is_declared = false;
+    for (term, value) in robot.terms() {
+        let TorqueTerm::Declared(term) = term else { continue };
+        is_declared = true;
+        let unit = match &term.law {
+            DeclaredLaw::Expression(expression) => of_expression(expression, q, dq),
+            DeclaredLaw::Table(table) => of_table(table, q[term.joint]),
+        };
+        torque[term.joint] += Symbol::splat(value) * unit;
+    }
+    is_declared.then_some(torque)
+}
+
+fn of_expression(expression: &Expression, q: &[Symbol], dq: &[Symbol]) -> Symbol {
+    let mut values: Vec<Symbol> = Vec::new();
+    for node in expression.nodes() {
+        let symbol = match *node {
+            ExpressionNode::Number(number) => Symbol::splat(number),
+            ExpressionNode::Position(joint) => q[joint],
+            ExpressionNode::Velocity(joint) => dq[joint],
+            ExpressionNode::Add(a, b) => values[a] + values[b],
+            ExpressionNode::Subtract(a, b) => values[a] - values[b],
+            ExpressionNode::Multiply(a, b) => values[a] * values[b],
+            ExpressionNode::Divide(a, b) => values[a] * values[b].recip(),
+            ExpressionNode::Negate(a) => -values[a],
+            ExpressionNode::WholePower(a, exponent) => whole_power(values[a], exponent),
+            ExpressionNode::Power(a, exponent) => values[a].power(exponent),
+            ExpressionNode::Call(function, a) => call(function, values[a]),
+            ExpressionNode::Call2(function, a, b) => values[a].call2(
+                match function {
+                    ExpressionFunction2::Atan2 => Function2::Atan2,
+                    ExpressionFunction2::Min => Function2::Min,
+                    ExpressionFunction2::Max => Function2::Max,
+                },
+                values[b],
+            ),
+        };
+        values.push(symbol);
+    }
+    values.last().copied().unwrap_or(Symbol::ZERO)
+}
+
+fn call(function: ExpressionFunction, x: Symbol) -> Symbol {
+    let function = match function {
+        ExpressionFunction::Sqrt => return x.power(0.5),
+        ExpressionFunction::Sin => Function::Sin,
+        ExpressionFunction::Cos => Function::Cos,
+        ExpressionFunction::Tan => Function::Tan,
+        ExpressionFunction::Asin => Function::Asin,
+        ExpressionFunction::Acos => Function::Acos,
+        ExpressionFunction::Atan => Function::Atan,
+        ExpressionFunction::Sinh => Function::Sinh,
+        ExpressionFunction::Cosh => Function::Cosh,
+        ExpressionFunction::Tanh => Function::Tanh,
+        ExpressionFunction::Exp => Function::Exp,
+        ExpressionFunction::Ln => Function::Ln,
+        ExpressionFunction::Abs => Function::Abs,
+    };
+    x.call(function)
+}
+
+/// `x^p` by squaring.
+fn whole_power(x: Symbol, exponent: i32) -> Symbol {
+    let (mut left, mut square, mut power) = (exponent.unsigned_abs(), x, Symbol::ONE);
+    while left > 0 {
+        if left & 1 == 1 {
+            power = power * square;
+        }
+        square = square * square;
+        left /= 2;
+    }
+    if exponent < 0 { power.recip() } else { power }
+}
+
+/// Every piece adds what its cubic gains as far as the position has come through it, so that no language needs a
+/// branch, and beyond the ends the torque stays.
+fn of_table(table: &TorqueTable, q: Symbol) -> Symbol {
+    let mut torque = Symbol::splat(table.points()[0][1]);
+    for piece in table.pieces() {
+        let ahead = (q - Symbol::splat(piece.from)).call2(Function2::Max, Symbol::ZERO);
+        let t = ahead.call2(Function2::Min, Symbol::splat(piece.width));
+        let [b, c, d] = piece.factors.map(Symbol::splat);
+        torque += t * (b + t * (c + t * d));
+    }
+    torque
+}

@@ -1,0 +1,135 @@
+//! A torque that a user declares: `τ = k f(q, q̇)` with a coefficient `k` to be found. Springs, counterbalances, cables,
+//! gas struts, magnets: all that holds a joint by where it stands.
+//!
+//! `f` is an [`Expression`] of positions and velocities, or a [`TorqueTable`] of the joint's own position. As for every
+//! term, the torque is what the drive has to give: a spring that pulls the joint back to `q₀` with the stiffness `c` is
+//! `c (q - q₀)`, and one that helps the drive has the other sign.
+
+use super::kind::{StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::{Expression, JointMotion, TermInput, TorqueTable};
+use serde::{Deserialize, Serialize};
+
+/// The coefficient of a declared torque of one joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Declared {
+    /// The parameter's symbol: a letter, then letters, digits and `_`.
+    pub name: String,
+    /// The joint that it acts on.
+    pub joint: usize,
+    /// What it follows.
+    pub law: DeclaredLaw,
+    /// Unit of the coefficient, as the user writes it.
+    pub unit: String,
+    /// What the coefficient is thought to be.
+    #[serde(default)]
+    pub nominal: Option<f64>,
+}
+
+/// What a declared torque follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum DeclaredLaw {
+    /// An expression of positions and velocities of any joints.
+    Expression(Expression),
+    /// A curve over the position of its own joint.
+    Table(TorqueTable),
+}
+
+impl Declared {
+    /// Whether `name` can be a symbol among others: an ASCII letter, then letters, digits and `_`, at most 60.
+    pub fn is_symbol(name: &str) -> bool {
+        name.len() <= 60
+            && name.starts_with(|c: char| c.is_ascii_alphabetic())
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    }
+
+    /// Derivatives of the torque of one unit at a sample: `take(joint, is_velocity, slope)`.
+    fn slopes(&self, motion: &JointMotion<'_>, sample: usize, mut take: impl FnMut(usize, bool, f64)) {
+        match &self.law {
+            DeclaredLaw::Expression(expression) => {
+                expression.slopes(|joint| motion.q_of(joint)[sample], |joint| motion.dq_of(joint)[sample], take);
+            }
+            DeclaredLaw::Table(table) => take(self.joint, false, table.slope(motion.q_of(self.joint)[sample])),
+        }
+    }
+}
+
+impl StateFunction for Declared {
+    fn value(&self, motion: &JointMotion<'_>, sample: usize) -> Option<f64> {
+        match &self.law {
+            DeclaredLaw::Expression(expression) => {
+                expression.value(|joint| motion.q_of(joint)[sample], |joint| motion.dq_of(joint)[sample])
+            }
+            DeclaredLaw::Table(table) => Some(table.value(motion.q_of(self.joint)[sample])).filter(|x| x.is_finite()),
+        }
+    }
+
+    fn is_inside(&self, motion: &JointMotion<'_>, sample: usize) -> bool {
+        match &self.law {
+            DeclaredLaw::Expression(_) => self.value(motion, sample).is_some(),
+            DeclaredLaw::Table(table) => {
+                let [first, last] = table.range();
+                (first..=last).contains(&motion.q_of(self.joint)[sample])
+            }
+        }
+    }
+
+    fn follows(&self) -> Vec<usize> {
+        match &self.law {
+            DeclaredLaw::Expression(expression) => expression.joints(),
+            DeclaredLaw::Table(_) => vec![self.joint],
+        }
+    }
+
+    fn description(&self) -> String {
+        match &self.law {
+            DeclaredLaw::Expression(expression) => expression.to_string(),
+            DeclaredLaw::Table(table) => {
+                let [first, last] = table.range();
+                format!("table of q{} from {first} to {last}", self.joint + 1)
+            }
+        }
+    }
+}
+
+impl TermKind for Declared {
+    fn label(&self) -> TermLabel<'_> {
+        TermLabel { kind: "declared", symbol: self.name.clone(), unit: &self.unit }
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        false
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::State(self)
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        match &self.law {
+            DeclaredLaw::Expression(expression) => vec![("expression", TermConstant::Text(expression.to_string()))],
+            DeclaredLaw::Table(table) => vec![("table", TermConstant::Points(table.points().to_vec()))],
+        }
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
+        for (sample, to) in out.iter_mut().enumerate() {
+            *to = self.value(motion, sample).unwrap_or(0.0);
+        }
+    }
+
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], [by_q, by_dq, _]: [&mut [f64]; 3]) {
+        for (sample, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+            self.slopes(motion, sample, |joint, is_velocity, slope| {
+                let to = if is_velocity { &mut *by_dq } else { &mut *by_q };
+                to[joint * motion.samples + sample] += weight * slope;
+            });
+        }
+    }
+}

@@ -1,0 +1,382 @@
+//! Reads expressions: a descent by precedence. `-q^2` is `-(q^2)`, `2^-1` is a half, `a^b^c` is `a^(b^c)`.
+
+use super::operations::{ExpressionFunction, ExpressionFunction2, ExpressionNode, value};
+use super::{LARGEST, MOST_NODES};
+use thiserror::Error;
+
+/// The longest text, in characters: that of the most operations, with all digits of their numbers, is shorter.
+const MOST_CHARACTERS: usize = 10_000;
+/// So many characters of it stand in a message.
+const MOST_SHOWN: usize = 2000;
+/// The deepest nesting of parentheses, functions and signs: each takes a frame of the stack.
+const MOST_DEPTH: usize = 64;
+/// Whole exponents up to this are products; beyond, powers of what is not negative.
+const MOST_PRODUCT: f64 = 64.0;
+
+/// What the joints are called in an expression.
+#[derive(Clone, Copy, Debug)]
+pub struct JointNames<'a> {
+    /// The joint whose position and velocity are `q` and `dq`.
+    pub own: Option<usize>,
+    /// The joints' names; where there are none, joints stand by numbers only, and of any size.
+    pub names: &'a [String],
+}
+
+/// An expression that cannot be read, with the place.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("`{text}`, character {character}: {problem}")]
+pub struct ExpressionError {
+    /// The expression.
+    pub text: String,
+    /// Where, in characters from 1.
+    pub character: usize,
+    /// What is wrong, and the fix.
+    pub problem: ExpressionProblem,
+}
+
+/// What can be wrong with an expression.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExpressionProblem {
+    /// Too long.
+    #[error("more than {most} {of}: write a shorter expression, or a table")]
+    TooLong {
+        /// How many there may be.
+        most: usize,
+        /// Of what.
+        of: &'static str,
+    },
+    /// Something else is needed here.
+    #[error("{found} where {expected} is expected")]
+    Expected {
+        /// What belongs here.
+        expected: &'static str,
+        /// What stands here.
+        found: String,
+    },
+    /// A name that means nothing.
+    #[error(
+        "nothing is called `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
+        functions()
+    )]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// A joint that is not there.
+    #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
+    Joint {
+        /// The joint.
+        joint: String,
+        /// The joints that are there.
+        known: Vec<String>,
+    },
+    /// `q` where there is no own joint.
+    #[error("whose {name} is not said: write {name}1, {name}2, ..")]
+    WhichJoint {
+        /// `q` or `dq`.
+        name: &'static str,
+    },
+    /// An exponent that moves.
+    #[error("the exponent is no number: write exp(exponent * ln(base))")]
+    Exponent,
+    /// A number that is none, or beyond 1e12.
+    #[error("{what} has no value of at most 1e12 in size")]
+    Value {
+        /// The part.
+        what: &'static str,
+    },
+}
+
+fn functions() -> String {
+    let of_one = ExpressionFunction::ALL.map(ExpressionFunction::name).into_iter();
+    of_one.chain(ExpressionFunction2::ALL.map(ExpressionFunction2::name)).collect::<Vec<_>>().join(", ")
+}
+
+pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<ExpressionNode>, ExpressionError> {
+    let shown: String = text.chars().take(MOST_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let mut parser = Parser { characters: text.chars().take(MOST_CHARACTERS + 1).collect(), ..Parser::new(joints) };
+    let parsed = if parser.characters.len() > MOST_CHARACTERS {
+        Err(ExpressionProblem::TooLong { most: MOST_CHARACTERS, of: "characters" })
+    } else {
+        parser.whole()
+    };
+    parsed.map_err(|problem| ExpressionError { text: shown, character: parser.begin + 1, problem })?;
+    Ok(parser.nodes)
+}
+
+struct Parser<'a> {
+    characters: Vec<char>,
+    /// The next character.
+    at: usize,
+    /// Where the word began that is being read: the place of a fault.
+    begin: usize,
+    depth: usize,
+    nodes: Vec<ExpressionNode>,
+    joints: &'a JointNames<'a>,
+}
+
+type Parsed<T = usize> = Result<T, ExpressionProblem>;
+
+impl<'a> Parser<'a> {
+    fn new(joints: &'a JointNames<'a>) -> Self {
+        Self { characters: Vec::new(), at: 0, begin: 0, depth: 0, nodes: Vec::new(), joints }
+    }
+
+    fn whole(&mut self) -> Parsed<()> {
+        self.sum()?;
+        match self.peek() {
+            None => Ok(()),
+            Some(_) => Err(self.expected("an operator (+ - * / ^) or the end")),
+        }
+    }
+
+    /// The next character that is no space, where a fault would be.
+    fn peek(&mut self) -> Option<char> {
+        while self.characters.get(self.at).is_some_and(|c| c.is_whitespace()) {
+            self.at += 1;
+        }
+        self.begin = self.at;
+        self.characters.get(self.at).copied()
+    }
+
+    fn take(&mut self, wanted: char) -> bool {
+        let is_there = self.peek() == Some(wanted);
+        self.at += usize::from(is_there);
+        is_there
+    }
+
+    fn need(&mut self, wanted: char, expected: &'static str) -> Parsed<()> {
+        if self.take(wanted) { Ok(()) } else { Err(self.expected(expected)) }
+    }
+
+    fn expected(&mut self, expected: &'static str) -> ExpressionProblem {
+        let found = self.peek().map_or_else(|| "the end".to_owned(), |c| format!("`{c}`"));
+        ExpressionProblem::Expected { expected, found }
+    }
+
+    fn push(&mut self, node: ExpressionNode) -> Parsed {
+        if self.nodes.len() == MOST_NODES {
+            return Err(ExpressionProblem::TooLong { most: MOST_NODES, of: "operations" });
+        }
+        self.nodes.push(node);
+        Ok(self.nodes.len() - 1)
+    }
+
+    fn deeper<T>(&mut self, read: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {
+        if self.depth == MOST_DEPTH {
+            return Err(ExpressionProblem::TooLong { most: MOST_DEPTH, of: "parentheses and signs within each other" });
+        }
+        self.depth += 1;
+        let result = read(self);
+        self.depth -= 1;
+        result
+    }
+
+    fn sum(&mut self) -> Parsed {
+        let mut left = self.product()?;
+        loop {
+            if self.take('+') {
+                let right = self.product()?;
+                left = self.push(ExpressionNode::Add(left, right))?;
+            } else if self.take('-') {
+                let right = self.product()?;
+                left = self.push(ExpressionNode::Subtract(left, right))?;
+            } else {
+                return Ok(left);
+            }
+        }
+    }
+
+    fn product(&mut self) -> Parsed {
+        let mut left = self.signed()?;
+        loop {
+            if self.take('*') {
+                let right = self.signed()?;
+                left = self.push(ExpressionNode::Multiply(left, right))?;
+            } else if self.take('/') {
+                let right = self.signed()?;
+                left = self.push(ExpressionNode::Divide(left, right))?;
+            } else {
+                return Ok(left);
+            }
+        }
+    }
+
+    fn signed(&mut self) -> Parsed {
+        if self.take('-') {
+            let of = self.deeper(Self::signed)?;
+            return match self.nodes[of] {
+                ExpressionNode::Number(number) => {
+                    self.nodes[of] = ExpressionNode::Number(-number);
+                    Ok(of)
+                }
+                _ => self.push(ExpressionNode::Negate(of)),
+            };
+        }
+        if self.take('+') { self.deeper(Self::signed) } else { self.power() }
+    }
+
+    fn power(&mut self) -> Parsed {
+        let base = self.atom()?;
+        if !self.take('^') {
+            return Ok(base);
+        }
+        let place = self.at;
+        let first = self.nodes.len();
+        self.deeper(Self::signed)?;
+        let exponent = number_of(&self.nodes[first..], first);
+        self.nodes.truncate(first);
+        self.begin = place;
+        let exponent = exponent.ok_or(ExpressionProblem::Exponent)?;
+        if exponent.is_nan() || exponent.abs() > LARGEST {
+            return Err(ExpressionProblem::Value { what: "the exponent" });
+        }
+        let is_product = exponent.fract() == 0.0 && exponent.abs() <= MOST_PRODUCT;
+        self.push(if is_product {
+            ExpressionNode::WholePower(base, exponent as i32)
+        } else {
+            ExpressionNode::Power(base, exponent)
+        })
+    }
+
+    fn atom(&mut self) -> Parsed {
+        match self.peek() {
+            Some('(') => {
+                self.at += 1;
+                let inside = self.deeper(Self::sum)?;
+                self.need(')', "`)` or an operator")?;
+                Ok(inside)
+            }
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.named(),
+            _ => Err(self.expected("a number, a name or `(`")),
+        }
+    }
+
+    fn number(&mut self) -> Parsed {
+        let begin = self.at;
+        let digits = |parser: &mut Self| {
+            while parser.characters.get(parser.at).is_some_and(char::is_ascii_digit) {
+                parser.at += 1;
+            }
+        };
+        digits(self);
+        if self.characters.get(self.at) == Some(&'.') {
+            self.at += 1;
+            digits(self);
+        }
+        if matches!(self.characters.get(self.at), Some('e' | 'E')) {
+            let sign = usize::from(matches!(self.characters.get(self.at + 1), Some('+' | '-')));
+            if self.characters.get(self.at + 1 + sign).is_some_and(char::is_ascii_digit) {
+                self.at += 1 + sign;
+                digits(self);
+            }
+        }
+        let text: String = self.characters[begin..self.at].iter().collect();
+        match text.parse::<f64>() {
+            Ok(number) if number <= LARGEST => self.push(ExpressionNode::Number(number)),
+            _ => Err(ExpressionProblem::Value { what: "the number" }),
+        }
+    }
+
+    fn word(&mut self) -> String {
+        let begin = self.at;
+        while self.characters.get(self.at).is_some_and(|c| c.is_alphanumeric() || *c == '_') {
+            self.at += 1;
+        }
+        self.characters[begin..self.at].iter().collect()
+    }
+
+    fn named(&mut self) -> Parsed {
+        let begin = self.at;
+        let name = self.word();
+        if name == "pi" {
+            return self.push(ExpressionNode::Number(core::f64::consts::PI));
+        }
+        if let Some(function) = ExpressionFunction::ALL.into_iter().find(|function| function.name() == name) {
+            self.need('(', "`(` of a function")?;
+            let of = self.deeper(Self::sum)?;
+            self.need(')', "`)` of a function of one value")?;
+            return self.push(ExpressionNode::Call(function, of));
+        }
+        if let Some(function) = ExpressionFunction2::ALL.into_iter().find(|function| function.name() == name) {
+            self.need('(', "`(` of a function")?;
+            let first = self.deeper(Self::sum)?;
+            self.need(',', "`,` and the second value")?;
+            let second = self.deeper(Self::sum)?;
+            self.need(')', "`)` of a function of two values")?;
+            return self.push(ExpressionNode::Call2(function, first, second));
+        }
+        for quantity in ["dq", "q"] {
+            let Some(rest) = name.strip_prefix(quantity) else { continue };
+            let joint = if rest.is_empty() {
+                if self.take('(') {
+                    self.joint_by_name()?
+                } else {
+                    self.begin = begin;
+                    self.joints.own.ok_or(ExpressionProblem::WhichJoint { name: quantity })?
+                }
+            } else if rest.bytes().all(|digit| digit.is_ascii_digit()) {
+                self.begin = begin;
+                self.joint_by_number(rest)?
+            } else {
+                continue;
+            };
+            return self.push(if quantity == "q" {
+                ExpressionNode::Position(joint)
+            } else {
+                ExpressionNode::Velocity(joint)
+            });
+        }
+        self.begin = begin;
+        Err(ExpressionProblem::Name { name })
+    }
+
+    fn joint_by_number(&self, digits: &str) -> Parsed {
+        let most = if self.joints.names.is_empty() { usize::from(u16::MAX) } else { self.joints.names.len() };
+        match digits.parse::<usize>() {
+            Ok(number) if (1..=most).contains(&number) => Ok(number - 1),
+            _ => Err(self.no_joint(format!("number {digits}"))),
+        }
+    }
+
+    /// Behind `q(`: a name up to `)`, or in quotes.
+    fn joint_by_name(&mut self) -> Parsed {
+        let quote = self.peek().filter(|c| matches!(c, '"' | '\''));
+        self.at += usize::from(quote.is_some());
+        let begin = self.at;
+        let end = quote.unwrap_or(')');
+        while self.characters.get(self.at).is_some_and(|c| *c != end) {
+            self.at += 1;
+        }
+        let written: String = self.characters[begin..self.at].iter().collect();
+        let name = if quote.is_some() { &written[..] } else { written.trim() };
+        if quote.is_some() {
+            self.need(end, "the quote that ends the joint's name")?;
+        }
+        self.need(')', "`)` behind the joint's name")?;
+        self.begin = begin;
+        let place = self.joints.names.iter().position(|known| known == name);
+        place.ok_or_else(|| self.no_joint(format!("`{name}`")))
+    }
+
+    fn no_joint(&self, joint: String) -> ExpressionProblem {
+        let known =
+            if self.joints.names.is_empty() { vec!["numbered from 1".to_owned()] } else { self.joints.names.to_vec() };
+        ExpressionProblem::Joint { joint, known }
+    }
+}
+
+/// The value of operations in which no joint stands; `first` is the place of the first of them.
+fn number_of(nodes: &[ExpressionNode], first: usize) -> Option<f64> {
+    if nodes.iter().any(|node| matches!(node, ExpressionNode::Position(_) | ExpressionNode::Velocity(_))) {
+        return None;
+    }
+    let mut values = vec![0.0; first];
+    for node in nodes {
+        let next = value(*node, &values);
+        values.push(next);
+    }
+    values.last().copied()
+}

@@ -1,0 +1,148 @@
+//! `[[torque]]`: torques of positions and velocities that the study declares: springs, counterbalances, cables.
+
+use super::{Folders, Study};
+use crate::error::{Error, StudyError};
+use dynident_model::terms::{Declared, DeclaredLaw, Expression, JointNames, TorqueTable, TorqueTerm};
+use dynident_model::{Model, ModelError};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Largest file of a table, bytes: 200 points are far less.
+const MOST_TABLE_BYTES: u64 = 1 << 20;
+
+/// `[[torque]]`: `coefficient · f(q, dq)` on one joint, with a coefficient to be found. What the drive has to give: a
+/// spring that pulls back to `q0` is `q - q0`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct TorqueSection {
+    /// Name of the coefficient in results: a letter, then letters, digits and `_`.
+    pub name: String,
+    /// The joint that it acts on.
+    pub joint: String,
+    /// `f` as an expression: `sin(q - 0.3)`, with `q`, `dq` of this joint, `q(NAME)` or `q3` of others, rad and rad/s
+    /// (m, m/s).
+    #[serde(default)]
+    pub expression: Option<String>,
+    /// `f` as points `[position, torque]` of this joint, ascending, with a smooth curve between them.
+    #[serde(default)]
+    pub table: Option<Vec<[f64; 2]>>,
+    /// The same points in a file: CSV with a column of positions and one of torques.
+    #[serde(default)]
+    pub table_file: Option<PathBuf>,
+    /// What the coefficient is thought to be: the prior's, and that of the robot which `simulate` simulates.
+    #[serde(default)]
+    pub nominal: Option<f64>,
+    /// Unit of the coefficient, free text; by default `Nm` of an expression and `1` of a table.
+    #[serde(default)]
+    pub unit: Option<String>,
+}
+
+impl TorqueSection {
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
+        if !Declared::is_symbol(&self.name) {
+            let fix = "give a letter and then letters, digits and `_`, at most 60: it stands among the parameters";
+            return Err(StudyError::conflict(format!("name `{}`", self.name), fix));
+        }
+        let given: Vec<&'static str> = [
+            self.expression.is_some().then_some("expression"),
+            self.table.is_some().then_some("table"),
+            self.table_file.is_some().then_some("table_file"),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        match given.len() {
+            0 => return Err(StudyError::missing("no expression", "give expression, table or table_file")),
+            1 => {}
+            _ => return Err(StudyError::Exclusive { keys: given }),
+        }
+        if self.nominal.is_some_and(|nominal| !nominal.is_finite()) {
+            return Err(StudyError::conflict("nominal", "give a finite number"));
+        }
+        if self.unit.as_ref().is_some_and(|unit| unit.chars().count() > 40 || unit.chars().any(char::is_control)) {
+            return Err(StudyError::conflict("unit", "give at most 40 characters on one line"));
+        }
+        Ok(())
+    }
+
+    fn term(
+        &self,
+        model: &Model,
+        read_table: impl Fn(&Path) -> Result<TorqueTable, Error>,
+        wrong: impl Fn(StudyError) -> Error,
+    ) -> Result<TorqueTerm, Error> {
+        let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+        let Some(joint) = model.joint_index(&self.joint) else {
+            return Err(wrong(ModelError::UnknownJoint { joint: self.joint.clone(), known: names }.into()));
+        };
+        let law = match (&self.expression, &self.table, &self.table_file) {
+            (Some(text), ..) => DeclaredLaw::Expression(
+                Expression::parse(text, &JointNames { own: Some(joint), names: &names })
+                    .map_err(|error| wrong(error.into()))?,
+            ),
+            (None, Some(points), _) => {
+                DeclaredLaw::Table(TorqueTable::new(points.clone()).map_err(|error| wrong(error.into()))?)
+            }
+            (None, None, Some(file)) => DeclaredLaw::Table(read_table(file)?),
+            (None, None, None) => {
+                return Err(wrong(StudyError::missing("no expression", "give expression, table or table_file")));
+            }
+        };
+        let usual = match law {
+            DeclaredLaw::Expression(_) => "Nm",
+            DeclaredLaw::Table(_) => "1",
+        };
+        let unit = self.unit.clone().unwrap_or_else(|| usual.to_owned());
+        Ok(TorqueTerm::Declared(Declared { name: self.name.clone(), joint, law, unit, nominal: self.nominal }))
+    }
+}
+
+/// The terms of the study's `[[torque]]`.
+///
+/// # Errors
+/// A joint that the model does not have, an expression or a table that cannot be read.
+pub(super) fn declared_terms(
+    study: &Study,
+    study_path: &Path,
+    folders: &Folders,
+    model: &Model,
+) -> Result<Vec<TorqueTerm>, Error> {
+    let of_section = |section: &TorqueSection| {
+        let wrong =
+            |source: StudyError| Error::study(study_path)(StudyError::at(format!("torque `{}`", section.name))(source));
+        section.term(model, |file| read_table(&folders.find(file, study.source.as_deref())?), wrong)
+    };
+    study.torque.iter().map(of_section).collect()
+}
+
+/// A table of two columns; a first line that holds no numbers is a header.
+fn read_table(path: &Path) -> Result<TorqueTable, Error> {
+    let cannot = |source| Error::File { path: path.to_owned(), source };
+    let at = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
+    if std::fs::metadata(path).map_err(cannot)?.len() > MOST_TABLE_BYTES {
+        return Err(at(1, "larger than 1 MiB: a table of torque has at most 200 points".to_owned()));
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .from_path(path)
+        .map_err(|error| at(1, error.to_string()))?;
+    let mut points = Vec::new();
+    for (place, record) in reader.records().enumerate() {
+        let record = record.map_err(|error| at(error.position().map_or(1, csv::Position::line), error.to_string()))?;
+        let line = record.position().map_or(1, csv::Position::line);
+        let numbers: Option<Vec<f64>> = record.iter().map(|field| field.parse::<f64>().ok()).collect();
+        match numbers.as_deref() {
+            Some(&[position, torque]) => points.push([position, torque]),
+            None if place == 0 && record.iter().all(|field| field.parse::<f64>().is_err()) => {}
+            Some(_) | None => {
+                let found = record.iter().collect::<Vec<_>>().join(",");
+                return Err(at(line, format!("`{found}`: give two numbers, position and torque")));
+            }
+        }
+    }
+    TorqueTable::new(points).map_err(|error| at(1, error.to_string()))
+}
