@@ -234,7 +234,7 @@ fn check_declared(model: &Model, terms: &[TorqueTerm]) -> Result<(), ParametricM
     for (place, term) in terms.iter().enumerate() {
         let TorqueTerm::Declared(declared) = term else { continue };
         let symbol = || declared.name.clone();
-        let of_bodies = (0..model.dof())
+        let of_bodies = (0..model.body_count())
             .any(|body| INERTIAL_NAMES.iter().any(|name| declared.name == format!("{name}{}", body + 1)));
         let of_terms = terms.iter().enumerate().any(|(other, one)| other != place && one.symbol() == declared.name);
         if !Declared::is_symbol(&declared.name) || of_bodies || of_terms {

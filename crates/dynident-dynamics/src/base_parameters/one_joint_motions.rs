@@ -6,7 +6,7 @@
 //! ranks of its diagonal blocks. One block has ten columns, so the cost grows with the square of a chain's length (its
 //! fourth power for [`numerical_rank`](super::numerical_rank)).
 
-use super::NumericalRank;
+use super::{NumericalRank, numerical_rank};
 use crate::independent_columns::independent_regressor_columns;
 use crate::inverse_dynamics::{inertial_wrench, moved};
 use crate::states::BodyState;
@@ -24,8 +24,12 @@ fn pairs(joints_on_path: usize) -> usize {
 /// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can
 /// separate from those of the bodies before it, at states as those of [`numerical_rank`](super::numerical_rank) that
 /// differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in
-/// `seed`.
+/// `seed`. Where joints follow others no joint moves alone, and the rank is [`numerical_rank`](super::numerical_rank)'s.
 pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
+    if model.coupling().is_some() {
+        // Not the states that the base parameters of such robots are found at.
+        return numerical_rank(model, &[], seed + 1, tolerance);
+    }
     let maps = model.maps();
     let mut random = Random::new(seed);
     let states: Vec<Vec<BodyState<f64>>> = (0..pairs(1))
