@@ -24,6 +24,7 @@ GENERATORS = {
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
     "mujoco-closed-loop": ("mujoco_closed_loop.py", "mujoco_closed_loop.json"),
     "mjcf": ("mjcf.py", "mjcf.json"),
+    "springs": ("springs.py", "springs.json"),
     "sdf": ("sdf.py", "sdf.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),
     "newey-west": ("statsmodels_newey_west.py", "statsmodels_newey_west.json"),

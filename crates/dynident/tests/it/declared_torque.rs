@@ -212,8 +212,8 @@ fn a_torque_that_is_gravity_already_is_said_and_not_fitted() {
     // The consistent set is the one nearest to all nominal values.
     let term = found.result.joints[0].terms.iter().find(|term| term.symbol == "spring").unwrap();
     assert!(term.std.is_none() && (term.value - 3.0).abs() < 0.3, "{term:?}");
-    // So it is at the shoulder of an arm on a level floor, where products of inertia take back what the weight would do to
-    // the joint before, but not at its elbow.
+    // So it is at the shoulder of an arm on a level floor, where products of inertia take back what the weight would do
+    // to the joint before, but not at its elbow.
     let torque = |joint: &str| {
         let torque = format!("[[torque]]\nname = \"balance\"\njoint = \"{joint}\"\nexpression = \"sin(q + 0.3)\"");
         Job::new(folder.path(), &study(&torque)).robot()
