@@ -1,7 +1,8 @@
 //! Springs and counterbalances through studies: put into logs by hand, declared, found, tested, simulated, exported.
 use crate::common::{Job, Motion, Random, Truth, assert_reads_back, repository};
 use core::ops::ControlFlow;
-use dynident::{Error, identify, simulate_study, validate};
+use dynident::export::Target;
+use dynident::{Error, design_study, export_model, identify, simulate_study, validate};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -111,6 +112,11 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
     let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
     assert!((again.validation[0].model.rmse_nm - with).abs() < 1e-12);
+    let exported = |target| export_model(&path, (&job.study, &job.path), None, target).unwrap();
+    assert!(exported(Target::Python).text.contains("def declared(q, dq):"));
+    let notes = exported(Target::Mjcf).notes.join("\n");
+    let left_out = ["counterbalance of joint elbow_joint, -35.", "Nm times sin(q3 + 0.3), is left out"];
+    assert!(left_out.iter().all(|fragment| notes.contains(fragment)), "{notes}");
     let other = Job::new(folder.path(), &study("[drive]\nfriction = \"stated\""));
     let refused = validate(&path, &other.study, &other.path, &Job::options(1)).unwrap_err().to_string();
     assert!(refused.contains("result.json"), "{refused}");
@@ -125,6 +131,34 @@ fn friction_is_chosen_beside_declared_torques() {
     let base = found.result.base_parameters.iter().find(|one| one.symbol == "counterbalance").unwrap();
     assert!((base.value - COUNTERBALANCE).abs() < 4.0 * base.std, "{} +- {}", base.value, base.std);
     assert!(found.result.validation[0].model.rmse_nm < 1.1 * NOISE);
+}
+
+/// A design goes where a stop that is felt beyond 0.8 rad alone can be told.
+#[test]
+fn designs_look_for_declared_torques() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        r#"
+        robot = {{ file = {:?}, joints = ["shoulder_lift_joint", "elbow_joint"] }}
+        [design]
+        search = {{ starts = 4, rounds = 0, evaluations_per_start = 600, polish_evaluations = 300, search_samples = 64 }}
+        [design.defaults]
+        floor = false
+        self_collision = false
+        [[torque]]
+        name = "stop"
+        joint = "elbow_joint"
+        expression = "max(q - 0.8, 0)^2"
+        "#,
+        repository("robots/ur10.urdf").display().to_string()
+    );
+    let job = Job::new(folder.path(), &text);
+    let designed = design_study(&job.study, &job.path, &Job::options(2), |_| ControlFlow::Continue(())).unwrap();
+    assert_reads_back(&designed.file);
+    let forecast = designed.file.forecast.iter().find(|one| one.expression == "stop").unwrap();
+    println!("{forecast:?}");
+    // Nm/rad² per Nm of noise: a motion that stays off the stop tells nothing.
+    assert!(forecast.std.unwrap() < 0.2, "{forecast:?}");
 }
 
 const PENDULUM: &str = r#"<robot name="pendulum"><link name="base"/>
