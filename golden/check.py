@@ -25,6 +25,7 @@ GENERATORS = {
     "mujoco-closed-loop": ("mujoco_closed_loop.py", "mujoco_closed_loop.json"),
     "coupled": ("coupled_joints.py", "coupled_joints.json"),
     "mjcf": ("mjcf.py", "mjcf.json"),
+    "springs": ("springs.py", "springs.json"),
     "sdf": ("sdf.py", "sdf.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),
     "newey-west": ("statsmodels_newey_west.py", "statsmodels_newey_west.json"),

@@ -7,7 +7,7 @@ use crate::nearest_friction::NearestFriction;
 use crate::robot_model::RobotModel;
 use crate::rotation::quaternion;
 use core::fmt::Write;
-use dynident_model::terms::{CouplingEffect, TorqueTerm};
+use dynident_model::terms::{CouplingEffect, StateFunction, TorqueTerm};
 use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, write_urdf};
 
 /// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
@@ -111,7 +111,7 @@ pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
                 ));
             }
             TorqueTerm::Declared(_) => {
-                let law = term.state_function().map_or_else(String::new, |function| function.description());
+                let law = term.state_function().map_or_else(String::new, StateFunction::description);
                 notes.push(format!("Torque {symbol} of joint {}, {value:?} {unit} times {law}, is left out: add it to the simulator's control.", joint_name(robot, term)));
             }
             TorqueTerm::Load(_) | TorqueTerm::MaxwellSlip(_) => {

@@ -2,7 +2,7 @@
 //! weight of a link), and no structure tells. So their columns are compared with all others at random states.
 //!
 //! A declared column that the other columns give, in the rows of all joints, is regrouped into them like any dependent
-//! column: its coefficient keeps its nominal value, and base parameters name it.
+//! column: nothing tells its coefficient, and base parameters name it.
 
 use crate::independent_columns::{IndependentColumns, independent_regressor_columns};
 use crate::regressor_panels::{Column, PanelLayout, Panels, regressor_panels};

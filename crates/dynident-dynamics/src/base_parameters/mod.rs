@@ -118,7 +118,7 @@ impl BaseParameters {
     }
 
     /// The declared torques that cannot be told from other parameters, with the symbols of the base columns whose sum
-    /// they are: their coefficients keep their nominal values, and these base parameters hold them.
+    /// they are: nothing tells their coefficients, and these base parameters hold them.
     pub fn coincident(&self) -> Vec<(&TorqueTerm, Vec<String>)> {
         let dependent = self.split.dependent.iter().zip(self.split.regrouping.column_iter());
         let of_declared = dependent.filter_map(|(&column, factors)| match &self.columns[column] {

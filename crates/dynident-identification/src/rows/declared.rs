@@ -3,7 +3,7 @@
 use super::builder::in_model_order;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
-use dynident_model::terms::JointMotion;
+use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_recording::MotionBlock;
 
 /// That every declared torque of the model has a value at each settled sample of a block: an expression that is
@@ -17,7 +17,7 @@ pub(super) fn require_declared(
     block: &MotionBlock,
     places: &[usize],
 ) -> Result<(), LogError> {
-    if !model.terms().iter().any(|term| term.is_declared()) {
+    if !model.terms().iter().any(TorqueTerm::is_declared) {
         return Ok(());
     }
     let [begin, end] = block.unsettled;

@@ -1,5 +1,5 @@
-//! A torque that a user declares: `τ = k f(q, q̇)` with a coefficient `k` to be found. Springs, counterbalances, cables,
-//! gas struts, magnets: all that holds a joint by where it stands.
+//! A torque that a user declares: `τ = k f(q, q̇)` with a coefficient `k` to be found. Springs, counterbalances,
+//! cables, gas struts, magnets: all that holds a joint by where it stands.
 //!
 //! `f` is an [`Expression`] of positions and velocities, or a [`TorqueTable`] of the joint's own position. As for every
 //! term, the torque is what the drive has to give: a spring that pulls the joint back to `q₀` with the stiffness `c` is

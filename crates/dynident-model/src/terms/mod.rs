@@ -1,6 +1,6 @@
-//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each term is one parameter and one regressor
-//! column per joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of
-//! [`TorqueTerm`] and a line in its `kind`.
+//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each term is one parameter
+//! and one regressor column per joint that feels it; each kind is one file here, which says all that there is to say of
+//! it, a variant of [`TorqueTerm`] and a line in its `kind`.
 
 mod coulomb;
 mod coupling;

@@ -1,9 +1,9 @@
 //! A torque measured at some positions, with a smooth curve between them: the characteristic of a spring.
 //!
-//! Between points the curve is a cubic whose slopes at the points follow Fritsch and Butland: the weighted harmonic mean
-//! of the slopes to either side, zero at a peak. It is monotone where the points are and makes no torque of its own
-//! between two equal ones; its first derivative is continuous. Beyond the ends the torque stays that of the end, so that
-//! a design or a simulation that passes them goes on; a log that passes them is refused
+//! Between points the curve is a cubic whose slopes at the points follow Fritsch and Butland: the weighted harmonic
+//! mean of the slopes to either side, zero at a peak. It is monotone where the points are and makes no torque of its
+//! own between two equal ones; its first derivative is continuous. Beyond the ends the torque stays that of the end, so
+//! that a design or a simulation that passes them goes on; a log that passes them is refused
 //! ([`TorqueTerm::undefined`](super::TorqueTerm::undefined)). Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5
 //! (1984) 300, with the three-point slopes at the ends that SciPy's `PchipInterpolator` has.
 

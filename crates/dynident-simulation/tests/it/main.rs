@@ -4,4 +4,5 @@
 mod closed_loop;
 mod controllers;
 mod mujoco;
+mod mujoco_springs;
 mod plant;

@@ -288,8 +288,8 @@ fn declared(name: &str, joint: usize, text: &str) -> TorqueTerm {
     TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None })
 }
 
-/// An undamped spring keeps its energy, `k q²/2` beside that of the bodies; the controller's model holds the robot where
-/// it stands, spring and weight together.
+/// An undamped spring keeps its energy, `k q²/2` beside that of the bodies; the controller's model holds the robot
+/// where it stands, spring and weight together.
 #[test]
 fn a_spring_keeps_its_energy_and_the_model_holds_it() {
     let model = random_tree(6, 2);

@@ -182,8 +182,8 @@ pub struct MethodSummary {
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
     #[serde(default)]
     pub not_excited: Vec<String>,
-    /// Declared torques that the other parameters' torques are already, in words: their coefficients stay at the nominal
-    /// values.
+    /// Declared torques that the other parameters' torques are already, in words: their coefficients stay near the
+    /// nominal values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coincident: Vec<String>,
     /// Joints that no training log moves above the noise of their positions.

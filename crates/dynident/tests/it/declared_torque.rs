@@ -1,7 +1,8 @@
 //! Springs and counterbalances through studies: put into logs by hand, declared, found, tested, simulated, exported.
 use crate::common::{Job, Motion, Random, Truth, assert_reads_back, repository};
 use core::ops::ControlFlow;
-use dynident::{Error, identify, simulate_study, validate};
+use dynident::export::Target;
+use dynident::{Error, design_study, export_model, identify, simulate_study, validate};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -30,8 +31,9 @@ fn write_log(path: &Path, seconds: f64, seed: u64) {
         tau[2] += COUNTERBALANCE * (q[2] + 0.3).sin();
         tau[1] += SPRING * spring(q[1]);
         write!(text, "\n{t}").unwrap();
-        q.iter().for_each(|q| write!(text, ",{q}").unwrap());
-        tau.iter().for_each(|tau| write!(text, ",{}", tau + NOISE * random.normal()).unwrap());
+        for value in q.into_iter().chain(tau.into_iter().map(|tau| tau + NOISE * random.normal())) {
+            write!(text, ",{value}").unwrap();
+        }
     }
     std::fs::write(path, text + "\n").unwrap();
 }
@@ -110,6 +112,11 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
     let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
     assert!((again.validation[0].model.rmse_nm - with).abs() < 1e-12);
+    let exported = |target| export_model(&path, (&job.study, &job.path), None, target).unwrap();
+    assert!(exported(Target::Python).text.contains("def declared(q, dq):"));
+    let notes = exported(Target::Mjcf).notes.join("\n");
+    let left_out = ["counterbalance of joint elbow_joint, -35.", "Nm times sin(q3 + 0.3), is left out"];
+    assert!(left_out.iter().all(|fragment| notes.contains(fragment)), "{notes}");
     let other = Job::new(folder.path(), &study("[drive]\nfriction = \"stated\""));
     let refused = validate(&path, &other.study, &other.path, &Job::options(1)).unwrap_err().to_string();
     assert!(refused.contains("result.json"), "{refused}");
@@ -124,6 +131,34 @@ fn friction_is_chosen_beside_declared_torques() {
     let base = found.result.base_parameters.iter().find(|one| one.symbol == "counterbalance").unwrap();
     assert!((base.value - COUNTERBALANCE).abs() < 4.0 * base.std, "{} +- {}", base.value, base.std);
     assert!(found.result.validation[0].model.rmse_nm < 1.1 * NOISE);
+}
+
+/// A design goes where a stop that is felt beyond 0.8 rad alone can be told.
+#[test]
+fn designs_look_for_declared_torques() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        r#"
+        robot = {{ file = {:?}, joints = ["shoulder_lift_joint", "elbow_joint"] }}
+        [design]
+        search = {{ starts = 4, rounds = 0, evaluations_per_start = 600, polish_evaluations = 300, search_samples = 64 }}
+        [design.defaults]
+        floor = false
+        self_collision = false
+        [[torque]]
+        name = "stop"
+        joint = "elbow_joint"
+        expression = "max(q - 0.8, 0)^2"
+        "#,
+        repository("robots/ur10.urdf").display().to_string()
+    );
+    let job = Job::new(folder.path(), &text);
+    let designed = design_study(&job.study, &job.path, &Job::options(2), |_| ControlFlow::Continue(())).unwrap();
+    assert_reads_back(&designed.file);
+    let forecast = designed.file.forecast.iter().find(|one| one.expression == "stop").unwrap();
+    println!("{forecast:?}");
+    // Nm/rad² per Nm of noise: a motion that stays off the stop tells nothing.
+    assert!(forecast.std.unwrap() < 0.2, "{forecast:?}");
 }
 
 const PENDULUM: &str = r#"<robot name="pendulum"><link name="base"/>
@@ -198,7 +233,7 @@ fn a_torque_that_is_gravity_already_is_said_and_not_fitted() {
     assert!(!found.result.base_parameters.iter().any(|one| one.symbol == "spring"));
     let [sentence] = &found.result.method.coincident[..] else { panic!("{:?}", found.result.method) };
     assert!(sentence.contains("spring") && sentence.contains("hinge"), "{sentence}");
-    assert!(sentence.contains("of mx1, mz1 already") && sentence.contains("its nominal 3;"), "{sentence}");
+    assert!(sentence.contains("of mx1, mz1 already") && sentence.contains("stays near its nominal 3;"), "{sentence}");
     // The sums are known all the same: mx = 0.6 kg m falls as -g mx cos(q), mz = 0.3 kg m as -g mz sin(q).
     let of = |symbol: &str| found.result.base_parameters.iter().find(|one| one.symbol == symbol).unwrap();
     let [x, z] = [of("mx1"), of("mz1")];
@@ -208,8 +243,11 @@ fn a_torque_that_is_gravity_already_is_said_and_not_fitted() {
         assert!(sum.expression.contains("spring"));
         assert!((sum.value - expected).abs() < 4.0 * sum.std + 0.005, "{} and {expected}", sum.value);
     }
-    // So it is at the shoulder of an arm on a level floor, where products of inertia take back what the weight would do to
-    // the joint before, but not at its elbow.
+    // The consistent set is the one nearest to all nominal values.
+    let term = found.result.joints[0].terms.iter().find(|term| term.symbol == "spring").unwrap();
+    assert!(term.std.is_none() && (term.value - 3.0).abs() < 0.3, "{term:?}");
+    // So it is at the shoulder of an arm on a level floor, where products of inertia take back what the weight would do
+    // to the joint before, but not at its elbow.
     let torque = |joint: &str| {
         let torque = format!("[[torque]]\nname = \"balance\"\njoint = \"{joint}\"\nexpression = \"sin(q + 0.3)\"");
         Job::new(folder.path(), &study(&torque)).robot()

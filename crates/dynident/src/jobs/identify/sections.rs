@@ -13,7 +13,7 @@ use dynident_identification::consistent::typical_length_m;
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{Conditional, Identification, Recording, RegressorModel, resting_joints};
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{StateFunction, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 
 pub(super) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
@@ -71,7 +71,7 @@ fn coincident(model: &RegressorModel) -> Vec<String> {
         let held =
             nominal.map_or("0, for the study gives no nominal".to_owned(), |value| format!("its nominal {value}"));
         format!(
-            "torque {} of joint {joint} is the torque of {} already: no motion tells its coefficient, which is held at {held}; the sum is known",
+            "torque {} of joint {joint} is the torque of {} already: no motion tells its coefficient, which stays near {held}; the sums are known",
             term.symbol(),
             others.join(", ")
         )
@@ -167,7 +167,7 @@ pub(super) fn term_results(
             value: parameters[column],
             std: alone.map(|place| estimate.std[place]),
             base_parameter: home.map(|place| expressions[place].clone()),
-            law: term.state_function().map(|function| function.description()),
+            law: term.state_function().map(StateFunction::description),
         }
     };
     model.terms().iter().enumerate().filter(|(_, term)| wanted(term)).map(of_term).collect()
