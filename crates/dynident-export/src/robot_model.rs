@@ -42,8 +42,8 @@ impl RobotModel {
         Ok(Self { model: checked.model().clone(), terms: checked.terms().to_vec(), values, velocities: Vec::new() })
     }
 
-    /// The same with the velocities at which its joints were recorded, joint by joint (none for a joint of which nothing
-    /// is known): what the friction of simulators is fitted over.
+    /// The same with the velocities at which its joints were recorded, joint by joint (none for a joint of which
+    /// nothing is known): what the friction of simulators is fitted over.
     ///
     /// # Errors
     /// Velocities of another number of joints; a velocity of zero, weights that are not positive, numbers that are not

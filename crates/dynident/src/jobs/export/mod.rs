@@ -11,6 +11,7 @@ use dynident_export::{
     ExportError, Exported, PayloadBody, PayloadReader, RecordedVelocity, RobotModel, Target, export, payload_command,
 };
 use dynident_identification::Role;
+use dynident_identification::rows::VelocityHistogram;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
 
@@ -86,7 +87,7 @@ fn recorded_velocities(stored: &ResultFile, dof: usize) -> Vec<Vec<RecordedVeloc
     let training: Vec<_> = stored.logs.iter().filter(|log| log.role == Role::Identify).collect();
     let of_joint = |joint: usize| {
         let histograms = training.iter().filter_map(|log| log.velocities.get(joint));
-        let moving = histograms.flat_map(|histogram| histogram.moving());
+        let moving = histograms.flat_map(VelocityHistogram::moving);
         moving.map(|(velocity, samples)| RecordedVelocity { velocity, samples: samples as f64 }).collect()
     };
     (0..dof).map(of_joint).collect()
