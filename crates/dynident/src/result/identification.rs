@@ -116,6 +116,9 @@ pub struct ResultFile {
     /// Why there is no identified.xml although the description is an MJCF and there is an identified.urdf.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_mjcf: Option<String>,
+    /// Why there is no identified.sdf although the description is an SDF and there is an identified.urdf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_sdf: Option<String>,
     /// Where the time went.
     pub timings_s: Timings,
 }
