@@ -39,10 +39,14 @@ run 0 "$dynident" inspect "$out/slip.urdf" --fix "$out/mended.urdf"
 run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
-for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json; do
+for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json simulator simulator-table; do
     run 0 "$dynident" export "$out/result/result.json" --study examples/ur10_simulated.toml --to "$form" --out "$out/exported.$form"
 done
 run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export" "$examples/description"
+run 0 "$venv/bin/python" .ci/simulator.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml examples/ur10_simulated "$out/simulator"
+# The recorded test in MuJoCo, before and after.
+run 0 "$venv/bin/python" examples/replay_in_mujoco.py robots/ur10.urdf "$out/exported.mjcf" examples/ur10_simulated/test.csv \
+    --position 'q{1..6}_rad' --torque 'tau{1..6}_Nm' --require-better
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
 # Joints that follow others: two closed chains, found, exported and held against MuJoCo.
 run 0 "$dynident" simulate examples/palletizer.toml --out "$out/palletizer_run"

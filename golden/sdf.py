@@ -2,7 +2,7 @@
 
     python golden/sdf.py [--out DIR]
 
-Reads golden/sdf/*.sdf (two examples of Drake's own, and rules_*.sdf, written for single rules of the format) and writes DIR/sdf.json: joints with their limits, the torque of rigid bodies at random states, without damping and dry friction.
+Reads golden/sdf/*.sdf (two examples of Drake's own, urdf_*.sdf, published URDFs as libsdformat's converter writes them, and rules_*.sdf, written for single rules of the format), fixes a base that is free to the world, and writes DIR/sdf.json: joints with their limits, the torque of rigid bodies at random states, without damping and dry friction.
 """
 import argparse
 import sys
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import MultibodyForces, PrismaticJoint, RevoluteJoint
+from pydrake.multibody.tree import BodyIndex, MultibodyForces, PrismaticJoint, RevoluteJoint
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
@@ -28,9 +28,14 @@ def limit(value):
     return value if abs(value) < 1e16 else None
 
 
-def golden(path, random):
+def plant_of(path):
+    """Drake's model, its base fixed to the world where the document does not."""
     plant = MultibodyPlant(time_step=0.0)
     Parser(plant).AddModels(str(path))
+    children = {plant.get_joint(index).child_body().index() for index in plant.GetJointIndices()}
+    bodies = [plant.get_body(BodyIndex(number)) for number in range(1, plant.num_bodies())]
+    for body in [body for body in bodies if body.index() not in children]:
+        plant.WeldFrames(plant.world_frame(), body.body_frame())
     # Drake's plant has a gravity of its own in place of the document's.
     gravity = ElementTree.parse(path).findtext(".//world/gravity")
     if gravity is not None:
@@ -38,6 +43,11 @@ def golden(path, random):
     else:
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -9.81])
     plant.Finalize()
+    return plant
+
+
+def golden(path, random):
+    plant = plant_of(path)
     joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
     joints = [joint for joint in joints if joint.num_positions() == 1]
     if len(joints) != plant.num_positions():

@@ -4,7 +4,7 @@
 //! cargo run -p dynident-cli --features schema --example schemas
 //! ```
 
-use dynident::export::{MODEL_SCHEMA, ModelFile};
+use dynident::export::{MODEL_SCHEMA, ModelFile, SIMULATOR_SCHEMA, SimulatorFile};
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
         (LOG_SCHEMA, written::<LogContents>()),
         (MODEL_SCHEMA, written::<ModelFile>()),
+        (SIMULATOR_SCHEMA, written::<SimulatorFile>()),
         (NEW_STUDY_SCHEMA, written::<NewStudyFile>()),
         (PAPER_SCHEMA, written::<PaperFile>()),
         (RESULT_SCHEMA, written::<ResultFile>()),

@@ -3,7 +3,7 @@
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
 use crate::exported::Exported;
-use crate::nearest_friction::NearestFriction;
+use crate::nearest_friction::{ComparedOver, NearestFriction};
 use crate::robot_model::RobotModel;
 use crate::rotation::quaternion;
 use core::fmt::Write;
@@ -81,8 +81,12 @@ pub(crate) fn frictions(
     let nearest: Vec<_> = (0..joints.len()).map(|joint| NearestFriction::of(robot, joint)).collect();
     for (joint, found) in joints.iter().zip(&nearest) {
         if found.most_error > WORTH_SAYING * (found.coulomb + found.viscous * found.most_speed) {
+            let over = match found.over {
+                ComparedOver::RecordedMotion => "over the recorded motion, velocities",
+                ComparedOver::VelocityLimit => "for velocities",
+            };
             notes.push(format!(
-                "Joint {}: {coulomb} and {viscous} are the nearest to its friction and offset for velocities up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
+                "Joint {}: {coulomb} and {viscous} are the nearest to its friction and offset {over} up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
                 joint.name,
                 found.most_speed,
                 if joint.turns() { "rad/s" } else { "m/s" },
@@ -114,9 +118,14 @@ pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
                 let law = term.state_function().map_or_else(String::new, StateFunction::description);
                 notes.push(format!("Torque {symbol} of joint {}, {value:?} {unit} times {law}, is left out: add it to the simulator's control.", joint_name(robot, term)));
             }
-            TorqueTerm::Load(_) | TorqueTerm::MaxwellSlip(_) => {
+            TorqueTerm::Load(_) => {
                 notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
             }
+            TorqueTerm::MaxwellSlip(slip) => notes.push(format!(
+                "{symbol} = {value:?} {unit} ({}) counts as the Coulomb friction that it is once the joint has moved on by {:?} rad (m).",
+                term.kind_name(),
+                2.0 * slip.yield_displacement
+            )),
             TorqueTerm::Viscous(_)
             | TorqueTerm::Coulomb(_)
             | TorqueTerm::DirectionalViscous(_)

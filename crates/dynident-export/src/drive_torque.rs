@@ -127,19 +127,28 @@ fn power(x: Symbol, exponent: f64) -> Symbol {
     if exponent == 2.0 { x * x } else { x.power(exponent) }
 }
 
-/// Friction and offset of a joint at the velocity `dq`, by its own terms alone: couplings, load, hysteresis and changes
-/// with temperature are left out.
+/// Friction and offset of a joint at the velocity `dq`, by its own terms alone: couplings, load and changes with
+/// temperature are left out; Maxwell slip is the Coulomb friction that it is once the joint has moved on by twice its
+/// yield displacement.
 pub(crate) fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
+    own_friction_terms(robot, joint, dq, None)
+}
+
+/// The same by all of these terms, or by the term at the place `only` for a value of one.
+pub(crate) fn own_friction_terms(robot: &RobotModel, joint: usize, dq: f64, only: Option<usize>) -> f64 {
     let zeros = vec![0.0; robot.model().dof()];
     let mut velocities = zeros.clone();
     velocities[joint] = dq;
     let motion = JointMotion { samples: 1, q: &zeros, dq: &velocities, ddq: &zeros };
     let is_own = |term: &TorqueTerm| term.own_joint() == Some(joint) && !term.is_drive_inertia() && !term.is_declared();
-    let own = robot.terms().filter(|(term, _)| is_own(term));
-    own.map(|(term, value)| {
+    let own = robot.terms().enumerate().filter(|(place, (term, _))| is_own(term) && only.is_none_or(|it| it == *place));
+    own.map(|(_, (term, value))| {
         let mut column = [0.0];
-        term.column(joint, &motion, &mut column);
-        value * column[0]
+        match term {
+            TorqueTerm::MaxwellSlip(_) => column[0] = if dq == 0.0 { 0.0 } else { dq.signum() },
+            _ => term.column(joint, &motion, &mut column),
+        }
+        if only.is_some() { column[0] } else { value * column[0] }
     })
     .sum()
 }

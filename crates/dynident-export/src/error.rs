@@ -24,6 +24,26 @@ pub enum ExportError {
         /// Its value.
         value: f64,
     },
+    /// Recorded velocities of another number of joints.
+    #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty where nothing is known")]
+    Velocities {
+        /// Number of joints.
+        expected: usize,
+        /// Number of lists.
+        found: usize,
+    },
+    /// A recorded velocity that is none.
+    #[error(
+        "joint `{joint}`: {samples} samples of the velocity {velocity}: it has to be finite and not zero, with a positive number of samples"
+    )]
+    Velocity {
+        /// The joint.
+        joint: String,
+        /// The velocity.
+        velocity: f64,
+        /// Its weight.
+        samples: f64,
+    },
     /// Bodies whose dynamics are unknown.
     #[error("the bodies {} have no inertial: their dynamics are unknown", bodies.join(", "))]
     Unknown {

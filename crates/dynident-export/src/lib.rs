@@ -16,6 +16,8 @@
 //! | [`Target::Ros2Yaml`] | parameters of a ROS 2 node |
 //! | [`Target::Json`] | all numbers, a [`ModelFile`] |
 //!
+//! Armature, damping, friction, delay and gain of every joint with their error bars are a [`SimulatorFile`].
+//!
 //! A payload by itself becomes the command of a controller: [`payload_command`].
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
@@ -35,10 +37,12 @@ mod languages;
 mod model_file;
 mod nearest_friction;
 mod payload;
+mod recorded_velocity;
 mod robot_model;
 mod ros2_parameters;
 mod rotation;
 mod sdf;
+mod simulator;
 mod statements;
 mod symbol;
 mod target;
@@ -48,9 +52,11 @@ pub use exported::Exported;
 pub use model_file::{
     MODEL_SCHEMA, ModelBody, ModelConstant, ModelFile, ModelJoint, ModelLimits, ModelLink, ModelPlacement, ModelTerm,
 };
-pub use nearest_friction::NearestFriction;
+pub use nearest_friction::{ComparedOver, NearestFriction, TermShare};
 pub use payload::{PayloadBody, PayloadReader, payload_command};
+pub use recorded_velocity::RecordedVelocity;
 pub use robot_model::RobotModel;
+pub use simulator::{DriveKnowledge, FrictionError, SIMULATOR_SCHEMA, SimulatorFile, SimulatorJoint, SimulatorValue};
 pub use target::{Target, export};
 
 #[cfg(doctest)]

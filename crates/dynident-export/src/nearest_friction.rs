@@ -1,13 +1,24 @@
 //! The friction of a simulator, `τ = c sign(q̇) + d q̇`, that is nearest to a fitted law.
 
-use crate::drive_torque::own_friction;
+use crate::drive_torque::{own_friction, own_friction_terms};
+use crate::recorded_velocity::RecordedVelocity;
 use crate::robot_model::RobotModel;
 
-/// Velocities on either side of rest at which laws are compared: even steps, more than a law has bends.
+/// Velocities on either side of rest at which laws are compared where no motion was recorded: even steps, more than a
+/// law has bends.
 const SPEEDS: u32 = 200;
 
 /// Range of joints whose description has no velocity limit, rad/s or m/s.
 const DEFAULT_SPEED: f64 = 1.0;
+
+/// What a nearest friction is nearest over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ComparedOver {
+    /// The velocities of the recorded motion.
+    RecordedMotion,
+    /// Even velocities up to the joint's limit, for no motion of it was recorded.
+    VelocityLimit,
+}
 
 /// Coulomb and viscous friction of one joint in place of its law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,46 +27,147 @@ pub struct NearestFriction {
     pub coulomb: f64,
     /// `d`, Nm s/rad (N s/m), not negative.
     pub viscous: f64,
-    /// Largest velocity at which the two were compared, rad/s (m/s): the joint's limit, 1 where there is none.
+    /// What the two were compared over.
+    pub over: ComparedOver,
+    /// Largest velocity at which they were, rad/s (m/s): the recorded one, or the joint's limit, 1 where there is none.
     pub most_speed: f64,
-    /// Root mean square of the difference over even velocities within it, Nm (N).
+    /// Root mean square of the difference over these velocities, Nm (N).
     pub rms_error: f64,
     /// Largest difference, Nm (N).
     pub most_error: f64,
 }
 
+/// What a term of the law does to the nearest friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TermShare {
+    /// Place of the term among the robot's terms.
+    pub term: usize,
+    /// `∂c/∂value`; zero where c is held at zero.
+    pub coulomb: f64,
+    /// `∂d/∂value`; zero where d is held at zero.
+    pub viscous: f64,
+}
+
 impl NearestFriction {
     /// None at all: of a joint that follows others, whose drives are theirs.
-    pub(crate) const NONE: Self = Self { coulomb: 0.0, viscous: 0.0, most_speed: 0.0, rms_error: 0.0, most_error: 0.0 };
+    pub(crate) const NONE: Self = Self {
+        coulomb: 0.0,
+        viscous: 0.0,
+        over: ComparedOver::VelocityLimit,
+        most_speed: 0.0,
+        rms_error: 0.0,
+        most_error: 0.0,
+    };
 
-    /// Least squares over even velocities from `-most_speed` to `most_speed` without rest, neither value negative; the
-    /// law is the joint's own friction and offset (at equal velocities of both sides what is even in the velocity, an
-    /// offset or a difference of directions, falls out of the fit and stands in the error).
+    /// Least squares over the joint's recorded velocities, each with its samples, or without them over even velocities
+    /// from minus to plus its limit without rest; neither value negative. The law is the joint's own friction and
+    /// offset (at equal velocities of both sides what is even in the velocity, an offset or a difference of directions,
+    /// falls out of the fit and stands in the error).
     ///
     /// # Panics
     /// If the model does not have the joint.
     pub fn of(robot: &RobotModel, joint: usize) -> Self {
-        let limit = robot.model().joints()[joint].limits.velocity;
-        let most_speed = limit.filter(|speed| speed.is_finite() && *speed > 0.0).unwrap_or(DEFAULT_SPEED);
-        let speeds = (1..=SPEEDS).map(|k| most_speed * f64::from(k) / f64::from(SPEEDS));
-        let samples: Vec<(f64, f64)> =
-            speeds.flat_map(|dq| [dq, -dq]).map(|dq| (dq, own_friction(robot, joint, dq))).collect();
-        let sum = |value: &dyn Fn(f64, f64) -> f64| samples.iter().map(|&(dq, tau)| value(dq, tau)).sum::<f64>();
-        let count = samples.len() as f64;
-        let (size, square) = (sum(&|dq, _| dq.abs()), sum(&|dq, _| dq * dq));
-        let (by_sign, by_speed) = (sum(&|dq, tau| dq.signum() * tau), sum(&|dq, tau| dq * tau));
-        let determinant = count * square - size * size;
-        let both =
-            ((by_sign * square - by_speed * size) / determinant, (by_speed * count - by_sign * size) / determinant);
-        // On the boundary one value is zero and the other its own least squares.
-        let (coulomb, viscous) = match both {
-            (coulomb, viscous) if coulomb >= 0.0 && viscous >= 0.0 => (coulomb, viscous),
-            (coulomb, _) if coulomb < 0.0 => (0.0, (by_speed / square).max(0.0)),
-            _ => ((by_sign / count).max(0.0), 0.0),
+        let (over, samples) = velocities(robot, joint);
+        let law: Vec<f64> = samples.iter().map(|one| own_friction(robot, joint, one.velocity)).collect();
+        let fit = Fit::of(&samples, &law);
+        let (coulomb, viscous) = fit.values(&samples, &law);
+        let left = |one: &RecordedVelocity, tau: f64| tau - coulomb * one.velocity.signum() - viscous * one.velocity;
+        let errors: Vec<f64> = samples.iter().zip(&law).map(|(one, &tau)| left(one, tau)).collect();
+        let square: f64 = samples.iter().zip(&errors).map(|(one, error)| one.samples * error * error).sum();
+        let count: f64 = samples.iter().map(|one| one.samples).sum();
+        Self {
+            coulomb,
+            viscous,
+            over,
+            most_speed: samples.iter().map(|one| one.velocity.abs()).fold(0.0, f64::max),
+            rms_error: (square / count).sqrt(),
+            most_error: errors.iter().map(|error| error.abs()).fold(0.0, f64::max),
+        }
+    }
+
+    /// How the nearest friction of a joint follows the values of its law's terms: it is linear in them as long as none
+    /// of the two changes between zero and not.
+    ///
+    /// # Panics
+    /// If the model does not have the joint.
+    pub fn shares(robot: &RobotModel, joint: usize) -> Vec<TermShare> {
+        let (_, samples) = velocities(robot, joint);
+        let law: Vec<f64> = samples.iter().map(|one| own_friction(robot, joint, one.velocity)).collect();
+        let fit = Fit::of(&samples, &law);
+        let share = |term: usize| {
+            let unit = samples.iter().map(|one| own_friction_terms(robot, joint, one.velocity, Some(term)));
+            let (coulomb, viscous) = fit.values(&samples, &unit.collect::<Vec<_>>());
+            TermShare { term, coulomb, viscous }
         };
-        let left = |dq: f64, tau: f64| tau - coulomb * dq.signum() - viscous * dq;
-        let rms_error = (sum(&|dq, tau| left(dq, tau).powi(2)) / count).sqrt();
-        let most_error = samples.iter().map(|&(dq, tau)| left(dq, tau).abs()).fold(0.0, f64::max);
-        Self { coulomb, viscous, most_speed, rms_error, most_error }
+        let terms = robot.terms().enumerate();
+        let own = terms.filter(|(_, (term, _))| term.own_joint() == Some(joint) && !term.is_drive_inertia());
+        own.map(|(term, _)| share(term)).collect()
+    }
+}
+
+fn velocities(robot: &RobotModel, joint: usize) -> (ComparedOver, Vec<RecordedVelocity>) {
+    if let Some(recorded) = robot.recorded_velocities(joint) {
+        return (ComparedOver::RecordedMotion, recorded.to_vec());
+    }
+    let limit = robot.model().joints()[joint].limits.velocity;
+    let most = limit.filter(|speed| speed.is_finite() && *speed > 0.0).unwrap_or(DEFAULT_SPEED);
+    let speeds = (1..=SPEEDS).map(|k| most * f64::from(k) / f64::from(SPEEDS));
+    let even = speeds.flat_map(|dq| [dq, -dq]).map(|velocity| RecordedVelocity { velocity, samples: 1.0 });
+    (ComparedOver::VelocityLimit, even.collect())
+}
+
+/// Which of the two the fit leaves at zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fit {
+    Both,
+    CoulombOnly,
+    ViscousOnly,
+    Neither,
+}
+
+/// Below this share of `Σw Σw q̇²` the determinant of the normal equations is rounding: one speed only was recorded,
+/// at which sign and velocity say the same.
+const ONE_SPEED: f64 = 1e-9;
+
+/// `Σw`, `Σw |q̇|`, `Σw q̇²`, `Σw sign(q̇) τ`, `Σw q̇ τ`.
+fn sums(samples: &[RecordedVelocity], tau: &[f64]) -> [f64; 5] {
+    let mut sums = [0.0; 5];
+    for (one, tau) in samples.iter().zip(tau) {
+        let (weight, dq) = (one.samples, one.velocity);
+        let added = [weight, weight * dq.abs(), weight * dq * dq, weight * dq.signum() * tau, weight * dq * tau];
+        for (sum, added) in sums.iter_mut().zip(added) {
+            *sum += added;
+        }
+    }
+    sums
+}
+
+impl Fit {
+    fn of(samples: &[RecordedVelocity], tau: &[f64]) -> Self {
+        let [count, size, square, by_sign, by_speed] = sums(samples, tau);
+        if count * square - size * size <= ONE_SPEED * count * square {
+            return if by_sign > 0.0 { Self::CoulombOnly } else { Self::Neither };
+        }
+        // On the boundary one value is zero and the other its own least squares.
+        match Self::Both.values(samples, tau) {
+            (coulomb, viscous) if coulomb >= 0.0 && viscous >= 0.0 => Self::Both,
+            (coulomb, _) if coulomb < 0.0 && by_speed > 0.0 => Self::ViscousOnly,
+            (coulomb, _) if coulomb >= 0.0 && by_sign > 0.0 => Self::CoulombOnly,
+            _ => Self::Neither,
+        }
+    }
+
+    fn values(self, samples: &[RecordedVelocity], tau: &[f64]) -> (f64, f64) {
+        let [count, size, square, by_sign, by_speed] = sums(samples, tau);
+        match self {
+            Self::Both => {
+                let determinant = count * square - size * size;
+                let coulomb = (by_sign * square - by_speed * size) / determinant;
+                (coulomb, (by_speed * count - by_sign * size) / determinant)
+            }
+            Self::CoulombOnly => (by_sign / count, 0.0),
+            Self::ViscousOnly => (0.0, by_speed / square),
+            Self::Neither => (0.0, 0.0),
+        }
     }
 }

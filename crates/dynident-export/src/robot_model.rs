@@ -1,6 +1,7 @@
 //! What is exported: a robot with all its numbers.
 
 use crate::error::ExportError;
+use crate::recorded_velocity::RecordedVelocity;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
@@ -15,6 +16,7 @@ pub struct RobotModel {
     model: Model,
     terms: Vec<TorqueTerm>,
     values: Vec<f64>,
+    velocities: Vec<Vec<RecordedVelocity>>,
 }
 
 impl RobotModel {
@@ -37,7 +39,33 @@ impl RobotModel {
         }
         // Says what is wrong with terms.
         let checked = ParametricModel::new(model, terms)?;
-        Ok(Self { model: checked.model().clone(), terms: checked.terms().to_vec(), values })
+        Ok(Self { model: checked.model().clone(), terms: checked.terms().to_vec(), values, velocities: Vec::new() })
+    }
+
+    /// The same with the velocities at which its joints were recorded, joint by joint (none for a joint of which
+    /// nothing is known): what the friction of simulators is fitted over.
+    ///
+    /// # Errors
+    /// Velocities of another number of joints; a velocity of zero, weights that are not positive, numbers that are not
+    /// finite.
+    pub fn with_velocities(self, velocities: Vec<Vec<RecordedVelocity>>) -> Result<Self, ExportError> {
+        if velocities.len() != self.model.dof() {
+            return Err(ExportError::Velocities { expected: self.model.dof(), found: velocities.len() });
+        }
+        let is_wrong = |one: &RecordedVelocity| {
+            !(one.velocity.is_finite() && one.velocity != 0.0 && one.samples.is_finite() && one.samples > 0.0)
+        };
+        for (joint, velocities) in self.model.joints().iter().zip(&velocities) {
+            if let Some(&RecordedVelocity { velocity, samples }) = velocities.iter().find(|one| is_wrong(one)) {
+                return Err(ExportError::Velocity { joint: joint.name.clone(), velocity, samples });
+            }
+        }
+        Ok(Self { velocities, ..self })
+    }
+
+    /// The velocities at which a joint was recorded; none where there are none.
+    pub(crate) fn recorded_velocities(&self, joint: usize) -> Option<&[RecordedVelocity]> {
+        self.velocities.get(joint).map(Vec::as_slice).filter(|velocities| !velocities.is_empty())
     }
 
     /// Links, joints and gravity.

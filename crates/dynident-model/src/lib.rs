@@ -15,7 +15,7 @@
 //! | other ones in their place | [`Model::with_inertials`] |
 //! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; one by one: [`terms::TorqueTerm`] |
 //! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
-//! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_dh`] |
+//! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_sdf`], [`rewrite_dh`] |
 //! | a URDF of any model | [`write_urdf`] |
 //!
 //! ```
@@ -80,7 +80,7 @@ pub use loops::{LoopClosure, LoopError};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
 pub use place::{Located, line_and_column};
 pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot};
-pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, read_sdf};
+pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, SdfWriteError, read_sdf, rewrite_sdf};
 pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{

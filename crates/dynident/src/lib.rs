@@ -6,7 +6,7 @@
 //! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
 //! | a finished model on other logs | [`validate()`] |
 //! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
-//! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; a payload for a controller | [`export_model()`], [`export_payload()`] |
+//! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
 //! | what a recording holds | [`log_contents()`] |
@@ -66,7 +66,7 @@ pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
-pub use jobs::export::{export_model, export_payload};
+pub use jobs::export::{export_model, export_payload, export_simulator};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
 pub use jobs::iterate::{IterationWatch, iterate_study};

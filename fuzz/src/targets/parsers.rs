@@ -5,8 +5,8 @@ use dynident::iteration::IterationStore;
 use dynident::iteration::robot::{ToHost, read_log_table};
 use dynident::model::terms::{Expression, JointNames};
 use dynident::model::{
-    AuditFinding, Model, audit, link_changes, read_dh, read_mjcf_with, read_sdf, read_urdf, rewrite_inertials,
-    rewrite_mjcf, rewrite_urdf, slips, write_urdf,
+    AuditFinding, Joint, JointChange, Model, audit, link_changes, read_dh, read_mjcf_with, read_sdf, read_urdf,
+    rewrite_inertials, rewrite_mjcf, rewrite_sdf, rewrite_urdf, slips, write_urdf,
 };
 use dynident::recording::log::{ChannelGroup, ColumnRef, Columns, TimeColumn};
 use dynident::recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
@@ -113,7 +113,7 @@ pub(crate) fn mjcf() -> io::Result<Box<dyn Run>> {
     })
 }
 
-/// SDF: reading, and the URDF of it.
+/// SDF: reading, the URDF of it, and new drives in it.
 pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
     plain(|input| {
         let Ok(text) = core::str::from_utf8(input) else { return false };
@@ -123,6 +123,22 @@ pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
         };
         sound(&robot.model);
         assert!(!write_urdf(&robot.model).is_empty());
+        // The same drives everywhere: written, read, and written again without a change.
+        let drive = |joint: &Joint| JointChange {
+            joint: joint.name.clone(),
+            damping: Some(0.25),
+            friction: Some(0.5),
+            drive_inertia: None,
+        };
+        let joints: Vec<JointChange> = robot.model.joints().iter().map(drive).collect();
+        match rewrite_sdf(text, &[], &joints) {
+            Ok(written) => {
+                let Ok(again) = read_sdf(&written) else { panic!("not read again: {written}") };
+                assert!(again.model.joints().iter().all(|joint| joint.damping == Some(0.25)));
+                assert_eq!(rewrite_sdf(&written, &[], &joints).ok(), Some(written));
+            }
+            Err(error) => drop(said(&error)),
+        }
         true
     })
 }

@@ -5,7 +5,7 @@ use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{Exported, PayloadReader, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile};
-use dynident::{Study, export_model, export_payload, study_inputs};
+use dynident::{Study, export_model, export_payload, export_simulator, study_inputs};
 use std::path::PathBuf;
 
 /// Options of `export`.
@@ -52,6 +52,10 @@ enum Form {
     Ros2Yaml,
     /// All numbers of the model.
     Json,
+    /// Armature, damping, friction, delay and gain of every joint with error bars, for a simulator: JSON.
+    Simulator,
+    /// The same as a table of Markdown.
+    SimulatorTable,
     /// A payload for Universal Robots: a line of URScript.
     PayloadUr,
     /// A payload for Franka: JSON.
@@ -62,24 +66,33 @@ enum Form {
     PayloadAbb,
 }
 
+/// What is written.
+enum Kind {
+    Model(Target),
+    SimulatorJson,
+    SimulatorTable,
+    Payload(PayloadReader),
+}
+
 impl Form {
-    /// What is written: the model, or a payload.
-    fn kind(self) -> Result<Target, PayloadReader> {
+    fn kind(self) -> Kind {
         match self {
-            Self::C => Ok(Target::C),
-            Self::Cpp => Ok(Target::Cpp),
-            Self::Rust => Ok(Target::Rust),
-            Self::Python => Ok(Target::Python),
-            Self::Matlab => Ok(Target::Matlab),
-            Self::Mjcf => Ok(Target::Mjcf),
-            Self::Urdf => Ok(Target::Urdf),
-            Self::Sdf => Ok(Target::Sdf),
-            Self::Ros2Yaml => Ok(Target::Ros2Yaml),
-            Self::Json => Ok(Target::Json),
-            Self::PayloadUr => Err(PayloadReader::UniversalRobots),
-            Self::PayloadFranka => Err(PayloadReader::Franka),
-            Self::PayloadKuka => Err(PayloadReader::Kuka),
-            Self::PayloadAbb => Err(PayloadReader::Abb),
+            Self::C => Kind::Model(Target::C),
+            Self::Cpp => Kind::Model(Target::Cpp),
+            Self::Rust => Kind::Model(Target::Rust),
+            Self::Python => Kind::Model(Target::Python),
+            Self::Matlab => Kind::Model(Target::Matlab),
+            Self::Mjcf => Kind::Model(Target::Mjcf),
+            Self::Urdf => Kind::Model(Target::Urdf),
+            Self::Sdf => Kind::Model(Target::Sdf),
+            Self::Ros2Yaml => Kind::Model(Target::Ros2Yaml),
+            Self::Json => Kind::Model(Target::Json),
+            Self::Simulator => Kind::SimulatorJson,
+            Self::SimulatorTable => Kind::SimulatorTable,
+            Self::PayloadUr => Kind::Payload(PayloadReader::UniversalRobots),
+            Self::PayloadFranka => Kind::Payload(PayloadReader::Franka),
+            Self::PayloadKuka => Kind::Payload(PayloadReader::Kuka),
+            Self::PayloadAbb => Kind::Payload(PayloadReader::Abb),
         }
     }
 }
@@ -94,14 +107,24 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         inputs.push(options.result.clone());
         dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;
     }
+    let with_study = || {
+        let study = study.as_ref().map(|(study, path)| (study, *path));
+        study.ok_or_else(|| "--study STUDY.toml is missing: name the study that the result was made with".to_owned())
+    };
+    let drives = || -> Result<_, String> {
+        let (study, path) = with_study()?;
+        export_simulator(&options.result, (study, path), data).map_err(known_in(path))
+    };
     let exported = match options.to.kind() {
-        Ok(target) => {
-            let Some((study, path)) = &study else {
-                return Err("--study STUDY.toml is missing: name the study that the result was made with".to_owned());
-            };
+        Kind::Model(target) => {
+            let (study, path) = with_study()?;
             export_model(&options.result, (study, path), data, target).map_err(known_in(path))?
         }
-        Err(reader) => export_payload(&options.result, options.payload.as_deref(), reader).map_err(message_of)?,
+        Kind::SimulatorJson => drives()?.json().map_err(|error| error.to_string())?,
+        Kind::SimulatorTable => drives()?.table(),
+        Kind::Payload(reader) => {
+            export_payload(&options.result, options.payload.as_deref(), reader).map_err(message_of)?
+        }
     };
     write(options, context, exported)
 }

@@ -11,6 +11,8 @@ const URDF: &str = "identified.urdf";
 const TABLE: &str = "identified.toml";
 /// The same as an MJCF, where the user's is one.
 const MJCF: &str = "identified.xml";
+/// The same as an SDF, where the user's is one.
+const SDF: &str = "identified.sdf";
 /// Problems on standard error; the others stand in the file.
 const PROBLEMS_SHOWN: usize = 8;
 
@@ -20,7 +22,7 @@ pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
     /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well, of an MJCF
-    /// identified.xml).
+    /// identified.xml, of an SDF identified.sdf).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder of the recordings, in place of the study's own.
@@ -33,7 +35,7 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(message_of)?;
-    let out = (&*options.out, &[URDF, TABLE, MJCF, "report.html", "result.json"][..]);
+    let out = (&*options.out, &[URDF, TABLE, MJCF, SDF, "report.html", "result.json"][..]);
     let of_study = (&study, &*options.study, options.data.as_deref());
     refuse_overwriting(out, of_study, &["robot", "torque", "log", "arm", "format", "motion", "estimator"], &[])?;
     check_writable(&options.out).map_err(message_of)?;
@@ -48,7 +50,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         .file("result.json", pretty_json(result)?)
         .file("report.html", identification.report().map_err(message_of)?);
     let mut models = Vec::new();
-    for (name, text) in [(URDF, &identification.urdf), (TABLE, &identification.table), (MJCF, &identification.mjcf)] {
+    let texts = [
+        (URDF, &identification.urdf),
+        (TABLE, &identification.table),
+        (MJCF, &identification.mjcf),
+        (SDF, &identification.sdf),
+    ];
+    for (name, text) in texts {
         models.extend(text.as_ref().map(|_| name));
         set = match text {
             Some(text) => set.file(name, text.as_str()),

@@ -58,6 +58,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         "identified.urdf",
         "identified.toml",
         "identified.xml",
+        "identified.sdf",
         "identification.html",
         "controller.json",
     ]);

@@ -75,6 +75,9 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     if let Some(reason) = &r.no_mjcf {
         text += &wrapped(&format!("no identified.xml: {reason}"), 2);
     }
+    if let Some(reason) = &r.no_sdf {
+        text += &wrapped(&format!("no identified.sdf: {reason}"), 2);
+    }
     text
 }
 

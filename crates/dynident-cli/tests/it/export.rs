@@ -4,7 +4,7 @@ use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
 use std::path::Path;
 
-const FORMS: [(&str, &str); 10] = [
+const FORMS: [(&str, &str); 12] = [
     ("c", "arm_inverse_dynamics(const double q[2]"),
     ("cpp", "inline Vector inverse_dynamics(const Vector& q"),
     ("rust", "pub fn inverse_dynamics<M: Math>(q: &[f64; 2]"),
@@ -15,6 +15,8 @@ const FORMS: [(&str, &str); 10] = [
     ("sdf", "<model name=\"arm\">"),
     ("ros2-yaml", "  ros__parameters:\n    robot: \"arm\""),
     ("json", "\"schema\": \"dynident/model/1\""),
+    ("simulator", "\"schema\": \"dynident/simulator/1\""),
+    ("simulator-table", "| joint | armature | damping | frictionloss |"),
 ];
 
 /// A folder with the fixture's study and the result of it.

@@ -26,7 +26,7 @@ fn every_model_has_the_joints_and_torques_of_drake() {
     let text = std::fs::read_to_string(repository("golden/sdf.json")).unwrap();
     let golden: Value = serde_json::from_str(&text).unwrap();
     let models = golden["models"].as_object().unwrap();
-    assert_eq!(models.len(), 6);
+    assert_eq!(models.len(), 23);
     for (name, file) in models {
         let model = load_robot(repository(&format!("golden/sdf/{name}.sdf"))).unwrap().model;
         let names: Vec<&str> = file["joints"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();

@@ -7,3 +7,4 @@ mod compiled;
 mod descriptions;
 mod parameters;
 mod refused;
+mod simulator;

@@ -3,6 +3,7 @@
 use super::coverage::set_aside;
 use super::joint_filters::JointFilters;
 use super::mask::RowMask;
+use super::velocities::VelocityHistogram;
 use super::{PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
@@ -40,6 +41,7 @@ pub struct RowBuilder<'a> {
     temperature_c: Vec<f64>,
     segment: usize,
     motion: [Vec<f64>; 3],
+    velocities: Vec<VelocityHistogram>,
     filtered_rows: u64,
     samples: u64,
 }
@@ -69,6 +71,7 @@ impl<'a> RowBuilder<'a> {
             temperature_c: Vec::new(),
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
+            velocities: vec![VelocityHistogram::default(); places.len()],
             filtered_rows: 0,
             samples: 0,
         })
@@ -105,6 +108,11 @@ impl<'a> RowBuilder<'a> {
         self.samples
     }
 
+    /// How often each joint moved at which velocity so far.
+    pub(crate) fn into_velocities(self) -> Vec<VelocityHistogram> {
+        self.velocities
+    }
+
     /// Makes the rows of the next samples.
     ///
     /// # Errors
@@ -121,6 +129,10 @@ impl<'a> RowBuilder<'a> {
             in_model_order(block, &self.places, from, samples, &mut self.motion);
             let [q, dq, ddq] = &self.motion;
             let motion = JointMotion { samples, q, dq, ddq };
+            let known = settled(block, from, samples);
+            for (velocities, dq) in self.velocities.iter_mut().zip(dq.chunks_exact(samples)) {
+                velocities.add(&dq[known.clone()]);
+            }
             if !block.temperature_c.is_empty() {
                 self.temperature_c.clear();
                 for &place in &self.places {
@@ -157,7 +169,7 @@ impl<'a> RowBuilder<'a> {
                 rate_hz: block.rate_hz,
                 panels: &self.panels,
                 set_aside: &self.set_aside,
-                settled: settled(block, from, samples),
+                settled: known,
             })?;
             let mut rows = samples;
             for joint in 0..model.dof() {

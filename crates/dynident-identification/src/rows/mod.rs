@@ -12,6 +12,7 @@ mod mask;
 mod motion_noise;
 mod pass;
 mod reader;
+mod velocities;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
@@ -20,6 +21,7 @@ pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub(crate) use joint_filters::JointFilters;
 pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
+pub use velocities::VelocityHistogram;
 
 use crate::recording::LogError;
 use dynident_dynamics::Panels;

@@ -6,6 +6,7 @@ use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
 use super::mask::RowMask;
 use super::reader::read_beside;
+use super::velocities::VelocityHistogram;
 use crate::progress::Progress;
 use crate::recording::{LogError, MotionRecord, Recording, Samples};
 use crate::regressor_model::RegressorModel;
@@ -36,6 +37,8 @@ pub struct LogStatistics {
     pub filter_cutoff_hz: Option<f64>,
     /// Filtered rows of each joint.
     pub filtered_rows: u64,
+    /// How often each joint of the model moved at which velocity.
+    pub velocities: Vec<VelocityHistogram>,
 }
 
 /// One recording to be passed: everything but the consumer.
@@ -144,6 +147,7 @@ impl LogPass<'_> {
             filtered_rate_hz,
             filter_cutoff_hz: filter.map(|settings| settings.cutoff_hz.unwrap_or(0.4 * filtered_rate_hz)),
             filtered_rows,
+            velocities: builder.into_velocities(),
         })
     }
 

@@ -1,4 +1,4 @@
-//! SDF, the format of Gazebo: reading.
+//! SDF, the format of Gazebo: reading, and writing identified values back.
 //!
 //! Read is one model (in `<sdf>` or in its one `<world>`) with the models nested in it: links with `<inertial>`, joints
 //! of type revolute, continuous, prismatic and fixed, poses relative to any link, joint, frame or nested model, axes
@@ -36,9 +36,11 @@ mod notices;
 mod scopes;
 mod tree;
 mod values;
+mod write;
 
 pub use fault::{SdfError, SdfFault};
 pub use notices::{SdfLoss, SdfNotice};
+pub use write::{SdfWriteError, rewrite_sdf};
 
 use crate::place::line_and_column;
 use crate::spatial::Vec3;
@@ -85,18 +87,7 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
         return Err(fault_at(root, SdfFault::NotSdf { root: root_name }));
     }
     let version = version(root)?;
-    let worlds: Vec<Node<'_, '_>> = children(root, "world").collect();
-    let around = match worlds[..] {
-        [] => root,
-        [only] => only,
-        [_, second, ..] => return Err(fault_at(second, SdfFault::Several { what: "worlds" })),
-    };
-    let models: Vec<Node<'_, '_>> = children(around, "model").collect();
-    let model = match models[..] {
-        [only] => only,
-        [] => return Err(fault_at(around, SdfFault::NoModel { hint: include_hint(around) })),
-        [_, second, ..] => return Err(fault_at(second, SdfFault::Several { what: "models" })),
-    };
+    let (around, model) = model_of(root)?;
 
     // What stands there, and where.
     let found = scopes(model, version)?;
@@ -122,6 +113,22 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
         .and_then(|model| model.with_gravity(gravity))
         .map_err(|error| fault_at(root, SdfFault::Model(error)))?;
     Ok(SdfRobot { model, notices: notices.list })
+}
+
+/// The one model, and what stands around it: the document or its world.
+fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Node<'a, 'input>), SdfError> {
+    let worlds: Vec<Node<'_, '_>> = children(root, "world").collect();
+    let around = match worlds[..] {
+        [] => root,
+        [only] => only,
+        [_, second, ..] => return Err(fault_at(second, SdfFault::Several { what: "worlds" })),
+    };
+    let models: Vec<Node<'_, '_>> = children(around, "model").collect();
+    match models[..] {
+        [only] => Ok((around, only)),
+        [] => Err(fault_at(around, SdfFault::NoModel { hint: include_hint(around) })),
+        [_, second, ..] => Err(fault_at(second, SdfFault::Several { what: "models" })),
+    }
 }
 
 /// A model that stands in another file.

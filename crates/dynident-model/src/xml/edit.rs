@@ -5,7 +5,8 @@ use std::ops::Range;
 
 /// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays.
 pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
-    edits.sort_by_key(|(range, _)| range.start);
+    // What is put in before a piece that is replaced comes first.
+    edits.sort_by_key(|(range, _)| (range.start, range.end));
     let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
     let mut done = 0;
     for (range, new) in edits {

@@ -11,6 +11,7 @@ mod friction_laws;
 mod mjcf;
 mod mjcf_write;
 mod sdf;
+mod sdf_write;
 mod slips;
 mod urdf;
 mod urdf_write;

@@ -48,6 +48,7 @@ fn summary(
         torque_lag_s: of_joints(&|lag| lag.lag_s),
         torque_lag_std_s: of_joints(&|lag| lag.std_s),
         torque_lag_half_width_95_s: of_joints(&|lag| lag.half_width_95_s),
+        velocities: statistics.velocities.clone(),
         model_findings,
     }
 }

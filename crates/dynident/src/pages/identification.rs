@@ -399,6 +399,9 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     if let Some(reason) = &r.no_mjcf {
         verdict = verdict.point(Tone::Warning, format!("no identified.xml: {reason}"));
     }
+    if let Some(reason) = &r.no_sdf {
+        verdict = verdict.point(Tone::Warning, format!("no identified.sdf: {reason}"));
+    }
     page.add(verdict);
     let rows = r.bodies.iter().map(|body| {
         let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));

@@ -15,6 +15,7 @@ use dynident_identification::examination::{
 };
 use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
 use dynident_identification::payload::{DriveGain, PayloadResult};
+use dynident_identification::rows::VelocityHistogram;
 use dynident_identification::{BetweenLogs, Condition, CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -115,6 +116,9 @@ pub struct ResultFile {
     /// Why there is no identified.xml although the description is an MJCF and there is an identified.urdf.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_mjcf: Option<String>,
+    /// Why there is no identified.sdf although the description is an SDF and there is an identified.urdf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_sdf: Option<String>,
     /// Where the time went.
     pub timings_s: Timings,
 }
@@ -492,6 +496,9 @@ pub struct LogSummary {
     /// Half the widths of their 95 % intervals.
     #[serde(default)]
     pub torque_lag_half_width_95_s: Vec<Option<f64>>,
+    /// How often each joint moved at which velocity, in the order of `robot.joints`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub velocities: Vec<VelocityHistogram>,
     /// What follows from both.
     #[serde(default)]
     pub model_findings: Vec<Finding>,

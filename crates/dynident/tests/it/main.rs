@@ -36,6 +36,7 @@ mod result_files;
 mod reversed_torque;
 mod same_result;
 mod scales;
+mod sdf;
 mod simulated_loop;
 mod spoilt_logs;
 mod synthetic_truth;

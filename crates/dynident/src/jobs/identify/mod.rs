@@ -41,7 +41,7 @@ pub struct IdentificationOutcome {
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values, or one of the robot that a D-H table or an MJCF describes; without it,
+    /// The user's own URDF with the new values, or one of the robot that a D-H table, an MJCF or an SDF describes; without it,
     /// [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
     /// The user's own D-H table with the new values, where the description is one.
@@ -49,6 +49,9 @@ pub struct IdentificationOutcome {
     /// The user's own MJCF with the new values, where the description is one; without it, [`ResultFile::no_mjcf`] says
     /// why.
     pub mjcf: Option<String>,
+    /// The user's own SDF with the new values, where the description is one; without it, [`ResultFile::no_sdf`] says
+    /// why.
+    pub sdf: Option<String>,
     /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was
     /// fitted to, the first 100 000 filtered rows of a held-out one.
     pub traces: Vec<LogTrace>,
@@ -176,12 +179,17 @@ pub(in crate::jobs) fn written(
         Ok(files) => (Some(files.with_provenance(&provenance)), None),
         Err(reason) => (None, Some(reason)),
     };
-    let (mut urdf, mut table, mut mjcf, mut no_mjcf) = (None, None, None, None);
+    let (mut urdf, mut table, mut mjcf, mut no_mjcf, mut sdf, mut no_sdf) = (None, None, None, None, None, None);
     if let Some(files) = files {
         (urdf, table) = (Some(files.urdf), files.table);
         match files.mjcf {
             Some(Ok(text)) => mjcf = Some(text),
             Some(Err(reason)) => no_mjcf = Some(reason),
+            None => {}
+        }
+        match files.sdf {
+            Some(Ok(text)) => sdf = Some(text),
+            Some(Err(reason)) => no_sdf = Some(reason),
             None => {}
         }
     }
@@ -193,6 +201,7 @@ pub(in crate::jobs) fn written(
         verdict,
         no_urdf,
         no_mjcf,
+        no_sdf,
         inertials: &inertials,
         training,
     };
@@ -205,7 +214,7 @@ pub(in crate::jobs) fn written(
     }
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
-    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, mjcf, traces })
+    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, mjcf, sdf, traces })
 }
 
 /// The earlier result of an arm, and where it lies.
@@ -268,6 +277,7 @@ struct Parts<'a> {
     verdict: PhysicalVerdict,
     no_urdf: Option<String>,
     no_mjcf: Option<String>,
+    no_sdf: Option<String>,
     inertials: &'a [InertialParameters],
     training: TrainingResult,
 }
@@ -339,6 +349,7 @@ fn result_file(
         check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check((study, robot), &task.settings, diagnosis)),
         no_urdf: parts.no_urdf,
         no_mjcf: parts.no_mjcf,
+        no_sdf: parts.no_sdf,
         timings_s: parts.timings,
     }
 }

@@ -9,7 +9,7 @@ use dynident_model::mjcf::{Loss, included_from};
 use dynident_model::terms::JointProperty;
 use dynident_model::{
     Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Model, Robot, link_changes,
-    rewrite_dh, rewrite_mjcf, rewrite_urdf, write_urdf,
+    rewrite_dh, rewrite_mjcf, rewrite_sdf, rewrite_urdf, write_urdf,
 };
 use std::path::Path;
 
@@ -22,6 +22,8 @@ pub(super) struct ModelFiles {
     pub(super) table: Option<String>,
     /// The user's own MJCF, or why there is none.
     pub(super) mjcf: Option<Result<String, String>>,
+    /// The user's own SDF, or why there is none.
+    pub(super) sdf: Option<Result<String, String>>,
 }
 
 /// The user's description with the new values; joints that were locked keep theirs. Otherwise the reason why there is
@@ -39,24 +41,30 @@ pub(super) fn model_files(
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
     match format {
-        DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None }),
+        DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None, sdf: None }),
         DescriptionFormat::Mjcf => {
-            let mjcf = keeping_locked(robot, model.model(), inertials).and_then(|mut links| {
+            let mjcf = keeping(robot, model.model(), inertials).and_then(|mut links| {
                 note_sources(model, parameters, sources, |property| property.is_none(), &mut links);
                 let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
                 rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
             });
-            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: Some(mjcf) })
+            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: Some(mjcf), sdf: None })
         }
-        DescriptionFormat::Sdf => Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: None }),
+        DescriptionFormat::Sdf => {
+            let sdf = keeping(robot, model.model(), inertials).and_then(|mut links| {
+                note_sources(model, parameters, sources, lost_in_urdf, &mut links);
+                rewrite_sdf(text, &links, &joints).map_err(|error| error.to_string())
+            });
+            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: None, sdf: Some(sdf) })
+        }
         DescriptionFormat::Dh => {
             let table = rewrite_dh(text, &links, &joints).map_err(|error| error.to_string())?;
-            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None })
+            Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None, sdf: None })
         }
     }
 }
 
-/// URDF and the D-H table have no drive inertia.
+/// URDF, SDF and the D-H table have no drive inertia.
 fn lost_in_urdf(property: Option<JointProperty>) -> bool {
     !matches!(property, Some(JointProperty::Damping | JointProperty::Friction))
 }
@@ -83,18 +91,21 @@ fn joint_changes(model: &ParametricModel, parameters: &[f64]) -> Vec<JointChange
 }
 
 /// The changes of an MJCF, in which bodies behind locked joints must keep their mass, for MuJoCo takes no body with a
-/// joint and without mass: the body that carries them gets the rest.
-fn keeping_locked(
-    robot: &StudyRobot,
-    model: &Model,
-    inertials: &[InertialParameters],
-) -> Result<Vec<LinkChange>, String> {
+/// joint and without mass, or of an SDF, in which every fixed link must, for it counts as 1 kg without: the body that
+/// carries them gets the rest.
+fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) -> Result<Vec<LinkChange>, String> {
+    let is_sdf = robot.robot.format == DescriptionFormat::Sdf;
     let mut rest = inertials.to_vec();
     let mut bodies: Vec<Body> = model.bodies().to_vec();
     let mut kept = Vec::new();
     for (body, rest) in bodies.iter_mut().zip(&mut rest) {
         let own = robot.robot.model.bodies().iter().find(|original| original.name() == body.name());
-        let is_own = |name: &str| own.is_none_or(|own| own.links.iter().any(|link| link.name == name));
+        let moving = body.name().to_owned();
+        let is_own = |name: &str| match own {
+            _ if is_sdf => name == moving,
+            Some(own) => own.links.iter().any(|link| link.name == name),
+            None => true,
+        };
         let (own, behind): (Vec<_>, Vec<_>) = body.links.drain(..).partition(|link| is_own(&link.name));
         body.links = own;
         for link in &behind {
@@ -103,6 +114,12 @@ fn keeping_locked(
                 return Err(format!(
                     "the mass of `{}` behind a locked joint is not known: give it an <inertial>",
                     link.name
+                ));
+            }
+            if is_sdf && link.inertial.is_none() {
+                let name = &link.name;
+                return Err(format!(
+                    "the fixed link `{name}` has no mass, which SDF takes for 1 kg: give it an <inertial>"
                 ));
             }
             if let Some(inertial) = link.inertial {
@@ -122,7 +139,8 @@ fn keeping_locked(
             _ => None,
         });
         if let Some(note) = set {
-            let text = format!("without what stands behind locked joints and keeps its values: {}", kept.join(", "));
+            let what = if is_sdf { "is fixed to it" } else { "stands behind locked joints" };
+            let text = format!("without what {what} and keeps its values: {}", kept.join(", "));
             *note = Some(note.take().map_or(text.clone(), |note| format!("{note}; {text}")));
         }
     }
@@ -180,8 +198,9 @@ impl ModelFiles {
             let rest = earlier.map_or(&*text, |(_, rest)| rest);
             format!("{TABLE_SIGNATURE}{line}\n{}", rest.trim_start_matches('\u{feff}'))
         };
-        let mjcf = self.mjcf.map(|mjcf| mjcf.map(|text| commented_xml(&text, &line)));
-        Self { urdf: commented_xml(&self.urdf, &line), table: self.table.map(table), mjcf }
+        let commented = |text: Result<String, String>| text.map(|text| commented_xml(&text, &line));
+        let (mjcf, sdf) = (self.mjcf.map(commented), self.sdf.map(commented));
+        Self { urdf: commented_xml(&self.urdf, &line), table: self.table.map(table), mjcf, sdf }
     }
 }
 

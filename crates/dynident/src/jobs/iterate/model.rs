@@ -20,11 +20,12 @@ const RESULT: &str = "result.json";
 const URDF: &str = "identified.urdf";
 const TABLE: &str = "identified.toml";
 const MJCF: &str = "identified.xml";
+const SDF: &str = "identified.sdf";
 const CONTROLLER: &str = "controller.json";
 const PAGE: &str = "identification.html";
 
 /// All of them: what the iteration writes when it ends, and what is absent until then.
-pub(super) const MODEL_FILES: [&str; 5] = [RESULT, URDF, TABLE, CONTROLLER, PAGE];
+pub(super) const MODEL_FILES: [&str; 7] = [RESULT, URDF, TABLE, MJCF, SDF, CONTROLLER, PAGE];
 
 /// An iteration of legs that are identified together, as it ended.
 pub(super) struct EndedStage<'a> {
@@ -112,9 +113,9 @@ pub(super) fn robot_found(
         (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
         (PAGE, outcome.report()?.into_bytes()),
     ];
-    let IdentificationOutcome { urdf, table, mjcf, result, .. } = outcome;
+    let IdentificationOutcome { urdf, table, mjcf, sdf, result, .. } = outcome;
     files.extend(
-        [(URDF, urdf), (TABLE, table), (MJCF, mjcf)]
+        [(URDF, urdf), (TABLE, table), (MJCF, mjcf), (SDF, sdf)]
             .into_iter()
             .filter_map(|(name, text)| Some((name, text?.into_bytes()))),
     );

@@ -1,0 +1,237 @@
+#!/usr/bin/env python3
+"""One recording of seven joints (21 channels and time) in every format that logs are read from, each written by another program: time and memory of reading it.
+
+    log_formats.py DYNIDENT SCRATCH [--rows 1000000] [--runs 3] [--identify] [--check]
+
+A table of Markdown: size, wall time (the least of RUNS) and peak memory of `dynident log FILE`, with --identify those of `dynident identify` as well; as multiples of CSV's.
+--check asserts what does not depend on the machine's speed: every format gives CSV's numbers, and the memory of formats that are read as a stream does not grow between
+ROWS / 4 and ROWS. Files stay in SCRATCH and are not written again. Needs numpy, scipy, pyarrow, h5py, zstandard, rosbags."""
+import argparse
+import csv
+import gzip
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+import scipy.io
+import zstandard
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROBOT = ROOT / "robots/iiwa14.urdf"
+JOINTS = 7
+RATE_HZ = 1000.0
+SEED = 20261123
+# Peak memory moves by some MiB from run to run (pages of threads and of the allocator); three quarters of 80,000 rows are 10 MiB of numbers.
+STEADY_MIB = 5
+# A page of a Parquet column has one MiB of numbers as pyarrow writes it, and one page of each column is unpacked at a time: memory grows up to so many rows.
+PAGE_ROWS = 1 << 17
+FLAT = {"time": "t_s", "position": "q{1..7}_rad", "velocity": "dq{1..7}_rad_s", "torque": "tau{1..7}_Nm"}
+ARRAYS = {"time": "t", "position": "q[{0..6}]", "velocity": "dq[{0..6}]", "torque": "tau[{0..6}]"}
+TOPIC = {"time": "/arm.header.stamp", "position": "/arm.position[joint{1..7}]", "velocity": "/arm.velocity[joint{1..7}]", "torque": "/arm.effort[joint{1..7}]"}
+
+
+def recording(dynident, scratch, rows):
+    """t, q, dq, tau of the robot under way, noise on position and torque."""
+    random = np.random.default_rng(SEED)
+    t = np.arange(rows) / RATE_HZ
+    harmonics, base = 5, 2 * np.pi * 0.1
+    amplitude, phase = random.uniform(0.05, 0.2, (JOINTS, harmonics)), random.uniform(0, 2 * np.pi, (JOINTS, harmonics))
+    q, dq, ddq = np.zeros((3, rows, JOINTS))
+    for joint in range(JOINTS):
+        for k in range(harmonics):
+            omega = base * (k + 1)
+            angle = omega * t + phase[joint, k]
+            q[:, joint] += amplitude[joint, k] * np.sin(angle)
+            dq[:, joint] += amplitude[joint, k] * omega * np.cos(angle)
+            ddq[:, joint] -= amplitude[joint, k] * omega**2 * np.sin(angle)
+    # The motion repeats every ten seconds: its torque is computed once.
+    period = min(rows, round(10 * RATE_HZ))
+    states, torques = scratch / "states.csv", scratch / "torques.csv"
+    with open(states, "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([f"{name}{k + 1}" for name in ("q", "dq", "ddq") for k in range(JOINTS)])
+        writer.writerows(np.hstack([q, dq, ddq])[:period].tolist())
+    subprocess.run([dynident, "evaluate", ROBOT, "--states", states, "--quantity", "inverse-dynamics", "--out", torques], check=True, capture_output=True)
+    rigid = np.genfromtxt(torques, delimiter=",", skip_header=1)[:, -JOINTS:]
+    tau = np.resize(rigid, (rows, JOINTS)) + 0.5 * dq + 0.8 * np.tanh(dq / 0.01)
+    return t, q + 1e-6 * random.standard_normal(q.shape), dq, tau + 0.05 * random.standard_normal(tau.shape)
+
+
+def flat(t, q, dq, tau):
+    names = ["t_s"] + [f"{name}{k}_{unit}" for name, unit in [("q", "rad"), ("dq", "rad_s"), ("tau", "Nm")] for k in range(1, JOINTS + 1)]
+    return names, np.column_stack([t, q, dq, tau])
+
+
+def write_csv(path, *arrays):
+    names, table = flat(*arrays)
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        # What a double needs to come back.
+        writer.writerows(table.tolist())
+
+
+def write_packed(pack):
+    def write(path, *arrays):
+        plain = path.parent / "log.csv"
+        with open(plain, "rb") as source, pack(path) as target:
+            shutil.copyfileobj(source, target)
+    return write
+
+
+def write_json_lines(path, t, q, dq, tau):
+    with open(path, "w") as file:
+        for row in zip(t.tolist(), q.tolist(), dq.tolist(), tau.tolist()):
+            file.write(json.dumps(dict(zip(("t", "q", "dq", "tau"), row))) + "\n")
+
+
+def write_npy(path, t, q, dq, tau):
+    table = np.zeros(len(t), dtype=[("t", "f8"), ("q", "f8", JOINTS), ("dq", "f8", JOINTS), ("tau", "f8", JOINTS)])
+    table["t"], table["q"], table["dq"], table["tau"] = t, q, dq, tau
+    np.save(path, table)
+
+
+def write_hdf5(path, *arrays):
+    with h5py.File(path, "w") as file:
+        for name, values in zip(("t", "q", "dq", "tau"), arrays):
+            file.create_dataset(name, data=values, compression="gzip", compression_opts=4)
+
+
+def write_parquet(path, *arrays):
+    names, table = flat(*arrays)
+    pyarrow.parquet.write_table(pyarrow.table({name: column for name, column in zip(names, table.T)}), path, compression="zstd")
+
+
+def write_bag(plugin):
+    def write(path, t, q, dq, tau):
+        types = get_typestore(Stores.ROS2_JAZZY)
+        state, header, stamp = (types.types[name] for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+        names = [f"joint{k}" for k in range(1, JOINTS + 1)]
+        with Writer(path, version=9, storage_plugin=plugin) as writer:
+            connection = writer.add_connection("/arm", state.__msgtype__, typestore=types)
+            for seconds, *row in zip(t, q, dq, tau):
+                nanoseconds = 1_790_000_000_000_000_000 + round(1e9 * seconds)
+                message = state(header(stamp(nanoseconds // 10**9, nanoseconds % 10**9), ""), names, *row)
+                writer.write(connection, nanoseconds, types.serialize_cdr(message, state.__msgtype__))
+    return write
+
+
+# name: (columns, rows from which on memory does not grow, or None where all is held, writer). CSV comes first: the others are compared with it, and packed ones are made of it.
+FORMATS = {
+    "log.csv": (FLAT, 0, write_csv),
+    "log.csv.gz": (FLAT, 0, write_packed(lambda path: gzip.open(path, "wb", compresslevel=6))),
+    "log.csv.zst": (FLAT, 0, write_packed(lambda path: zstandard.open(path, "wb"))),
+    "log.jsonl": (ARRAYS, 0, write_json_lines),
+    "log.npy": (ARRAYS, None, write_npy),
+    "log.npz": (ARRAYS, None, lambda path, *arrays: np.savez(path, **dict(zip(("t", "q", "dq", "tau"), arrays)))),
+    "log.parquet": (FLAT, PAGE_ROWS, write_parquet),
+    "log.mat": (ARRAYS, None, lambda path, *arrays: scipy.io.savemat(path, dict(zip(("t", "q", "dq", "tau"), arrays)), do_compression=True)),
+    "log.h5": (ARRAYS, None, write_hdf5),
+    "bag_mcap": (TOPIC, 0, write_bag(StoragePlugin.MCAP)),
+    "bag_sqlite": (TOPIC, 0, write_bag(StoragePlugin.SQLITE3)),
+}
+
+
+def size(path):
+    return sum(file.stat().st_size for file in path.rglob("*")) if path.is_dir() else path.stat().st_size
+
+
+# A process begins with the memory of the one that made it, so a small one makes it.
+HELPER = """
+import json, resource, subprocess, sys, time
+start = time.perf_counter()
+code = subprocess.run(sys.argv[2:], stdout=open(sys.argv[1], "wb"), stderr=subprocess.DEVNULL).returncode
+print(json.dumps([time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024, code]))
+"""
+
+
+def measured(command):
+    """Wall time in seconds, peak memory in MiB, what was printed, exit status."""
+    with tempfile.NamedTemporaryFile() as printed:
+        helper = [sys.executable, "-S", "-c", HELPER, printed.name, *map(str, command)]
+        took, memory, code = json.loads(subprocess.run(helper, check=True, capture_output=True).stdout)
+        return took, memory, pathlib.Path(printed.name).read_bytes(), code
+
+
+def best(command, runs):
+    results = [measured(command) for _ in range(runs)]
+    if any(code not in (0, 1) for *_, code in results):
+        sys.exit(f"exit status {results[-1][-1]}: {' '.join(map(str, command))}")
+    return min(result[0] for result in results), max(result[1] for result in results), results[-1][2]
+
+
+def study(folder, name, columns):
+    text = f'[robot]\nfile = "{ROBOT}"\n\n[drive]\ndrive_inertia = false\n\n[format]\n'
+    text += f'time = {{ column = "{columns["time"]}" }}\n'
+    text += "".join(f'{key} = {{ columns = "{columns[key]}" }}\n' for key in ("position", "velocity", "torque"))
+    path = folder / f"{name}.toml"
+    path.write_text(text + f'\n[[log]]\nfile = "{name}"\n')
+    return path
+
+
+def numbers(printed, columns):
+    """Samples, missing values and range of every channel of the study, in order; time by its span."""
+    told = json.loads(printed)
+    channels = {channel["name"]: channel for channel in told["channels"]}
+    names = [columns[key].replace("{1..7}", "{}").replace("{0..6}", "{}") for key in ("position", "velocity", "torque")]
+    first = 0 if "{0..6}" in columns["position"] else 1
+    found = [channels[name.format(k)] for name in names for k in range(first, first + JOINTS)]
+    return [(channel["samples"], channel["missing"], channel["range"]) for channel in found]
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("dynident")
+    options.add_argument("scratch", type=pathlib.Path)
+    options.add_argument("--rows", type=int, default=1_000_000)
+    options.add_argument("--runs", type=int, default=3)
+    options.add_argument("--identify", action="store_true")
+    options.add_argument("--check", action="store_true")
+    chosen = options.parse_args()
+
+    def files(rows):
+        folder = chosen.scratch / str(rows)
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(not (folder / name).exists() for name in FORMATS):
+            arrays = recording(chosen.dynident, folder, rows)
+            for name, (_, _, write) in FORMATS.items():
+                if not (folder / name).exists():
+                    write(folder / name, *arrays)
+        return folder
+
+    folder = files(chosen.rows)
+    fewer = files(chosen.rows // 4) if chosen.check else None
+    head = ["file", "MB", "log, s", "of CSV's", "MiB"] + (["identify, s", "of CSV's", "MiB"] if chosen.identify else [])
+    print(f"{chosen.rows} rows\n\n| {' | '.join(head)} |\n|{' --- |' * len(head)}")
+    of_csv = None
+    for name, (columns, steady_rows, _) in FORMATS.items():
+        took, memory, printed = best([chosen.dynident, "log", folder / name, "--json"], chosen.runs)
+        cells = [took, memory]
+        if chosen.identify:
+            path = study(folder, name, columns)
+            cells += best([chosen.dynident, "identify", path, "--out", folder / "result", "--quiet"], 1)[:2]
+        values = numbers(printed, columns)
+        of_csv = of_csv or (cells, values)
+        shown = [f"{cells[0]:.2f} | {cells[0] / of_csv[0][0]:.2f} | {cells[1]:.0f}"]
+        if chosen.identify:
+            shown.append(f"{cells[2]:.1f} | {cells[2] / of_csv[0][2]:.2f} | {cells[3]:.0f}")
+        print(f"| `{name}` | {size(folder / name) / 1e6:.0f} | {' | '.join(shown)} |", flush=True)
+        if chosen.check:
+            assert values == of_csv[1], f"{name}: other numbers than CSV's"
+            assert all(samples == chosen.rows and missing == 0 for samples, missing, _ in values), name
+            if steady_rows is not None and chosen.rows // 4 >= steady_rows:
+                before = best([chosen.dynident, "log", fewer / name, "--json"], 1)[1]
+                assert memory < before + STEADY_MIB, f"{name}: {before:.0f} MiB became {memory:.0f} with four times the rows"
+
+
+if __name__ == "__main__":
+    main()

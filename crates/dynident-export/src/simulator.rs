@@ -1,0 +1,262 @@
+//! Joint parameters as simulators ask for them, with their error bars.
+
+use crate::descriptions::{left_out, plain};
+use crate::drive_torque::drive_inertia;
+use crate::error::ExportError;
+use crate::exported::Exported;
+use crate::nearest_friction::{ComparedOver, NearestFriction, TermShare};
+use crate::robot_model::RobotModel;
+use core::fmt::Write;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the schema of [`SimulatorFile`].
+pub const SIMULATOR_SCHEMA: &str = "dynident/simulator/1";
+
+/// Why a joint without drive inertia has no bar of it.
+const NO_DRIVE_INERTIA: &str = "the study has no drive inertia, so that a part of it stands in the links' (drive.drive_inertia = true asks for it)";
+
+/// Why friction that is zero has no bar.
+const NO_FRICTION: &str = "not in the identified law, or held at zero, which is its limit";
+
+/// What a simulator needs of every joint beside the bodies: `τ = armature q̈ + damping q̇ + frictionloss sign(q̇)`, the
+/// delay and the gain of the drive.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct SimulatorFile {
+    /// [`SIMULATOR_SCHEMA`].
+    pub schema: String,
+    /// The robot's name.
+    pub name: String,
+    /// Program and version.
+    pub written_by: String,
+    /// Where the values come from, what no simulator's joint holds, and what speaks against them; a sentence each.
+    pub notes: Vec<String>,
+    /// The delay of all joints together, ms, as [`SimulatorJoint::delay`]; null where the logs determine none.
+    pub common_delay: Option<SimulatorValue>,
+    /// Joints in the order of the robot.
+    pub joints: Vec<SimulatorJoint>,
+}
+
+/// The parameters of one joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct SimulatorJoint {
+    /// Its name.
+    pub name: String,
+    /// Inertia of the drive, kg m² (kg at a joint that slides): MuJoCo's `armature`, PhysX's `armature`.
+    pub armature: SimulatorValue,
+    /// Nm s/rad (N s/m): MuJoCo's `damping`, PhysX's `viscousFrictionCoefficient`.
+    pub damping: SimulatorValue,
+    /// Nm (N): MuJoCo's `frictionloss`, PhysX's `staticFrictionEffort` and `dynamicFrictionEffort`.
+    pub frictionloss: SimulatorValue,
+    /// What damping and frictionloss leave of the identified friction.
+    pub friction_error: FrictionError,
+    /// By how much the logged torque comes after the motion that it makes, ms. Of logs of a measured torque that is the
+    /// delay of the measurement; of logs of a commanded torque an actuator's delay is its negative. Null where the logs
+    /// determine none.
+    pub delay: Option<SimulatorValue>,
+    /// Nm (N) of joint torque for each unit of what was logged as torque.
+    pub actuator_gain: SimulatorValue,
+}
+
+/// A number with what is known of its error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct SimulatorValue {
+    /// The number.
+    pub value: f64,
+    /// Half the width of its 95 % interval; null where the logs do not tell one, and `note` says why.
+    pub half_width_95: Option<f64>,
+    /// Its unit.
+    pub unit: String,
+    /// What has to be known of it; null where there is nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+/// How far simplified friction is from the identified law and offset of a joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct FrictionError {
+    /// Root mean square, Nm (N).
+    pub rms_nm: f64,
+    /// Largest, Nm (N).
+    pub most_nm: f64,
+    /// Largest velocity that was compared, rad/s (m/s).
+    pub most_speed_rad_s: f64,
+    /// `recorded-motion`: by the velocities of the logs that were fitted to, those beside rest left out;
+    /// `velocity-limit`: by even velocities up to the joint's limit, for a result without recorded ones.
+    pub over: String,
+}
+
+/// What is known of the drives beside a robot's values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveKnowledge {
+    /// For each pair of the robot's terms the covariance of their values in units in which one is half of a 95 %
+    /// interval; none for terms that the logs do not tell by themselves.
+    pub term_products: Vec<Vec<Option<f64>>>,
+    /// For each term what keeps it from having an interval of its own; none where there is nothing to say.
+    pub term_notes: Vec<Option<String>>,
+    /// The common delay.
+    pub common_delay: Option<SimulatorValue>,
+    /// Joint by joint.
+    pub delays: Vec<Option<SimulatorValue>>,
+    /// Joint by joint.
+    pub actuator_gains: Vec<SimulatorValue>,
+}
+
+impl SimulatorFile {
+    /// The parameters of `robot`, whose friction is fitted over its recorded velocities, with the error bars that
+    /// follow from `knowledge`: `h² = aᵀ H a` for a value that is `a` times the terms' values and H
+    /// [`DriveKnowledge::term_products`].
+    ///
+    /// # Errors
+    /// [`ExportError::Values`] if `knowledge` is not of this robot.
+    pub fn of(robot: &RobotModel, knowledge: &DriveKnowledge, further: &[String]) -> Result<Self, ExportError> {
+        let (model, terms) = (robot.model(), robot.terms().count());
+        let DriveKnowledge { term_products, term_notes, common_delay, delays, actuator_gains } = knowledge;
+        let same = |found: usize, expected: usize| {
+            if found == expected { Ok(()) } else { Err(ExportError::Values { expected, found }) }
+        };
+        same(term_products.len(), terms)?;
+        term_products.iter().try_for_each(|row| same(row.len(), terms))?;
+        same(term_notes.len(), terms)?;
+        same(delays.len(), model.dof())?;
+        same(actuator_gains.len(), model.dof())?;
+        let rotors = drive_inertia(robot);
+        let joints = (0..model.dof()).map(|joint| {
+            let turns = model.joints()[joint].turns();
+            let unit = |turning: &str, sliding: &str| if turns { turning.to_owned() } else { sliding.to_owned() };
+            let nearest = NearestFriction::of(robot, joint);
+            let shares = NearestFriction::shares(robot, joint);
+            let of_shares = |share: fn(&TermShare) -> f64| {
+                shares.iter().map(|one| (one.term, share(one))).filter(|(_, share)| *share != 0.0).collect::<Vec<_>>()
+            };
+            let drives =
+                robot.terms().enumerate().map(|(term, (kind, _))| (term, kind.mass_matrix_entry(joint, joint)));
+            let drives: Vec<_> = drives.filter(|(_, share)| *share != 0.0).collect();
+            let value = |value: f64, parts: &[(usize, f64)], none: &str, unit: String| {
+                let (half_width_95, note) = knowledge.bar(parts, none);
+                SimulatorValue { value, half_width_95, unit, note }
+            };
+            SimulatorJoint {
+                name: model.joints()[joint].name.clone(),
+                armature: value(rotors[joint * model.dof() + joint], &drives, NO_DRIVE_INERTIA, unit("kg m^2", "kg")),
+                damping: value(nearest.viscous, &of_shares(|one| one.viscous), NO_FRICTION, unit("Nm s/rad", "N s/m")),
+                frictionloss: value(nearest.coulomb, &of_shares(|one| one.coulomb), NO_FRICTION, unit("Nm", "N")),
+                friction_error: FrictionError {
+                    rms_nm: nearest.rms_error,
+                    most_nm: nearest.most_error,
+                    most_speed_rad_s: nearest.most_speed,
+                    over: match nearest.over {
+                        ComparedOver::RecordedMotion => "recorded-motion".to_owned(),
+                        ComparedOver::VelocityLimit => "velocity-limit".to_owned(),
+                    },
+                },
+                delay: delays[joint].clone(),
+                actuator_gain: actuator_gains[joint].clone(),
+            }
+        });
+        let joints = joints.collect();
+        let notes = further.iter().cloned().chain(left_out(robot)).collect();
+        Ok(Self {
+            schema: SIMULATOR_SCHEMA.to_owned(),
+            name: model.name().to_owned(),
+            written_by: format!("dynident {}", env!("CARGO_PKG_VERSION")),
+            notes,
+            common_delay: common_delay.clone(),
+            joints,
+        })
+    }
+
+    /// As JSON.
+    ///
+    /// # Errors
+    /// [`ExportError::Json`], for numbers that are none.
+    pub fn json(&self) -> Result<Exported, ExportError> {
+        let text = serde_json::to_string_pretty(self).map_err(|error| ExportError::Json { message: error.to_string() });
+        Ok(Exported { text: text? + "\n", notes: self.notes.clone() })
+    }
+
+    /// As a table of Markdown with the notes below.
+    pub fn table(&self) -> Exported {
+        let mut text = format!(
+            "# {}\n\n| joint | armature | damping | frictionloss | friction off by, rms (most) | delay | gain |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+            cell(&self.name)
+        );
+        let mut remarks = Vec::new();
+        for joint in &self.joints {
+            let name = cell(&joint.name);
+            let delay = joint.delay.as_ref();
+            let _ = writeln!(
+                text,
+                "| {name} | {} | {} | {} | {:.3} ({:.3}) | {} | {} |",
+                with_bar(&joint.armature),
+                with_bar(&joint.damping),
+                with_bar(&joint.frictionloss),
+                joint.friction_error.rms_nm,
+                joint.friction_error.most_nm,
+                delay.map_or("not determined".to_owned(), with_bar),
+                with_bar(&joint.actuator_gain)
+            );
+            let values = [
+                ("armature", Some(&joint.armature)),
+                ("damping", Some(&joint.damping)),
+                ("frictionloss", Some(&joint.frictionloss)),
+                ("delay", delay),
+                ("gain", Some(&joint.actuator_gain)),
+            ];
+            let said = values.into_iter().filter_map(|(what, value)| Some((what, value?.note.as_ref()?)));
+            remarks.extend(said.map(|(what, note)| (format!("{what}: {}", plain(note)), name.clone())));
+        }
+        text += "\nBars are half the widths of 95 % intervals; `?` where the logs tell none.\n";
+        if let Some(delay) = &self.common_delay {
+            let _ = writeln!(text, "Delay of all joints together: {}.", with_bar(delay));
+        }
+        // What holds for several joints is said once.
+        let mut said: Vec<(String, Vec<String>)> = Vec::new();
+        for (remark, joint) in remarks {
+            match said.iter_mut().find(|(earlier, _)| *earlier == remark) {
+                Some((_, joints)) => joints.push(joint),
+                None => said.push((remark, vec![joint])),
+            }
+        }
+        let remarks = said.into_iter().map(|(remark, joints)| format!("{}, {remark}", joints.join(", ")));
+        let lines: Vec<String> = remarks.chain(self.notes.iter().map(|note| plain(note))).collect();
+        if !lines.is_empty() {
+            let _ = writeln!(text, "\n- {}", lines.join("\n- "));
+        }
+        Exported { text, notes: self.notes.clone() }
+    }
+}
+
+impl DriveKnowledge {
+    /// Half the width of the interval of `Σ share value` over the terms, or why there is none.
+    fn bar(&self, parts: &[(usize, f64)], none: &str) -> (Option<f64>, Option<String>) {
+        let notes: Vec<&str> = parts.iter().filter_map(|(term, _)| self.term_notes[*term].as_deref()).collect();
+        let note = (!notes.is_empty()).then(|| notes.join("; "));
+        if parts.is_empty() {
+            return (None, Some(none.to_owned()));
+        }
+        let pairs = parts.iter().flat_map(|a| parts.iter().map(move |b| (a, b)));
+        let square: Option<f64> = pairs.map(|(a, b)| Some(a.1 * b.1 * self.term_products[a.0][b.0]?)).sum();
+        (square.map(|square| square.max(0.0).sqrt()), note)
+    }
+}
+
+/// A value with its bar to the bar's second digit.
+fn with_bar(value: &SimulatorValue) -> String {
+    let unit = &value.unit;
+    match value.half_width_95.filter(|half| *half > 0.0 && half.is_finite()) {
+        Some(half) => {
+            let digits = (1.0 - half.log10().floor()).clamp(0.0, 12.0) as usize;
+            format!("{:.digits$} ± {half:.digits$} {unit}", value.value)
+        }
+        None => format!("{:.4} ± ? {unit}", value.value),
+    }
+}
+
+/// A name as a cell of a table.
+fn cell(name: &str) -> String {
+    plain(name).replace('|', "\\|")
+}

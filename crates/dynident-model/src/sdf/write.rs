@@ -1,0 +1,210 @@
+//! Writing identified values back into the user's own SDF.
+//!
+//! Only `<pose>`, `<mass>` and `<inertia>` in `<inertial>` of links and `<damping>` and `<friction>` of joints change;
+//! every other byte stays. A link that is fixed to another keeps its own inertial, for SDF takes one without for 1 kg:
+//! the link that carries it gets the rest.
+
+use super::fault::SdfError;
+use super::frames::{Carrier, Frames, carrier};
+use super::scopes::{Kind, Scopes, WORLD, full_name, scopes};
+use super::values::{child, required_text};
+use super::{model_of, read_sdf, version};
+use crate::inertial::InertialParameters;
+use crate::spatial::{Mat3, Transform, Vec3};
+use crate::urdf::{JointChange, LinkChange, MAX_MAGNITUDE};
+use crate::xml::MAX_NODES;
+use crate::xml::edit::{Line, Source, comment_text, edited};
+use roxmltree::{Document, Node, ParsingOptions};
+use std::collections::HashSet;
+use std::ops::Range;
+use thiserror::Error;
+
+/// Why an SDF could not be rewritten.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SdfWriteError {
+    /// The original is not readable.
+    #[error(transparent)]
+    Original(#[from] SdfError),
+    /// A change to something that the original does not hold.
+    #[error("the SDF has no {kind} `{name}`: write into the file that the model was read from")]
+    Unknown {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// Two changes to one link or joint.
+    #[error("two changes to {kind} `{name}`: give one")]
+    Repeated {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// An inertial that is to be taken away.
+    #[error("link `{link}` cannot be without <inertial>, which SDF takes for 1 kg: leave it as it is")]
+    Removed {
+        /// The link.
+        link: String,
+    },
+    /// A value that is not finite, or beyond what a description may hold.
+    #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
+    NotFinite {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A body that simulators refuse.
+    #[error(
+        "the new values of link `{link}` are those of no body with mass, which simulators refuse: use physically consistent parameters"
+    )]
+    NotPhysical {
+        /// The link.
+        link: String,
+    },
+}
+
+/// `original` with the changes made and every other byte as it was: inertials in the links' frames, as [`read_sdf`]
+/// gives them, are written about the centre of mass in the axes of the `<link>`, every number in the shortest form that
+/// reads back to the same `f64`. Drive inertia, which SDF has none of, is passed over.
+///
+/// # Errors
+/// If the original is no SDF, a link or joint is unknown or named twice, an inertial is to be removed, or a link would
+/// be no body that can be real.
+pub fn rewrite_sdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, SdfWriteError> {
+    read_sdf(original)?;
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    // The same text has been parsed a moment ago.
+    let Ok(document) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
+    let root = document.root_element();
+    let (_, model) = model_of(root)?;
+    let found = scopes(model, version(root)?)?;
+    let frames = Frames::new(&found)?;
+    let source = Source::new(original);
+    let mut edits = Vec::new();
+    let mut seen = HashSet::new();
+    for change in links {
+        let (name, inertial, note) = match change {
+            LinkChange::Set { link, inertial, note } => (link, inertial, note.as_deref()),
+            LinkChange::Remove { link } => return Err(SdfWriteError::Removed { link: link.clone() }),
+        };
+        let index = named(&found, name, Kind::Link, "link")?;
+        if !seen.insert(name) {
+            return Err(SdfWriteError::Repeated { kind: "link", name: name.clone() });
+        }
+        let origin = moved_origin(&found, &frames, index)?;
+        let link_from_moved = Transform { rotation: Mat3::IDENTITY, translation: origin };
+        let own = if origin == Vec3::ZERO { *inertial } else { inertial.expressed_in(&link_from_moved) };
+        write_inertial(&source, found.items[index].node, name, &own, note, &mut edits)?;
+    }
+    let mut seen = HashSet::new();
+    for change in joints {
+        let name = &change.joint;
+        let index = named(&found, name, Kind::Joint, "joint")?;
+        if !seen.insert(name) {
+            return Err(SdfWriteError::Repeated { kind: "joint", name: name.clone() });
+        }
+        write_dynamics(&source, found.items[index].node, change, &mut edits)?;
+    }
+    Ok(edited(original, edits))
+}
+
+fn named(found: &Scopes<'_, '_>, name: &str, kind: Kind, word: &'static str) -> Result<usize, SdfWriteError> {
+    let index = found.by_name.get(name).copied().filter(|&index| found.items[index].kind == kind);
+    index.ok_or_else(|| SdfWriteError::Unknown { kind: word, name: name.to_owned() })
+}
+
+/// Where the frame that the reader gives to a link stands in the link: at the joint that moves it.
+fn moved_origin(found: &Scopes<'_, '_>, frames: &Frames, link: usize) -> Result<Vec3, SdfError> {
+    let place = |name: &str| frames.of(name).unwrap_or(Transform::IDENTITY);
+    for joint in found.items.iter().filter(|item| item.kind == Kind::Joint) {
+        let is_fixed = joint.node.attribute("type") == Some("fixed");
+        let written = required_text(joint.node, "child")?;
+        let name = if written == WORLD { WORLD.to_owned() } else { full_name(&joint.scope, written) };
+        if !is_fixed && carrier(found, &name) == Some(Carrier::Link(link)) {
+            return Ok(place(&found.items[link].name).inverse().then(&place(&joint.name)).translation);
+        }
+    }
+    Ok(Vec3::ZERO)
+}
+
+/// The link's `<inertial>`; what stands in the old one beside pose, mass and inertia stays.
+fn write_inertial(
+    source: &Source<'_>,
+    node: Node<'_, '_>,
+    link: &str,
+    inertial: &InertialParameters,
+    note: Option<&str>,
+    edits: &mut Vec<(Range<usize>, String)>,
+) -> Result<(), SdfWriteError> {
+    if inertial.0.iter().any(|x| x.abs().is_nan() || x.abs() > MAX_MAGNITUDE) {
+        return Err(SdfWriteError::NotFinite { kind: "link", name: link.to_owned() });
+    }
+    let not_physical = || SdfWriteError::NotPhysical { link: link.to_owned() };
+    let (Some(com), Some(inertia), Some([a, b, c])) =
+        (inertial.com_m(), inertial.inertia_at_com(), inertial.principal_moments())
+    else {
+        return Err(not_physical());
+    };
+    let mass = inertial.mass_kg();
+    if com.0.iter().any(|x| x.abs() > MAX_MAGNITUDE) || !(mass > 0.0 && a > 0.0 && a + b >= c) {
+        return Err(not_physical());
+    }
+    let ([x, y, z], i) = (com.0, inertia.0);
+    let mut lines: Vec<Line> = vec![(0, "<inertial>".to_owned())];
+    lines.extend(note.map(|note| (1, format!("<!-- {} -->", comment_text(note)))));
+    lines.push((1, format!("<pose>{x:?} {y:?} {z:?} 0 0 0</pose>")));
+    lines.push((1, format!("<mass>{mass:?}</mass>")));
+    lines.push((1, "<inertia>".to_owned()));
+    let moments = [("ixx", i[0][0]), ("ixy", i[0][1]), ("ixz", i[0][2]), ("iyy", i[1][1]), ("iyz", i[1][2])];
+    lines.extend(moments.into_iter().chain([("izz", i[2][2])]).map(|(name, x)| (2, format!("<{name}>{x:?}</{name}>"))));
+    lines.push((1, "</inertia>".to_owned()));
+    let old = child(node, "inertial");
+    let others = old.into_iter().flat_map(|old| old.children().filter(Node::is_element));
+    let others = others.filter(|other| !matches!(other.tag_name().name(), "pose" | "mass" | "inertia"));
+    lines.extend(others.map(|other| (1, source.text[other.range()].to_owned())));
+    lines.push((0, "</inertial>".to_owned()));
+    edits.push(match old {
+        Some(old) => source.replacement(old, &lines),
+        None => source.insertion_at_start(node, &lines),
+    });
+    Ok(())
+}
+
+/// Damping and friction of one joint.
+fn write_dynamics(
+    source: &Source<'_>,
+    node: Node<'_, '_>,
+    change: &JointChange,
+    edits: &mut Vec<(Range<usize>, String)>,
+) -> Result<(), SdfWriteError> {
+    let unknown = || SdfWriteError::Unknown { kind: "joint", name: change.joint.clone() };
+    let axis = child(node, "axis").ok_or_else(unknown)?;
+    let dynamics = child(axis, "dynamics");
+    let mut new: Vec<Line> = Vec::new();
+    for (name, value) in [("damping", change.damping), ("friction", change.friction)] {
+        let Some(value) = value else { continue };
+        if !value.is_finite() {
+            return Err(SdfWriteError::NotFinite { kind: "joint", name: change.joint.clone() });
+        }
+        let line = (0, format!("<{name}>{value:?}</{name}>"));
+        match dynamics.and_then(|dynamics| child(dynamics, name)) {
+            Some(old) => edits.push(source.replacement(old, &[line])),
+            None => new.push(line),
+        }
+    }
+    if new.is_empty() {
+        return Ok(());
+    }
+    edits.push(match dynamics {
+        Some(dynamics) => source.insertion_at_start(dynamics, &new),
+        None => {
+            let inner = new.into_iter().map(|(depth, line)| (depth + 1, line));
+            let all = [(0, "<dynamics>".to_owned())].into_iter().chain(inner).chain([(0, "</dynamics>".to_owned())]);
+            source.insertion_at_start(axis, &all.collect::<Vec<_>>())
+        }
+    });
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! What a result knows of drives, for simulators.
+
+use super::{reservations, robot_model};
+use crate::error::Error;
+use crate::result::{BaseParameterResult, ResultFile, TermResult};
+use crate::study::Study;
+use dynident_export::{DriveKnowledge, ExportError, RobotModel, SimulatorFile, SimulatorValue};
+use dynident_identification::examination::{LagKind, TorqueLag};
+use std::path::Path;
+
+/// Armature, damping, frictionloss, delay and actuator gain of every joint as simulators mean them, with error bars:
+/// friction nearest to the identified law over the recorded velocities, bars by the covariance of `result.json`.
+/// `study` is the study that the result was made with; `data` a folder in which its robot is looked for as well.
+///
+/// # Errors
+/// If the result does not belong to the study's robot.
+pub fn export_simulator(
+    result_path: &Path,
+    (study, study_path): (&Study, &Path),
+    data: Option<&Path>,
+) -> Result<SimulatorFile, Error> {
+    let stored = ResultFile::read(result_path)?;
+    let robot = robot_model(&stored, result_path, (study, study_path), data)?;
+    let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
+    SimulatorFile::of(&robot, &drive_knowledge(&stored, &robot), &reservations(&stored)).map_err(cannot)
+}
+
+/// Covariance, delays and gains that a result holds, in the order of the robot's terms and joints.
+fn drive_knowledge(stored: &ResultFile, robot: &RobotModel) -> DriveKnowledge {
+    let known: Vec<Option<&TermResult>> = robot
+        .terms()
+        .map(|(term, _)| {
+            let (symbol, mut all) = (term.symbol(), stored.joints.iter().flat_map(|joint| &joint.terms));
+            all.find(|known| known.symbol == symbol)
+                .or_else(|| stored.couplings.iter().find(|known| known.symbol == symbol))
+        })
+        .collect();
+    let base: Vec<Option<usize>> = known.iter().map(|term| base_place(stored, (*term)?)).collect();
+    let product = |a: Option<usize>, b: Option<usize>| {
+        let (a, b) = (a?, b?);
+        let covariance = *stored.base_parameter_covariance.get(a)?.get(b)?;
+        let product = covariance * half_widths(&stored.base_parameters[a]) * half_widths(&stored.base_parameters[b]);
+        product.is_finite().then_some(product)
+    };
+    let joints: Vec<&str> = robot.model().joints().iter().map(|joint| joint.name.as_str()).collect();
+    let lag_of = |name: &&str| stored.joints.iter().find(|joint| joint.name == **name)?.torque_lag;
+    DriveKnowledge {
+        term_products: base.iter().map(|&a| base.iter().map(|&b| product(a, b)).collect()).collect(),
+        term_notes: known.iter().map(|term| term.and_then(|term| note(stored, term))).collect(),
+        common_delay: common_delay(stored),
+        delays: joints.iter().map(|name| lag_of(name).map(|lag| delay(&lag))).collect(),
+        actuator_gains: joints
+            .iter()
+            .zip(robot.model().joints())
+            .map(|(name, j)| gain(stored, name, j.turns()))
+            .collect(),
+    }
+}
+
+/// The base parameter that a term is by itself, if the logs excite it.
+fn base_place(stored: &ResultFile, term: &TermResult) -> Option<usize> {
+    let place =
+        stored.base_parameters.iter().position(|base| Some(&base.expression) == term.base_parameter.as_ref())?;
+    (term.std.is_some() && stored.base_parameters[place].excited).then_some(place)
+}
+
+/// Half of the 95 % interval in standard deviations.
+fn half_widths(base: &BaseParameterResult) -> f64 {
+    if base.std > 0.0 { base.bar_95() / base.std } else { 0.0 }
+}
+
+/// What keeps a term from having an interval of its own.
+fn note(stored: &ResultFile, term: &TermResult) -> Option<String> {
+    let expression = term.base_parameter.as_ref()?;
+    let base = stored.base_parameters.iter().find(|base| base.expression == *expression)?;
+    if !base.excited {
+        return Some(format!("the logs do not excite {}: it was held", base.symbol));
+    }
+    if term.std.is_none() {
+        let (value, bar) = (base.value, base.bar_95());
+        return Some(format!(
+            "{} is told only in the sum {expression} = {value:.4} ± {bar:.4}, which is shared out near the description",
+            term.symbol
+        ));
+    }
+    None
+}
+
+fn milliseconds(seconds: f64, half_width_95_s: Option<f64>, note: Option<String>) -> SimulatorValue {
+    let half_width_95 = half_width_95_s.map(|half| 1e3 * half).filter(|half| half.is_finite());
+    SimulatorValue { value: 1e3 * seconds, half_width_95, unit: "ms".to_owned(), note }
+}
+
+fn delay(lag: &TorqueLag) -> SimulatorValue {
+    let taken_off = (lag.taken_off_s != 0.0)
+        .then(|| format!("{:.3} ms of it were taken off the torque before the fit", 1e3 * lag.taken_off_s));
+    milliseconds(lag.lag_s, Some(lag.half_width_95_s), taken_off)
+}
+
+/// The delay of all joints together; where joints have their own or the study states them, it means nothing beside.
+fn common_delay(stored: &ResultFile) -> Option<SimulatorValue> {
+    let choice = &stored.method.torque_lag;
+    match choice.kind {
+        LagKind::None | LagKind::Common => choice.common.as_ref().map(delay),
+        LagKind::Stated => {
+            let first = *choice.lag_s.first()?;
+            let is_one = choice.lag_s.iter().all(|lag_s| *lag_s == first);
+            is_one.then(|| milliseconds(first, None, Some("as the study states".to_owned())))
+        }
+        LagKind::Joints => None,
+    }
+}
+
+fn gain(stored: &ResultFile, joint: &str, turns: bool) -> SimulatorValue {
+    let unit = format!("{} per unit logged", if turns { "Nm" } else { "N" });
+    let found = stored.drive_gains.iter().flatten().find(|gain| gain.joint == joint);
+    match found {
+        Some(found) => SimulatorValue {
+            value: found.gain,
+            half_width_95: found.identified.then_some(found.half_width_95).filter(|half| half.is_finite()),
+            unit,
+            note: found.reason.clone(),
+        },
+        None => SimulatorValue {
+            value: 1.0,
+            half_width_95: None,
+            unit,
+            note: Some(
+                "torque was taken as logged, in Nm (N) by the study's format: a gain of the torque scales all parameters, so that only logs with a known payload can tell it (drive.gains = \"unknown\")".to_owned(),
+            ),
+        },
+    }
+}
