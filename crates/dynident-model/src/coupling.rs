@@ -4,6 +4,9 @@ use crate::error::ModelError;
 use crate::joint::Joint;
 use dynident_lanes::Scalar;
 
+/// Joints that are followed, with their multipliers, and an offset.
+type Law = (Vec<(usize, f64)>, f64);
+
 /// How the joints of the tree follow the degrees of freedom: `q_tree = G q + q_0`, so `dq_tree = G dq`,
 /// `ddq_tree = G ddq`, and by virtual power `tau = Gᵀ tau_tree`.
 ///
@@ -27,8 +30,8 @@ impl JointCoupling {
     /// Joints that follow each other in a circle, or a multiplier or offset that is not finite.
     pub(crate) fn of(tree: &[Joint]) -> Result<Option<Self>, ModelError> {
         let place = |name: &str| tree.iter().position(|joint| joint.name == name);
-        // Of each joint that follows: its sources with their multipliers, and its offset.
-        let mut follows: Vec<Option<(Vec<(usize, f64)>, f64)>> = Vec::with_capacity(tree.len());
+        // Of each joint that follows.
+        let mut follows: Vec<Option<Law>> = Vec::with_capacity(tree.len());
         for joint in tree {
             let Some(mimic) = &joint.mimic else {
                 follows.push(None);

@@ -37,8 +37,8 @@ pub struct JointLimits {
     pub effort: Option<f64>,
 }
 
-/// A joint that follows others: `q = Σ multiplier · q_source + offset`. One source in URDF's `mimic`; the passive joints
-/// of a parallelogram may have two.
+/// A joint that follows others: `q = Σ multiplier · q_source + offset`. One source in URDF's `mimic`; the passive
+/// joints of a parallelogram may have two.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
     /// The joints that are followed.
@@ -90,8 +90,8 @@ pub struct Joint {
     pub friction: Option<f64>,
     /// Inertia of rotor and gear, reflected to the joint, kg m² (kg), where the description gives it.
     pub drive_inertia: Option<f64>,
-    /// What it follows, if it does not move by itself; see [`JointCoupling`](crate::JointCoupling). A joint that follows
-    /// one which is not in the model moves by itself.
+    /// What it follows, if it does not move by itself; see [`JointCoupling`](crate::JointCoupling). A joint that
+    /// follows one which is not in the model moves by itself.
     pub mimic: Option<Mimic>,
 }
 

@@ -124,7 +124,7 @@ pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mi
         }
     }
     let (gap_m, cut) = open(&q);
-    if !(gap_m <= CLOSES * cut.size_m) {
+    if gap_m.is_nan() || gap_m > CLOSES * cut.size_m {
         let (first, second) = named(cut);
         return Err(LoopError::Open { first, second, gap_m });
     }
@@ -155,7 +155,7 @@ pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mi
         }
         let (gap_m, cut) = open(&q);
         // The multipliers are as exact as the description's lengths, and postures far from zero lever them.
-        if !(gap_m <= 10.0 * CLOSES * cut.size_m) {
+        if gap_m.is_nan() || gap_m > 10.0 * CLOSES * cut.size_m {
             let (first, second) = named(cut);
             return Err(LoopError::NotLinear { first, second, gap_m });
         }

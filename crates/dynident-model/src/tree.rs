@@ -48,10 +48,10 @@ impl Body {
 
 /// A robot on a fixed base: a tree of joints and bodies in an order where parents come before children.
 ///
-/// Body `i` hangs on joint `i` of the tree ([`tree_joints`](Model::tree_joints)). Most robots have one degree of freedom
-/// for each of these; where joints follow others ([`Joint::mimic`]) the **degrees of freedom** ([`joints`](Model::joints))
-/// are those that move by themselves, and [`coupling`](Model::coupling) says how the tree follows them. Positions,
-/// velocities and torques are vectors over the degrees of freedom.
+/// Body `i` hangs on joint `i` of the tree ([`tree_joints`](Model::tree_joints)). Most robots have one degree of
+/// freedom for each of these; where joints follow others ([`Joint::mimic`]) the **degrees of freedom**
+/// ([`joints`](Model::joints)) are those that move by themselves, and [`coupling`](Model::coupling) says how the tree
+/// follows them. Positions, velocities and torques are vectors over the degrees of freedom.
 #[doc(alias("robot", "kinematic tree", "multibody"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
@@ -147,7 +147,8 @@ impl Model {
         self.coupling.as_ref().map_or(joint, |coupling| coupling.driving()[joint])
     }
 
-    /// The degrees of freedom that a joint of the tree moves with, and its velocity per velocity of each: its row of `G`.
+    /// The degrees of freedom that a joint of the tree moves with, and its velocity per velocity of each: its row of
+    /// `G`.
     pub fn drivers(&self, tree_joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let itself = self.coupling.is_none().then_some((tree_joint, 1.0));
         let followed = self.coupling.iter().flat_map(move |coupling| coupling.row(tree_joint).iter().copied());
@@ -279,8 +280,8 @@ impl Model {
         Ok(model)
     }
 
-    /// The same robot without some links: one that is fixed to another is taken off it; with one that moves with a joint
-    /// goes everything that hangs on it.
+    /// The same robot without some links: one that is fixed to another is taken off it; with one that moves with a
+    /// joint goes everything that hangs on it.
     ///
     /// # Errors
     /// If a link is not there, or a joint would follow one that went.

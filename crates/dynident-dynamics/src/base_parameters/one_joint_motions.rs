@@ -24,7 +24,7 @@ fn pairs(joints_on_path: usize) -> usize {
 /// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can
 /// separate from those of the bodies before it, at states as those of [`numerical_rank`](super::numerical_rank) that
 /// differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in
-/// `seed`. Where joints follow others no joint moves alone, and the rank is [`numerical_rank`](super::numerical_rank)'s.
+/// `seed`. Where joints follow others none moves alone: there it is [`numerical_rank`](super::numerical_rank).
 pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
     if model.coupling().is_some() {
         // Not the states that the base parameters of such robots are found at.

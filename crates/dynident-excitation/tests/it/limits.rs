@@ -1,6 +1,6 @@
 //! Values, derivatives, peaks and the re-check of all limits, on random trees and a real arm.
 
-use crate::common::{Harmonics, all_limits, grid, ur10};
+use crate::common::{Harmonics, all_limits, grid, palletizer, ur10};
 use dynident_excitation::Motion;
 use dynident_excitation::check::check_limits;
 use dynident_excitation::limits::{
@@ -72,6 +72,7 @@ fn gradient_agrees(model: &Model, seed: u64, swept: bool) {
 fn the_adjoint_equals_central_differences() {
     for swept in [false, true] {
         gradient_agrees(&ur10(), 3, swept);
+        gradient_agrees(&palletizer(), 4, swept);
         for seed in 0..12 {
             gradient_agrees(&random_tree(seed, 1 + seed as usize % 8), seed, swept);
         }
@@ -114,7 +115,7 @@ fn worst(set: &LimitSet, values: &[f64], samples: usize) -> BTreeMap<(LimitKind,
 
 #[test]
 fn check_agrees_with_the_values_and_peaks_bound_both() {
-    let mut models = vec![ur10()];
+    let mut models = vec![ur10(), palletizer()];
     models.extend((20..26).map(|seed| random_tree(seed, 2 + seed as usize % 6)));
     for (seed, model) in models.iter().enumerate() {
         let limits = all_limits(model);

@@ -2,8 +2,9 @@
 //!
 //! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
 //! Fixed joints are lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>`
-//! is unknown, never zero. A joint with `mimic` is no degree of freedom: it follows its source.
-//! Joints stand depth first, in the order of the document under each link. A rotation of `<origin>` is `rpy` or, as in URDF 1.1, `quat_xyzw`.
+//! is unknown, never zero. A joint with `mimic` is no degree of freedom: it follows its source. Joints stand depth
+//! first, in the order of the document under each link. A rotation of `<origin>` is `rpy` or, as in URDF 1.1,
+//! `quat_xyzw`.
 //!
 //! ```
 //! let text = r#"<robot name="pendulum">

@@ -2,13 +2,30 @@
 
 use dynident_excitation::Motion;
 use dynident_excitation::limits::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint, SelfCollision};
-use dynident_model::Model;
 use dynident_model::sample::Random;
+use dynident_model::{LoopClosure, Model};
 
 /// The UR10 of the repository.
 pub(crate) fn ur10() -> Model {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
     dynident_model::load_robot(path).expect("the repository holds robots/ur10.urdf").model
+}
+
+/// A palletising arm with its two closed chains: four joints that follow others, with limits of their own.
+pub(crate) fn palletizer() -> Model {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/robots/palletizer.urdf");
+    let tree = dynident_model::load_robot(path).expect("the repository holds the arm").model;
+    let cut = |first: &str, second: &str, passive: [&str; 2]| LoopClosure {
+        links: [first.to_owned(), second.to_owned()],
+        points_m: [[0.0; 3]; 2],
+        passive: passive.map(str::to_owned).to_vec(),
+    };
+    let cuts = [
+        cut("rod_end", "forearm_back", ["elbow_joint", "rod_joint"]),
+        cut("strut_end", "plate_back", ["strut_joint", "plate_joint"]),
+    ];
+    let followers = dynident_model::loops::followers(&tree, &cuts).expect("both are parallelograms");
+    tree.with_followers(&followers).expect("what was found is there")
 }
 
 /// Every kind of limit on every joint and body.
