@@ -34,10 +34,8 @@ fn law(term: &Value, dq: f64) -> f64 {
         }
         "power" => dq * dq.hypot(number("rounding")).powf(number("exponent") - 1.0),
         "offset" => 1.0,
-        // At rest of acceleration and at the reference temperature.
-        "drive-inertia" | "temperature-viscous" => 0.0,
-        // No friction: it follows positions.
-        "declared" => 0.0,
+        // At rest of acceleration and at the reference temperature; and what follows positions is no friction.
+        "drive-inertia" | "temperature-viscous" | "declared" => 0.0,
         other => panic!("{other}"),
     };
     term["value"].as_f64().unwrap() * function

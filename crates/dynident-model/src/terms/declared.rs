@@ -87,8 +87,10 @@ impl StateFunction for Declared {
         match &self.law {
             DeclaredLaw::Expression(expression) => expression.to_string(),
             DeclaredLaw::Table(table) => {
-                let [first, last] = table.range();
-                format!("table of q{} from {first} to {last}", self.joint + 1)
+                let points = table.points();
+                let [[first, begin], [last, end]] = [points[0], points[points.len() - 1]];
+                let (joint, count) = (self.joint + 1, points.len());
+                format!("table of q{joint}, {count} points from ({first}, {begin}) to ({last}, {end})")
             }
         }
     }

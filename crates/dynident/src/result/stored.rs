@@ -102,7 +102,25 @@ impl ResultFile {
             }
             values.push(stored.value);
         }
+        self.require_laws(path, model)?;
         Ok(values)
+    }
+
+    /// That declared torques follow what they followed when the result was made: their symbols do not say it.
+    fn require_laws(&self, path: &Path, model: &ParametricModel) -> Result<(), Error> {
+        for term in model.terms() {
+            let (Some(function), symbol) = (term.state_function(), term.symbol()) else { continue };
+            let stored = self.joints.iter().flat_map(|joint| &joint.terms).find(|stored| stored.symbol == symbol);
+            let law = stored.and_then(|stored| stored.law.clone()).unwrap_or_default();
+            let own = function.description();
+            if law != own {
+                let message = format!(
+                    "torque `{symbol}` was `{law}`, and the study says `{own}`: use the study that the result was made with"
+                );
+                return Err(Error::Result { path: path.to_owned(), message });
+            }
+        }
+        Ok(())
     }
 
     /// The base parameters of its physically consistent set, where it has one.

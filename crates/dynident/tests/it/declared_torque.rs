@@ -97,7 +97,10 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
         let mut terms = found.result.joints.iter().flat_map(|joint| &joint.terms);
         terms.find(|term| term.symbol == name).unwrap().law.clone().unwrap()
     };
-    assert_eq!([law("counterbalance"), law("spring")], ["sin(q3 + 0.3)", "table of q2 from -3 to 3"]);
+    assert_eq!(
+        [law("counterbalance"), law("spring")],
+        ["sin(q3 + 0.3)", "table of q2, 61 points from (-3, -13.8) to (3, 13.8)"]
+    );
     assert!(found.result.method.coincident.is_empty(), "{:?}", found.result.method.coincident);
     assert!(found.result.provenance.as_ref().unwrap().inputs.iter().any(|input| input.file.ends_with("spring.csv")));
     let [with, without] = [&found, &Job::new(folder.path(), &study("[drive]\nfriction = \"stated\"")).identify()]
@@ -120,6 +123,10 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     let other = Job::new(folder.path(), &study("[drive]\nfriction = \"stated\""));
     let refused = validate(&path, &other.study, &other.path, &Job::options(1)).unwrap_err().to_string();
     assert!(refused.contains("result.json"), "{refused}");
+    let declared = DECLARED.replace("q + 0.3", "q + 0.2");
+    let moved = Job::new(folder.path(), &study(&format!("[drive]\nfriction = \"stated\"\n{declared}")));
+    let refused = validate(&path, &moved.study, &moved.path, &Job::options(1)).unwrap_err().to_string();
+    assert!(refused.contains("`counterbalance` was `sin(q3 + 0.3)`, and the study says `sin(q3 + 0.2)`"), "{refused}");
 }
 
 /// What the logs choose of friction leaves declared torques alone.
