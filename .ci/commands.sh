@@ -91,6 +91,8 @@ run 0 "$examples/basin" 2 601
 run 0 "$examples/logistic_against_fourier" 2 0.3
 run 0 "$examples/differentiators" 1 12
 run 0 "$examples/import_speed" 20000
+# Every format gives the same numbers, and memory does not grow with the recording.
+run 0 "$venv/bin/python" benchmarks/log_formats.py "$dynident" "$out/log_formats" --rows 80000 --runs 1 --check
 run 0 "$examples/gallery" "$out/gallery.html"
 run 0 env DYNIDENT_BENCHMARK='target/debug/dynident-benchmark --only rnea' benchmarks/compare.sh --own-only "$venv" "$out/compare" 1
 run 0 python3 docs/summaries.py --check

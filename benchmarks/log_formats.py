@@ -111,17 +111,36 @@ def write_parquet(path, *arrays):
     pyarrow.parquet.write_table(pyarrow.table({name: column for name, column in zip(names, table.T)}), path, compression="zstd")
 
 
+def messages(types, t, q, dq, tau):
+    """JointState messages as rosbags serializes them: the first one by it, the others by what differs, the last one compared."""
+    state, header, stamp = (types.types[name] for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+    names = [f"joint{k}" for k in range(1, JOINTS + 1)]
+    nanoseconds = 1_790_000_000_000_000_000 + np.round(1e9 * t).astype(np.int64)
+
+    def serialized(k):
+        time = stamp(int(nanoseconds[k] // 10**9), int(nanoseconds[k] % 10**9))
+        return bytes(types.serialize_cdr(state(header(time, ""), names, q[k], dq[k], tau[k]), state.__msgtype__))
+
+    table = np.tile(np.frombuffer(serialized(0), dtype=np.uint8), (len(t), 1))
+    words = np.stack([nanoseconds // 10**9, nanoseconds % 10**9], axis=1).astype("<u4")
+    table[:, 4:12] = words.view(np.uint8)
+    # Three sequences at the end: a length, padding, numbers.
+    numbers = 8 * JOINTS
+    for place, values in enumerate((tau, dq, q)):
+        end = table.shape[1] - place * (numbers + 8)
+        table[:, end - numbers : end] = np.ascontiguousarray(values).view(np.uint8)
+    assert table[-1].tobytes() == serialized(len(t) - 1)
+    return state.__msgtype__, nanoseconds.tolist(), table
+
+
 def write_bag(plugin):
-    def write(path, t, q, dq, tau):
+    def write(path, *arrays):
         types = get_typestore(Stores.ROS2_JAZZY)
-        state, header, stamp = (types.types[name] for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
-        names = [f"joint{k}" for k in range(1, JOINTS + 1)]
+        name, nanoseconds, table = messages(types, *arrays)
         with Writer(path, version=9, storage_plugin=plugin) as writer:
-            connection = writer.add_connection("/arm", state.__msgtype__, typestore=types)
-            for seconds, *row in zip(t, q, dq, tau):
-                nanoseconds = 1_790_000_000_000_000_000 + round(1e9 * seconds)
-                message = state(header(stamp(nanoseconds // 10**9, nanoseconds % 10**9), ""), names, *row)
-                writer.write(connection, nanoseconds, types.serialize_cdr(message, state.__msgtype__))
+            connection = writer.add_connection("/arm", name, typestore=types)
+            for time, message in zip(nanoseconds, table):
+                writer.write(connection, time, message.tobytes())
     return write
 
 

@@ -19,6 +19,7 @@ mod json {
     use crate::arrays::MOST_COLUMNS;
     use crate::kind::FileFormat;
     use crate::table::slots;
+    use core::fmt::Write;
     use serde_json::Value;
     use std::collections::{HashMap, VecDeque};
     use std::io::Read;
@@ -39,9 +40,7 @@ mod json {
             Value::String(_) => {}
             Value::Array(items) => {
                 for (index, item) in items.iter().enumerate() {
-                    path.push('[');
-                    *path += &index.to_string();
-                    path.push(']');
+                    let _ = write!(path, "[{index}]");
                     flattened(item, path, found);
                     path.truncate(length);
                 }
@@ -63,6 +62,9 @@ mod json {
         path: PathBuf,
         reader: Box<dyn BufRead + Send>,
         line: u64,
+        /// The bytes of a line, and the path of a number in it: kept for the next one.
+        bytes: Vec<u8>,
+        number_path: String,
         names: Vec<String>,
         column_of: HashMap<String, usize>,
         /// Lines that were read in search of columns.
@@ -84,6 +86,8 @@ mod json {
             path: path.to_owned(),
             reader,
             line: 0,
+            bytes: Vec::new(),
+            number_path: String::new(),
             names: Vec::new(),
             column_of: HashMap::new(),
             waiting: VecDeque::new(),
@@ -116,9 +120,16 @@ mod json {
 
         /// The next line that is not blank.
         fn read(&mut self) -> Result<Option<Value>, FileError> {
+            let mut line = core::mem::take(&mut self.bytes);
+            let value = self.read_into(&mut line);
+            self.bytes = line;
+            value
+        }
+
+        fn read_into(&mut self, line: &mut Vec<u8>) -> Result<Option<Value>, FileError> {
             loop {
-                let mut line = Vec::new();
-                let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line);
+                line.clear();
+                let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', line);
                 let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;
                 if read == 0 {
                     return Ok(None);
@@ -127,7 +138,7 @@ mod json {
                 if read as u64 == LONGEST_LINE {
                     return Err(self.broken("it is longer than 4 MiB"));
                 }
-                let text = if self.line == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line) } else { &line };
+                let text = if self.line == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { &line[..] };
                 if text.trim_ascii().is_empty() {
                     continue;
                 }
@@ -168,11 +179,19 @@ mod json {
         fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError> {
             let Some(value) = self.next()? else { return Ok(false) };
             values.fill(f64::NAN);
-            flattened(&value, &mut String::new(), &mut |name, number| {
-                if let Some(slot) = self.column_of.get(name).and_then(|column| self.slot_of[*column]) {
+            let mut path = core::mem::take(&mut self.number_path);
+            // Lines mostly hold the same numbers in the same order, so that names need not be looked up.
+            let mut next = 0;
+            flattened(&value, &mut path, &mut |name, number| {
+                let is_next = self.names.get(next).is_some_and(|expected| expected == name);
+                let column = if is_next { Some(next) } else { self.column_of.get(name).copied() };
+                let Some(column) = column else { return };
+                next = column + 1;
+                if let Some(slot) = self.slot_of[column] {
                     values[slot] = number;
                 }
             });
+            self.number_path = path;
             Ok(true)
         }
 

@@ -198,13 +198,12 @@ fn write_dynamics(
     if new.is_empty() {
         return Ok(());
     }
-    edits.push(match dynamics {
-        Some(dynamics) => source.insertion_at_start(dynamics, &new),
-        None => {
-            let inner = new.into_iter().map(|(depth, line)| (depth + 1, line));
-            let all = [(0, "<dynamics>".to_owned())].into_iter().chain(inner).chain([(0, "</dynamics>".to_owned())]);
-            source.insertion_at_start(axis, &all.collect::<Vec<_>>())
-        }
+    edits.push(if let Some(dynamics) = dynamics {
+        source.insertion_at_start(dynamics, &new)
+    } else {
+        let inner = new.into_iter().map(|(depth, line)| (depth + 1, line));
+        let all = [(0, "<dynamics>".to_owned())].into_iter().chain(inner).chain([(0, "</dynamics>".to_owned())]);
+        source.insertion_at_start(axis, &all.collect::<Vec<_>>())
     });
     Ok(())
 }

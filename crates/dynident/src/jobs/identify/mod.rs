@@ -41,8 +41,8 @@ pub struct IdentificationOutcome {
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values, or one of the robot that a D-H table, an MJCF or an SDF describes; without it,
-    /// [`ResultFile::no_urdf`] says why.
+    /// The user's own URDF with the new values, or one of the robot that a D-H table, an MJCF or an SDF describes;
+    /// without it, [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
     /// The user's own D-H table with the new values, where the description is one.
     pub table: Option<String>,
