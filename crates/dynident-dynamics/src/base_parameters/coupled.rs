@@ -1,7 +1,7 @@
 //! Base parameters where joints follow others. The structure of a tree says which columns a joint's torque tells; a
 //! degree of freedom that moves several joints feels sums of these, whose dependencies are those of regressors at
-//! random states. Friction stays apart, as in the structural rule: it mixes with nothing, and each of its functions of the
-//! motion is one condition.
+//! random states. Friction stays apart, as in the structural rule: it mixes with nothing, and each of its functions
+//! of the motion is one condition.
 
 use super::numerical::stacked_regressors;
 use super::structural::friction_conditions;

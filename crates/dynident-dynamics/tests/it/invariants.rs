@@ -42,7 +42,7 @@ fn coupled(model: Model, random: &mut Random) -> Model {
     // What a joint follows has a lower place in this order: no circles, but sources before and after it in the tree.
     let count = names.len();
     let place = |k: usize| (5 * k + 2) % count.max(1);
-    let in_turn = count % 5 != 0;
+    let in_turn = !count.is_multiple_of(5);
     let mut followers = Vec::new();
     for k in 1..count {
         if random.uniform(0.0, 3.0) > 1.0 {

@@ -81,7 +81,7 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
         upper: joint.limits.upper,
         velocity: joint.limits.velocity,
         effort: joint.limits.effort,
-        mimic: joint.mimic.as_ref().map(|mimic| mimic.source_names()),
+        mimic: joint.mimic.as_ref().map(dynident_model::Mimic::source_names),
     });
     let bodies = model.bodies().iter().map(|body| {
         let prior = body.prior();
