@@ -19,7 +19,7 @@ use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3}
 /// # let rod = InertialParameters::from_centre_of_mass(2.0, Vec3([0.5, 0.0, 0.0]), &Mat3::ZERO);
 /// # let joint = Joint { name: "hinge".into(), kind: JointKind::Continuous, parent: None, placement: Transform::IDENTITY,
 /// #     axis: Vec3([0.0, 1.0, 0.0]), limits: JointLimits::default(), damping: None, friction: None,
-/// #     drive_inertia: None, mimic: None };
+/// #     drive_inertia: None, spring: None, mimic: None };
 /// # let model = Model::new("pendulum", Body { links: vec![link("base", None)] }, vec![joint],
 /// #     vec![Body { links: vec![link("bob", Some(rod))] }]).unwrap();
 /// use dynident_dynamics::{Workspace, inverse_dynamics};

@@ -19,7 +19,7 @@ const WORTH_SAYING: f64 = 1e-3;
 pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let (model, bodies) = (robot.model(), robot.model().body_count());
     let friction = frictions(robot, "frictionloss", "damping", &mut notes);
-    notes.extend(left_out(robot));
+    notes.extend(left_out(robot, true));
     notes.push("MJCF has no velocity limits; shapes are left out.".to_owned());
     let rotors = drive_inertia(robot);
     let [gx, gy, gz] = model.gravity().0;
@@ -49,7 +49,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
 pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
-    notes.extend(left_out(robot));
+    notes.extend(left_out(robot, false));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("URDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
     }
@@ -99,8 +99,8 @@ pub(crate) fn frictions(
     nearest
 }
 
-/// Terms that no joint of a description has.
-pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
+/// Terms that no joint of a description has; springs of joints where the format does not hold them.
+pub(crate) fn left_out(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
         let (symbol, unit) = (term.symbol(), term.unit());
@@ -114,6 +114,7 @@ pub(crate) fn left_out(robot: &RobotModel) -> Vec<String> {
                     "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
                 ));
             }
+            TorqueTerm::Declared(declared) if declared.is_spring && holds_springs => {}
             TorqueTerm::Declared(_) => {
                 let law = term.state_function().map_or_else(String::new, StateFunction::description);
                 notes.push(format!("Torque {symbol} of joint {}, {value:?} {unit} times {law}, is left out: add it to the simulator's control.", joint_name(robot, term)));
@@ -146,6 +147,14 @@ fn joint_name<'a>(robot: &'a RobotModel, term: &TorqueTerm) -> &'a str {
     term.own_joint().map_or("", |joint| &robot.model().joints()[joint].name)
 }
 
+/// Stiffness and reference of the spring at a joint of the tree.
+pub(crate) fn spring(robot: &RobotModel, tree_joint: usize) -> Option<(f64, f64)> {
+    let model = robot.model();
+    let (joint, described) = (model.joint_of(tree_joint)?, model.tree_joints()[tree_joint].spring?);
+    let is_it = |term: &TorqueTerm| matches!(term, TorqueTerm::Declared(own) if own.is_spring && own.joint == joint);
+    robot.terms().find(|(term, _)| is_it(term)).map(|(_, stiffness)| (stiffness, described.reference))
+}
+
 fn write_body(
     text: &mut String,
     robot: &RobotModel,
@@ -159,6 +168,9 @@ fn write_body(
     let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", body_name(body.name()), placement(&joint.placement));
     let _ = writeln!(text, "{pad}  {}", inertial(model, index)?);
     let kind = if joint.turns() { "hinge" } else { "slide" };
+    let spring = spring(robot, index).map_or_else(String::new, |(stiffness, reference)| {
+        format!(" stiffness=\"{stiffness:?}\" springref=\"{reference:?}\"")
+    });
     let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
     let range = limits.map_or(String::new(), |(lower, upper)| format!(" range=\"{lower:?} {upper:?}\""));
     let [x, y, z] = joint.axis.0;
@@ -166,7 +178,7 @@ fn write_body(
     let found = own.map_or(NearestFriction::NONE, |own| friction[own]);
     let _ = writeln!(
         text,
-        "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\"{range} armature=\"{:?}\" damping=\"{:?}\" frictionloss=\"{:?}\"/>",
+        "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\"{range}{spring} armature=\"{:?}\" damping=\"{:?}\" frictionloss=\"{:?}\"/>",
         attribute(&joint.name),
         own.map_or(0.0, |own| rotors[own * model.dof() + own]),
         found.viscous,

@@ -1,6 +1,6 @@
 //! SDF, which Gazebo and Drake read.
 
-use crate::descriptions::{attribute, comment, frictions, left_out, real_inertial};
+use crate::descriptions::{attribute, comment, frictions, left_out, real_inertial, spring};
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::nearest_friction::NearestFriction;
@@ -15,7 +15,7 @@ use dynident_model::{Body, Joint, JointKind, STANDARD_GRAVITY, Transform};
 pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
-    notes.extend(left_out(robot));
+    notes.extend(left_out(robot, true));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("SDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
     }
@@ -52,7 +52,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
             joints[index], i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]
         );
         let friction = model.joint_of(index).map_or(NearestFriction::NONE, |joint| friction[joint]);
-        write_joint(&mut text, joint, &friction, [&joints[index], parent, link]);
+        write_joint(&mut text, joint, (&friction, spring(robot, index)), [&joints[index], parent, link]);
         write_frames(&mut text, body, link, &mut names);
     }
     notes.extend(names.notes());
@@ -60,7 +60,12 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
     Ok(Exported { text, notes })
 }
 
-fn write_joint(text: &mut String, joint: &Joint, friction: &NearestFriction, [name, parent, child]: [&String; 3]) {
+fn write_joint(
+    text: &mut String,
+    joint: &Joint,
+    (friction, spring): (&NearestFriction, Option<(f64, f64)>),
+    [name, parent, child]: [&String; 3],
+) {
     let limits = &joint.limits;
     let stops = limits.lower.zip(limits.upper).filter(|(lower, upper)| lower < upper);
     let stops = stops.filter(|_| joint.kind != JointKind::Continuous);
@@ -83,11 +88,16 @@ fn write_joint(text: &mut String, joint: &Joint, friction: &NearestFriction, [na
             write_limit(element, value);
         }
     }
+    let springs = spring.map_or_else(String::new, |(stiffness, reference)| {
+        format!(
+            "          <spring_reference>{reference:?}</spring_reference>\n          <spring_stiffness>{stiffness:?}</spring_stiffness>\n"
+        )
+    });
     let [x, y, z] = joint.axis.0;
     let _ = write!(
         text,
         "    <joint name=\"{name}\" type=\"{kind}\">\n      {}\n      <parent>{parent}</parent>\n      <child>{child}</child>\n      <axis>\n        <xyz>{x:?} {y:?} {z:?}</xyz>\n        \
-         <limit>\n{limit}        </limit>\n        <dynamics>\n          <damping>{:?}</damping>\n          <friction>{:?}</friction>\n        </dynamics>\n      </axis>\n    </joint>\n",
+         <limit>\n{limit}        </limit>\n        <dynamics>\n          <damping>{:?}</damping>\n          <friction>{:?}</friction>\n{springs}        </dynamics>\n      </axis>\n    </joint>\n",
         pose(&joint.placement, parent),
         friction.viscous,
         friction.coulomb

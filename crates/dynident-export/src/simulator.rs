@@ -158,7 +158,7 @@ impl SimulatorFile {
             }
         });
         let joints = joints.collect();
-        let notes = further.iter().cloned().chain(left_out(robot)).collect();
+        let notes = further.iter().cloned().chain(left_out(robot, true)).collect();
         Ok(Self {
             schema: SIMULATOR_SCHEMA.to_owned(),
             name: model.name().to_owned(),

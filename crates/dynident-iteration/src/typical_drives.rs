@@ -26,6 +26,8 @@ pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
             (Some(JointProperty::DriveInertia), _) => effort / DRIVE_ACCELERATION,
             (Some(JointProperty::Friction), _) => FRICTION * effort,
             (Some(JointProperty::Damping), _) => FRICTION * effort / limits.velocity.unwrap_or(SPEED),
+            // A spring has the value of the description.
+            (Some(JointProperty::Stiffness), _) => continue,
             (
                 None,
                 TermAction::Inertia { .. }

@@ -37,6 +37,15 @@ pub struct JointLimits {
     pub effort: Option<f64>,
 }
 
+/// A spring about (along) a joint: the drive has to give `τ = stiffness (q - reference)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointSpring {
+    /// Nm/rad (N/m).
+    pub stiffness: f64,
+    /// Where it pulls to, rad or m.
+    pub reference: f64,
+}
+
 /// A joint that follows others: `q = Σ multiplier · q_source + offset`. One source in URDF's `mimic`; the passive
 /// joints of a parallelogram may have two.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,6 +99,9 @@ pub struct Joint {
     pub friction: Option<f64>,
     /// Inertia of rotor and gear, reflected to the joint, kg m² (kg), where the description gives it.
     pub drive_inertia: Option<f64>,
+    /// The spring of the description. Rigid-body dynamics know nothing of it: it is a torque term,
+    /// [`Declared::springs`](crate::terms::Declared::springs).
+    pub spring: Option<JointSpring>,
     /// What it follows, if it does not move by itself; see [`JointCoupling`](crate::JointCoupling). A joint that
     /// follows one which is not in the model moves by itself.
     pub mimic: Option<Mimic>,

@@ -75,7 +75,7 @@ pub use coupling::JointCoupling;
 pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
-pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic, MimicSource};
+pub use joint::{Joint, JointKind, JointLimits, JointMap, JointSpring, Mimic, MimicSource};
 pub use loops::{LoopClosure, LoopError};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
 pub use place::{Located, line_and_column};

@@ -69,6 +69,7 @@ fn plain_joint(name: String, kind: JointKind, parent: Option<usize>, placement: 
         damping: None,
         friction: None,
         drive_inertia: None,
+        spring: None,
         mimic: None,
     }
 }

@@ -129,6 +129,7 @@ pub(crate) fn sdf() -> io::Result<Box<dyn Run>> {
             damping: Some(0.25),
             friction: Some(0.5),
             drive_inertia: None,
+            stiffness: Some(2.0),
         };
         let joints: Vec<JointChange> = robot.model.joints().iter().map(drive).collect();
         match rewrite_sdf(text, &[], &joints) {

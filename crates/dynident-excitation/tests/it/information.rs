@@ -29,7 +29,14 @@ fn derivatives_by_the_motion_equal_differences() {
         for (joint, text) in [(0, "sin(2 * q) * cos(q3) + q2"), (2, "exp(-q^2 / 4) * dq1 + q * dq")] {
             let expression = Expression::parse(text, &JointNames { own: Some(joint), names: &[] }).unwrap();
             let (name, law) = (format!("declared{joint}"), DeclaredLaw::Expression(expression));
-            terms.push(TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None }));
+            terms.push(TorqueTerm::Declared(Declared {
+                name,
+                joint,
+                law,
+                unit: "Nm".to_owned(),
+                nominal: None,
+                is_spring: false,
+            }));
         }
         let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());

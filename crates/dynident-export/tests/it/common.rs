@@ -41,7 +41,7 @@ pub(crate) fn with_all_terms(model: Model) -> RobotModel {
     let power = |exponent| TorqueTerm::Power(Power { joint: last, exponent, rounding: 1e-3 });
     let declared = |name: &str, joint, law| {
         let (name, unit) = (name.to_owned(), "Nm".to_owned());
-        TorqueTerm::Declared(Declared { name, joint, law, unit, nominal: None })
+        TorqueTerm::Declared(Declared { name, joint, law, unit, nominal: None, is_spring: false })
     };
     let expression = |own, text: &str| {
         DeclaredLaw::Expression(Expression::parse(text, &JointNames { own: Some(own), names: &[] }).unwrap())

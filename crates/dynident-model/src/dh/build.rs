@@ -74,6 +74,7 @@ pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
             damping: source.number("damping", damping)?,
             friction: source.number("friction", friction)?,
             drive_inertia: None,
+            spring: None,
             mimic: None,
         });
         let inertial = row

@@ -280,6 +280,7 @@ impl<'t> Reader<'t> {
             damping: element.damping,
             friction: element.friction,
             drive_inertia: element.drive_inertia,
+            spring: element.spring,
             mimic: None,
         })
     }

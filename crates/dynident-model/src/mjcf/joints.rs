@@ -5,7 +5,7 @@ use super::compiler::Compiler;
 use super::expanded::Place;
 use super::fault::{MjcfError, MjcfFault};
 use super::notices::{Loss, Notices};
-use crate::joint::{JointKind, JointLimits};
+use crate::joint::{JointKind, JointLimits, JointSpring};
 use crate::spatial::{Transform, Vec3};
 use crate::xml::shortened;
 
@@ -23,6 +23,7 @@ pub(super) struct JointElement {
     pub(super) damping: Option<f64>,
     pub(super) friction: Option<f64>,
     pub(super) drive_inertia: Option<f64>,
+    pub(super) spring: Option<JointSpring>,
 }
 
 /// A joint; `body_from_frame` is where the `<frame>` around it stands.
@@ -69,9 +70,11 @@ pub(super) fn joint(
         notices.note(stated, Loss::DampingPolynomial { joint: label.clone() });
     }
     let (stiffness, is_polynomial) = first("stiffness")?;
-    if is_polynomial || stiffness.is_some_and(|stiffness| stiffness != 0.0) {
-        notices.note(stated, Loss::Spring { joint: label });
+    if is_polynomial {
+        notices.note(stated, Loss::SpringPolynomial { joint: label });
     }
+    let reference = angle(stated.number("springref")?.unwrap_or(0.0));
+    let spring = stiffness.filter(|stiffness| *stiffness != 0.0);
     Ok(JointElement {
         name,
         place: stated.place,
@@ -88,6 +91,7 @@ pub(super) fn joint(
         damping,
         friction: stated.number("frictionloss")?,
         drive_inertia: stated.size("armature")?,
+        spring: spring.map(|stiffness| JointSpring { stiffness, reference }),
     })
 }
 

@@ -26,8 +26,8 @@ pub enum Loss {
         /// Why.
         why: &'static str,
     },
-    /// A joint with a spring.
-    Spring {
+    /// A joint with a spring that is no straight line: its first factor counts alone.
+    SpringPolynomial {
         /// The joint.
         joint: String,
     },
@@ -83,7 +83,7 @@ impl Loss {
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
-            Self::Spring { .. } => "spring",
+            Self::SpringPolynomial { .. } => "spring-polynomial",
             Self::DampingPolynomial { .. } => "damping-polynomial",
             Self::OneSidedEffort { .. } => "one-sided-effort",
             Self::GravityCompensation { .. } => "gravity-compensation",
@@ -105,8 +105,11 @@ impl fmt::Display for Loss {
                     "the mass of body `{body}` {why}, which is not computed: it counts as unknown; give the body an <inertial>"
                 )
             }
-            Self::Spring { joint } => {
-                write!(f, "joint {joint} has a spring (`stiffness`), which the model does not hold")
+            Self::SpringPolynomial { joint } => {
+                write!(
+                    f,
+                    "joint {joint} has a spring (`stiffness`) that is no straight line: its first factor counts alone"
+                )
             }
             Self::DampingPolynomial { joint } => {
                 write!(

@@ -256,7 +256,12 @@ fn drive(
     change: &JointChange,
     edits: &mut Vec<(Range<usize>, String)>,
 ) -> Result<(), MjcfWriteError> {
-    let values = [("damping", change.damping), ("frictionloss", change.friction), ("armature", change.drive_inertia)];
+    let values = [
+        ("damping", change.damping),
+        ("frictionloss", change.friction),
+        ("armature", change.drive_inertia),
+        ("stiffness", change.stiffness),
+    ];
     let mut new = String::new();
     for (name, value) in values {
         let Some(value) = value else { continue };

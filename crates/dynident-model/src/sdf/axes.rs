@@ -3,10 +3,9 @@
 use super::Version;
 use super::fault::{SdfError, SdfFault, fault_at};
 use super::frames::Frames;
-use super::notices::{Notices, SdfLoss};
 use super::scopes::{Item, MODEL, full_name};
 use super::values::{child, flag, number, number_of_any_size, numbers_in, required_text, word_of};
-use crate::joint::{JointKind, JointLimits, Mimic};
+use crate::joint::{JointKind, JointLimits, JointSpring, Mimic};
 use crate::spatial::Vec3;
 use roxmltree::Node;
 
@@ -21,17 +20,12 @@ pub(super) struct Axis {
     pub(super) limits: JointLimits,
     pub(super) damping: Option<f64>,
     pub(super) friction: Option<f64>,
+    pub(super) spring: Option<JointSpring>,
     pub(super) mimic: Option<Mimic>,
 }
 
 /// The axis of a joint that slides or turns.
-pub(super) fn axis(
-    joint: &Item<'_, '_>,
-    slides: bool,
-    version: Version,
-    frames: &Frames,
-    notices: &mut Notices,
-) -> Result<Axis, SdfError> {
+pub(super) fn axis(joint: &Item<'_, '_>, slides: bool, version: Version, frames: &Frames) -> Result<Axis, SdfError> {
     let missing = || SdfFault::Missing { element: "joint".to_owned(), kind: "element", name: "axis" };
     let node = child(joint.node, "axis").ok_or_else(|| fault_at(joint.node, missing()))?;
     let mut found = Axis {
@@ -40,6 +34,7 @@ pub(super) fn axis(
         limits: JointLimits::default(),
         damping: None,
         friction: None,
+        spring: None,
         mimic: None,
     };
     if let Some(limit) = child(node, "limit") {
@@ -63,9 +58,9 @@ pub(super) fn axis(
     if let Some(dynamics) = child(node, "dynamics") {
         found.damping = number(dynamics, "damping")?;
         found.friction = number(dynamics, "friction")?;
-        if number(dynamics, "spring_stiffness")?.is_some_and(|stiffness| stiffness != 0.0) {
-            notices.note(dynamics, SdfLoss::Spring { joint: joint.name.clone() });
-        }
+        let stiffness = number(dynamics, "spring_stiffness")?.filter(|stiffness| *stiffness != 0.0);
+        let reference = number(dynamics, "spring_reference")?.unwrap_or(0.0);
+        found.spring = stiffness.map(|stiffness| JointSpring { stiffness, reference });
     }
     found.mimic = child(node, "mimic").map(|mimic| followed(joint, mimic)).transpose()?;
     Ok(found)

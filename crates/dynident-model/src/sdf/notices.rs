@@ -24,11 +24,6 @@ pub enum SdfLoss {
         /// Why.
         why: &'static str,
     },
-    /// A joint with a spring.
-    Spring {
-        /// The joint.
-        joint: String,
-    },
     /// A link on which gravity does not act.
     Weightless {
         /// The link.
@@ -51,7 +46,6 @@ impl SdfLoss {
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
-            Self::Spring { .. } => "spring",
             Self::Weightless { .. } => "weightless",
             Self::AddedMass { .. } => "added-mass",
             Self::Include { .. } => "include",
@@ -64,9 +58,6 @@ impl fmt::Display for SdfLoss {
         match self {
             Self::UnknownMass { link, why } => {
                 write!(f, "the mass of link `{link}` {why}: it counts as unknown; give the link an <inertial>")
-            }
-            Self::Spring { joint } => {
-                write!(f, "joint `{joint}` has a spring (`spring_stiffness`), which the model does not hold")
             }
             Self::Weightless { link } => {
                 write!(f, "link `{link}` has no gravity, which the model does not hold: its weight counts in full")

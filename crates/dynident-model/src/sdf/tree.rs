@@ -39,7 +39,7 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
         return Err(fault_at(found.model, missing));
     };
     note_includes(found.items[first].node.document().root_element(), notices);
-    let connections = connections(found, frames, notices)?;
+    let connections = connections(found, frames)?;
 
     // Who carries whom.
     let mut carried_by: HashMap<usize, usize> = HashMap::new();
@@ -118,6 +118,7 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
                 damping: axis.damping,
                 friction: axis.friction,
                 drive_inertia: None,
+                spring: axis.spring,
                 mimic: axis.mimic.clone(),
             });
             if tree.joints.len() > MAX_MOVING_JOINTS {
@@ -152,7 +153,6 @@ fn several(found: &Scopes<'_, '_>, (first, second): (&str, usize)) -> SdfError {
 fn connections<'s, 'a, 'input>(
     found: &'s Scopes<'a, 'input>,
     frames: &Frames,
-    notices: &mut Notices,
 ) -> Result<Vec<Connection<'s, 'a, 'input>>, SdfError> {
     let mut connections = Vec::new();
     for item in found.items.iter().filter(|item| item.kind == Kind::Joint) {
@@ -190,7 +190,7 @@ fn connections<'s, 'a, 'input>(
                 return Err(fault_at(item.node, SdfFault::Unsupported { what, fix }));
             }
         };
-        let axis = slides.map(|slides| axis(item, slides, found.version, frames, notices)).transpose()?;
+        let axis = slides.map(|slides| axis(item, slides, found.version, frames)).transpose()?;
         connections.push(Connection { item, parent, child, axis });
     }
     Ok(connections)

@@ -184,7 +184,8 @@ fn write_dynamics(
     let axis = child(node, "axis").ok_or_else(unknown)?;
     let dynamics = child(axis, "dynamics");
     let mut new: Vec<Line> = Vec::new();
-    for (name, value) in [("damping", change.damping), ("friction", change.friction)] {
+    let values = [("damping", change.damping), ("friction", change.friction), ("spring_stiffness", change.stiffness)];
+    for (name, value) in values {
         let Some(value) = value else { continue };
         if !value.is_finite() {
             return Err(SdfWriteError::NotFinite { kind: "joint", name: change.joint.clone() });

@@ -5,8 +5,10 @@
 //! term, the torque is what the drive has to give: a spring that pulls the joint back to `q₀` with the stiffness `c` is
 //! `c (q - q₀)`, and one that helps the drive has the other sign.
 
-use super::kind::{StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
-use super::{Expression, JointMotion, TermInput, TorqueTable};
+use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::{Expression, JointMotion, JointNames, TermInput, TorqueTable};
+use crate::joint::{Joint, JointSpring};
+use crate::tree::Model;
 use serde::{Deserialize, Serialize};
 
 /// The coefficient of a declared torque of one joint.
@@ -24,6 +26,9 @@ pub struct Declared {
     /// What the coefficient is thought to be.
     #[serde(default)]
     pub nominal: Option<f64>,
+    /// True for the spring that the robot's description has at this very joint: the coefficient is its stiffness.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub is_spring: bool,
 }
 
 /// What a declared torque follows.
@@ -38,6 +43,33 @@ pub enum DeclaredLaw {
 }
 
 impl Declared {
+    /// The springs that the description of `model` has at its joints, `stiffness (q - reference)`, each named `k_` and
+    /// the joint. That of a joint which follows another acts on the one that it follows; where it follows several, it
+    /// is not among them, for a declared torque has one joint.
+    pub fn springs(model: &Model) -> Vec<Self> {
+        let spring = |(place, described): (usize, &Joint)| {
+            let JointSpring { stiffness, reference } = described.spring?;
+            let mut drivers = model.drivers(place);
+            let (Some((joint, share)), None) = (drivers.next(), drivers.next()) else { return None };
+            let from = reference - model.coupling().map_or(0.0, |coupling| coupling.offset(place));
+            let names = JointNames { own: Some(joint), names: &[] };
+            let law = match share {
+                1.0 => format!("q - ({from:?})"),
+                share => format!("({share:?}) * (({share:?}) * q - ({from:?}))"),
+            };
+            let letters = described.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' });
+            Some(Self {
+                name: format!("k_{}", letters.take(50).collect::<String>()),
+                joint,
+                law: DeclaredLaw::Expression(Expression::parse(&law, &names).ok()?),
+                unit: if described.turns() { "Nm/rad" } else { "N/m" }.to_owned(),
+                nominal: Some(stiffness),
+                is_spring: model.joint_of(place).is_some(),
+            })
+        };
+        model.tree_joints().iter().enumerate().filter_map(spring).collect()
+    }
+
     /// Whether `name` can be a symbol among others: an ASCII letter, then letters, digits and `_`, at most 60.
     pub fn is_symbol(name: &str) -> bool {
         name.len() <= 60
@@ -111,6 +143,10 @@ impl TermKind for Declared {
 
     fn action(&self) -> TermAction<'_> {
         TermAction::State(self)
+    }
+
+    fn property(&self) -> Option<JointProperty> {
+        self.is_spring.then_some(JointProperty::Stiffness)
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {

@@ -134,6 +134,8 @@ pub enum JointProperty {
     Friction,
     /// Nothing (`armature`).
     DriveInertia,
+    /// Nothing (`stiffness`).
+    Stiffness,
 }
 
 /// A constant of a term, such as a velocity or an exponent, for programs that are not this one.

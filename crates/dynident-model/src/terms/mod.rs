@@ -251,6 +251,7 @@ impl TorqueTerm {
             JointProperty::Damping => joint.damping,
             JointProperty::Friction => joint.friction,
             JointProperty::DriveInertia => joint.drive_inertia,
+            JointProperty::Stiffness => joint.spring.map(|spring| spring.stiffness),
         }
     }
 

@@ -85,6 +85,7 @@ pub(super) fn model(
                 damping: joint.damping,
                 friction: joint.friction,
                 drive_inertia: None,
+                spring: None,
                 mimic: joint.mimic.clone(),
             });
             bodies.push(Body { links: vec![link_at(child, Transform::IDENTITY)] });

@@ -53,6 +53,8 @@ pub struct JointChange {
     pub friction: Option<f64>,
     /// Drive inertia, kg m² (kg), which only MJCF holds.
     pub drive_inertia: Option<f64>,
+    /// Stiffness of the joint's spring, Nm/rad (N/m), which MJCF and SDF hold.
+    pub stiffness: Option<f64>,
 }
 
 /// Why a URDF could not be rewritten.

@@ -19,7 +19,14 @@ fn at(text: &str, q: [f64; 2], dq: [f64; 2]) -> Option<f64> {
 }
 
 fn term(law: DeclaredLaw) -> TorqueTerm {
-    TorqueTerm::Declared(Declared { name: "spring".to_owned(), joint: 0, law, unit: "Nm".to_owned(), nominal: None })
+    TorqueTerm::Declared(Declared {
+        name: "spring".to_owned(),
+        joint: 0,
+        law,
+        unit: "Nm".to_owned(),
+        nominal: None,
+        is_spring: false,
+    })
 }
 
 /// By the rules of arithmetic, worked out by hand.

@@ -57,8 +57,14 @@ fn only_inertials_and_friction_change() {
         }
     }
     let joints = vec![
-        JointChange { joint: "a".to_owned(), damping: Some(0.75), friction: Some(2.0), drive_inertia: None },
-        JointChange { joint: "c".to_owned(), damping: None, friction: Some(1.5), drive_inertia: None },
+        JointChange {
+            joint: "a".to_owned(),
+            damping: Some(0.75),
+            friction: Some(2.0),
+            drive_inertia: None,
+            stiffness: None,
+        },
+        JointChange { joint: "c".to_owned(), damping: None, friction: Some(1.5), drive_inertia: None, stiffness: None },
     ];
     let text = rewrite_dh(TABLE, &links, &joints).unwrap();
     let back = read_dh(&text).unwrap();

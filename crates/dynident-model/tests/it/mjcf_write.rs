@@ -57,6 +57,7 @@ fn published_models_take_new_bodies_and_drives() {
                 damping: Some(0.125),
                 friction: Some(1.0 / 3.0),
                 drive_inertia: Some(0.0625),
+                stiffness: None,
             })
             .collect();
         match rewrite_mjcf(text, &mut files, &links, &joints) {
@@ -88,8 +89,13 @@ fn the_written_panda_is_the_one_that_mujoco_has_read() {
     let robot = load_robot(repository("golden/mjcf/robosuite_panda.xml")).unwrap();
     let bodies = other_bodies(&robot.model);
     let links = link_changes(&robot.model, &bodies).unwrap();
-    let joint =
-        JointChange { joint: "joint4".to_owned(), damping: Some(0.75), friction: Some(1.5), drive_inertia: Some(0.25) };
+    let joint = JointChange {
+        joint: "joint4".to_owned(),
+        damping: Some(0.75),
+        friction: Some(1.5),
+        drive_inertia: Some(0.25),
+        stiffness: None,
+    };
     let written = rewrite_mjcf(&robot.text, &mut no_files, &links, &[joint]).unwrap();
     let expected = repository("golden/mjcf/written_panda.xml");
     assert_eq!(written, std::fs::read_to_string(expected).unwrap());
@@ -107,7 +113,13 @@ fn only_inertials_and_drives_change() {
     // The link's frame stands at the hinge, half a metre along x.
     let inertial = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
     let links = link_changes(&model, &[inertial]).unwrap();
-    let joint = JointChange { joint: "j".to_owned(), damping: Some(0.5), friction: None, drive_inertia: Some(0.1) };
+    let joint = JointChange {
+        joint: "j".to_owned(),
+        damping: Some(0.5),
+        friction: None,
+        drive_inertia: Some(0.1),
+        stiffness: None,
+    };
     let written = rewrite_mjcf(ARM, &mut no_files, &links, &[joint]).unwrap();
     let expected = ARM
         .replace("'3'", "'0.5'")
@@ -161,6 +173,7 @@ fn what_mujoco_would_refuse_or_change_is_refused() {
         damping: Some(damping),
         friction: None,
         drive_inertia: None,
+        stiffness: None,
     };
     let refused = |joints: &[JointChange]| rewrite_mjcf(ARM, &mut no_files, &[], joints).unwrap_err().to_string();
     assert!(refused(&[joint("k", 1.0)]).contains("the MJCF has no joint `k`"));

@@ -1,7 +1,7 @@
 //! SDF: what is refused, with place and fix, and what is only said. Dynamics against Drake are in dynident-dynamics.
 
 use crate::common::{mutate, mutations};
-use dynident_model::{DescriptionFormat, SdfLoss, audit, load_robot, read_sdf, write_urdf};
+use dynident_model::{DescriptionFormat, JointSpring, SdfLoss, audit, load_robot, read_sdf, write_urdf};
 use dynident_testing::{count, repository};
 use proptest::prelude::*;
 
@@ -94,10 +94,12 @@ fn what_the_model_does_not_hold_is_said() {
     let mut said: Vec<&str> = robot.notices.iter().map(|notice| notice.loss.name()).collect();
     said.sort_unstable();
     // Of the base nothing has to be known.
-    assert_eq!(said, ["include", "spring", "unknown-mass", "weightless"]);
+    assert_eq!(said, ["include", "unknown-mass", "weightless"]);
     let unknown = robot.notices.iter().find(|notice| matches!(notice.loss, SdfLoss::UnknownMass { .. })).unwrap();
     assert_eq!(unknown.line, 3);
     assert_eq!(robot.model.bodies_without_prior(), ["rod"]);
+    // A spring is held: it is a torque term.
+    assert_eq!(robot.model.joints()[0].spring, Some(JointSpring { stiffness: 3.0, reference: 0.0 }));
     let whole = read_sdf(&pendulum(INERTIAL, AXIS, "")).unwrap();
     assert!(whole.notices.is_empty(), "{:?}", whole.notices);
 }

@@ -42,6 +42,7 @@ fn every_model_takes_new_bodies_and_drives() {
             damping: Some(0.125),
             friction: Some(1.0 / 3.0),
             drive_inertia: Some(0.0625),
+            stiffness: None,
         };
         let joints: Vec<JointChange> = model.joints().iter().map(|joint| drive(&joint.name)).collect();
         let new = rewrite_sdf(&text, &links, &joints).unwrap();
@@ -79,7 +80,13 @@ fn set(inertial: InertialParameters) -> LinkChange {
 fn only_inertials_and_drives_change() {
     // The link's frame stands at the joint, half a metre along x.
     let inertial = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
-    let joint = JointChange { joint: "j".to_owned(), damping: Some(0.5), friction: Some(0.25), drive_inertia: None };
+    let joint = JointChange {
+        joint: "j".to_owned(),
+        damping: Some(0.5),
+        friction: Some(0.25),
+        drive_inertia: None,
+        stiffness: None,
+    };
     let written = rewrite_sdf(ARM, &[set(inertial)], &[joint]).unwrap();
     let new = "<inertial><!-- a - - b --><pose>0.75 0.0 0.0 0 0 0</pose><mass>2.0</mass><inertia><ixx>1.0</ixx><ixy>0.0</ixy><ixz>0.0</ixz><iyy>1.0</iyy>\
                <iyz>0.0</iyz><izz>1.0</izz></inertia><density>3</density></inertial>";
@@ -99,6 +106,7 @@ fn what_cannot_be_written_is_refused() {
         damping: Some(damping),
         friction: None,
         drive_inertia: None,
+        stiffness: None,
     };
     assert!(refused(&[set(InertialParameters::ZERO)], &[]).contains("`rod` are those of no body with mass"));
     let mut broken = good;
@@ -122,7 +130,8 @@ fn the_written_model_is_the_one_that_drake_has_read() {
     let inertials = other_inertials(robot.model.dof());
     let links = link_changes(&own_links(&robot.model), &inertials).unwrap();
     let first = robot.model.joints()[0].name.clone();
-    let joint = JointChange { joint: first, damping: Some(0.75), friction: Some(1.5), drive_inertia: None };
+    let joint =
+        JointChange { joint: first, damping: Some(0.75), friction: Some(1.5), drive_inertia: None, stiffness: None };
     let written = rewrite_sdf(&robot.text, &links, &[joint]).unwrap();
     let expected = repository("golden/sdf/written_rules_poses.sdf");
     assert_eq!(written, std::fs::read_to_string(expected).unwrap());

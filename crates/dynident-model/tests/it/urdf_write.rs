@@ -67,6 +67,7 @@ fn identified_bodies_are_read_back_and_nothing_else_changes() {
                 damping: Some(0.125),
                 friction: Some(1.0 / 3.0),
                 drive_inertia: None,
+                stiffness: None,
             })
             .collect();
         let written = rewrite_urdf(text, &link_changes(&model, &new).unwrap(), &joints).unwrap();
@@ -89,7 +90,13 @@ fn only_the_touched_elements_differ() {
         inertial: InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY.scale(0.5)),
         note: Some("from a log --- and\tmore".to_owned()),
     };
-    let friction = JointChange { joint: "lift".to_owned(), damping: Some(7.0), friction: None, drive_inertia: None };
+    let friction = JointChange {
+        joint: "lift".to_owned(),
+        damping: Some(7.0),
+        friction: None,
+        drive_inertia: None,
+        stiffness: None,
+    };
     let written = rewrite_urdf(ARM, &[set, LinkChange::Remove { link: "tool".to_owned() }], &[friction]).unwrap();
     let expected = ARM
         .replace(
@@ -144,8 +151,13 @@ fn an_inertial_is_inserted_where_there_was_none() {
 fn friction_keeps_other_attributes() {
     let text =
         ARM.replace(r#"<dynamics damping="0.4" friction="1.1"/>"#, "<dynamics  friction = '1.1' spring=\"2\" />");
-    let change =
-        JointChange { joint: "shoulder".to_owned(), damping: Some(0.5), friction: Some(-0.0), drive_inertia: None };
+    let change = JointChange {
+        joint: "shoulder".to_owned(),
+        damping: Some(0.5),
+        friction: Some(-0.0),
+        drive_inertia: None,
+        stiffness: None,
+    };
     let written = rewrite_urdf(&text, &[], &[change]).unwrap();
     let expected = text.replace("<dynamics  friction = '1.1'", "<dynamics damping=\"0.5\"  friction = '-0.0'");
     assert_eq!(written, expected);
@@ -162,7 +174,13 @@ fn what_urdf_cannot_say_is_refused() {
     assert!(change("upper", [f64::NAN; 10]).unwrap_err().to_string().contains("finite"));
     assert!(change("nobody", [1.0; 10]).unwrap_err().to_string().contains("no link `nobody`"));
     assert!(read_urdf(&change("upper", [0.0; 10]).unwrap()).unwrap().model.inertials()[1].mass_kg() == 0.0);
-    let twice = JointChange { joint: "lift".to_owned(), damping: Some(1.0), friction: None, drive_inertia: None };
+    let twice = JointChange {
+        joint: "lift".to_owned(),
+        damping: Some(1.0),
+        friction: None,
+        drive_inertia: None,
+        stiffness: None,
+    };
     assert!(rewrite_urdf(ARM, &[], &[twice.clone(), twice]).unwrap_err().to_string().contains("two changes"));
     assert!(link_changes(&read_urdf(ARM).unwrap().model, &[]).is_err());
 }

@@ -24,13 +24,17 @@ fn springs_and_cables_are_those_of_mujoco() {
     let declared = |name: &str, joint, text: &str| {
         let expression = Expression::parse(text, &JointNames { own: Some(joint), names: &names }).unwrap();
         let (name, law) = (name.to_owned(), DeclaredLaw::Expression(expression));
-        TorqueTerm::Declared(Declared { name, joint, law, unit: "N/m".to_owned(), nominal: None })
+        TorqueTerm::Declared(Declared { name, joint, law, unit: "N/m".to_owned(), nominal: None, is_spring: false })
     };
     // The cable from (0.1, 0.3) to 0.25 m along the link is sqrt(square) long; its torque is its force times the
     // derivative of its length.
     let square = "(0.1625 - 0.05 * cos(q) + 0.15 * sin(q))";
     let cable = format!("max(sqrt{square} - 0.3, 0) * (0.05 * sin(q) + 0.15 * cos(q)) / (2 * sqrt{square})");
-    let terms = [declared("spring", 1, "q - 0.35"), declared("cable", 0, &cable)];
+    // The spring is the description's own.
+    let springs = Declared::springs(&model);
+    assert_eq!((springs.len(), &*springs[0].name, springs[0].joint), (1, "k_elbow", 1));
+    assert_eq!((springs[0].nominal, springs[0].is_spring), (Some(40.0), true));
+    let terms = [TorqueTerm::Declared(springs[0].clone()), declared("cable", 0, &cable)];
     let stiffness = [40.0, 900.0];
     let mut plant = Plant::new(&model, &terms, &stiffness).unwrap();
     let mut workspace = Workspace::new(&model);

@@ -285,7 +285,7 @@ fn forward_after_inverse_with_every_term() {
 fn declared(name: &str, joint: usize, text: &str) -> TorqueTerm {
     let expression = Expression::parse(text, &JointNames { own: Some(joint), names: &[] }).unwrap();
     let (name, law) = (name.to_owned(), DeclaredLaw::Expression(expression));
-    TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None })
+    TorqueTerm::Declared(Declared { name, joint, law, unit: "Nm".to_owned(), nominal: None, is_spring: false })
 }
 
 /// An undamped spring keeps its energy, `k q²/2` beside that of the bodies; the controller's model holds the robot

@@ -5,7 +5,9 @@ use super::torque::declared_terms;
 use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, Study};
 use crate::error::{Error, StudyError};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
-use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
+use dynident_model::terms::{
+    CoulombShape, Coupling, CouplingEffect, Declared, DriveChoice, TorqueTerm, terms_per_joint,
+};
 use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, load_robot, loops};
 use std::path::Path;
 
@@ -83,6 +85,7 @@ impl StudyRobot {
         }
         let mut terms = torque_terms(&study.drive, &study.coupling, &model).map_err(&in_study)?;
         terms.extend(declared_terms(study, study_path, folders, &model)?);
+        terms.extend(Declared::springs(&model).into_iter().map(TorqueTerm::Declared));
         let parametric = ParametricModel::new(model, terms).map_err(Error::study(study_path))?;
         Ok(Self { robot, parametric, log_joints })
     }

@@ -176,6 +176,8 @@ impl SimulationSection {
                         (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
                         (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
                         (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
+                        // By the description, above.
+                        (Some(JointProperty::Stiffness), _) => None,
                         (None, TermAction::Constant) => Some(self.offset.of(joint)),
                         (
                             None,

@@ -94,7 +94,14 @@ impl TorqueSection {
             DeclaredLaw::Table(_) => "1",
         };
         let unit = self.unit.clone().unwrap_or_else(|| usual.to_owned());
-        Ok(TorqueTerm::Declared(Declared { name: self.name.clone(), joint, law, unit, nominal: self.nominal }))
+        Ok(TorqueTerm::Declared(Declared {
+            name: self.name.clone(),
+            joint,
+            law,
+            unit,
+            nominal: self.nominal,
+            is_spring: false,
+        }))
     }
 }
 

@@ -78,13 +78,14 @@ fn joint_changes(model: &ParametricModel, parameters: &[f64]) -> Vec<JointChange
         let name = &model.model().joints()[joint].name;
         let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {
             let joint = name.clone();
-            joints.push(JointChange { joint, damping: None, friction: None, drive_inertia: None });
+            joints.push(JointChange { joint, damping: None, friction: None, drive_inertia: None, stiffness: None });
             joints.len() - 1
         });
         *match property {
             JointProperty::Damping => &mut joints[place].damping,
             JointProperty::Friction => &mut joints[place].friction,
             JointProperty::DriveInertia => &mut joints[place].drive_inertia,
+            JointProperty::Stiffness => &mut joints[place].stiffness,
         } = Some(value);
     }
     joints
