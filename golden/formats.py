@@ -15,6 +15,7 @@ import sqlite3
 import h5py
 import numpy as np
 import pyarrow as pa
+import pyarrow.feather
 import pyarrow.parquet as pq
 import scipy
 import scipy.io
@@ -428,6 +429,69 @@ def parquet_files(out):
     return {"zstd.parquet": columns, "snappy.parquet": columns}
 
 
+def arrow_files(out):
+    """What a column may be, in every packing, as a file and as a stream."""
+    holes = [i % 7 == 3 for i in range(ROWS)]
+    lists = [None if hole else [float(x) for x in Q[:, i]][: 1 if i == 9 else 2] for i, hole in enumerate(holes)]
+    table = pa.table({
+        "t": T,
+        "stamp": pa.array(STAMPS, pa.timestamp("ns", tz="UTC")),
+        "task": pa.array(["push"] * ROWS),
+        "observation.state": pa.array(lists, pa.list_(pa.float64())),
+        "action": pa.array([[float(x) for x in F32[:, i]] for i in range(ROWS)], pa.list_(pa.float32(), 2)),
+        "seen": pa.array(["far" if hole else None for hole in holes], pa.string_view()),
+        "ticks": pa.array([[i, -i] for i in range(ROWS)], pa.large_list(pa.int16())),
+        "mode": pa.array(["idle", "moving"] * (ROWS // 2)).dictionary_encode(),
+        "maybe": pa.array([None if hole else float(TAU[0, i]) for i, hole in enumerate(holes)], pa.float64()),
+        "flag": pa.array([bool(i % 2) for i in range(ROWS)]),
+        "empty": pa.nulls(ROWS),
+        "words": pa.array([["a", "b"]] * ROWS, pa.list_(pa.string())),
+        "half": pa.array(Q[0].astype(np.float16)),
+        "big": pa.array([2**63 + i * 2**40 for i in range(ROWS)], pa.uint64()),
+        "small": pa.array([-i for i in range(ROWS)], pa.int8()),
+        "waited": pa.array([1500 * i for i in range(ROWS)], pa.duration("us")),
+        "clock": pa.array([36_000_000 + i for i in range(ROWS)], pa.time32("ms")),
+        "inner": pa.array(
+            [None if hole else {"x": float(TAU[1, i]), "name": "b"} for i, hole in enumerate(holes)],
+            pa.struct([("x", pa.float64()), ("name", pa.string())]),
+        ),
+        "matrix": pa.array([[[1.0], [2.0]]] * ROWS, pa.list_(pa.list_(pa.float64()))),
+        "either": pa.UnionArray.from_dense(
+            pa.array([0, 1] * (ROWS // 2), pa.int8()), pa.array([i // 2 for i in range(ROWS)], pa.int32()),
+            [pa.array(T[: ROWS // 2]), pa.array(["x"] * (ROWS // 2))],
+        ),
+        "last": pa.array(np.arange(ROWS), pa.uint32()),
+    })
+    for codec in ["lz4", "zstd"]:
+        pa.feather.write_feather(table, out / f"{codec}.feather", compression=codec, chunksize=15)
+    plain = pa.ipc.IpcWriteOptions(compression=None)
+    with pa.ipc.new_file(out / "plain.arrow", table.schema, options=plain) as writer:
+        writer.write_table(table, max_chunksize=15)
+    with pa.ipc.new_stream(out / "stream.arrows", table.schema, options=plain) as writer:
+        writer.write_table(table, max_chunksize=15)
+    old = pa.ipc.IpcWriteOptions(use_legacy_format=True, metadata_version=pa.ipc.MetadataVersion.V4)
+    with pa.ipc.new_file(out / "before_0_15.feather", table.drop_columns(["seen", "either"]).schema, options=old) as writer:
+        writer.write_table(table.drop_columns(["seen", "either"]))
+
+    def present(values):
+        return np.array([np.nan if hole else float(x) for hole, x in zip(holes, values)])
+
+    second = present(Q[1])
+    second[9] = np.nan
+    columns = {
+        "t": T, "stamp": seconds(STAMPS), "observation.state[0]": present(Q[0]), "observation.state[1]": second,
+        "action[0]": F32[0], "action[1]": F32[1], "ticks[0]": np.arange(ROWS), "ticks[1]": -np.arange(ROWS),
+        "maybe": present(TAU[0]), "flag": np.arange(ROWS) % 2, "half": Q[0].astype(np.float16),
+        "big": [float(2**63 + i * 2**40) for i in range(ROWS)], "small": -np.arange(ROWS),
+        "waited": [1500 * i / 1e6 for i in range(ROWS)], "clock": [(36_000_000 + i) / 1e3 for i in range(ROWS)],
+        "inner.x": present(TAU[1]), "last": np.arange(ROWS),
+    }
+    return {
+        name: dict(columns)
+        for name in ["lz4.feather", "zstd.feather", "plain.arrow", "stream.arrows", "before_0_15.feather"]
+    }
+
+
 def matlab_files(out):
     variables = {
         "t": T[:, None], "q": Q.T, "tau": TAU, "ticks": np.arange(ROWS, dtype=np.int16)[:, None], "single_q": F32.T,
@@ -493,7 +557,7 @@ def main():
     out = parser.parse_args().out / "formats"
     out.mkdir(parents=True, exist_ok=True)
     files = {}
-    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, matlab_files, hdf5_files]:
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, matlab_files, hdf5_files]:
         files |= make(out)
     versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
     files = {name: dict(columns) for name, columns in files.items()}

@@ -22,6 +22,8 @@ pub enum FileFormat {
     Rosbag2,
     /// Parquet.
     Parquet,
+    /// Arrow, in the file format (Feather) or as a stream.
+    Arrow,
     /// MATLAB, `save -v6` and `-v7`.
     Mat5,
     /// HDF5, which MATLAB's `save -v7.3` writes too.
@@ -41,6 +43,7 @@ impl FileFormat {
             Self::Mcap => "MCAP",
             Self::Rosbag2 => "rosbag2",
             Self::Parquet => "Parquet",
+            Self::Arrow => "Arrow",
             Self::Mat5 => "MATLAB 5 file",
             Self::Hdf5 => "HDF5 file",
         }

@@ -8,6 +8,7 @@
 //! | JSON, one object a line | numbers by their path: `arm.q[0]` | `json` |
 //! | MCAP, rosbag2 | numbers of ROS 2 messages by topic and path: `/joint_states.position[elbow]` | `bags` |
 //! | Parquet | columns, lists with their indices | `parquet` |
+//! | Arrow: Feather, streams | as Parquet | `arrow` |
 //! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices either way up | `gzip`, `hdf5` |
 //!
 //! Columns that were recorded on different clocks (topics of a bag) are joined on that of the first one selected: see
@@ -30,11 +31,19 @@
 //! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(
-    not(all(feature = "gzip", feature = "zstd", feature = "bags", feature = "parquet", feature = "hdf5")),
+    not(all(
+        feature = "gzip",
+        feature = "zstd",
+        feature = "bags",
+        feature = "parquet",
+        feature = "arrow",
+        feature = "hdf5"
+    )),
     allow(dead_code, unused_variables, clippy::needless_pass_by_value, reason = "what formats share is not all used")
 )]
 
 mod arrays;
+mod arrow;
 mod bags;
 mod bytes;
 mod error;
@@ -122,6 +131,7 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
         FileFormat::Mcap => bags::open_mcap(path)?,
         FileFormat::Rosbag2 => bags::open_database(path)?,
         FileFormat::Parquet => Contents::Table(parquet::open(path)?),
+        FileFormat::Arrow => Contents::Table(arrow::open(path)?),
         FileFormat::Mat5 => Contents::Table(mat::open(path, reader)?),
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path)?),
     };

@@ -105,6 +105,21 @@ fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
     let mut row = [0.0];
     while table.next_row(&mut row).unwrap() {}
     assert!(row == [2.0] && table.truncated());
+    // A stream of Arrow has no end before it is closed; a file of Arrow without its end was not finished.
+    let path = scratch.path().join("crash.arrow");
+    let whole = std::fs::read(folder().join("stream.arrows")).unwrap();
+    std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
+    let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
+    let mut row = vec![0.0; table.width()];
+    let mut rows = 0;
+    while table.next_row(&mut row).unwrap() {
+        rows += 1;
+    }
+    assert!(rows == 30 && table.truncated(), "{rows}");
+    let whole = std::fs::read(folder().join("plain.arrow")).unwrap();
+    std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
+    let message = drain(&path).unwrap_err().to_string();
+    assert!(message.ends_with("its end: it is cut off, or its writer was never closed; write or copy it again"), "{message}");
 }
 
 #[test]
@@ -137,7 +152,8 @@ fn formats_that_are_not_read_are_named() {
     let path = scratch.path().join("log.csv");
     for (bytes, words) in [
         (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag, which is not read; convert it to MCAP"),
-        (b"ARROW1\0\0", "write it as Parquet"),
+        (b"FEA1\0\0", "write it as Parquet"),
+        (b"ARROW1\0\0", "its end: it is cut off"),
         (b"BZh91AY&SY", "unpack it first"),
         (b"\xFF\xFEa\0", "save it as UTF-8"),
         (b"PK\x03\x04nothing", "the list of members is missing"),

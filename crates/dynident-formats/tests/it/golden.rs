@@ -129,6 +129,8 @@ fn files_are_known_by_their_content() {
         ("zstd.mcap", FileFormat::Mcap),
         ("jazzy.db3", FileFormat::Rosbag2),
         ("zstd.parquet", FileFormat::Parquet),
+        ("lz4.feather", FileFormat::Arrow),
+        ("stream.arrows", FileFormat::Arrow),
         ("packed.mat", FileFormat::Mat5),
         ("v73.mat", FileFormat::Hdf5),
         ("groups.h5", FileFormat::Hdf5),
