@@ -492,6 +492,64 @@ def arrow_files(out):
     }
 
 
+def lerobot_files(out):
+    """Data sets as lerobot 0.4.4 (version 3, episodes one after the other in files) and 0.3 (version 2.1, one file an episode) lay them out, written by pyarrow."""
+    lengths = [15, 12, 13]
+    bounds = np.cumsum([0, *lengths])
+    stamps = np.concatenate([np.arange(n) / 100.0 for n in lengths]).astype(np.float32)
+    episode = np.repeat(np.arange(len(lengths)), lengths)
+    time, offset = np.zeros(ROWS), 0.0
+    for i in range(ROWS):
+        if i and episode[i] != episode[i - 1]:
+            offset = time[i - 1] + 10.0 - float(stamps[i])
+        time[i] = float(stamps[i]) + offset
+    effort = TAU.astype(np.float32)
+    names = [f"{joint}.pos" for joint in JOINTS]
+    feature = {"dtype": "float32", "shape": [2], "names": names}
+    scalar = {"shape": [1], "names": None}
+    features = {
+        "action": feature | {"names": {"motors": JOINTS}},
+        "observation.state": feature,
+        "observation.effort": feature | {"names": ["dim"]},
+        "observation.images.top": {"dtype": "video", "shape": [3, 4, 4], "names": ["channels", "height", "width"]},
+        "timestamp": scalar | {"dtype": "float32"},
+        **{key: scalar | {"dtype": "int64"} for key in ["frame_index", "episode_index", "index", "task_index"]},
+    }
+
+    def rows(begin, end):
+        def lists(values):
+            return pa.array([[float(x) for x in values[:, i]] for i in range(begin, end)], pa.list_(pa.float32(), 2))
+        return pa.table({
+            "action": lists(F32), "observation.state": lists(DQ.astype(np.float32)), "observation.effort": lists(effort),
+            "timestamp": stamps[begin:end], "frame_index": np.concatenate([np.arange(n) for n in lengths])[begin:end],
+            "episode_index": episode[begin:end], "index": np.arange(begin, end), "task_index": np.zeros(end - begin, np.int64),
+        })
+
+    layouts = {
+        "lerobot_v2": ("v2.1", "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet", bounds),
+        "lerobot_v3": ("v3.0", "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet", bounds[[0, 2, 3]]),
+    }
+    for name, (version, path, ends) in layouts.items():
+        info = {
+            "codebase_version": version, "robot_type": "two_joints", "total_episodes": len(lengths), "total_frames": ROWS, "fps": 100,
+            "chunks_size": 1000, "data_path": path, "features": features,
+        }
+        (out / name / "meta").mkdir(parents=True, exist_ok=True)
+        (out / name / "meta/info.json").write_text(json.dumps(info, indent=4) + "\n", encoding="utf-8")
+        for k, (begin, end) in enumerate(zip(ends, ends[1:])):
+            file = out / name / path.format(episode_chunk=0, episode_index=k, chunk_index=0, file_index=k)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            pq.write_table(rows(begin, end), file, compression="snappy", use_dictionary=True)
+    columns = {
+        "action[shoulder]": F32[0], "action[elbow]": F32[1],
+        "observation.state[shoulder.pos]": DQ.astype(np.float32)[0], "observation.state[elbow.pos]": DQ.astype(np.float32)[1],
+        "observation.effort[0]": effort[0], "observation.effort[1]": effort[1], "timestamp": stamps,
+        "frame_index": np.concatenate([np.arange(n) for n in lengths]), "episode_index": episode, "index": np.arange(ROWS),
+        "task_index": np.zeros(ROWS), "time": time,
+    }
+    return {name: dict(columns) for name in layouts}
+
+
 def matlab_files(out):
     variables = {
         "t": T[:, None], "q": Q.T, "tau": TAU, "ticks": np.arange(ROWS, dtype=np.int16)[:, None], "single_q": F32.T,
@@ -557,7 +615,7 @@ def main():
     out = parser.parse_args().out / "formats"
     out.mkdir(parents=True, exist_ok=True)
     files = {}
-    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, matlab_files, hdf5_files]:
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, lerobot_files, matlab_files, hdf5_files]:
         files |= make(out)
     versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
     files = {name: dict(columns) for name, columns in files.items()}

@@ -22,6 +22,8 @@ pub enum FileFormat {
     Rosbag2,
     /// Parquet.
     Parquet,
+    /// The folder of a LeRobot data set.
+    LeRobot,
     /// Arrow, in the file format (Feather) or as a stream.
     Arrow,
     /// MATLAB, `save -v6` and `-v7`.
@@ -43,6 +45,7 @@ impl FileFormat {
             Self::Mcap => "MCAP",
             Self::Rosbag2 => "rosbag2",
             Self::Parquet => "Parquet",
+            Self::LeRobot => "LeRobot data set",
             Self::Arrow => "Arrow",
             Self::Mat5 => "MATLAB 5 file",
             Self::Hdf5 => "HDF5 file",

@@ -119,7 +119,10 @@ fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
     let whole = std::fs::read(folder().join("plain.arrow")).unwrap();
     std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
     let message = drain(&path).unwrap_err().to_string();
-    assert!(message.ends_with("its end: it is cut off, or its writer was never closed; write or copy it again"), "{message}");
+    assert!(
+        message.ends_with("its end: it is cut off, or its writer was never closed; write or copy it again"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -168,6 +171,39 @@ fn formats_that_are_not_read_are_named() {
     std::fs::write(scratch.path().join("metadata.yaml"), "relative_file_paths:\n  - gone.mcap\n").unwrap();
     let message = open(scratch.path()).unwrap_err().to_string();
     assert!(message.contains("`gone.mcap` is not in the folder; let `ros2 bag reindex`"), "{message}");
+}
+
+#[test]
+fn a_data_set_that_is_not_whole_says_what_is_missing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let set = scratch.path().join("set");
+    std::fs::create_dir_all(set.join("meta")).unwrap();
+    let golden = folder().join("lerobot_v2");
+    let refused = |words: &str| {
+        let error = drain(&set).expect_err(words);
+        told(&error, "set");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    std::fs::write(set.join("meta/info.json"), "{").unwrap();
+    refused("meta/info.json: it is not JSON");
+    std::fs::write(set.join("meta/info.json"), "{}").unwrap();
+    refused("meta/info.json: it has no `features`");
+    std::fs::copy(golden.join("meta/info.json"), set.join("meta/info.json")).unwrap();
+    assert!(drain(&set).is_err());
+    let chunk = set.join("data/chunk-000");
+    std::fs::create_dir_all(&chunk).unwrap();
+    refused("no chunk in it holds a Parquet file; fetch the data set whole");
+    let episodes = golden.join("data/chunk-000");
+    std::fs::copy(episodes.join("episode_000000.parquet"), chunk.join("episode_000000.parquet")).unwrap();
+    let Contents::Table(table) = open(&set).unwrap().contents else { panic!() };
+    assert!(table.notes().contains(&"1 of 3 episodes are there".to_owned()), "{:?}", table.notes());
+    assert_eq!(drain(&set).unwrap(), 15);
+    // What stands for a file that Git left behind; a table of another kind.
+    let second = chunk.join("episode_000001.parquet");
+    std::fs::write(&second, "version https://git-lfs.github.com/spec/v1\n").unwrap();
+    refused("episode_000001.parquet: it is no Parquet file; fetch the data set whole");
+    std::fs::copy(folder().join("snappy.parquet"), &second).unwrap();
+    refused("episode_000001.parquet: its columns, or the lengths of its lists, are not those of the first file");
 }
 
 #[test]
