@@ -77,6 +77,40 @@ fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
 }
 
 #[test]
+fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
+    let path = repository("golden/closed_chains.json");
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let robot = load_robot(repository("golden/coupled/palletizer.xml")).unwrap();
+    assert!(robot.notices.is_empty(), "{:?}", robot.notices);
+    let model = robot.model;
+    let order = order(&model, &file);
+    let passive: Vec<&str> = file["passive"].as_array().unwrap().iter().map(text).collect();
+    assert_eq!(model.followers().count(), passive.len());
+    let mut workspace = Workspace::new(&model);
+    for state in file["states"].as_array().unwrap() {
+        let [q, dq, ddq, tau] = ["q", "dq", "ddq", "tau"].map(|key| ordered(&order, &state[key]));
+        let mut stand = vec![0.0; model.body_count()];
+        model.coupling().unwrap().positions(&q, 1, &mut stand);
+        for (name, theirs) in passive.iter().zip(numbers(&state["passive"])) {
+            let own = model.tree_joints().iter().position(|joint| joint.name == *name).unwrap();
+            close(1e-9, &[stand[own]], &[theirs], name);
+        }
+        close(1e-9, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, "tau");
+    }
+    // The same robot as the URDF with [[robot.loop]], whose elbow is drawn at zero.
+    for (_, theirs) in palletizer().followers() {
+        let own = model.tree_joints().iter().find(|joint| joint.name == theirs.name).unwrap();
+        let (own, theirs) = (own.mimic.as_ref().unwrap(), theirs.mimic.as_ref().unwrap());
+        let row = |mimic: &dynident_model::Mimic| {
+            let mut row: Vec<_> = mimic.sources.iter().map(|one| (one.joint.clone(), one.multiplier)).collect();
+            row.sort_by(|a, b| a.0.cmp(&b.0));
+            row
+        };
+        assert_eq!(row(own), row(theirs));
+    }
+}
+
+#[test]
 fn a_palletising_arm_is_its_tree_held_together() {
     let (model, golden) = (palletizer(), golden());
     let file = &golden["loops"];
