@@ -550,6 +550,46 @@ def lerobot_files(out):
     return {name: dict(columns) for name in layouts}
 
 
+def diadem_files(out):
+    """Headers and numbers by NI's description of DIAdem's keys and by published traces of KUKA's controllers (no program that writes them runs here): a
+    trace of two drives, and numbers of several types, channel after channel, highest byte first."""
+    def header(order, channels):
+        lines = ["DIAEXTENDED", "#BEGINGLOBALHEADER", "  1,DOS", '102,rob "#KR6R900"', "111,9.9000000000E+34", f"112,{order}", "#ENDGLOBALHEADER", ""]
+        for channel in channels:
+            lines += ["#BEGINCHANNELHEADER", *(f"{key},{value}" for key, value in channel.items()), "#ENDCHANNELHEADER", ""]
+        return "\r\n".join(lines).encode("latin-1")
+
+    clock = {200: "Zeit", 201: "Zeitkanal", 202: "sec", 210: "IMPLIZIT", 220: ROWS, 240: "0.00000", 241: "0.00400000"}
+    folder = out / "trace"
+    folder.mkdir(exist_ok=True)
+    columns = {"Zeit": [0.0 + 0.004 * i for i in range(ROWS)]}
+    for drive in range(2):
+        micro = 1e6 * Q[drive]
+        torque = np.where(np.arange(ROWS) == 5, 9.9e34, TAU[drive])
+        (folder / f"run_NextGenDrive#{drive + 1}.r64").write_bytes(np.stack([micro, torque], axis=1).astype("<f8").tobytes())
+        channels = [clock]
+        for place, (name, unit, factor) in enumerate([("Istposition", "\u00b0", "1.000000e-06"), ("Istmoment", "Nm", "1.000000e+00")]):
+            channels.append({
+                200: name, 201: "AT_Drive", 202: unit, 210: "EXPLIZIT", 211: f"renamed_NextGenDrive#{drive + 1}.r64", 213: "BLOCK", 214: "REAL64",
+                220: ROWS, 221: place + 1, 240: 0, 241: factor,
+            })
+        (folder / f"run_NextGenDrive#{drive + 1}.dat").write_bytes(header("High -> Low", channels))
+        columns[f"Istposition[A{drive + 1}]"] = [float(x) * 1e-6 + 0.0 for x in micro]
+        columns[f"Istmoment[A{drive + 1}]"] = np.where(np.arange(ROWS) == 5, np.nan, TAU[drive])
+    counts = np.round(1000 * Q[0]).astype(int)
+    parts = {"REAL32": F32[1].astype(">f4"), "INT16": counts.astype(">i2"), "WORD8": (np.arange(ROWS) % 7).astype(">u1")}
+    channels = [clock]
+    for kind, values in parts.items():
+        (folder / f"types.{kind}").write_bytes(bytes(values.itemsize) + values.tobytes())
+        channels.append({
+            200: kind.lower(), 210: "EXPLICIT", 211: f"C:\\KRC\\TRACE\\types.{kind}", 213: "CHANNEL", 214: kind, 220: ROWS, 221: 2,
+            240: "0.5", 241: "0.25",
+        })
+    (folder / "types.dat").write_bytes(header("Low -> High", channels))
+    types = {"Zeit": columns["Zeit"], **{kind.lower(): [float(x) * 0.25 + 0.5 for x in values] for kind, values in parts.items()}}
+    return {"trace/run_NextGenDrive#2.dat": columns, "trace/types.dat": types}
+
+
 def matlab_files(out):
     variables = {
         "t": T[:, None], "q": Q.T, "tau": TAU, "ticks": np.arange(ROWS, dtype=np.int16)[:, None], "single_q": F32.T,
@@ -615,7 +655,7 @@ def main():
     out = parser.parse_args().out / "formats"
     out.mkdir(parents=True, exist_ok=True)
     files = {}
-    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, lerobot_files, matlab_files, hdf5_files]:
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, lerobot_files, diadem_files, matlab_files, hdf5_files]:
         files |= make(out)
     versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
     files = {name: dict(columns) for name, columns in files.items()}

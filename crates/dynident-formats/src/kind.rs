@@ -26,6 +26,8 @@ pub enum FileFormat {
     LeRobot,
     /// Arrow, in the file format (Feather) or as a stream.
     Arrow,
+    /// DIAdem data, which KUKA's controllers write.
+    Diadem,
     /// MATLAB, `save -v6` and `-v7`.
     Mat5,
     /// HDF5, which MATLAB's `save -v7.3` writes too.
@@ -47,6 +49,7 @@ impl FileFormat {
             Self::Parquet => "Parquet",
             Self::LeRobot => "LeRobot data set",
             Self::Arrow => "Arrow",
+            Self::Diadem => "DIAdem data (KUKA trace)",
             Self::Mat5 => "MATLAB 5 file",
             Self::Hdf5 => "HDF5 file",
         }

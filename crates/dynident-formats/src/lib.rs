@@ -10,6 +10,7 @@
 //! | Parquet | columns, lists with their indices | `parquet` |
 //! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`, `parquet` |
 //! | Arrow: Feather, streams | as Parquet | `arrow` |
+//! | DIAdem header and numbers (KUKA trace) | channels, of all drives: `Istmoment[A3]` | |
 //! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices either way up | `gzip`, `hdf5` |
 //!
 //! Columns that were recorded on different clocks (topics of a bag) are joined on that of the first one selected: see
@@ -47,6 +48,7 @@ mod arrays;
 mod arrow;
 mod bags;
 mod bytes;
+mod diadem;
 mod error;
 mod hdf5;
 mod json_lines;
@@ -139,14 +141,15 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
         FileFormat::Parquet => Contents::Table(parquet::open(path)?),
         FileFormat::LeRobot => Contents::Table(lerobot::open(path)?),
         FileFormat::Arrow => Contents::Table(arrow::open(path)?),
+        FileFormat::Diadem => Contents::Table(diadem::open(path)?),
         FileFormat::Mat5 => Contents::Table(mat::open(path, reader)?),
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path)?),
     };
     Ok(Opened { format, contents })
 }
 
-/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording or a LeRobot data set, the
-/// description of them first.
+/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording, a LeRobot data set or a DIAdem
+/// recording, the description of them first.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.
@@ -155,6 +158,9 @@ pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, FileError> {
         return lerobot::files(folder);
     }
     if !path.is_dir() {
+        if diadem::is_header(path) {
+            return diadem::files(path);
+        }
         return Ok(vec![path.to_owned()]);
     }
     let mut files = vec![path.join(bags::METADATA)];

@@ -1,6 +1,7 @@
 //! What a file is, by its first bytes.
 
 use crate::arrow;
+use crate::diadem;
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::io::{BufRead, BufReader, Read};
@@ -24,6 +25,7 @@ const READ: &[(&[u8], FileFormat)] = &[
     (b"\x93NUMPY", FileFormat::Npy),
     (b"PAR1", FileFormat::Parquet),
     (arrow::MAGIC, FileFormat::Arrow),
+    (diadem::BEGIN, FileFormat::Diadem),
     (b"PK\x03\x04", FileFormat::Npz),
     (b"\x1F\x8B", FileFormat::GzipText),
     (b"\x28\xB5\x2F\xFD", FileFormat::ZstdText),

@@ -207,6 +207,40 @@ fn a_data_set_that_is_not_whole_says_what_is_missing() {
 }
 
 #[test]
+fn a_trace_that_is_not_whole_says_what_is_missing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let golden = |name: &str| std::fs::read(folder().join("trace").join(name)).unwrap();
+    let refused = |header: &[u8], words: &str| {
+        let path = scratch.path().join("run_NextGenDrive#1.dat");
+        std::fs::write(&path, header).unwrap();
+        let error = drain(&path).expect_err(words);
+        told(&error, "run_NextGenDrive#");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let header = golden("run_NextGenDrive#1.dat");
+    let changed = |from: &str, to: &str| {
+        let text: String = header.iter().map(|byte| char::from(*byte)).collect();
+        assert!(text.contains(from));
+        text.replacen(from, to, 1).chars().map(|letter| letter as u8).collect::<Vec<_>>()
+    };
+    refused(
+        &header,
+        "channel `Istposition`: there is no file `renamed_NextGenDrive#1.r64`; copy the whole trace again",
+    );
+    let data = golden("run_NextGenDrive#1.r64");
+    let beside = scratch.path().join("run_NextGenDrive#1.r64");
+    std::fs::write(&beside, &data[..data.len() - 8]).unwrap();
+    refused(&header, "40 values are told, and `run_NextGenDrive#1.r64` ends before");
+    std::fs::write(&beside, &data).unwrap();
+    refused(b"DIAEXTENDED\r\n#BEGINCHANNELHEADER\r\n200,Zeit\r\n", "it describes no channel to its end");
+    refused(&changed("221,1\r\n", "221,1\r\n222,3\r\n"), "222 is 3, and 2 channels stand side by side");
+    refused(&changed("214,REAL64", "214,REAL32"), "channels of several types stand side by side");
+    refused(&changed("220,40", "220,-40"), "it has no length (220)");
+    std::fs::write(scratch.path().join("run_NextGenDrive#2.dat"), changed("241,0.004", "241,0.002")).unwrap();
+    refused(&header, "its time differs from that of the first drive");
+}
+
+#[test]
 fn what_mutated_inputs_found_is_refused() {
     // An attachment longer than its chunk; a column at a negative place.
     for file in ["bags/wrong_length.mcap", "parquet/negative_place.parquet"] {

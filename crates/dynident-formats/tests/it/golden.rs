@@ -140,6 +140,8 @@ fn files_are_known_by_their_content() {
         std::fs::copy(folder().join(file), &renamed).unwrap();
         assert_eq!(open(&renamed).unwrap().format, format, "{file}");
     }
+    let trace = folder().join("trace/run_NextGenDrive#2.dat");
+    assert_eq!((open(&trace).unwrap().format, files(&trace).unwrap().len()), (FileFormat::Diadem, 4));
     for name in ["lerobot_v3", "lerobot_v3/meta/info.json"] {
         let path = folder().join(name);
         assert_eq!(open(&path).unwrap().format, FileFormat::LeRobot, "{name}");
