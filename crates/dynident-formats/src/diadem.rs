@@ -1,8 +1,8 @@
 //! DIAdem data: a header of text (`.dat`) and files of numbers beside it. KUKA's controllers write their traces so, a
 //! header for each drive. Keys of the header: <https://www.ni.com/docs/en-US/bundle/diadem/page/header/header/header_overview.htm>.
 //!
-//! `value = number · (241) + (240)`. In a block, the numbers of all channels of a file stand side by side, row after row;
-//! `221` is the place of a channel's first one, counted from 1 (from 0 where some channel's is 0).
+//! `value = number · (241) + (240)`. In a block, the numbers of all channels of a file stand side by side, row after
+//! row; `221` is the place of a channel's first one, counted from 1 (from 0 where some channel's is 0).
 
 use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
 use crate::bytes::{Bytes, Number};

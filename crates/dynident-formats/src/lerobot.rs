@@ -1,5 +1,5 @@
-//! LeRobot data sets: a folder with `meta/info.json` and Parquet files below `data`, one for each episode (version 2) or
-//! for several (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
+//! LeRobot data sets: a folder with `meta/info.json` and Parquet files below `data`, one for each episode (version 2)
+//! or for several (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
 
 use crate::error::FileError;
 use crate::kind::FileFormat;

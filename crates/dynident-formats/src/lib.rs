@@ -98,7 +98,8 @@ impl core::fmt::Debug for Contents {
     }
 }
 
-/// Opens the file at `path`, or the folder of a rosbag2 recording or of a LeRobot data set, and finds out what it holds.
+/// Opens the file at `path`, or the folder of a rosbag2 recording or of a LeRobot data set, and finds out what it
+/// holds.
 ///
 /// # Errors
 /// If it cannot be read, is of a format that is not read, or is broken where its columns are named.

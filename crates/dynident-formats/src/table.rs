@@ -58,8 +58,8 @@ pub trait Table: fmt::Debug + Send {
     /// If the file is broken there.
     fn skip_row(&mut self) -> Result<bool, FileError>;
 
-    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which rows
-    /// lie in the file. Not after [`select`](Self::select).
+    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which
+    /// rows lie in the file. Not after [`select`](Self::select).
     ///
     /// # Errors
     /// If the file is broken, behind the last row that was given.

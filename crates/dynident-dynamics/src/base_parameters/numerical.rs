@@ -32,11 +32,11 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
     }
 }
 
-/// Regressors at random states, of numbers without units: lengths count in the robot's longest link, inertia and gravity
-/// each in their largest entry.
+/// Regressors at random states, of numbers without units: lengths count in the robot's longest link, inertia and
+/// gravity each in their largest entry.
 ///
-/// A sum of columns is zero in all states exactly when it is zero at rest, and what motion adds to it is: rows at rest and
-/// rows of what motion adds have the dependencies of their sums, whatever the size of gravity beside inertia.
+/// A sum of columns is zero in all states exactly when it is zero at rest, and what motion adds to it is: rows at rest
+/// and rows of what motion adds have the dependencies of their sums, whatever the size of gravity beside inertia.
 pub(super) struct ScaledRegressors {
     /// Rows of joint after joint of what motion adds, then at rest; all columns.
     pub(super) rows: DMatrix<f64>,
@@ -103,7 +103,8 @@ fn reach_of_torque(model: &Model, joint: usize, length: f64) -> f64 {
     if model.joints()[joint].turns() { length } else { 1.0 }
 }
 
-/// The longest way from one joint to the next, m; 1 where all stand in one place. Where the first stands does not matter.
+/// The longest way from one joint to the next, m; 1 where all stand in one place. Where the first stands does not
+/// matter.
 fn longest_link_m(model: &Model) -> f64 {
     let links = model.tree_joints().iter().filter(|joint| joint.parent.is_some());
     let longest = links.map(|joint| joint.placement.translation.norm()).fold(0.0, f64::max);

@@ -1,5 +1,5 @@
-//! Tables of FlatBuffers, in which Arrow writes its schema and the places of its columns. Every place is checked when it
-//! is followed: what points outside counts as absent. Format: <https://flatbuffers.dev/internals>.
+//! Tables of FlatBuffers, in which Arrow writes its schema and the places of its columns. Every place is checked when
+//! it is followed: what points outside counts as absent. Format: <https://flatbuffers.dev/internals>.
 
 use crate::bytes::Bytes;
 

@@ -1,5 +1,6 @@
-//! Arrow: tables in the file format (`ARROW1`, which is Feather's second version) and in the streaming format; columns as those of Parquet.
-//! Format: <https://arrow.apache.org/docs/format/Columnar.html#serialization-and-interprocess-communication-ipc>.
+//! Arrow: tables in the file format (`ARROW1`, which is Feather's second version) and in the streaming format; columns
+//! as those of Parquet. Format:
+//! <https://arrow.apache.org/docs/format/Columnar.html#serialization-and-interprocess-communication-ipc>.
 
 #[cfg(feature = "arrow")]
 mod batch;

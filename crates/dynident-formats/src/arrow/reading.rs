@@ -90,7 +90,8 @@ fn broken(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> 
     FileError::broken(path, FileFormat::Arrow, place, problem, "write or copy it again")
 }
 
-/// Where the messages of a file of `length` bytes end: before its footer, whose length and the magic are the last bytes.
+/// Where the messages of a file of `length` bytes end: before its footer, whose length and the magic are the last
+/// bytes.
 fn end_of_messages(reader: &mut BufReader<File>, length: u64) -> std::io::Result<Result<u64, &'static str>> {
     let mut tail = [0; 4 + MAGIC.len()];
     let Some(tail_at) = length.checked_sub(tail.len() as u64).filter(|at| *at >= 8) else {

@@ -1,7 +1,8 @@
-//! `<connect>` under `<equality>`: chains of the parallelogram kind are closed, as `[[robot.loop]]` of a study closes them.
+//! `<connect>` under `<equality>`: chains of the parallelogram kind are closed, as `[[robot.loop]]` of a study closes
+//! them.
 //!
-//! The two points are the anchor and what it meets in the drawn pose. The file does not say which joints are passive: of
-//! those that the chain moves, the ones that no actuator drives and that follow nothing yet.
+//! The two points are the anchor and what it meets in the drawn pose. The file does not say which joints are passive:
+//! of those that the chain moves, the ones that no actuator drives and that follow nothing yet.
 
 use super::bodies::LinkPlace;
 use super::classes::Stated;

@@ -35,7 +35,8 @@ pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3
 }
 
 /// Effort limits of joints by their actuators: what a joint's actuators can give at most together, where each of them
-/// has a limit that is the same both ways. A lower limit of the joint itself stays. Gives the joints that have actuators.
+/// has a limit that is the same both ways. A lower limit of the joint itself stays. Gives the joints that have
+/// actuators.
 pub(super) fn efforts(
     document: &Expanded,
     classes: &Classes<'_>,

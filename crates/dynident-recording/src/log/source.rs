@@ -142,8 +142,8 @@ pub trait LogTable: fmt::Debug + Send {
     /// If it cannot be read.
     fn skip_row(&mut self) -> Result<bool, RecordingError>;
 
-    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which rows
-    /// lie in the source. Not after [`select`](Self::select). Written anew only where there are several groups.
+    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which
+    /// rows lie in the source. Not after [`select`](Self::select). Written anew only where there are several groups.
     ///
     /// # Errors
     /// If a row is no row of numbers, behind those that were given.

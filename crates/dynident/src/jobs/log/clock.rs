@@ -30,7 +30,8 @@ impl Clock {
         }
     }
 
-    /// Rows in one unit of the clock: steps by the `span` of all `rows`, or without their holes by the sum of the steps.
+    /// Rows in one unit of the clock: steps by the `span` of all `rows`, or without their holes by the sum of the
+    /// steps.
     pub(super) fn rate(&self, rows: u64, span: f64) -> Option<f64> {
         let rate = if self.holes == 0 { rows.saturating_sub(1) as f64 / span } else { self.steps as f64 / self.sum };
         Some(rate).filter(|rate| *rate > 0.0 && rate.is_finite())
