@@ -205,10 +205,6 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
                 notes.push(format!("{name}: numbers of the type `{}` are not read", channel.text(214)));
                 continue;
             }
-            let unit = channel.text(202);
-            if !unit.is_empty() && (is_time || own == &paths[0]) {
-                notes.push(format!("{}: in {unit}", channel.name()));
-            }
             let column = if is_time { Ok(even(channel, count)) } else { numbers(&header, channel, count) };
             arrays.push(Array::row_major(name, [count, 1], column?));
         }

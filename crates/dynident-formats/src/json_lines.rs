@@ -10,8 +10,10 @@ pub(crate) fn open(path: &Path, _: Box<dyn BufRead + Send>) -> Result<Box<dyn Ta
     Err(FileError::NotBuilt { file: path.to_owned(), format: "JSON lines", feature: "json" })
 }
 
+#[cfg(feature = "bags")]
+pub(crate) use json::flattened;
 #[cfg(feature = "json")]
-pub(crate) use json::{flattened, open};
+pub(crate) use json::open;
 
 #[cfg(feature = "json")]
 mod json {

@@ -118,19 +118,15 @@ mod reading {
         let clock = match (place("timestamp"), place("episode_index"), place(TIME)) {
             (Some(stamp), Some(episode), None) => {
                 names.push(TIME.to_owned());
-                notes.push(format!(
-                    "{TIME}: `timestamp` with one episode after the other, {BETWEEN_EPISODES_S} s between them; one \
-                     alone: `keep_where` by `episode_index`"
-                ));
                 Some(Clock { stamp, episode, ..Clock::default() })
             }
             _ => None,
         };
         if let (Some(path), Some(episodes)) = (info["data_path"].as_str(), info["total_episodes"].as_u64())
             && path.contains("episode_index")
-            && episodes != parts.len() as u64
+            && episodes > parts.len() as u64
         {
-            notes.push(format!("{} of {episodes} episodes are there", parts.len()));
+            notes.push(format!("{} of {episodes} episodes, whose files are not there", episodes - parts.len() as u64));
         }
         let wanted = (0..names.len()).collect::<Vec<_>>();
         let mut table = DataSet {

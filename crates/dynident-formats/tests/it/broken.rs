@@ -196,7 +196,7 @@ fn a_data_set_that_is_not_whole_says_what_is_missing() {
     let episodes = golden.join("data/chunk-000");
     std::fs::copy(episodes.join("episode_000000.parquet"), chunk.join("episode_000000.parquet")).unwrap();
     let Contents::Table(table) = open(&set).unwrap().contents else { panic!() };
-    assert!(table.notes().contains(&"1 of 3 episodes are there".to_owned()), "{:?}", table.notes());
+    assert!(table.notes().contains(&"2 of 3 episodes, whose files are not there".to_owned()), "{:?}", table.notes());
     assert_eq!(drain(&set).unwrap(), 15);
     // What stands for a file that Git left behind; a table of another kind.
     let second = chunk.join("episode_000001.parquet");
