@@ -27,9 +27,8 @@ pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
             (Some(JointProperty::Friction), _) => FRICTION * effort,
             (Some(JointProperty::Damping), _) => FRICTION * effort / limits.velocity.unwrap_or(SPEED),
             // A spring has the value of the description.
-            (Some(JointProperty::Stiffness), _) => continue,
             (
-                None,
+                Some(JointProperty::Stiffness) | None,
                 TermAction::Inertia { .. }
                 | TermAction::Damping { .. }
                 | TermAction::Friction(_)

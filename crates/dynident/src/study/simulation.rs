@@ -176,10 +176,10 @@ impl SimulationSection {
                         (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
                         (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
                         (Some(JointProperty::DriveInertia), _) => Some(self.drive_inertia.of(joint)),
-                        // By the description, above.
-                        (Some(JointProperty::Stiffness), _) => None,
                         (None, TermAction::Constant) => Some(self.offset.of(joint)),
-                        (
+                        // Springs have the description's value, above.
+                        (Some(JointProperty::Stiffness), _)
+                        | (
                             None,
                             TermAction::Inertia { .. }
                             | TermAction::Damping { .. }

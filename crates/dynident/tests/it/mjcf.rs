@@ -45,3 +45,40 @@ fn the_users_mjcf_gets_the_identified_values() {
     let expected: f64 = terms.map(|term| term.value).sum();
     assert!((sums[0] - expected).abs() < 1e-12 && expected > 0.0, "{sums:?} {expected}");
 }
+
+/// A spring that the description has at the elbow, softer than it says: found, and written back.
+#[test]
+fn a_spring_of_the_description_is_identified() {
+    const STIFFNESS: f64 = 25.0;
+    let mut text = std::fs::read_to_string(repository("golden/mjcf/robosuite_ur5e.xml")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let description = folder.path().join("arm.xml");
+    let elbow = load_robot(repository("golden/mjcf/robosuite_ur5e.xml")).unwrap().model.joints()[2].name.clone();
+    let at = text.find(&format!("name=\"{elbow}\"")).unwrap();
+    text.insert_str(at, "stiffness=\"30\" springref=\"0.2\" ");
+    std::fs::write(&description, text).unwrap();
+    let mut random = Random(6);
+    let truth = Truth::other(&description, &mut random);
+    let dof = truth.drive.len();
+    let motion = Motion::new(dof, 12);
+    write_log(&folder.path().join("log.csv"), &truth, &motion, (200.0, 15.0), &header(dof), |q, tau| {
+        let mut tau: Vec<f64> = tau.iter().map(|tau| tau + 0.05 * random.normal()).collect();
+        tau[2] += STIFFNESS * (q[2] - 0.2);
+        [q.to_vec(), tau].concat()
+    });
+    let study = format!(
+        "robot.file = \"arm.xml\"\nlog = [{{ file = \"log.csv\" }}]\ndrive.drive_inertia = true\n[format]\ntime = {{ column = \"t\" }}\n\
+         position = {{ columns = \"q{{1..{dof}}}\" }}\ntorque = {{ columns = \"tau{{1..{dof}}}\" }}\n"
+    );
+    let found = Job::new(folder.path(), &study).identify();
+    let name = format!("k_{elbow}");
+    let spring = found.result.joints[2].terms.iter().find(|term| term.symbol == name).unwrap();
+    let std = spring.std.unwrap();
+    // One of three hundred robots is three deviations off.
+    assert!((spring.value - STIFFNESS).abs() < 3.0 * std && std < 0.5, "{} ± {std}", spring.value);
+    let written = folder.path().join("identified.xml");
+    std::fs::write(&written, found.mjcf.unwrap()).unwrap();
+    let joint = &load_robot(&written).unwrap().model.joints()[2].clone();
+    let (read, reference) = joint.spring.map(|spring| (spring.stiffness, spring.reference)).unwrap();
+    assert_eq!((read, reference), (spring.value, 0.2));
+}
