@@ -162,8 +162,8 @@ fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, L
             add(LimitKind::Power, name(), Probe::Power { joint, limit });
         }
     }
-    for (index, joint) in model.tree_joints().iter().enumerate() {
-        let Some(coupling) = model.coupling().filter(|coupling| !coupling.driving().contains(&index)) else { continue };
+    for (index, joint) in model.followers() {
+        let Some(coupling) = model.coupling() else { continue };
         let sources = || coupling.row(index).to_vec();
         if let Some((lower, upper)) = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper)
         {

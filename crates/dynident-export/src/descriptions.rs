@@ -198,7 +198,7 @@ fn write_body(
 fn write_followers(text: &mut String, model: &Model) {
     let Some(coupling) = model.coupling() else { return };
     let (mut tendons, mut equalities) = (String::new(), String::new());
-    for (index, joint) in model.tree_joints().iter().enumerate().filter(|(index, _)| model.joint_of(*index).is_none()) {
+    for (index, joint) in model.followers() {
         let (name, offset) = (attribute(&joint.name), coupling.offset(index));
         let source = |dof: usize| attribute(&model.joints()[dof].name);
         match *coupling.row(index) {

@@ -20,7 +20,7 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     for (name, key) in names.iter().zip(&keys).filter(|(name, key)| *name != key) {
         notes.push(format!("Joint {name} stands under dynamics.{key}."));
     }
-    for joint in model.tree_joints().iter().filter(|joint| model.joint_index(&joint.name).is_none()) {
+    for (_, joint) in model.followers() {
         notes.push(format!("Joint {} follows others: what it carries is not here; see the format json.", joint.name));
     }
     let mut text = String::new();

@@ -25,7 +25,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
             model.gravity().0
         ));
     }
-    for joint in model.tree_joints().iter().filter(|joint| model.joint_index(&joint.name).is_none()) {
+    for (_, joint) in model.followers() {
         notes.push(format!("SDF before 1.11 has no followers: joint {} is free in this file.", joint.name));
     }
     let mut names = Names::default();

@@ -163,6 +163,11 @@ impl Model {
         }
     }
 
+    /// The joints of the tree that follow others, with their places in it.
+    pub fn followers(&self) -> impl Iterator<Item = (usize, &Joint)> {
+        self.tree.iter().enumerate().filter(|(place, _)| self.joint_of(*place).is_none())
+    }
+
     /// Number of moving bodies, and of joints of the tree.
     pub fn body_count(&self) -> usize {
         self.tree.len()

@@ -16,7 +16,7 @@ const SEED: u64 = 1;
 /// The split of all columns (bodies, then terms), where a share below `tolerance` counts as none.
 pub(super) fn independent_columns(model: &Model, terms: &[TorqueTerm], tolerance: f64) -> IndependentColumns {
     let mut rows = stacked_regressors(model, terms, SEED);
-    let first_term = 10 * model.body_count();
+    let first_term = model.inertial_count();
     for (place, term) in terms.iter().enumerate() {
         if !term.functions().is_empty() {
             rows.column_mut(first_term + place).fill(0.0);

@@ -4,9 +4,9 @@
 //! A declared column that the other columns give, in the rows of all joints, is regrouped into them like any dependent
 //! column: nothing tells its coefficient, and base parameters name it.
 
+use super::numerical::stacked;
 use crate::independent_columns::{IndependentColumns, independent_regressor_columns};
-use crate::regressor_panels::{Column, PanelLayout, Panels, regressor_panels};
-use crate::workspace::BatchWorkspace;
+use crate::regressor_panels::Column;
 use dynident_model::Model;
 use dynident_model::sample::Random;
 use dynident_model::terms::{JointMotion, TorqueTerm};
@@ -60,7 +60,9 @@ pub(super) fn regrouped(
     }
     // The declared ones behind all others: a column is tried against those before it.
     let order = [others, declared].concat();
-    let values = stacked(model, order.iter().map(|&column| columns[column].clone()).collect());
+    let states = States::inside_limits(model, 4 * order.len() / model.dof().max(1) + 20);
+    let tried = order.iter().map(|&column| columns[column].clone()).collect();
+    let values = stacked(model, tried, &states.motion());
     let found = independent_regressor_columns(&values, tolerance);
     let lost: Vec<usize> =
         (0..order.len()).filter(|place| found.dependent.contains(place) && is_declared(order[*place])).collect();
@@ -94,24 +96,6 @@ pub(super) fn regrouped(
         weakest_independent: split.weakest_independent,
         strongest_dependent: split.strongest_dependent,
     }
-}
-
-/// The columns in the rows of all joints at random states inside the limits.
-fn stacked(model: &Model, columns: Vec<Column>) -> DMatrix<f64> {
-    let (dof, count) = (model.dof(), columns.len());
-    let states = States::inside_limits(model, 4 * count / dof.max(1) + 20);
-    let layout = PanelLayout::new(model, columns);
-    let mut panels = Panels::default();
-    regressor_panels(model, &mut BatchWorkspace::new(model), &layout, &states.motion(), &mut panels);
-    let samples = states.samples;
-    let mut stacked = DMatrix::zeros(dof * samples, count);
-    for joint in 0..dof {
-        for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
-            let values = &panels.joint(joint)[place * samples..(place + 1) * samples];
-            stacked.view_mut((joint * samples, column), (samples, 1)).copy_from_slice(values);
-        }
-    }
-    stacked
 }
 
 /// Random states, joint-major.

@@ -1,7 +1,7 @@
 //! The numerical rank of regressors at random states: the cross-check of the structural base parameters.
 
 use crate::independent_columns::independent_regressor_columns;
-use crate::regressor_panels::{PanelLayout, Panels, all_columns, regressor_panels};
+use crate::regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels};
 use crate::workspace::BatchWorkspace;
 use dynident_model::Model;
 use dynident_model::sample::Random;
@@ -41,10 +41,15 @@ pub(super) fn stacked_regressors(model: &Model, terms: &[TorqueTerm], seed: u64)
     };
     let q = states(&|joint| if model.joints()[joint].turns() { core::f64::consts::PI } else { 1.0 });
     let (dq, ddq) = (states(&|_| 2.0), states(&|_| 5.0));
+    stacked(model, columns, &JointMotion { samples, q: &q, dq: &dq, ddq: &ddq })
+}
+
+/// The regressor of some columns at the states of a motion: rows of joint after joint.
+pub(super) fn stacked(model: &Model, columns: Vec<Column>, motion: &JointMotion<'_>) -> DMatrix<f64> {
+    let (dof, count, samples) = (model.dof(), columns.len(), motion.samples);
     let layout = PanelLayout::new(model, columns);
     let mut panels = Panels::default();
-    let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
-    regressor_panels(model, &mut BatchWorkspace::new(model), &layout, &motion, &mut panels);
+    regressor_panels(model, &mut BatchWorkspace::new(model), &layout, motion, &mut panels);
     let mut stacked = DMatrix::zeros(dof * samples, count);
     for joint in 0..dof {
         for (place, &column) in layout.joint_columns(joint).iter().enumerate() {

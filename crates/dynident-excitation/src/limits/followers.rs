@@ -22,9 +22,9 @@ struct FollowerBand {
 fn follower_bands(model: &Model) -> Vec<FollowerBand> {
     let Some(coupling) = model.coupling() else { return Vec::new() };
     let mut bands = Vec::new();
-    for (index, joint) in model.tree_joints().iter().enumerate() {
+    for (index, joint) in model.followers() {
         let sources = coupling.row(index).to_vec();
-        if coupling.driving().contains(&index) || sources.is_empty() {
+        if sources.is_empty() {
             continue;
         }
         let limits = &joint.limits;
