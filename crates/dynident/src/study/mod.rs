@@ -10,6 +10,7 @@ mod friction_keys;
 mod inputs;
 mod iteration;
 mod log;
+mod log_source;
 mod overlap;
 mod payload;
 mod physical;
@@ -28,10 +29,12 @@ pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use friction::{FrictionChoice, FrictionTerm};
+pub(crate) use inputs::StudyInput;
 pub use iteration::{
     Automatic, DifferentiatorKey, IterationSection, LegOrder, LegSection, MotionChoice, PriorChoice, RobotChoice,
 };
 pub use log::LogSection;
+pub(crate) use log_source::StudyLogSource;
 pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;
 pub use robot::{FollowSection, LoopSection, RobotSection};
