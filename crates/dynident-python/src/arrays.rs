@@ -3,14 +3,18 @@
 //! Vectors over joints stand in the last axis; whatever axes come before it count samples. What comes back has the same
 //! axes before its own, so that one posture gives a vector and a thousand give a table.
 
+use crate::pool::pool;
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::borrow::Cow;
 
+/// Numbers of a result from which on more than one thread is worth waking.
+const WORTH_THREADS: usize = 50_000;
+
 /// Numbers of an array, row-major, and its axes before the last.
-pub(crate) struct Samples<'py> {
+struct Samples<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
     lead: Vec<usize>,
 }
@@ -18,16 +22,15 @@ pub(crate) struct Samples<'py> {
 impl<'py> Samples<'py> {
     /// Anything that NumPy makes an array of, with `joints` entries in the last axis.
     pub(crate) fn of(object: &Bound<'py, PyAny>, name: &str, joints: usize) -> PyResult<Self> {
-        let array = match object.cast::<PyArrayDyn<f64>>() {
-            Ok(array) => array.clone(),
-            Err(_) => {
-                let py = object.py();
-                let settings = PyDict::new(py);
-                settings.set_item("dtype", "float64")?;
-                let made = py.import("numpy")?.call_method("asarray", (object,), Some(&settings))?;
-                made.cast_into::<PyArrayDyn<f64>>()
-                    .map_err(|_| PyValueError::new_err(format!("{name}: give an array of numbers")))?
-            }
+        let array = if let Ok(array) = object.cast::<PyArrayDyn<f64>>() {
+            array.clone()
+        } else {
+            let py = object.py();
+            let settings = PyDict::new(py);
+            settings.set_item("dtype", "float64")?;
+            let made = py.import("numpy")?.call_method("asarray", (object,), Some(&settings))?;
+            made.cast_into::<PyArrayDyn<f64>>()
+                .map_err(|_| PyValueError::new_err(format!("{name}: give an array of numbers")))?
         };
         let shape = array.shape();
         match shape.split_last() {
@@ -78,4 +81,73 @@ pub(crate) fn array<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let shape: Vec<usize> = lead.iter().chain(own).copied().collect();
     numbers.into_pyarray(py).reshape(shape)
+}
+
+/// A motion of `(..., n)` arrays, of which velocity and acceleration may be left out: at rest.
+pub(crate) struct Motion<'py> {
+    q: Samples<'py>,
+    dq: Option<Samples<'py>>,
+    ddq: Option<Samples<'py>>,
+}
+
+impl<'py> Motion<'py> {
+    pub(crate) fn of(
+        dof: usize,
+        q: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let q = Samples::of(q, "q", dof)?;
+        let other = |array: Option<&Bound<'py, PyAny>>, name: &str| {
+            array.map(|array| Samples::of(array, name, dof)?.like(&q, name)).transpose()
+        };
+        let (dq, ddq) = (other(dq, "dq")?, other(ddq, "ddq")?);
+        Ok(Self { q, dq, ddq })
+    }
+
+    /// The axes before the last.
+    pub(crate) fn lead(&self) -> &[usize] {
+        self.q.lead()
+    }
+
+    /// Number of samples.
+    pub(crate) fn count(&self) -> usize {
+        self.q.count()
+    }
+
+    /// Runs `work`, which makes so many numbers, on the numbers, without the interpreter's lock; on several threads
+    /// where that is worth it.
+    pub(crate) fn compute<R: Send>(
+        &self,
+        py: Python<'py>,
+        results: usize,
+        work: impl FnOnce([&[f64]; 3]) -> R + Send,
+    ) -> R {
+        let q = self.q.numbers();
+        let rest = vec![0.0; if self.dq.is_none() || self.ddq.is_none() { q.len() } else { 0 }];
+        let dq = self.dq.as_ref().map(Samples::numbers);
+        let ddq = self.ddq.as_ref().map(Samples::numbers);
+        let (q, dq, ddq) = (&*q, dq.as_deref().unwrap_or(&rest), ddq.as_deref().unwrap_or(&rest));
+        let pool = if results < WORTH_THREADS { None } else { pool(py) };
+        py.detach(move || match pool {
+            Some(pool) => pool.install(|| work([q, dq, ddq])),
+            None => work([q, dq, ddq]),
+        })
+    }
+}
+
+/// Rows of samples as rows of joints.
+pub(crate) fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
+    let mut out = vec![0.0; rows.len()];
+    for (sample, row) in rows.chunks_exact(joints.max(1)).enumerate() {
+        for (joint, value) in row.iter().enumerate() {
+            out[joint * samples + sample] = *value;
+        }
+    }
+    out
+}
+
+/// Rows of joints as rows of samples.
+pub(crate) fn sample_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
+    joint_major(rows, joints, samples)
 }

@@ -1,65 +1,82 @@
 //! `Robot`: a description, and its dynamics over arrays.
 
-use crate::arrays::{Samples, array};
+use crate::arrays::{Motion, array, joint_major};
 use crate::errors;
+use crate::study::{Study, json_of};
 use dynident::dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
     forward_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, mass_matrix, regressor_panels,
 };
 use dynident::model::terms::JointMotion;
-use dynident::model::{Model, load_robot, read_dh, read_mjcf, read_sdf, read_urdf};
+use dynident::model::{DescriptionFormat, Model, Robot as Description, load_robot, read_robot};
+use dynident::{Folders, StudyRobot};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// Samples of one block of a batch: enough for full lanes, little enough for the cache.
 const BLOCK: usize = 128;
-/// Numbers of a result from which on more than one thread is worth waking.
-const WORTH_THREADS: usize = 50_000;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
 /// A robot on a fixed base: links, joints, gravity.
 ///
-/// Made by ``Robot.load(path)``, or ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` of a text. Vectors over
-/// joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any number of them,
-/// shape ``(..., n)``, and give the axes before the last back.
+/// Made by ``Robot.load(path)``, or ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` of a path or a text. Keyword
+/// arguments are the keys of ``[robot]`` of a study: which joints move, what they follow, where gravity points.
+///
+/// Vectors over joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any
+/// number of them, shape ``(..., n)``, and give the axes before the last back.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Robot {
+    /// As read.
+    description: Description,
+    /// Keys of ``[robot]`` beside the file, as JSON.
+    settings: String,
+    /// With these in force.
     model: Model,
-    path: Option<PathBuf>,
     /// Scratch memory of threads that have called.
     singles: Mutex<Vec<Workspace>>,
     batches: Mutex<Vec<BatchWorkspace>>,
 }
 
 impl Robot {
-    fn of(model: Model, path: Option<PathBuf>) -> Self {
-        Self { model, path, singles: Mutex::default(), batches: Mutex::default() }
+    fn base(&self) -> BaseParameters {
+        BaseParameters::new(&self.model, &[], &BaseParameterSettings::default())
     }
 
-    /// Lends scratch memory to `work`. A panic of another call leaves a poisoned lock, and memory like new.
+    /// The description with the keys of ``[robot]`` in force.
+    fn new(py: Python<'_>, description: Description, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let settings = settings.map_or_else(|| Ok("{}".to_owned()), |settings| json_of(py, settings))?;
+        Self::with_settings(py, description, settings)
+    }
+
+    pub(crate) fn with_settings(py: Python<'_>, description: Description, settings: String) -> PyResult<Self> {
+        let path = description.path.clone();
+        let study = Study::assembled(py, &study_of(&path, &settings)?, path, Some(description.clone()), Vec::new())?;
+        let folders = Folders::new(&study.study, &study.path, None);
+        let made = StudyRobot::new(&study.study, &study.path, &folders).map_err(|error| errors::job(py, &error))?;
+        let model = made.model().clone();
+        Ok(Self { description, settings, model, singles: Mutex::default(), batches: Mutex::default() })
+    }
+
+    /// What was read, before any key is in force.
+    pub(crate) fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Lends scratch memory to `work`. Nobody waits for it: a process that was forked while another thread held the lock
+    /// would wait for ever.
     fn with_single<R>(&self, work: impl FnOnce(&mut Workspace) -> R) -> R {
-        let lent = self.singles.lock().ok().and_then(|mut all| all.pop());
-        let mut workspace = lent.unwrap_or_else(|| Workspace::new(&self.model));
-        let result = work(&mut workspace);
-        if let Ok(mut all) = self.singles.lock() {
-            all.push(workspace);
-        }
-        result
+        lend(&self.singles, || Workspace::new(&self.model), work)
     }
 
     fn with_batch<R>(&self, work: impl FnOnce(&mut BatchWorkspace) -> R) -> R {
-        let lent = self.batches.lock().ok().and_then(|mut all| all.pop());
-        let mut workspace = lent.unwrap_or_else(|| BatchWorkspace::new(&self.model));
-        let result = work(&mut workspace);
-        if let Ok(mut all) = self.batches.lock() {
-            all.push(workspace);
-        }
-        result
+        lend(&self.batches, || BatchWorkspace::new(&self.model), work)
     }
 
     /// `each(row, numbers)` for every sample, where `numbers` are the `size` ones of its result.
@@ -98,57 +115,55 @@ impl Robot {
     }
 }
 
-/// Hands out blocks of samples, to several threads where that is worth it.
+fn lend<W, R>(kept: &Mutex<Vec<W>>, make: impl FnOnce() -> W, work: impl FnOnce(&mut W) -> R) -> R {
+    let lent = kept.try_lock().ok().and_then(|mut all| all.pop());
+    let mut workspace = lent.unwrap_or_else(make);
+    let result = work(&mut workspace);
+    if let Ok(mut all) = kept.try_lock() {
+        all.push(workspace);
+    }
+    result
+}
+
+/// The sections of a study of nothing but a robot.
+fn study_of(path: &Path, settings: &str) -> PyResult<String> {
+    let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
+    let mut section: serde_json::Map<String, serde_json::Value> = serde_json::from_str(settings).map_err(wrong)?;
+    section.insert("file".to_owned(), path.display().to_string().into());
+    serde_json::to_string(&serde_json::json!({ "robot": section })).map_err(wrong)
+}
+
+/// A description of the format `wanted`: `source` is its text if it holds one, else the file's path.
+fn described(
+    source: &str,
+    wanted: DescriptionFormat,
+    name: &str,
+    is_text: impl FnOnce(&str) -> bool,
+) -> PyResult<Description> {
+    let found = if is_text(source) {
+        read_robot(source.to_owned(), Path::new(name)).map_err(errors::robot)?
+    } else {
+        load_robot(source).map_err(errors::robot)?
+    };
+    if found.format == wanted {
+        Ok(found)
+    } else {
+        Err(errors::robot(format!("{}: is {:?}, not {wanted:?}: use Robot.load", found.path.display(), found.format)))
+    }
+}
+
+/// Whether a text is XML and no path.
+fn is_xml(text: &str) -> bool {
+    text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
+}
+
+/// Hands out blocks of samples, to all threads of the pool that this runs in, if any.
 fn in_blocks(out: &mut [f64], size: usize, each: impl Fn((usize, &mut [f64])) + Sync) {
     let chunk = (BLOCK * size).max(1);
-    if out.len() < WORTH_THREADS {
+    if rayon::current_thread_index().is_none() {
         out.chunks_mut(chunk).enumerate().for_each(each);
     } else {
         out.par_chunks_mut(chunk).enumerate().for_each(&each);
-    }
-}
-
-/// Rows of samples as rows of joints.
-fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
-    let mut out = vec![0.0; rows.len()];
-    for (sample, row) in rows.chunks_exact(joints.max(1)).enumerate() {
-        for (joint, value) in row.iter().enumerate() {
-            out[joint * samples + sample] = *value;
-        }
-    }
-    out
-}
-
-/// A motion of `(..., n)` arrays, of which velocity and acceleration may be left out: at rest.
-struct Motion<'py> {
-    q: Samples<'py>,
-    dq: Option<Samples<'py>>,
-    ddq: Option<Samples<'py>>,
-}
-
-impl<'py> Motion<'py> {
-    fn of(
-        dof: usize,
-        q: &Bound<'py, PyAny>,
-        dq: Option<&Bound<'py, PyAny>>,
-        ddq: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Self> {
-        let q = Samples::of(q, "q", dof)?;
-        let other = |array: Option<&Bound<'py, PyAny>>, name: &str| {
-            array.map(|array| Samples::of(array, name, dof)?.like(&q, name)).transpose()
-        };
-        let (dq, ddq) = (other(dq, "dq")?, other(ddq, "ddq")?);
-        Ok(Self { q, dq, ddq })
-    }
-
-    /// Runs `work` on the numbers, without the interpreter's lock.
-    fn compute<R: Send>(&self, py: Python<'py>, work: impl FnOnce([&[f64]; 3]) -> R + Send) -> R {
-        let q = self.q.numbers();
-        let rest = vec![0.0; if self.dq.is_none() || self.ddq.is_none() { q.len() } else { 0 }];
-        let dq = self.dq.as_ref().map(Samples::numbers);
-        let ddq = self.ddq.as_ref().map(Samples::numbers);
-        let (q, dq, ddq) = (&*q, dq.as_deref().unwrap_or(&rest), ddq.as_deref().unwrap_or(&rest));
-        py.detach(move || work([q, dq, ddq]))
     }
 }
 
@@ -156,33 +171,60 @@ impl<'py> Motion<'py> {
 impl Robot {
     /// Reads a description: URDF, MJCF, SDF or a D-H table in TOML, told by its content.
     #[staticmethod]
-    fn load(path: PathBuf) -> PyResult<Self> {
-        let robot = load_robot(&path).map_err(errors::robot)?;
-        Ok(Self::of(robot.model, Some(path)))
+    #[pyo3(signature = (path, **settings))]
+    fn load(py: Python<'_>, path: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        Self::new(py, load_robot(&path).map_err(errors::robot)?, settings)
     }
 
-    /// A robot of the text of a URDF.
+    /// A robot of a URDF: a path, or the text itself.
     #[staticmethod]
-    fn from_urdf(text: &str) -> PyResult<Self> {
-        Ok(Self::of(read_urdf(text).map_err(errors::robot)?.model, None))
+    #[pyo3(signature = (source, **settings))]
+    fn from_urdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        Self::new(py, described(&source, DescriptionFormat::Urdf, "robot.urdf", is_xml)?, settings)
     }
 
-    /// A robot of the text of MuJoCo's MJCF.
+    /// A robot of MuJoCo's MJCF: a path, or the text itself.
     #[staticmethod]
-    fn from_mjcf(text: &str) -> PyResult<Self> {
-        Ok(Self::of(read_mjcf(text).map_err(errors::robot)?.model, None))
+    #[pyo3(signature = (source, **settings))]
+    fn from_mjcf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        Self::new(py, described(&source, DescriptionFormat::Mjcf, "robot.xml", is_xml)?, settings)
     }
 
-    /// A robot of the text of Gazebo's SDF.
+    /// A robot of Gazebo's SDF: a path, or the text itself.
     #[staticmethod]
-    fn from_sdf(text: &str) -> PyResult<Self> {
-        Ok(Self::of(read_sdf(text).map_err(errors::robot)?.model, None))
+    #[pyo3(signature = (source, **settings))]
+    fn from_sdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        Self::new(py, described(&source, DescriptionFormat::Sdf, "robot.sdf", is_xml)?, settings)
     }
 
-    /// A robot of a Denavit-Hartenberg table in TOML.
+    /// A robot of a Denavit-Hartenberg table in TOML: a path, or the text itself, which has more than one line.
     #[staticmethod]
-    fn from_dh(text: &str) -> PyResult<Self> {
-        Ok(Self::of(read_dh(text).map_err(errors::robot)?, None))
+    #[pyo3(signature = (source, **settings))]
+    fn from_dh(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        let is_text = |source: &str| source.contains('\n');
+        Self::new(py, described(&source, DescriptionFormat::Dh, "robot.toml", is_text)?, settings)
+    }
+
+    /// The inverse of ``__reduce__``.
+    #[staticmethod]
+    fn _restore(py: Python<'_>, text: String, path: PathBuf, settings: String) -> PyResult<Self> {
+        Self::with_settings(py, read_robot(text, &path).map_err(errors::robot)?, settings)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, PathBuf, String))> {
+        let own = slf.get();
+        let state = (own.description.text.clone(), own.description.path.clone(), own.settings.clone());
+        Ok((slf.get_type().getattr("_restore")?, state))
+    }
+
+    /// The keys of ``[robot]`` that are in force beside the file, as JSON.
+    #[getter]
+    fn _settings(&self) -> &str {
+        &self.settings
     }
 
     /// The robot's name.
@@ -191,10 +233,16 @@ impl Robot {
         self.model.name()
     }
 
-    /// The file it was read from, if any.
+    /// The file that it was read from; of a text a name only.
     #[getter]
-    fn path(&self) -> Option<PathBuf> {
-        self.path.clone()
+    fn path(&self) -> &Path {
+        &self.description.path
+    }
+
+    /// The text of the description.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.description.text
     }
 
     /// Names of the degrees of freedom, base to tip: the order of all vectors.
@@ -223,9 +271,16 @@ impl Robot {
     }
 
     /// The same robot with the named joints held, ``{name: position}`` in rad or m.
-    fn locked(&self, positions: std::collections::BTreeMap<String, f64>) -> PyResult<Self> {
-        let held: Vec<(String, f64)> = positions.into_iter().collect();
-        Ok(Self::of(self.model.locked(&held).map_err(errors::robot)?, self.path.clone()))
+    fn locked(&self, py: Python<'_>, positions: BTreeMap<String, f64>) -> PyResult<Self> {
+        let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
+        let mut settings: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(&self.settings).map_err(wrong)?;
+        let held = settings.entry("lock").or_insert_with(|| serde_json::json!({}));
+        if let Some(held) = held.as_object_mut() {
+            held.extend(positions.into_iter().map(|(name, at)| (name, at.into())));
+        }
+        let settings = serde_json::to_string(&settings).map_err(wrong)?;
+        Self::with_settings(py, self.description.clone(), settings)
     }
 
     /// Joint torques of a motion, Nm (N): ``M(q) ddq + C(q, dq) dq + g(q)`` of the rigid bodies. Shapes ``(..., n)``;
@@ -240,7 +295,7 @@ impl Robot {
     ) -> PyResult<Array<'py>> {
         let dof = self.model.dof();
         let motion = Motion::of(dof, q, dq, ddq)?;
-        let tau = motion.compute(py, |motion| {
+        let tau = motion.compute(py, motion.count() * dof, |motion| {
             self.for_blocks(motion, dof, |workspace, motion, out| {
                 let mut tau = vec![0.0; out.len()];
                 inverse_dynamics_batch(&self.model, workspace, motion, &mut tau);
@@ -251,7 +306,7 @@ impl Robot {
                 }
             })
         });
-        array(py, motion.q.lead(), &[dof], tau)
+        array(py, motion.lead(), &[dof], tau)
     }
 
     /// Torques that hold the robot at rest, Nm (N), shape ``(..., n)``.
@@ -270,28 +325,28 @@ impl Robot {
         let dof = self.model.dof();
         // The torque takes the place of the acceleration.
         let motion = Motion::of(dof, q, Some(dq), Some(tau))?;
-        let count = motion.q.count();
-        let ddq = motion.compute(py, |[q, dq, tau]| {
+        let count = motion.count();
+        let ddq = motion.compute(py, count * dof, |[q, dq, tau]| {
             self.for_each(count, dof, |workspace, row, out| {
                 let of = row * dof..(row + 1) * dof;
                 let (q, dq, tau) = (&q[of.clone()], &dq[of.clone()], &tau[of]);
                 out.copy_from_slice(forward_dynamics(&self.model, workspace, q, dq, tau));
             })
         });
-        array(py, motion.q.lead(), &[dof], ddq)
+        array(py, motion.lead(), &[dof], ddq)
     }
 
     /// Mass matrices ``M(q)``, kg m² (kg m, kg), shape ``(..., n, n)``.
     fn mass_matrix<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
         let dof = self.model.dof();
         let motion = Motion::of(dof, q, None, None)?;
-        let count = motion.q.count();
-        let matrices = motion.compute(py, |[q, ..]| {
+        let count = motion.count();
+        let matrices = motion.compute(py, count * dof * dof, |[q, ..]| {
             self.for_each(count, dof * dof, |workspace, row, out| {
                 out.copy_from_slice(mass_matrix(&self.model, workspace, &q[row * dof..(row + 1) * dof]));
             })
         });
-        array(py, motion.q.lead(), &[dof, dof], matrices)
+        array(py, motion.lead(), &[dof, dof], matrices)
     }
 
     /// Derivatives of the torques by position, velocity and acceleration: three arrays of shape ``(..., n, n)``, row =
@@ -306,8 +361,8 @@ impl Robot {
     ) -> PyResult<Matrices<'py>> {
         let dof = self.model.dof();
         let motion = Motion::of(dof, q, dq, ddq)?;
-        let (count, size) = (motion.q.count(), dof * dof);
-        let all = motion.compute(py, |[q, dq, ddq]| {
+        let (count, size) = (motion.count(), dof * dof);
+        let all = motion.compute(py, 3 * count * size, |[q, dq, ddq]| {
             self.for_each(count, 3 * size, |workspace, row, out| {
                 let of = row * dof..(row + 1) * dof;
                 let found =
@@ -320,7 +375,7 @@ impl Robot {
         let part = |which: usize| {
             let rows = all.chunks_exact((3 * size).max(1));
             let numbers = rows.flat_map(|row| &row[which * size..(which + 1) * size]).copied().collect();
-            array(py, motion.q.lead(), &[dof, dof], numbers)
+            array(py, motion.lead(), &[dof, dof], numbers)
         };
         Ok((part(0)?, part(1)?, part(2)?))
     }
@@ -337,7 +392,7 @@ impl Robot {
         let (dof, columns) = (self.model.dof(), self.model.inertial_count());
         let motion = Motion::of(dof, q, dq, ddq)?;
         let layout = PanelLayout::new(&self.model, all_columns(&self.model, &[]));
-        let numbers = motion.compute(py, |motion| {
+        let numbers = motion.compute(py, motion.count() * dof * columns, |motion| {
             self.for_blocks(motion, dof * columns, |workspace, motion, out| {
                 let mut panels = Panels::default();
                 regressor_panels(&self.model, workspace, &layout, motion, &mut panels);
@@ -351,13 +406,37 @@ impl Robot {
                 }
             })
         });
-        array(py, motion.q.lead(), &[dof, columns], numbers)
+        array(py, motion.lead(), &[dof, columns], numbers)
     }
 
     /// The base parameters of the bodies: what torque can tell, as sums of inertial parameters.
     #[getter]
     fn base_parameters(&self) -> Vec<String> {
-        BaseParameters::new(&self.model, &[], &BaseParameterSettings::default()).expressions()
+        self.base().expressions()
+    }
+
+    /// The matrix of shape ``(base parameters, 10 bodies)`` with ``base_projection @ inertial_parameters.ravel()`` the
+    /// values of ``base_parameters``.
+    #[getter]
+    fn base_projection<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let (base, columns) = (self.base(), self.model.inertial_count());
+        let rows = base.count();
+        let mut numbers = vec![0.0; rows * columns];
+        for column in 0..columns {
+            let mut one = vec![0.0; columns];
+            one[column] = 1.0;
+            for (row, value) in base.values(&one).into_iter().enumerate() {
+                numbers[row * columns + column] = value;
+            }
+        }
+        array(py, &[rows], &[columns], numbers)
+    }
+
+    /// Places of the regressor's columns that stand for the base parameters:
+    /// ``regressor(...)[..., base_columns] @ values == tau``.
+    #[getter]
+    fn base_columns(&self) -> Vec<usize> {
+        self.base().independent().to_vec()
     }
 
     fn __repr__(&self) -> String {

@@ -188,6 +188,11 @@ impl MemoryLog {
         Ok(Self { label: label.into(), names: names.map(Into::into), width, rows, values: Arc::new(values) })
     }
 
+    /// Names of the columns, if they have any.
+    pub fn names(&self) -> Option<&[String]> {
+        self.names.as_deref()
+    }
+
     /// Whether both are clones of one table.
     pub fn is_same_table(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.values, &other.values)
