@@ -7,16 +7,18 @@
 >>> tau = model.predict(q, dq, ddq)                                     # doctest: +SKIP
 """
 
+from ._iterate import Iteration, iterate
 from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
 from ._log import Log
 from ._model import Model
-from ._native import Error, LogError, ResultError, Robot, RobotError, Study, StudyError, __version__
+from ._native import Error, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, __version__
 from ._study import study, with_logs
 
 __all__ = [
     "Check",
     "Design",
     "Error",
+    "Iteration",
     "Log",
     "LogError",
     "Model",
@@ -24,13 +26,16 @@ __all__ = [
     "ResultError",
     "Robot",
     "RobotError",
+    "Run",
     "Simulation",
+    "StopRun",
     "Study",
     "StudyError",
     "__version__",
     "check",
     "design",
     "identify",
+    "iterate",
     "log_contents",
     "simulate",
     "study",

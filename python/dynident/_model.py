@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ._native import FittedModel, Robot, Study
+from ._native import FittedModel, Robot, Study, _write_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,7 +116,7 @@ class Model:
         """By held-out log ``100 ‖τ - τ̂‖ / ‖τ‖`` of the model that is written."""
 
         def error(log: dict[str, Any]) -> float | None:
-            found: float | None = (log["physical"] or log["model"])["relative_error_percent"]
+            found: float | None = (log["physical"] or log)["relative_error_percent"]
             return found
 
         return {log["log"]: error(log) for log in self.result["validation"]}
@@ -169,8 +169,6 @@ class Model:
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Writes ``result.json``, ``report.html`` and the description with the new values, as ``dynident identify``."""
-        place = Path(folder)
-        place.mkdir(parents=True, exist_ok=True)
         native = self._native
         texts = {
             "identified.urdf": native.urdf,
@@ -180,7 +178,7 @@ class Model:
             "report.html": native.report,
             "result.json": json.dumps(self.result, indent=2) + "\n",
         }
-        native.write(fspath(place), texts)
+        _write_files(fspath(folder), texts)
 
     def plot_parameters(self) -> Figure:
         """Base parameters with their 95 % intervals beside the description's values."""

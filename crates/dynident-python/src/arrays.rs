@@ -66,8 +66,9 @@ impl<'py> Samples<'py> {
     /// All numbers, row-major; copied only where the array is not.
     pub(crate) fn numbers(&self) -> Cow<'_, [f64]> {
         match self.array.as_slice() {
-            Ok(numbers) => Cow::Borrowed(numbers),
-            Err(_) => Cow::Owned(self.array.as_array().iter().copied().collect()),
+            // A slice is also what lies column by column without a gap.
+            Ok(numbers) if self.array.is_c_contiguous() => Cow::Borrowed(numbers),
+            _ => Cow::Owned(self.array.as_array().iter().copied().collect()),
         }
     }
 }

@@ -21,6 +21,8 @@ create_exception!(dynident, StudyError, Error, "A study that cannot be done as i
 create_exception!(dynident, LogError, Error, "A recording that cannot be read or used.");
 create_exception!(dynident, ResultError, Error, "A result that does not belong to its study, or cannot be exported.");
 
+create_exception!(dynident, StopRun, Error, "The robot has to be stopped: a run gives no further torque.");
+
 /// The exception of a description or of what is asked of it.
 pub(crate) fn robot(error: impl core::fmt::Display) -> PyErr {
     RobotError::new_err(error.to_string())

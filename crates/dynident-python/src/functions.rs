@@ -1,20 +1,24 @@
 //! The jobs of the command as functions: a study in, JSON and models out.
 
 use crate::errors;
-use crate::jobs::{run, threads as threads_or_all};
+use crate::function_robot::{Raised, robot_of};
+use crate::jobs::{run, run_to_its_stop, threads as threads_or_all};
 use crate::model::{Descriptions, FittedModel};
 use crate::study::Study;
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
+use dynident::iteration::{RobotRun, RunRecord, StopSignal};
 use dynident::{
-    Error, IdentificationOutcome, RunOptions, check, design_study, identify, log_contents, simulate_study,
-    validate_result,
+    Error, IdentificationOutcome, IterationWatch, OutputSet, RunOptions, check, design_study, identify, iterate_study,
+    iterate_with_robot, log_contents, simulate_study, validate_result,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
@@ -127,11 +131,69 @@ pub(crate) fn _simulate(
     })
 }
 
+/// Iterates a study's robot, or a function in its place, into the folder `out`: JSON. `heard` is called after every run
+/// with its number and its largest tracking error, rad (m).
+#[pyfunction]
+#[pyo3(signature = (study, out, robot=None, resume=false, threads=None, heard=None))]
+pub(crate) fn _iterate(
+    py: Python<'_>,
+    study: &Bound<'_, Study>,
+    out: PathBuf,
+    robot: Option<Py<PyAny>>,
+    resume: bool,
+    threads: Option<usize>,
+    heard: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let (study, path) = study.get().owned();
+    let threads = threads_or_all(threads);
+    let (stop, raised) = (StopSignal::default(), Raised::default());
+    let (asked, kept) = (stop.clone(), raised.clone());
+    let found = run_to_its_stop(py, threads, &stop, move |watch| {
+        let options = RunOptions { data: None, threads, progress: watch };
+        let design =
+            |_: &DesignProgress| if asked.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let mut made = |record: &RunRecord, _: &[RobotRun]| {
+            if let Some(heard) = &heard {
+                kept.keep(Python::attach(|py| {
+                    heard
+                        .call1(py, (record.run, record.max_tracking_error_rad.iter().copied().fold(0.0, f64::max)))
+                        .map(|_| ())
+                }));
+            }
+        };
+        let mut watch = IterationWatch { design: &design, run: &mut made, stop: asked.clone(), allow: None };
+        let file = match robot {
+            None => iterate_study(&study, &path, &out, resume, &options, &mut watch),
+            Some(function) => {
+                let function = Arc::new(function);
+                let mut make = |joints: &[String]| robot_of(&function, joints, &kept);
+                iterate_with_robot(&study, &path, (&out, resume), &options, &mut watch, &mut make)
+            }
+        };
+        json(&file?)
+    });
+    match raised.taken() {
+        // What the robot's own code raised says more than what became of the iteration.
+        Some(error) => Err(error),
+        None => found,
+    }
+}
+
 /// What a recording holds: JSON.
 #[pyfunction]
 pub(crate) fn _log_contents(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let contents = py.detach(|| log_contents(&path).and_then(|contents| json(&contents)));
     contents.map_err(|error| errors::job(py, &error))
+}
+
+/// Writes texts into a folder, all or none; files of None are taken away.
+#[pyfunction]
+pub(crate) fn _write_files(py: Python<'_>, folder: PathBuf, texts: BTreeMap<String, Option<String>>) -> PyResult<()> {
+    let set = texts.into_iter().fold(OutputSet::new(&folder), |set, (name, text)| match text {
+        Some(text) => set.file(&name, text),
+        None => set.absent(&name),
+    });
+    set.write().map_err(|error| errors::job(py, &error))
 }
 
 /// Runs the command line, the name of the program first, and returns its exit status.

@@ -1,6 +1,7 @@
 //! A job beside the interpreter: other threads of Python run on, Ctrl-C ends it, progress is heard.
 
 use crate::errors;
+use dynident::iteration::StopSignal;
 use dynident::{Error, Progress};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -67,6 +68,17 @@ pub(crate) fn threads(asked: Option<usize>) -> usize {
     asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1)
 }
 
+/// As [`run`], where Ctrl-C asks `stop` first and the job is waited for: a robot is not left moving. A second one leaves
+/// it to itself.
+pub(crate) fn run_to_its_stop<T: Send + 'static>(
+    py: Python<'_>,
+    threads: usize,
+    stop: &StopSignal,
+    work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    waited_for(py, threads, (None, Some(stop)), work)
+}
+
 /// Runs `work` on a thread of its own, with a pool of `threads` threads, while this one looks for Ctrl-C and tells
 /// `progress(stage, done, total)` where it is.
 pub(crate) fn run<T: Send + 'static>(
@@ -75,6 +87,16 @@ pub(crate) fn run<T: Send + 'static>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
+    waited_for(py, threads, (progress, None), work)
+}
+
+fn waited_for<T: Send + 'static>(
+    py: Python<'_>,
+    threads: usize,
+    (progress, stop): (Option<&Bound<'_, PyAny>>, Option<&StopSignal>),
+    work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    let mut interrupted = None;
     let watch = Arc::new(Watch::default());
     let (send, receive) = channel();
     // One thread waits at a time, which a lock proves.
@@ -97,7 +119,9 @@ pub(crate) fn run<T: Send + 'static>(
             Err(_) => Err(RecvTimeoutError::Disconnected),
         });
         match heard {
-            Ok(Ok(outcome)) => return outcome.map_err(|error| errors::job(py, &error)),
+            Ok(Ok(outcome)) => {
+                return interrupted.map_or_else(|| outcome.map_err(|error| errors::job(py, &error)), Err);
+            }
             Ok(Err(panic)) if panic.is::<Cancelled>() => return Err(PyKeyboardInterrupt::new_err(())),
             Ok(Err(panic)) => resume_unwind(panic),
             // It ended without a word, which a thread does not do.
@@ -108,6 +132,11 @@ pub(crate) fn run<T: Send + 'static>(
         }
         let told = py.check_signals().and_then(|()| tell(&watch, progress));
         if let Err(interruption) = told {
+            if let (Some(stop), None) = (stop, &interrupted) {
+                stop.request();
+                interrupted = Some(interruption);
+                continue;
+            }
             watch.cancelled.store(true, Ordering::Relaxed);
             return Err(interruption);
         }

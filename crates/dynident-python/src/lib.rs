@@ -5,6 +5,7 @@
 
 mod arrays;
 mod errors;
+mod function_robot;
 mod functions;
 mod jobs;
 mod model;
@@ -16,9 +17,13 @@ mod study;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::errors::{Error, LogError, ResultError, RobotError, StudyError};
+    use crate::errors::{Error, LogError, ResultError, RobotError, StopRun, StudyError};
     #[pymodule_export]
-    use crate::functions::{_check, _command, _design, _identify, _log_contents, _simulate, _validate};
+    use crate::function_robot::Run;
+    #[pymodule_export]
+    use crate::functions::{
+        _check, _command, _design, _identify, _iterate, _log_contents, _simulate, _validate, _write_files,
+    };
     #[pymodule_export]
     use crate::model::FittedModel;
     #[pymodule_export]

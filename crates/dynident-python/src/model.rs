@@ -6,10 +6,9 @@ use crate::study::Study;
 use dynident::export::Target;
 use dynident::model::read_robot;
 use dynident::model::terms::JointMotion;
-use dynident::{OutputSet, ResultFile, TorquePredictor, export_result};
+use dynident::{ResultFile, TorquePredictor, export_result};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What messages call a result in memory.
@@ -155,15 +154,6 @@ impl FittedModel {
     #[getter]
     fn joint_names(&self) -> Vec<String> {
         self.predictor.joint_names()
-    }
-
-    /// Writes files into a folder, all or none; those of None are taken away.
-    fn write(&self, py: Python<'_>, folder: PathBuf, texts: BTreeMap<String, Option<String>>) -> PyResult<()> {
-        let set = texts.into_iter().fold(OutputSet::new(&folder), |set, (name, text)| match text {
-            Some(text) => set.file(&name, text),
-            None => set.absent(&name),
-        });
-        set.write().map_err(|error| errors::job(py, &error))
     }
 
     /// Torque along a motion and half the width of its 95 % band, both of shape ``(..., n)``.

@@ -13,7 +13,7 @@
 //! | what a recording holds | [`log_contents()`] |
 //! | a study from a robot and its recordings | [`new_study()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
-//! | run, identify, run again | [`iterate_study()`] |
+//! | run, identify, run again | [`iterate_study()`]; on a robot that is a function: [`iterate_with_robot()`] |
 //! | the sections of a study, the parts of results | [`study`], [`result`] |
 //! | a progress bar | [`Progress`] in [`RunOptions`] |
 //!
@@ -71,7 +71,7 @@ pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{export_model, export_payload, export_result, export_simulator};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
-pub use jobs::iterate::{IterationWatch, iterate_study};
+pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
 pub use jobs::new_study::{NewStudy, new_study};
 pub use jobs::options::RunOptions;
