@@ -116,6 +116,24 @@ impl<'py> Motion<'py> {
         self.q.count()
     }
 
+    /// An array with the samples' axes and `own` ones, which `work` fills row by row, without the interpreter's lock; on
+    /// several threads where that is worth it. The memory is NumPy's own: it knows how to ask for large pages.
+    pub(crate) fn fill(
+        &self,
+        py: Python<'py>,
+        own: &[usize],
+        work: impl FnOnce([&[f64]; 3], &mut [f64]) + Send,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let shape: Vec<usize> = self.lead().iter().chain(own).copied().collect();
+        let array = PyArrayDyn::<f64>::zeros(py, shape, false);
+        {
+            let mut lent = array.readwrite();
+            let out = lent.as_slice_mut().map_err(|error| PyValueError::new_err(error.to_string()))?;
+            self.compute(py, out.len(), |motion| work(motion, out));
+        }
+        Ok(array)
+    }
+
     /// Runs `work`, which makes so many numbers, on the numbers, without the interpreter's lock; on several threads
     /// where that is worth it.
     pub(crate) fn compute<R: Send>(

@@ -20,6 +20,8 @@ use std::sync::Mutex;
 
 /// Samples of one block of a batch: enough for full lanes, little enough for the cache.
 const BLOCK: usize = 128;
+/// Rows of a regressor that are written at once: their pages fit into the first level of the address cache.
+const ROWS_AT_ONCE: usize = 16;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
@@ -79,39 +81,33 @@ impl Robot {
         lend(&self.batches, || BatchWorkspace::new(&self.model), work)
     }
 
-    /// `each(row, numbers)` for every sample, where `numbers` are the `size` ones of its result.
-    fn for_each(&self, count: usize, size: usize, each: impl Fn(&mut Workspace, usize, &mut [f64]) + Sync) -> Vec<f64> {
-        let mut out = vec![0.0; count * size];
-        let block = |(number, block): (usize, &mut [f64])| {
+    /// `each(row, numbers)` for every sample, where `numbers` are the `size` ones of its result in `out`.
+    fn for_each(&self, out: &mut [f64], size: usize, each: impl Fn(&mut Workspace, usize, &mut [f64]) + Sync) {
+        in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
             self.with_single(|workspace| {
-                for (row, numbers) in block.chunks_exact_mut(size).enumerate() {
+                for (row, numbers) in block.chunks_exact_mut(size.max(1)).enumerate() {
                     each(workspace, number * BLOCK + row, numbers);
                 }
             });
-        };
-        in_blocks(&mut out, size, block);
-        out
+        });
     }
 
-    /// `each(block, first row, numbers)` for blocks of samples, whose motion stands joint by joint.
+    /// `each(motion, numbers)` for blocks of samples, whose motion stands joint by joint.
     fn for_blocks(
         &self,
         [q, dq, ddq]: [&[f64]; 3],
-        size: usize,
+        (out, size): (&mut [f64], usize),
         each: impl Fn(&mut BatchWorkspace, &JointMotion<'_>, &mut [f64]) + Sync,
-    ) -> Vec<f64> {
+    ) {
         let dof = self.model.dof();
-        let mut out = vec![0.0; q.len() / dof.max(1) * size];
-        let block = |(number, block): (usize, &mut [f64])| {
+        in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
             let samples = block.len() / size.max(1);
             let first = number * BLOCK * dof;
             let of = |rows: &[f64]| joint_major(&rows[first..first + samples * dof], samples, dof);
             let (q, dq, ddq) = (of(q), of(dq), of(ddq));
             let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
             self.with_batch(|workspace| each(workspace, &motion, block));
-        };
-        in_blocks(&mut out, size, block);
-        out
+        });
     }
 }
 
@@ -295,8 +291,8 @@ impl Robot {
     ) -> PyResult<Array<'py>> {
         let dof = self.model.dof();
         let motion = Motion::of(dof, q, dq, ddq)?;
-        let tau = motion.compute(py, motion.count() * dof, |motion| {
-            self.for_blocks(motion, dof, |workspace, motion, out| {
+        motion.fill(py, &[dof], |numbers, out| {
+            self.for_blocks(numbers, (out, dof), |workspace, motion, out| {
                 let mut tau = vec![0.0; out.len()];
                 inverse_dynamics_batch(&self.model, workspace, motion, &mut tau);
                 for (sample, row) in out.chunks_exact_mut(dof.max(1)).enumerate() {
@@ -304,9 +300,8 @@ impl Robot {
                         *to = tau[joint * motion.samples + sample];
                     }
                 }
-            })
-        });
-        array(py, motion.lead(), &[dof], tau)
+            });
+        })
     }
 
     /// Torques that hold the robot at rest, Nm (N), shape ``(..., n)``.
@@ -325,28 +320,24 @@ impl Robot {
         let dof = self.model.dof();
         // The torque takes the place of the acceleration.
         let motion = Motion::of(dof, q, Some(dq), Some(tau))?;
-        let count = motion.count();
-        let ddq = motion.compute(py, count * dof, |[q, dq, tau]| {
-            self.for_each(count, dof, |workspace, row, out| {
+        motion.fill(py, &[dof], |[q, dq, tau], out| {
+            self.for_each(out, dof, |workspace, row, out| {
                 let of = row * dof..(row + 1) * dof;
                 let (q, dq, tau) = (&q[of.clone()], &dq[of.clone()], &tau[of]);
                 out.copy_from_slice(forward_dynamics(&self.model, workspace, q, dq, tau));
-            })
-        });
-        array(py, motion.lead(), &[dof], ddq)
+            });
+        })
     }
 
     /// Mass matrices ``M(q)``, kg m² (kg m, kg), shape ``(..., n, n)``.
     fn mass_matrix<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
         let dof = self.model.dof();
         let motion = Motion::of(dof, q, None, None)?;
-        let count = motion.count();
-        let matrices = motion.compute(py, count * dof * dof, |[q, ..]| {
-            self.for_each(count, dof * dof, |workspace, row, out| {
+        motion.fill(py, &[dof, dof], |[q, ..], out| {
+            self.for_each(out, dof * dof, |workspace, row, out| {
                 out.copy_from_slice(mass_matrix(&self.model, workspace, &q[row * dof..(row + 1) * dof]));
-            })
-        });
-        array(py, motion.lead(), &[dof, dof], matrices)
+            });
+        })
     }
 
     /// Derivatives of the torques by position, velocity and acceleration: three arrays of shape ``(..., n, n)``, row =
@@ -363,14 +354,16 @@ impl Robot {
         let motion = Motion::of(dof, q, dq, ddq)?;
         let (count, size) = (motion.count(), dof * dof);
         let all = motion.compute(py, 3 * count * size, |[q, dq, ddq]| {
-            self.for_each(count, 3 * size, |workspace, row, out| {
+            let mut all = vec![0.0; 3 * count * size];
+            self.for_each(&mut all, 3 * size, |workspace, row, out| {
                 let of = row * dof..(row + 1) * dof;
                 let found =
                     inverse_dynamics_derivatives(&self.model, workspace, &q[of.clone()], &dq[of.clone()], &ddq[of]);
                 out[..size].copy_from_slice(found.by_position);
                 out[size..2 * size].copy_from_slice(found.by_velocity);
                 out[2 * size..].copy_from_slice(found.by_acceleration);
-            })
+            });
+            all
         });
         let part = |which: usize| {
             let rows = all.chunks_exact((3 * size).max(1));
@@ -392,21 +385,24 @@ impl Robot {
         let (dof, columns) = (self.model.dof(), self.model.inertial_count());
         let motion = Motion::of(dof, q, dq, ddq)?;
         let layout = PanelLayout::new(&self.model, all_columns(&self.model, &[]));
-        let numbers = motion.compute(py, motion.count() * dof * columns, |motion| {
-            self.for_blocks(motion, dof * columns, |workspace, motion, out| {
+        motion.fill(py, &[dof, columns], |numbers, out| {
+            self.for_blocks(numbers, (out, dof * columns), |workspace, motion, out| {
                 let mut panels = Panels::default();
                 regressor_panels(&self.model, workspace, &layout, motion, &mut panels);
                 for joint in 0..dof {
-                    for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
-                        let entries = &panels.joint(joint)[place * motion.samples..(place + 1) * motion.samples];
-                        for (sample, entry) in entries.iter().enumerate() {
-                            out[(sample * dof + joint) * columns + column] = *entry;
+                    // A few rows at a time, or every number written is a page of its own.
+                    for (part, rows) in out.chunks_mut(ROWS_AT_ONCE * dof * columns).enumerate() {
+                        let from = part * ROWS_AT_ONCE;
+                        for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+                            let entries = &panels.joint(joint)[place * motion.samples + from..];
+                            for (row, entry) in rows.chunks_exact_mut(dof * columns).zip(entries) {
+                                row[joint * columns + column] = *entry;
+                            }
                         }
                     }
                 }
-            })
-        });
-        array(py, motion.lead(), &[dof, columns], numbers)
+            });
+        })
     }
 
     /// The base parameters of the bodies: what torque can tell, as sums of inertial parameters.
