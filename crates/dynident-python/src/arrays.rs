@@ -116,8 +116,8 @@ impl<'py> Motion<'py> {
         self.q.count()
     }
 
-    /// An array with the samples' axes and `own` ones, which `work` fills row by row, without the interpreter's lock; on
-    /// several threads where that is worth it. The memory is NumPy's own: it knows how to ask for large pages.
+    /// An array with the samples' axes and `own` ones, which `work` fills row by row, without the interpreter's lock;
+    /// on several threads where that is worth it. The memory is NumPy's own: it knows how to ask for large pages.
     pub(crate) fn fill(
         &self,
         py: Python<'py>,

@@ -30,8 +30,8 @@ impl Raised {
 
 /// One run of a robot: what it has to follow, and the controller that it asks for torque.
 ///
-/// The function brings its robot to ``q[0]`` and at every sample asks ``torque`` with the measured state, applies what it
-/// gets, and returns after the last sample. It runs at ``rate_hz``.
+/// The function brings its robot to ``q[0]`` and at every sample asks ``torque`` with the measured state, applies what
+/// it gets, and returns after the last sample. It runs at ``rate_hz``.
 #[pyclass(frozen, module = "dynident")]
 pub(crate) struct Run {
     /// Lent for as long as the function runs.
@@ -94,8 +94,8 @@ impl Run {
         self.rows(py, 2)
     }
 
-    /// The drives' torques for the next sample, Nm (N), shape ``(n,)``, by the measured state at ``time_s`` of the robot's
-    /// own clock. Raises ``StopRun`` where the robot has to be stopped at once: let it pass, or stop and return.
+    /// The drives' torques for the next sample, Nm (N), shape ``(n,)``, by the measured state at ``time_s`` of the
+    /// robot's own clock. Raises ``StopRun`` where the robot has to be stopped at once: let it pass, or stop and return.
     fn torque<'py>(
         &self,
         py: Python<'py>,

@@ -68,8 +68,8 @@ pub(crate) fn threads(asked: Option<usize>) -> usize {
     asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1)
 }
 
-/// As [`run`], where Ctrl-C asks `stop` first and the job is waited for: a robot is not left moving. A second one leaves
-/// it to itself.
+/// As [`run`], where Ctrl-C asks `stop` first and the job is waited for: a robot is not left moving. A second one
+/// leaves it to itself.
 pub(crate) fn run_to_its_stop<T: Send + 'static>(
     py: Python<'_>,
     threads: usize,

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
 
 mod arrays;
+mod assembled;
 mod errors;
 mod function_robot;
 mod functions;

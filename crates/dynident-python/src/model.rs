@@ -1,6 +1,7 @@
 //! `FittedModel`: what an identification found, with its study.
 
 use crate::arrays::{Motion, array, joint_major, sample_major};
+use crate::assembled::assembled;
 use crate::errors;
 use crate::study::Study;
 use dynident::export::Target;
@@ -86,9 +87,9 @@ impl FittedModel {
     ) -> PyResult<Self> {
         let ((sections, path, description), [urdf, table, mjcf, sdf]) = (study, descriptions);
         let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
-        let study = Study::assembled(py, &sections, path, robot, Vec::new())?;
+        let study = assembled(py, &sections, &path, robot, Vec::new())?;
         let descriptions = Descriptions { urdf, table, mjcf, sdf };
-        Self::new(study.study, study.path, json, descriptions, report).map_err(|error| errors::job(py, &error))
+        Self::new(study, path, json, descriptions, report).map_err(|error| errors::job(py, &error))
     }
 
     /// Without the samples that it was fitted to.

@@ -1,8 +1,8 @@
 //! `Robot`: a description, and its dynamics over arrays.
 
 use crate::arrays::{Motion, array, joint_major};
+use crate::assembled::{assembled, json_of};
 use crate::errors;
-use crate::study::{Study, json_of};
 use dynident::dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
     forward_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, mass_matrix, regressor_panels,
@@ -28,8 +28,8 @@ type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
 /// A robot on a fixed base: links, joints, gravity.
 ///
-/// Made by ``Robot.load(path)``, or ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` of a path or a text. Keyword
-/// arguments are the keys of ``[robot]`` of a study: which joints move, what they follow, where gravity points.
+/// Made by ``Robot.load(path)``, or ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` of a path or a text.
+/// Keyword arguments are the keys of ``[robot]`` of a study: which joints move, what they follow, where gravity points.
 ///
 /// Vectors over joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any
 /// number of them, shape ``(..., n)``, and give the axes before the last back.
@@ -59,9 +59,9 @@ impl Robot {
 
     pub(crate) fn with_settings(py: Python<'_>, description: Description, settings: String) -> PyResult<Self> {
         let path = description.path.clone();
-        let study = Study::assembled(py, &study_of(&path, &settings)?, path, Some(description.clone()), Vec::new())?;
-        let folders = Folders::new(&study.study, &study.path, None);
-        let made = StudyRobot::new(&study.study, &study.path, &folders).map_err(|error| errors::job(py, &error))?;
+        let study = assembled(py, &study_of(&path, &settings)?, &path, Some(description.clone()), Vec::new())?;
+        let folders = Folders::new(&study, &path, None);
+        let made = StudyRobot::new(&study, &path, &folders).map_err(|error| errors::job(py, &error))?;
         let model = made.model().clone();
         Ok(Self { description, settings, model, singles: Mutex::default(), batches: Mutex::default() })
     }
@@ -71,8 +71,8 @@ impl Robot {
         &self.description
     }
 
-    /// Lends scratch memory to `work`. Nobody waits for it: a process that was forked while another thread held the lock
-    /// would wait for ever.
+    /// Lends scratch memory to `work`. Nobody waits for it: a process that was forked while another thread held the
+    /// lock would wait for ever.
     fn with_single<R>(&self, work: impl FnOnce(&mut Workspace) -> R) -> R {
         lend(&self.singles, || Workspace::new(&self.model), work)
     }

@@ -1,13 +1,14 @@
 //! `Study`: robot, drives, logs and settings of a job, from a file or from memory.
 
 use crate::arrays::array;
+use crate::assembled::assembled;
 use crate::errors;
 use crate::robot::Robot;
 use dynident::model::read_robot;
 use dynident::recording::{LogSource, MemoryLog};
 use numpy::{PyArrayDyn, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyTuple;
 use std::path::{Path, PathBuf};
 
 /// Samples of one log: names of the columns, and the columns.
@@ -23,22 +24,6 @@ pub(crate) struct Study {
 }
 
 impl Study {
-    /// Of sections in JSON, a robot and samples in memory.
-    pub(crate) fn assembled(
-        py: Python<'_>,
-        sections: &str,
-        path: PathBuf,
-        robot: Option<dynident::model::Robot>,
-        samples: Vec<Option<MemoryLog>>,
-    ) -> PyResult<Self> {
-        let mut study = dynident::Study::from_json(sections, &path).map_err(|error| errors::job(py, &error))?;
-        study.robot.description = robot.map(Box::new);
-        for (log, samples) in study.log.iter_mut().zip(samples) {
-            log.samples = samples;
-        }
-        Ok(Self { study, path })
-    }
-
     /// The study and where it stands, as jobs take it on another thread.
     pub(crate) fn owned(&self) -> (dynident::Study, PathBuf) {
         (self.study.clone(), self.path.clone())
@@ -75,7 +60,7 @@ impl Study {
         let tables = samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose());
         let tables = tables.collect::<PyResult<Vec<_>>>()?;
         let description = robot.map(|robot| robot.get().description().clone());
-        Self::assembled(py, sections, path, description, tables)
+        Ok(Self { study: assembled(py, sections, &path, description, tables)?, path })
     }
 
     /// The inverse of ``__reduce__``.
@@ -90,7 +75,7 @@ impl Study {
         let tables = samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose());
         let tables = tables.collect::<PyResult<Vec<_>>>()?;
         let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
-        Self::assembled(py, sections, path, robot, tables)
+        Ok(Self { study: assembled(py, sections, &path, robot, tables)?, path })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
@@ -174,9 +159,4 @@ fn columns<'py>(
         array(py, &[own.len()], &[], own)
     };
     Ok((table.label(), (names.clone(), (0..names.len()).map(of).collect::<PyResult<Vec<_>>>()?)))
-}
-
-/// A dictionary of keyword arguments as JSON.
-pub(crate) fn json_of(py: Python<'_>, settings: &Bound<'_, PyDict>) -> PyResult<String> {
-    py.import("json")?.call_method1("dumps", (settings,))?.extract()
 }

@@ -18,7 +18,8 @@
 //! | a progress bar | [`Progress`] in [`RunOptions`] |
 //!
 //! A study may hold its samples and its robot itself ([`samples`](study::LogSection::samples),
-//! [`description`](study::RobotSection::description)). Who wants no study at all: [`identification`] takes arrays. The crates below are re-exported:
+//! [`description`](study::RobotSection::description)). Who wants no study at all: [`identification`] takes arrays.
+//! The crates below are re-exported:
 //! [`model`], [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`],
 //! [`iteration`], [`export`].
 //!

@@ -192,8 +192,8 @@ impl Study {
         Ok(study)
     }
 
-    /// Builds a study from JSON with the keys of the TOML, null for one that is not there; `path` is named in messages, and files are looked for beside
-    /// it.
+    /// Builds a study from JSON with the keys of the TOML, null for one that is not there; `path` is named in messages,
+    /// and files are looked for beside it.
     ///
     /// # Errors
     /// As [`parse`](Study::parse), without line and column.

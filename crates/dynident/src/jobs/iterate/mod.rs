@@ -101,8 +101,8 @@ pub fn iterate_study(
 /// Makes a robot of the joints with these names.
 pub type RobotMaker<'a> = &'a mut dyn FnMut(&[String]) -> Box<dyn Robot>;
 
-/// As [`iterate_study`] with a robot of the caller's own in place of the study's: `robot` is given the joints' names, and
-/// what it makes is run as it is.
+/// As [`iterate_study`] with a robot of the caller's own in place of the study's: `robot` is given the joints' names,
+/// and what it makes is run as it is.
 ///
 /// # Errors
 /// As [`iterate_study`], and legs that hold joints locked, which only the simulator does.
