@@ -95,7 +95,8 @@ impl Run {
     }
 
     /// The drives' torques for the next sample, Nm (N), shape ``(n,)``, by the measured state at ``time_s`` of the
-    /// robot's own clock. Raises ``StopRun`` where the robot has to be stopped at once: let it pass, or stop and return.
+    /// robot's own clock. Raises ``StopRun`` where the robot has to be stopped at once: let it pass, or stop and
+    /// return.
     fn torque<'py>(
         &self,
         py: Python<'py>,
