@@ -19,6 +19,7 @@ import tempfile
 import h5py
 import numpy as np
 import pyarrow
+import pyarrow.feather
 import pyarrow.parquet
 import scipy.io
 import zstandard
@@ -34,6 +35,8 @@ SEED = 20261123
 STEADY_MIB = 5
 # A page of a Parquet column has one MiB of numbers as pyarrow writes it, and one page of each column is unpacked at a time: memory grows up to so many rows.
 PAGE_ROWS = 1 << 17
+# Rows of a batch of Arrow, as pyarrow writes Feather files.
+BATCH_ROWS = 1 << 16
 FLAT = {"time": "t_s", "position": "q{1..7}_rad", "velocity": "dq{1..7}_rad_s", "torque": "tau{1..7}_Nm"}
 ARRAYS = {"time": "t", "position": "q[{0..6}]", "velocity": "dq[{0..6}]", "torque": "tau[{0..6}]"}
 TOPIC = {"time": "/arm.header.stamp", "position": "/arm.position[joint{1..7}]", "velocity": "/arm.velocity[joint{1..7}]", "torque": "/arm.effort[joint{1..7}]"}
@@ -111,6 +114,11 @@ def write_parquet(path, *arrays):
     pyarrow.parquet.write_table(pyarrow.table({name: column for name, column in zip(names, table.T)}), path, compression="zstd")
 
 
+def write_feather(path, *arrays):
+    names, table = flat(*arrays)
+    pyarrow.feather.write_feather(pyarrow.table({name: column for name, column in zip(names, table.T)}), path, compression="lz4")
+
+
 def messages(types, t, q, dq, tau):
     """JointState messages as rosbags serializes them: the first one by it, the others by what differs, the last one compared."""
     state, header, stamp = (types.types[name] for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
@@ -153,6 +161,7 @@ FORMATS = {
     "log.npy": (ARRAYS, None, write_npy),
     "log.npz": (ARRAYS, None, lambda path, *arrays: np.savez(path, **dict(zip(("t", "q", "dq", "tau"), arrays)))),
     "log.parquet": (FLAT, PAGE_ROWS, write_parquet),
+    "log.feather": (FLAT, BATCH_ROWS, write_feather),
     "log.mat": (ARRAYS, None, lambda path, *arrays: scipy.io.savemat(path, dict(zip(("t", "q", "dq", "tau"), arrays)), do_compression=True)),
     "log.h5": (ARRAYS, None, write_hdf5),
     "bag_mcap": (TOPIC, 0, write_bag(StoragePlugin.MCAP)),

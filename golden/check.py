@@ -24,6 +24,7 @@ GENERATORS = {
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
     "mujoco-closed-loop": ("mujoco_closed_loop.py", "mujoco_closed_loop.json"),
     "coupled": ("coupled_joints.py", "coupled_joints.json"),
+    "closed-chains": ("closed_chains.py", "closed_chains.json"),
     "mjcf": ("mjcf.py", "mjcf.json"),
     "springs": ("springs.py", "springs.json"),
     "sdf": ("sdf.py", "sdf.json"),

@@ -15,6 +15,7 @@ import sqlite3
 import h5py
 import numpy as np
 import pyarrow as pa
+import pyarrow.feather
 import pyarrow.parquet as pq
 import scipy
 import scipy.io
@@ -428,6 +429,167 @@ def parquet_files(out):
     return {"zstd.parquet": columns, "snappy.parquet": columns}
 
 
+def arrow_files(out):
+    """What a column may be, in every packing, as a file and as a stream."""
+    holes = [i % 7 == 3 for i in range(ROWS)]
+    lists = [None if hole else [float(x) for x in Q[:, i]][: 1 if i == 9 else 2] for i, hole in enumerate(holes)]
+    table = pa.table({
+        "t": T,
+        "stamp": pa.array(STAMPS, pa.timestamp("ns", tz="UTC")),
+        "task": pa.array(["push"] * ROWS),
+        "observation.state": pa.array(lists, pa.list_(pa.float64())),
+        "action": pa.array([[float(x) for x in F32[:, i]] for i in range(ROWS)], pa.list_(pa.float32(), 2)),
+        "seen": pa.array(["far" if hole else None for hole in holes], pa.string_view()),
+        "ticks": pa.array([[i, -i] for i in range(ROWS)], pa.large_list(pa.int16())),
+        "mode": pa.array(["idle", "moving"] * (ROWS // 2)).dictionary_encode(),
+        "maybe": pa.array([None if hole else float(TAU[0, i]) for i, hole in enumerate(holes)], pa.float64()),
+        "flag": pa.array([bool(i % 2) for i in range(ROWS)]),
+        "empty": pa.nulls(ROWS),
+        "words": pa.array([["a", "b"]] * ROWS, pa.list_(pa.string())),
+        "half": pa.array(Q[0].astype(np.float16)),
+        "big": pa.array([2**63 + i * 2**40 for i in range(ROWS)], pa.uint64()),
+        "small": pa.array([-i for i in range(ROWS)], pa.int8()),
+        "waited": pa.array([1500 * i for i in range(ROWS)], pa.duration("us")),
+        "clock": pa.array([36_000_000 + i for i in range(ROWS)], pa.time32("ms")),
+        "inner": pa.array(
+            [None if hole else {"x": float(TAU[1, i]), "name": "b"} for i, hole in enumerate(holes)],
+            pa.struct([("x", pa.float64()), ("name", pa.string())]),
+        ),
+        "matrix": pa.array([[[1.0], [2.0]]] * ROWS, pa.list_(pa.list_(pa.float64()))),
+        "either": pa.UnionArray.from_dense(
+            pa.array([0, 1] * (ROWS // 2), pa.int8()), pa.array([i // 2 for i in range(ROWS)], pa.int32()),
+            [pa.array(T[: ROWS // 2]), pa.array(["x"] * (ROWS // 2))],
+        ),
+        "last": pa.array(np.arange(ROWS), pa.uint32()),
+    })
+    for codec in ["lz4", "zstd"]:
+        pa.feather.write_feather(table, out / f"{codec}.feather", compression=codec, chunksize=15)
+    plain = pa.ipc.IpcWriteOptions(compression=None)
+    with pa.ipc.new_file(out / "plain.arrow", table.schema, options=plain) as writer:
+        writer.write_table(table, max_chunksize=15)
+    with pa.ipc.new_stream(out / "stream.arrows", table.schema, options=plain) as writer:
+        writer.write_table(table, max_chunksize=15)
+    old = pa.ipc.IpcWriteOptions(use_legacy_format=True, metadata_version=pa.ipc.MetadataVersion.V4)
+    with pa.ipc.new_file(out / "before_0_15.feather", table.drop_columns(["seen", "either"]).schema, options=old) as writer:
+        writer.write_table(table.drop_columns(["seen", "either"]))
+
+    def present(values):
+        return np.array([np.nan if hole else float(x) for hole, x in zip(holes, values)])
+
+    second = present(Q[1])
+    second[9] = np.nan
+    columns = {
+        "t": T, "stamp": seconds(STAMPS), "observation.state[0]": present(Q[0]), "observation.state[1]": second,
+        "action[0]": F32[0], "action[1]": F32[1], "ticks[0]": np.arange(ROWS), "ticks[1]": -np.arange(ROWS),
+        "maybe": present(TAU[0]), "flag": np.arange(ROWS) % 2, "half": Q[0].astype(np.float16),
+        "big": [float(2**63 + i * 2**40) for i in range(ROWS)], "small": -np.arange(ROWS),
+        "waited": [1500 * i / 1e6 for i in range(ROWS)], "clock": [(36_000_000 + i) / 1e3 for i in range(ROWS)],
+        "inner.x": present(TAU[1]), "last": np.arange(ROWS),
+    }
+    return {
+        name: dict(columns)
+        for name in ["lz4.feather", "zstd.feather", "plain.arrow", "stream.arrows", "before_0_15.feather"]
+    }
+
+
+def lerobot_files(out):
+    """Data sets as lerobot 0.4.4 (version 3, episodes one after the other in files) and 0.3 (version 2.1, one file an episode) lay them out, written by pyarrow."""
+    lengths = [15, 12, 13]
+    bounds = np.cumsum([0, *lengths])
+    stamps = np.concatenate([np.arange(n) / 100.0 for n in lengths]).astype(np.float32)
+    episode = np.repeat(np.arange(len(lengths)), lengths)
+    time, offset = np.zeros(ROWS), 0.0
+    for i in range(ROWS):
+        if i and episode[i] != episode[i - 1]:
+            offset = time[i - 1] + 10.0 - float(stamps[i])
+        time[i] = float(stamps[i]) + offset
+    effort = TAU.astype(np.float32)
+    names = [f"{joint}.pos" for joint in JOINTS]
+    feature = {"dtype": "float32", "shape": [2], "names": names}
+    scalar = {"shape": [1], "names": None}
+    features = {
+        "action": feature | {"names": {"motors": JOINTS}},
+        "observation.state": feature,
+        "observation.effort": feature | {"names": ["dim"]},
+        "observation.images.top": {"dtype": "video", "shape": [3, 4, 4], "names": ["channels", "height", "width"]},
+        "timestamp": scalar | {"dtype": "float32"},
+        **{key: scalar | {"dtype": "int64"} for key in ["frame_index", "episode_index", "index", "task_index"]},
+    }
+
+    def rows(begin, end):
+        def lists(values):
+            return pa.array([[float(x) for x in values[:, i]] for i in range(begin, end)], pa.list_(pa.float32(), 2))
+        return pa.table({
+            "action": lists(F32), "observation.state": lists(DQ.astype(np.float32)), "observation.effort": lists(effort),
+            "timestamp": stamps[begin:end], "frame_index": np.concatenate([np.arange(n) for n in lengths])[begin:end],
+            "episode_index": episode[begin:end], "index": np.arange(begin, end), "task_index": np.zeros(end - begin, np.int64),
+        })
+
+    layouts = {
+        "lerobot_v2": ("v2.1", "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet", bounds),
+        "lerobot_v3": ("v3.0", "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet", bounds[[0, 2, 3]]),
+    }
+    for name, (version, path, ends) in layouts.items():
+        info = {
+            "codebase_version": version, "robot_type": "two_joints", "total_episodes": len(lengths), "total_frames": ROWS, "fps": 100,
+            "chunks_size": 1000, "data_path": path, "features": features,
+        }
+        (out / name / "meta").mkdir(parents=True, exist_ok=True)
+        (out / name / "meta/info.json").write_text(json.dumps(info, indent=4) + "\n", encoding="utf-8")
+        for k, (begin, end) in enumerate(zip(ends, ends[1:])):
+            file = out / name / path.format(episode_chunk=0, episode_index=k, chunk_index=0, file_index=k)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            pq.write_table(rows(begin, end), file, compression="snappy", use_dictionary=True)
+    columns = {
+        "action[shoulder]": F32[0], "action[elbow]": F32[1],
+        "observation.state[shoulder.pos]": DQ.astype(np.float32)[0], "observation.state[elbow.pos]": DQ.astype(np.float32)[1],
+        "observation.effort[0]": effort[0], "observation.effort[1]": effort[1], "timestamp": stamps,
+        "frame_index": np.concatenate([np.arange(n) for n in lengths]), "episode_index": episode, "index": np.arange(ROWS),
+        "task_index": np.zeros(ROWS), "time": time,
+    }
+    return {name: dict(columns) for name in layouts}
+
+
+def diadem_files(out):
+    """Headers and numbers by NI's description of DIAdem's keys and by published traces of KUKA's controllers (no program that writes them runs here): a
+    trace of two drives, and numbers of several types, channel after channel, highest byte first."""
+    def header(order, channels):
+        lines = ["DIAEXTENDED", "#BEGINGLOBALHEADER", "  1,DOS", '102,rob "#KR6R900"', "111,9.9000000000E+34", f"112,{order}", "#ENDGLOBALHEADER", ""]
+        for channel in channels:
+            lines += ["#BEGINCHANNELHEADER", *(f"{key},{value}" for key, value in channel.items()), "#ENDCHANNELHEADER", ""]
+        return "\r\n".join(lines).encode("latin-1")
+
+    clock = {200: "Zeit", 201: "Zeitkanal", 202: "sec", 210: "IMPLIZIT", 220: ROWS, 240: "0.00000", 241: "0.00400000"}
+    folder = out / "trace"
+    folder.mkdir(exist_ok=True)
+    columns = {"Zeit": [0.0 + 0.004 * i for i in range(ROWS)]}
+    for drive in range(2):
+        micro = 1e6 * Q[drive]
+        torque = np.where(np.arange(ROWS) == 5, 9.9e34, TAU[drive])
+        (folder / f"run_NextGenDrive#{drive + 1}.r64").write_bytes(np.stack([micro, torque], axis=1).astype("<f8").tobytes())
+        channels = [clock]
+        for place, (name, unit, factor) in enumerate([("Istposition", "\u00b0", "1.000000e-06"), ("Istmoment", "Nm", "1.000000e+00")]):
+            channels.append({
+                200: name, 201: "AT_Drive", 202: unit, 210: "EXPLIZIT", 211: f"renamed_NextGenDrive#{drive + 1}.r64", 213: "BLOCK", 214: "REAL64",
+                220: ROWS, 221: place + 1, 240: 0, 241: factor,
+            })
+        (folder / f"run_NextGenDrive#{drive + 1}.dat").write_bytes(header("High -> Low", channels))
+        columns[f"Istposition[A{drive + 1}]"] = [float(x) * 1e-6 + 0.0 for x in micro]
+        columns[f"Istmoment[A{drive + 1}]"] = np.where(np.arange(ROWS) == 5, np.nan, TAU[drive])
+    counts = np.round(1000 * Q[0]).astype(int)
+    parts = {"REAL32": F32[1].astype(">f4"), "INT16": counts.astype(">i2"), "WORD8": (np.arange(ROWS) % 7).astype(">u1")}
+    channels = [clock]
+    for kind, values in parts.items():
+        (folder / f"types.{kind}").write_bytes(bytes(values.itemsize) + values.tobytes())
+        channels.append({
+            200: kind.lower(), 210: "EXPLICIT", 211: f"C:\\KRC\\TRACE\\types.{kind}", 213: "CHANNEL", 214: kind, 220: ROWS, 221: 2,
+            240: "0.5", 241: "0.25",
+        })
+    (folder / "types.dat").write_bytes(header("Low -> High", channels))
+    types = {"Zeit": columns["Zeit"], **{kind.lower(): [float(x) * 0.25 + 0.5 for x in values] for kind, values in parts.items()}}
+    return {"trace/run_NextGenDrive#2.dat": columns, "trace/types.dat": types}
+
+
 def matlab_files(out):
     variables = {
         "t": T[:, None], "q": Q.T, "tau": TAU, "ticks": np.arange(ROWS, dtype=np.int16)[:, None], "single_q": F32.T,
@@ -493,7 +655,7 @@ def main():
     out = parser.parse_args().out / "formats"
     out.mkdir(parents=True, exist_ok=True)
     files = {}
-    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, matlab_files, hdf5_files]:
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, arrow_files, lerobot_files, diadem_files, matlab_files, hdf5_files]:
         files |= make(out)
     versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
     files = {name: dict(columns) for name, columns in files.items()}

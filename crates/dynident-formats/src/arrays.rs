@@ -6,6 +6,9 @@ use crate::table::Table;
 /// Columns of all arrays together, at most.
 pub(crate) const MOST_COLUMNS: usize = 1 << 14;
 
+/// Entries of a list that are columns.
+pub(crate) const LONGEST_LIST: usize = 1024;
+
 /// An array of numbers with one or two sides.
 #[derive(Clone, Debug)]
 pub(crate) struct Array {

@@ -22,6 +22,12 @@ pub enum FileFormat {
     Rosbag2,
     /// Parquet.
     Parquet,
+    /// The folder of a LeRobot data set.
+    LeRobot,
+    /// Arrow, in the file format (Feather) or as a stream.
+    Arrow,
+    /// DIAdem data, which KUKA's controllers write.
+    Diadem,
     /// MATLAB, `save -v6` and `-v7`.
     Mat5,
     /// HDF5, which MATLAB's `save -v7.3` writes too.
@@ -41,6 +47,9 @@ impl FileFormat {
             Self::Mcap => "MCAP",
             Self::Rosbag2 => "rosbag2",
             Self::Parquet => "Parquet",
+            Self::LeRobot => "LeRobot data set",
+            Self::Arrow => "Arrow",
+            Self::Diadem => "DIAdem data (KUKA trace)",
             Self::Mat5 => "MATLAB 5 file",
             Self::Hdf5 => "HDF5 file",
         }

@@ -8,6 +8,9 @@
 //! | JSON, one object a line | numbers by their path: `arm.q[0]` | `json` |
 //! | MCAP, rosbag2 | numbers of ROS 2 messages by topic and path: `/joint_states.position[elbow]` | `bags` |
 //! | Parquet | columns, lists with their indices | `parquet` |
+//! | LeRobot data sets | as Parquet, entries by their names: `action[elbow]`; time over all episodes | `json`, `parquet` |
+//! | Arrow: Feather, streams | as Parquet | `arrow` |
+//! | DIAdem header and numbers (KUKA trace) | channels, of all drives: `Istmoment[A3]` | |
 //! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices either way up | `gzip`, `hdf5` |
 //!
 //! Columns that were recorded on different clocks (topics of a bag) are joined on that of the first one selected: see
@@ -30,17 +33,27 @@
 //! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(
-    not(all(feature = "gzip", feature = "zstd", feature = "bags", feature = "parquet", feature = "hdf5")),
+    not(all(
+        feature = "gzip",
+        feature = "zstd",
+        feature = "bags",
+        feature = "parquet",
+        feature = "arrow",
+        feature = "hdf5"
+    )),
     allow(dead_code, unused_variables, clippy::needless_pass_by_value, reason = "what formats share is not all used")
 )]
 
 mod arrays;
+mod arrow;
 mod bags;
 mod bytes;
+mod diadem;
 mod error;
 mod hdf5;
 mod json_lines;
 mod kind;
+mod lerobot;
 mod mat;
 mod npy;
 mod packed;
@@ -85,13 +98,18 @@ impl core::fmt::Debug for Contents {
     }
 }
 
-/// Opens the file at `path`, or the folder of a rosbag2 recording, and finds out what it holds.
+/// Opens the file at `path`, or the folder of a rosbag2 recording or of a LeRobot data set, and finds out what it
+/// holds.
 ///
 /// # Errors
 /// If it cannot be read, is of a format that is not read, or is broken where its columns are named.
 pub fn open(path: &Path) -> Result<Opened, FileError> {
     let refused = |source| FileError::Io { file: path.to_owned(), source };
-    if std::fs::metadata(path).map_err(refused)?.is_dir() {
+    let folder = std::fs::metadata(path).map_err(refused)?.is_dir();
+    if let Some(folder) = lerobot::folder(path) {
+        return Ok(Opened { format: FileFormat::LeRobot, contents: Contents::Table(lerobot::open(folder)?) });
+    }
+    if folder {
         if path.join(bags::METADATA).is_file() {
             return Ok(Opened { format: FileFormat::Rosbag2, contents: bags::open_folder(path)? });
         }
@@ -122,19 +140,28 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
         FileFormat::Mcap => bags::open_mcap(path)?,
         FileFormat::Rosbag2 => bags::open_database(path)?,
         FileFormat::Parquet => Contents::Table(parquet::open(path)?),
+        FileFormat::LeRobot => Contents::Table(lerobot::open(path)?),
+        FileFormat::Arrow => Contents::Table(arrow::open(path)?),
+        FileFormat::Diadem => Contents::Table(diadem::open(path)?),
         FileFormat::Mat5 => Contents::Table(mat::open(path, reader)?),
         FileFormat::Hdf5 => Contents::Table(hdf5::open(path)?),
     };
     Ok(Opened { format, contents })
 }
 
-/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording's folder, its list of parts
-/// first.
+/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording, a LeRobot data set or a DIAdem
+/// recording, the description of them first.
 ///
 /// # Errors
 /// If a folder's list of parts cannot be read.
 pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, FileError> {
+    if let Some(folder) = lerobot::folder(path) {
+        return lerobot::files(folder);
+    }
     if !path.is_dir() {
+        if diadem::is_header(path) {
+            return diadem::files(path);
+        }
         return Ok(vec![path.to_owned()]);
     }
     let mut files = vec![path.join(bags::METADATA)];

@@ -15,7 +15,7 @@ pub(crate) use reading::open;
 #[cfg(feature = "parquet")]
 mod reading {
     use super::{FileError, Path, Table};
-    use crate::arrays::MOST_COLUMNS;
+    use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
     use crate::kind::FileFormat;
     use crate::table::slots;
     use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
@@ -28,8 +28,6 @@ mod reading {
 
     /// Rows that are unpacked at once.
     const BLOCK: usize = 4096;
-    /// Entries of a list that are columns.
-    const LONGEST_LIST: usize = 1024;
 
     /// One column of the file, which may be several of the table's.
     #[derive(Debug)]

@@ -1,5 +1,7 @@
 //! What a file is, by its first bytes.
 
+use crate::arrow;
+use crate::diadem;
 use crate::error::FileError;
 use crate::kind::FileFormat;
 use std::io::{BufRead, BufReader, Read};
@@ -22,6 +24,8 @@ const READ: &[(&[u8], FileFormat)] = &[
     (b"\x89HDF\r\n\x1a\n", FileFormat::Hdf5),
     (b"\x93NUMPY", FileFormat::Npy),
     (b"PAR1", FileFormat::Parquet),
+    (arrow::MAGIC, FileFormat::Arrow),
+    (diadem::BEGIN, FileFormat::Diadem),
     (b"PK\x03\x04", FileFormat::Npz),
     (b"\x1F\x8B", FileFormat::GzipText),
     (b"\x28\xB5\x2F\xFD", FileFormat::ZstdText),
@@ -34,7 +38,7 @@ const EXPORT: &str = "export its table as CSV (pandas: `frame.to_csv(\"log.csv\"
 const UNPACK: &str = "unpack it first";
 const FOREIGN: &[Foreign] = &[
     (b"#ROSBAG V", "a ROS 1 bag", "convert it to MCAP (`rosbags-convert`), or export the joint states as CSV"),
-    (b"ARROW1", "an Arrow (Feather) table", "write it as Parquet (pandas: `frame.to_parquet(\"log.parquet\")`)"),
+    (b"FEA1", "a Feather table of version 1", "write it as Parquet (pandas: `frame.to_parquet(\"log.parquet\")`)"),
     (b"BZh", "a bzip2 archive", UNPACK),
     (b"\xFD7zXZ\0", "an xz archive", UNPACK),
     (b"\x04\x22\x4D\x18", "an LZ4 archive", UNPACK),
@@ -51,6 +55,9 @@ const FOREIGN: &[Foreign] = &[
 pub(crate) fn recognised(path: &Path, head: &[u8]) -> Result<FileFormat, FileError> {
     if let Some((_, format)) = READ.iter().find(|(begins, _)| head.starts_with(begins)) {
         return Ok(*format);
+    }
+    if arrow::begins_stream(head) {
+        return Ok(FileFormat::Arrow);
     }
     if let Some((_, format, fix)) = FOREIGN.iter().find(|(begins, _, _)| head.starts_with(begins)) {
         return Err(FileError::OtherFormat { file: path.to_owned(), format, fix });

@@ -58,6 +58,21 @@ pub trait Table: fmt::Debug + Send {
     /// If the file is broken there.
     fn skip_row(&mut self) -> Result<bool, FileError>;
 
+    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which
+    /// rows lie in the file. Not after [`select`](Self::select).
+    ///
+    /// # Errors
+    /// If the file is broken, behind the last row that was given.
+    fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), FileError> {
+        let columns = self.width();
+        self.select(&(0..columns).collect::<Vec<_>>());
+        let mut row = vec![0.0; columns];
+        while self.next_row(&mut row)? {
+            each(0, &row);
+        }
+        Ok(())
+    }
+
     /// What the file holds beside its columns and why it is none, a sentence each.
     fn notes(&self) -> Vec<String> {
         Vec::new()

@@ -171,6 +171,15 @@ pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mi
     Ok(passive.iter().enumerate().map(follower).collect())
 }
 
+/// The joints of the tree on the way to a link, and where it stands in the frame of the last one's body (of the base
+/// where there is none).
+pub(crate) fn way_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
+    let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
+    let mut all = core::iter::once((None, model.base())).chain(bodies);
+    let (body, own) = all.find_map(|(body, of)| Some((body, of.links.iter().find(|own| own.name == *link)?)))?;
+    Some((body.map_or_else(Vec::new, |body| model.path(body)), own.placement))
+}
+
 /// A loop with its names looked up.
 struct Cut {
     links: [String; 2],
@@ -187,12 +196,8 @@ impl Cut {
             if closure.points_m[k].iter().any(|x| !x.is_finite()) {
                 return Err(LoopError::NotFinite { link: link.clone() });
             }
-            let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
-            let mut all = core::iter::once((None, model.base())).chain(bodies);
-            let found = all.find_map(|(body, of)| Some((body, of.links.iter().find(|own| own.name == *link)?)));
-            let (body, own) = found.ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
-            let path = body.map_or_else(Vec::new, |body| model.path(body));
-            Ok((path, own.placement.point(Vec3(closure.points_m[k]))))
+            let (path, placement) = way_to(model, link).ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
+            Ok((path, placement.point(Vec3(closure.points_m[k]))))
         };
         let ends = [end(0)?, end(1)?];
         let length = |(path, point): &(Vec<usize>, Vec3)| {

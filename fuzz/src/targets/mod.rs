@@ -23,7 +23,7 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 18] = [
+pub(crate) const TARGETS: [Target; 20] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
     Target { name: "sdf", repetitions: 20, new: parsers::sdf },
@@ -35,6 +35,8 @@ pub(crate) const TARGETS: [Target; 18] = [
     Target { name: "numpy", repetitions: 10, new: formats::any },
     Target { name: "bags", repetitions: 4, new: formats::any },
     Target { name: "parquet", repetitions: 4, new: formats::any },
+    Target { name: "arrow", repetitions: 4, new: formats::any },
+    Target { name: "diadem", repetitions: 4, new: formats::any },
     Target { name: "matlab", repetitions: 10, new: formats::any },
     Target { name: "states", repetitions: 20, new: parsers::states },
     Target { name: "result", repetitions: 10, new: parsers::result },

@@ -3,7 +3,7 @@
 //! random states. Friction stays apart, as in the structural rule: it mixes with nothing, and each of its functions
 //! of the motion is one condition.
 
-use super::numerical::stacked_regressors;
+use super::numerical::ScaledRegressors;
 use super::structural::friction_conditions;
 use crate::independent_columns::{IndependentColumns, independent_regressor_columns};
 use dynident_model::Model;
@@ -15,21 +15,26 @@ const SEED: u64 = 1;
 
 /// The split of all columns (bodies, then terms), where a share below `tolerance` counts as none.
 pub(super) fn independent_columns(model: &Model, terms: &[TorqueTerm], tolerance: f64) -> IndependentColumns {
-    let mut rows = stacked_regressors(model, terms, SEED);
+    let ScaledRegressors { mut rows, factors } = ScaledRegressors::new(model, terms, SEED);
     let first_term = model.inertial_count();
-    for (place, term) in terms.iter().enumerate() {
-        if !term.functions().is_empty() {
-            rows.column_mut(first_term + place).fill(0.0);
-        }
+    let is_friction = |column: usize| column >= first_term && !terms[column - first_term].functions().is_empty();
+    for column in (0..rows.ncols()).filter(|&column| is_friction(column)) {
+        rows.column_mut(column).fill(0.0);
     }
     let friction = friction_conditions(terms);
-    // Beside rows that are one entry each, torques count as much in any unit.
-    let largest = rows.amax();
     let mut all = DMatrix::zeros(rows.nrows() + friction.len(), rows.ncols());
-    all.rows_mut(0, rows.nrows()).copy_from(&if largest > 0.0 { rows / largest } else { rows });
+    all.rows_mut(0, rows.nrows()).copy_from(&rows);
     for (k, condition) in friction.iter().enumerate() {
         let mut row = all.row_mut(all.nrows() - friction.len() + k);
         row.columns_mut(first_term, terms.len()).tr_copy_from(condition);
     }
-    independent_regressor_columns(&all, tolerance)
+    let mut split = independent_regressor_columns(&all, tolerance);
+    // Back to columns as they are: those of terms that rows of their own hold were never scaled.
+    let factor = |column: usize| if is_friction(column) { 1.0 } else { factors[column] };
+    for (d, &dependent) in split.dependent.iter().enumerate() {
+        for (b, &base) in split.independent.iter().enumerate() {
+            split.regrouping[(b, d)] *= factor(base) / factor(dependent);
+        }
+    }
+    split
 }

@@ -3,9 +3,9 @@
 use crate::independent_columns::independent_regressor_columns;
 use crate::regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels};
 use crate::workspace::BatchWorkspace;
-use dynident_model::Model;
 use dynident_model::sample::Random;
 use dynident_model::terms::{JointMotion, TorqueTerm};
+use dynident_model::{Model, Vec3};
 use nalgebra::DMatrix;
 
 /// What random states say about the columns.
@@ -19,10 +19,12 @@ pub struct NumericalRank {
     pub strongest_dependent: f64,
 }
 
-/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±1 m, velocities within ±2,
-/// accelerations within ±5) and splits their columns at `tolerance`. Deterministic in `seed`.
+/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±ℓ, velocities within ±2 of
+/// rad or ℓ each second, accelerations within ±5) and splits their columns at `tolerance`. The unit of length is ℓ, the
+/// robot's longest link, and gravity stands in rows of its own: a robot a thousand times as long has the same split.
+/// Deterministic in `seed`.
 pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance: f64) -> NumericalRank {
-    let split = independent_regressor_columns(&stacked_regressors(model, terms, seed), tolerance);
+    let split = independent_regressor_columns(&ScaledRegressors::new(model, terms, seed).rows, tolerance);
     NumericalRank {
         independent: split.independent,
         weakest_independent: split.weakest_independent,
@@ -30,18 +32,83 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
     }
 }
 
-/// Regressors at random states under one another: rows of joint after joint, all columns.
-pub(super) fn stacked_regressors(model: &Model, terms: &[TorqueTerm], seed: u64) -> DMatrix<f64> {
-    let columns = all_columns(model, terms);
-    let (dof, count) = (model.dof(), columns.len());
-    let samples = 2 * count / dof.max(1) + 10;
-    let mut random = Random::new(seed);
-    let mut states = |range: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        (0..dof * samples).map(|k| random.uniform(-1.0, 1.0) * range(k / samples)).collect()
-    };
-    let q = states(&|joint| if model.joints()[joint].turns() { core::f64::consts::PI } else { 1.0 });
-    let (dq, ddq) = (states(&|_| 2.0), states(&|_| 5.0));
-    stacked(model, columns, &JointMotion { samples, q: &q, dq: &dq, ddq: &ddq })
+/// Regressors at random states, of numbers without units: lengths count in the robot's longest link, inertia and
+/// gravity each in their largest entry.
+///
+/// A sum of columns is zero in all states exactly when it is zero at rest, and what motion adds to it is: rows at rest
+/// and rows of what motion adds have the dependencies of their sums, whatever the size of gravity beside inertia.
+pub(super) struct ScaledRegressors {
+    /// Rows of joint after joint of what motion adds, then at rest; all columns.
+    pub(super) rows: DMatrix<f64>,
+    /// Of each column, what it was multiplied by.
+    pub(super) factors: Vec<f64>,
+}
+
+impl ScaledRegressors {
+    pub(super) fn new(model: &Model, terms: &[TorqueTerm], seed: u64) -> Self {
+        let columns = all_columns(model, terms);
+        let (dof, count) = (model.dof(), columns.len());
+        let samples = 2 * count / dof.max(1) + 10;
+        let length = longest_link_m(model);
+        let reach = |joint: usize| if model.joints()[joint].turns() { 1.0 } else { length };
+        let mut random = Random::new(seed);
+        let mut states = |range: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (0..dof * samples).map(|k| random.uniform(-1.0, 1.0) * range(k / samples)).collect()
+        };
+        let q = states(&|joint| if model.joints()[joint].turns() { core::f64::consts::PI } else { length });
+        let (dq, ddq) = (states(&|joint| 2.0 * reach(joint)), states(&|joint| 5.0 * reach(joint)));
+        let still = vec![0.0; dof * samples];
+        let weightless = model.clone().with_gravity(Vec3::ZERO).unwrap_or_else(|_| model.clone());
+        let resting = JointMotion { samples, q: &q, dq: &still, ddq: &still };
+        let moving = stacked(&weightless, columns.clone(), &JointMotion { samples, q: &q, dq: &dq, ddq: &ddq })
+            - stacked(&weightless, columns.clone(), &resting);
+        let at_rest = stacked(model, columns.clone(), &resting);
+
+        let of_body = |column: &Column| match column {
+            Column::Body { parameter: 0, .. } => Some(1.0),
+            Column::Body { parameter: 1..=3, .. } => Some(length),
+            Column::Body { .. } => Some(length * length),
+            Column::Term(_) => None,
+        };
+        let mut factors: Vec<f64> = columns.iter().map(|column| of_body(column).unwrap_or(1.0)).collect();
+        let bodies = model.inertial_count();
+        let mut rows = DMatrix::zeros(2 * dof * samples, count);
+        for (begin, mut block) in [(0, moving), (dof * samples, at_rest)] {
+            for (column, factor) in factors.iter().enumerate() {
+                block.column_mut(column).scale_mut(*factor);
+            }
+            for joint in 0..dof {
+                block.rows_mut(joint * samples, samples).unscale_mut(reach_of_torque(model, joint, length));
+            }
+            let largest = block.columns(0, bodies).amax();
+            if largest > 0.0 {
+                block.unscale_mut(largest);
+            }
+            rows.rows_mut(begin, dof * samples).copy_from(&block);
+        }
+        // Terms have units of many kinds, and each counts by itself.
+        for column in bodies..count {
+            let largest = rows.column(column).amax();
+            if largest > 0.0 {
+                rows.column_mut(column).unscale_mut(largest);
+                factors[column] /= largest;
+            }
+        }
+        Self { rows, factors }
+    }
+}
+
+/// What a force's lever adds to the torque of a joint: torques grow with one length more than forces.
+fn reach_of_torque(model: &Model, joint: usize, length: f64) -> f64 {
+    if model.joints()[joint].turns() { length } else { 1.0 }
+}
+
+/// The longest way from one joint to the next, m; 1 where all stand in one place. Where the first stands does not
+/// matter.
+fn longest_link_m(model: &Model) -> f64 {
+    let links = model.tree_joints().iter().filter(|joint| joint.parent.is_some());
+    let longest = links.map(|joint| joint.placement.translation.norm()).fold(0.0, f64::max);
+    if longest > 0.0 { longest } else { 1.0 }
 }
 
 /// The regressor of some columns at the states of a motion: rows of joint after joint.

@@ -3,13 +3,13 @@
 
 use crate::golden::{close, numbers, text};
 use dynident_dynamics::{
-    BaseParameterSettings, BaseParameters, BatchWorkspace, MotionGradient, PanelLayout, Panels, Workspace,
+    BaseParameterSettings, BaseParameters, BatchWorkspace, Column, MotionGradient, PanelLayout, Panels, Workspace,
     body_placements, forward_dynamics, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives,
     mass_matrix, numerical_rank, regressor_panels, regressor_panels_adjoint,
 };
 use dynident_model::sample::Random;
 use dynident_model::terms::{DriveChoice, JointMotion, terms_per_joint};
-use dynident_model::{LoopClosure, LoopError, Model, load_robot, loops};
+use dynident_model::{Body, InertialParameters, Joint, LoopClosure, LoopError, Model, Transform, load_robot, loops};
 use dynident_testing::repository;
 use serde_json::Value;
 
@@ -73,6 +73,40 @@ fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
                 close(ROUNDING, &placement.translation.0, &numbers(&state["placements_m"][&joint.name]), &joint.name);
             }
         }
+    }
+}
+
+#[test]
+fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
+    let path = repository("golden/closed_chains.json");
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let robot = load_robot(repository("golden/coupled/palletizer.xml")).unwrap();
+    assert!(robot.notices.is_empty(), "{:?}", robot.notices);
+    let model = robot.model;
+    let order = order(&model, &file);
+    let passive: Vec<&str> = file["passive"].as_array().unwrap().iter().map(text).collect();
+    assert_eq!(model.followers().count(), passive.len());
+    let mut workspace = Workspace::new(&model);
+    for state in file["states"].as_array().unwrap() {
+        let [q, dq, ddq, tau] = ["q", "dq", "ddq", "tau"].map(|key| ordered(&order, &state[key]));
+        let mut stand = vec![0.0; model.body_count()];
+        model.coupling().unwrap().positions(&q, 1, &mut stand);
+        for (name, theirs) in passive.iter().zip(numbers(&state["passive"])) {
+            let own = model.tree_joints().iter().position(|joint| joint.name == *name).unwrap();
+            close(1e-9, &[stand[own]], &[theirs], name);
+        }
+        close(1e-9, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, "tau");
+    }
+    // The same robot as the URDF with [[robot.loop]], whose elbow is drawn at zero.
+    for (_, theirs) in palletizer().followers() {
+        let own = model.tree_joints().iter().find(|joint| joint.name == theirs.name).unwrap();
+        let (own, theirs) = (own.mimic.as_ref().unwrap(), theirs.mimic.as_ref().unwrap());
+        let row = |mimic: &dynident_model::Mimic| {
+            let mut row: Vec<_> = mimic.sources.iter().map(|one| (one.joint.clone(), one.multiplier)).collect();
+            row.sort_by(|a, b| a.0.cmp(&b.0));
+            row
+        };
+        assert_eq!(row(own), row(theirs));
     }
 }
 
@@ -164,6 +198,87 @@ fn base_parameters_of_coupled_joints_carry_the_torque_and_no_more() {
         let mut tau = vec![0.0; dof * samples];
         inverse_dynamics_batch(&model, &mut BatchWorkspace::new(&model), &motion, &mut tau);
         close(ROUNDING, &torque(&PanelLayout::new(&model, base.all_columns().to_vec()), &own), &tau, model.name());
+    }
+}
+
+/// The same robot with all lengths and masses times these factors; joints that slide and follow joints that turn follow
+/// them further.
+fn scaled(model: &Model, length: f64, mass: f64) -> Model {
+    let placed = |placement: Transform| Transform { translation: placement.translation.scale(length), ..placement };
+    let body = |body: &Body| {
+        let mut body = body.clone();
+        for link in &mut body.links {
+            link.placement = placed(link.placement);
+            link.inertial = link.inertial.map(|inertial| {
+                let by = |k: usize| {
+                    if k == 0 {
+                        1.0
+                    } else if k < 4 {
+                        length
+                    } else {
+                        length * length
+                    }
+                };
+                InertialParameters(core::array::from_fn(|k| mass * by(k) * inertial.0[k]))
+            });
+        }
+        body
+    };
+    let tree = model.tree_joints();
+    let reach = |joint: &Joint| if joint.turns() { 1.0 } else { length };
+    let joints = tree.iter().map(|joint| {
+        let mut joint = Joint { placement: placed(joint.placement), ..joint.clone() };
+        let own = reach(&joint);
+        if let Some(mimic) = &mut joint.mimic {
+            mimic.offset *= own;
+            for source in &mut mimic.sources {
+                let followed = tree.iter().find(|other| other.name == source.joint).unwrap();
+                source.multiplier *= own / reach(followed);
+            }
+        }
+        joint
+    });
+    let bodies = model.bodies().iter().map(body).collect();
+    let scaled = Model::new(model.name(), body(model.base()), joints.collect(), bodies).unwrap();
+    scaled.with_gravity(model.gravity()).unwrap()
+}
+
+/// Links of a millimetre or a kilometre, a gram or a ton: the same base parameters with factors scaled, and gravity the
+/// same all along. 1e-7 of a factor is what the split's own rounding, 1e-12, leaves at a share of 2e-5 and more.
+#[test]
+fn base_parameters_of_coupled_joints_do_not_depend_on_size() {
+    let followers = load_robot(repository("golden/coupled/followers.urdf")).unwrap().model;
+    let panda = load_robot(repository("robots/panda.urdf")).unwrap().model;
+    for model in [palletizer(), followers, panda] {
+        let choice = DriveChoice { drive_inertia: true, viscous: true, offset: true, ..DriveChoice::default() };
+        let base_of = |model: &Model| {
+            let terms = terms_per_joint(model, |_| choice);
+            let base = BaseParameters::new(model, &terms, &BaseParameterSettings::default());
+            assert_eq!(numerical_rank(model, &terms, 99, 2e-5).independent, base.independent(), "{}", model.name());
+            base
+        };
+        let usual = base_of(&model);
+        let unit = |column: &Column, length: f64| match column {
+            Column::Body { parameter: 0, .. } => 1.0,
+            Column::Body { parameter: 1..=3, .. } => length,
+            Column::Body { .. } => length * length,
+            Column::Term(term) if model.joints()[term.own_joint().unwrap()].turns() => length * length,
+            Column::Term(_) => 1.0,
+        };
+        for (length, mass) in [(1e-3, 1.0), (1e3, 1.0), (1.0, 1e-3), (1.0, 1e3), (1e-3, 1e-3), (1e3, 1e3)] {
+            let base = base_of(&scaled(&model, length, mass));
+            assert_eq!(base.independent(), usual.independent(), "{} {length} {mass}", model.name());
+            for (d, dependent) in base.dependent().iter().enumerate() {
+                for (b, independent) in base.independent().iter().enumerate() {
+                    let factor = |column: usize| unit(&base.all_columns()[column], length);
+                    let expected = usual.regrouping()[(b, d)] * factor(*independent) / factor(*dependent);
+                    let size = factor(*independent) / factor(*dependent);
+                    let found = base.regrouping()[(b, d)];
+                    let near = (found - expected).abs() <= 1e-7 * expected.abs().max(size);
+                    assert!(near, "{} {length}: {found} for {expected}", model.name());
+                }
+            }
+        }
     }
 }
 

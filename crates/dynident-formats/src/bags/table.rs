@@ -195,6 +195,24 @@ impl BagTable {
         found
     }
 
+    /// Reads the message under way, of topic `index`, into the sample.
+    fn read(&mut self, index: usize, header: Header) -> Result<(), FileError> {
+        let topic = &mut self.topics[index];
+        topic.read(header.log_ns, &self.buffer, &mut self.sample).map_err(|problem| {
+            let place = format!("message {} of {}", topic.messages, topic.name);
+            FileError::broken(&self.path, self.format, place, problem, "leave the topic out, or record it again")
+        })
+    }
+
+    /// Whether a message is a row of these columns: publishers may take turns on one topic, and a message without any
+    /// of what is asked for is none.
+    fn is_row(&self, topic: usize, columns: &[usize], values: &[f64]) -> bool {
+        let clocks = [Some(0), self.topics[topic].stamp_column()];
+        let told = |(column, value): (&usize, &f64)| !clocks.contains(&Some(*column)) && !value.is_nan();
+        let only_clocks = columns.iter().all(|column| clocks.contains(&Some(*column)));
+        only_clocks || columns.iter().zip(values).any(told)
+    }
+
     /// Reads messages until a row is whole.
     fn advance(&mut self) -> Result<Option<Vec<f64>>, FileError> {
         loop {
@@ -211,18 +229,10 @@ impl BagTable {
             };
             let Some(index) = self.topic(header) else { continue };
             let Some(at) = self.plan.topics.iter().position(|(topic, _)| *topic == index) else { continue };
-            let topic = &mut self.topics[index];
-            topic.read(header.log_ns, &self.buffer, &mut self.sample).map_err(|problem| {
-                let place = format!("message {} of {}", topic.messages, topic.name);
-                FileError::broken(&self.path, self.format, place, problem, "leave the topic out, or record it again")
-            })?;
+            self.read(index, header)?;
             let columns = &self.plan.topics[at].1;
             let values: Vec<f64> = columns.iter().map(|column| self.sample.values[*column]).collect();
-            // Publishers that take turns on one topic: a message without any of what is asked for is no row.
-            let clocks = [Some(0), topic.stamp_column()];
-            let told = |(column, value): (&usize, &f64)| !clocks.contains(&Some(*column)) && !value.is_nan();
-            let only_clocks = columns.iter().all(|column| clocks.contains(&Some(*column)));
-            if !only_clocks && !columns.iter().zip(&values).any(told) {
+            if !self.is_row(index, columns, &values) {
                 continue;
             }
             let stamp = if self.plan.by_stamp { self.sample.stamp_ns } else { None };
@@ -294,6 +304,19 @@ impl Table for BagTable {
 
     fn skip_row(&mut self) -> Result<bool, FileError> {
         Ok(self.advance()?.is_some())
+    }
+
+    /// Every message once, whatever topic it is of.
+    fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), FileError> {
+        let columns: Vec<Vec<usize>> = self.topics.iter().map(|topic| (0..topic.columns.len()).collect()).collect();
+        while let Some(header) = self.messages.next(&mut self.buffer)? {
+            let Some(index) = self.topic(header) else { continue };
+            self.read(index, header)?;
+            if self.is_row(index, &columns[index], &self.sample.values) {
+                each(index, &self.sample.values);
+            }
+        }
+        Ok(())
     }
 
     fn notes(&self) -> Vec<String> {

@@ -105,6 +105,24 @@ fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
     let mut row = [0.0];
     while table.next_row(&mut row).unwrap() {}
     assert!(row == [2.0] && table.truncated());
+    // A stream of Arrow has no end before it is closed; a file of Arrow without its end was not finished.
+    let path = scratch.path().join("crash.arrow");
+    let whole = std::fs::read(folder().join("stream.arrows")).unwrap();
+    std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
+    let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
+    let mut row = vec![0.0; table.width()];
+    let mut rows = 0;
+    while table.next_row(&mut row).unwrap() {
+        rows += 1;
+    }
+    assert!(rows == 30 && table.truncated(), "{rows}");
+    let whole = std::fs::read(folder().join("plain.arrow")).unwrap();
+    std::fs::write(&path, &whole[..whole.len() * 9 / 10]).unwrap();
+    let message = drain(&path).unwrap_err().to_string();
+    assert!(
+        message.ends_with("its end: it is cut off, or its writer was never closed; write or copy it again"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -137,7 +155,8 @@ fn formats_that_are_not_read_are_named() {
     let path = scratch.path().join("log.csv");
     for (bytes, words) in [
         (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag, which is not read; convert it to MCAP"),
-        (b"ARROW1\0\0", "write it as Parquet"),
+        (b"FEA1\0\0", "write it as Parquet"),
+        (b"ARROW1\0\0", "its end: it is cut off"),
         (b"BZh91AY&SY", "unpack it first"),
         (b"\xFF\xFEa\0", "save it as UTF-8"),
         (b"PK\x03\x04nothing", "the list of members is missing"),
@@ -152,6 +171,73 @@ fn formats_that_are_not_read_are_named() {
     std::fs::write(scratch.path().join("metadata.yaml"), "relative_file_paths:\n  - gone.mcap\n").unwrap();
     let message = open(scratch.path()).unwrap_err().to_string();
     assert!(message.contains("`gone.mcap` is not in the folder; let `ros2 bag reindex`"), "{message}");
+}
+
+#[test]
+fn a_data_set_that_is_not_whole_says_what_is_missing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let set = scratch.path().join("set");
+    std::fs::create_dir_all(set.join("meta")).unwrap();
+    let golden = folder().join("lerobot_v2");
+    let refused = |words: &str| {
+        let error = drain(&set).expect_err(words);
+        told(&error, "set");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    std::fs::write(set.join("meta/info.json"), "{").unwrap();
+    refused("meta/info.json: it is not JSON");
+    std::fs::write(set.join("meta/info.json"), "{}").unwrap();
+    refused("meta/info.json: it has no `features`");
+    std::fs::copy(golden.join("meta/info.json"), set.join("meta/info.json")).unwrap();
+    assert!(drain(&set).is_err());
+    let chunk = set.join("data/chunk-000");
+    std::fs::create_dir_all(&chunk).unwrap();
+    refused("no chunk in it holds a Parquet file; fetch the data set whole");
+    let episodes = golden.join("data/chunk-000");
+    std::fs::copy(episodes.join("episode_000000.parquet"), chunk.join("episode_000000.parquet")).unwrap();
+    let Contents::Table(table) = open(&set).unwrap().contents else { panic!() };
+    assert!(table.notes().contains(&"1 of 3 episodes are there".to_owned()), "{:?}", table.notes());
+    assert_eq!(drain(&set).unwrap(), 15);
+    // What stands for a file that Git left behind; a table of another kind.
+    let second = chunk.join("episode_000001.parquet");
+    std::fs::write(&second, "version https://git-lfs.github.com/spec/v1\n").unwrap();
+    refused("episode_000001.parquet: it is no Parquet file; fetch the data set whole");
+    std::fs::copy(folder().join("snappy.parquet"), &second).unwrap();
+    refused("episode_000001.parquet: its columns, or the lengths of its lists, are not those of the first file");
+}
+
+#[test]
+fn a_trace_that_is_not_whole_says_what_is_missing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let golden = |name: &str| std::fs::read(folder().join("trace").join(name)).unwrap();
+    let refused = |header: &[u8], words: &str| {
+        let path = scratch.path().join("run_NextGenDrive#1.dat");
+        std::fs::write(&path, header).unwrap();
+        let error = drain(&path).expect_err(words);
+        told(&error, "run_NextGenDrive#");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let header = golden("run_NextGenDrive#1.dat");
+    let changed = |from: &str, to: &str| {
+        let text: String = header.iter().map(|byte| char::from(*byte)).collect();
+        assert!(text.contains(from));
+        text.replacen(from, to, 1).chars().map(|letter| letter as u8).collect::<Vec<_>>()
+    };
+    refused(
+        &header,
+        "channel `Istposition`: there is no file `renamed_NextGenDrive#1.r64`; copy the whole trace again",
+    );
+    let data = golden("run_NextGenDrive#1.r64");
+    let beside = scratch.path().join("run_NextGenDrive#1.r64");
+    std::fs::write(&beside, &data[..data.len() - 8]).unwrap();
+    refused(&header, "40 values are told, and `run_NextGenDrive#1.r64` ends before");
+    std::fs::write(&beside, &data).unwrap();
+    refused(b"DIAEXTENDED\r\n#BEGINCHANNELHEADER\r\n200,Zeit\r\n", "it describes no channel to its end");
+    refused(&changed("221,1\r\n", "221,1\r\n222,3\r\n"), "222 is 3, and 2 channels stand side by side");
+    refused(&changed("214,REAL64", "214,REAL32"), "channels of several types stand side by side");
+    refused(&changed("220,40", "220,-40"), "it has no length (220)");
+    std::fs::write(scratch.path().join("run_NextGenDrive#2.dat"), changed("241,0.004", "241,0.002")).unwrap();
+    refused(&header, "its time differs from that of the first drive");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Files that other programs wrote (`golden/formats.py`) give the numbers that were put into them, to the last bit.
 
-use dynident_formats::{Contents, FileFormat, Table, open};
+use dynident_formats::{Contents, FileFormat, Table, files, open};
 use serde_json::Value;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -129,6 +129,9 @@ fn files_are_known_by_their_content() {
         ("zstd.mcap", FileFormat::Mcap),
         ("jazzy.db3", FileFormat::Rosbag2),
         ("zstd.parquet", FileFormat::Parquet),
+        ("lerobot_v2/data/chunk-000/episode_000001.parquet", FileFormat::Parquet),
+        ("lz4.feather", FileFormat::Arrow),
+        ("stream.arrows", FileFormat::Arrow),
         ("packed.mat", FileFormat::Mat5),
         ("v73.mat", FileFormat::Hdf5),
         ("groups.h5", FileFormat::Hdf5),
@@ -136,6 +139,14 @@ fn files_are_known_by_their_content() {
         let renamed = scratch.path().join("log.csv");
         std::fs::copy(folder().join(file), &renamed).unwrap();
         assert_eq!(open(&renamed).unwrap().format, format, "{file}");
+    }
+    let trace = folder().join("trace/run_NextGenDrive#2.dat");
+    assert_eq!((open(&trace).unwrap().format, files(&trace).unwrap().len()), (FileFormat::Diadem, 4));
+    for name in ["lerobot_v3", "lerobot_v3/meta/info.json"] {
+        let path = folder().join(name);
+        assert_eq!(open(&path).unwrap().format, FileFormat::LeRobot, "{name}");
+        let files = files(&path).unwrap();
+        assert!(files.len() == 3 && files[0].ends_with("meta/info.json"), "{files:?}");
     }
 }
 

@@ -19,7 +19,7 @@ use crate::xml::shortened;
 use std::collections::{HashMap, HashSet};
 
 /// Name of the link that does not move.
-const WORLD: &str = "world";
+pub(super) const WORLD: &str = "world";
 
 /// Elements that a body may hold and that play no part in its dynamics.
 const APART: [&str; 4] = ["site", "camera", "light", "plugin"];

@@ -1,7 +1,8 @@
 //! `<actuator>`, `<equality>`, `<tendon>`, `<option>`: effort limits, followers, gravity, and what the model does not
 //! hold of them.
 
-use super::bodies::Tree;
+use super::bodies::{Tree, WORLD};
+use super::chains::Connect;
 use super::classes::{Classes, MAIN, Stated};
 use super::expanded::{Element, Expanded};
 use super::fault::{MjcfError, MjcfFault};
@@ -10,7 +11,7 @@ use crate::joint::Mimic;
 use crate::spatial::Vec3;
 use crate::tree::STANDARD_GRAVITY;
 use crate::xml::shortened;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Gravity of `<option>`.
 pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3, MjcfError> {
@@ -34,13 +35,14 @@ pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3
 }
 
 /// Effort limits of joints by their actuators: what a joint's actuators can give at most together, where each of them
-/// has a limit that is the same both ways. A lower limit of the joint itself stays.
+/// has a limit that is the same both ways. A lower limit of the joint itself stays. Gives the joints that have
+/// actuators.
 pub(super) fn efforts(
     document: &Expanded,
     classes: &Classes<'_>,
     tree: &mut Tree,
     notices: &mut Notices,
-) -> Result<(), MjcfError> {
+) -> Result<HashSet<String>, MjcfError> {
     let mut sums: HashMap<usize, Option<f64>> = HashMap::new();
     let index: HashMap<String, usize> =
         tree.joints.iter().enumerate().map(|(index, joint)| (joint.name.clone(), index)).collect();
@@ -64,12 +66,13 @@ pub(super) fn efforts(
         let sum = sums.entry(joint).or_insert(Some(0.0));
         *sum = sum.zip(limit).map(|(sum, limit)| sum + limit);
     }
+    let driven = sums.keys().map(|&joint| tree.joints[joint].name.clone()).collect();
     for (joint, sum) in sums {
         let Some(sum) = sum.filter(|sum| sum.is_finite()) else { continue };
         let limits = &mut tree.joints[joint].limits;
         limits.effort = Some(limits.effort.map_or(sum, |own| own.min(sum)));
     }
-    Ok(())
+    Ok(driven)
 }
 
 /// The range of an actuator's force: its own, or that of a motor's control, which is the force.
@@ -91,8 +94,13 @@ fn force(stated: &Stated<'_>, element: &Element) -> Result<Option<[f64; 2]>, Mjc
     })
 }
 
-/// Joints that follow others, and constraints that the model does not hold.
-pub(super) fn couplings(document: &Expanded, tree: &mut Tree, notices: &mut Notices) -> Result<(), MjcfError> {
+/// Joints that follow others, chains that may be closed, and constraints that the model does not hold.
+pub(super) fn couplings<'t>(
+    document: &'t Expanded,
+    tree: &mut Tree,
+    notices: &mut Notices,
+) -> Result<Vec<Connect<'t>>, MjcfError> {
+    let mut connects = Vec::new();
     for element in document.sections("equality").flat_map(|section| document.children(section)) {
         let stated = Stated::own(document, element);
         if stated.get("active").is_some_and(|active| active.value == "false") {
@@ -102,6 +110,13 @@ pub(super) fn couplings(document: &Expanded, tree: &mut Tree, notices: &mut Noti
         let keys = ["joint1", "joint2", "body1", "body2", "site1", "site2", "tendon1", "tendon2", "flex"];
         let between: Vec<String> = keys.iter().filter_map(|key| named(key)).collect();
         let constraint = || Loss::Constraint { element: shortened(&element.tag), between: between.join(" and ") };
+        if let ("connect", Some(body), Some(anchor)) =
+            (&*element.tag, element.attribute("body1"), stated.vector("anchor")?)
+        {
+            let second = element.attribute("body2").map_or(WORLD, |name| &name.value);
+            connects.push(Connect { stated, bodies: [body.value.clone(), second.to_owned()], anchor });
+            continue;
+        }
         if element.tag != "joint" {
             notices.note(&stated, constraint());
             continue;
@@ -130,7 +145,7 @@ pub(super) fn couplings(document: &Expanded, tree: &mut Tree, notices: &mut Noti
         let mimic = Mimic::of(&tree.joints[source].name, law[1], offset);
         tree.joints[follower].mimic = Some(mimic);
     }
-    Ok(())
+    Ok(connects)
 }
 
 /// Tendons that act by themselves.

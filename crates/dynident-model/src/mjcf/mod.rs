@@ -23,6 +23,7 @@
 //! ```
 
 mod bodies;
+mod chains;
 mod classes;
 mod compiler;
 mod drives;
@@ -46,6 +47,7 @@ pub use write::{MjcfWriteError, rewrite_mjcf};
 
 use crate::tree::Model;
 use bodies::{LinkPlace, Reader, Tree};
+use chains::Around;
 use classes::Classes;
 use compiler::Compiler;
 use expanded::{Expanded, Place};
@@ -102,8 +104,8 @@ fn read(document: &Expanded) -> Result<Found, MjcfError> {
     let meshes = geoms::meshes(document, &classes, &compiler)?;
     let mut notices = Notices::default();
     let mut tree = Reader::new(document, &classes, &compiler, &meshes, &mut notices).tree()?;
-    drives::efforts(document, &classes, &mut tree, &mut notices)?;
-    drives::couplings(document, &mut tree, &mut notices)?;
+    let driven = drives::efforts(document, &classes, &mut tree, &mut notices)?;
+    let connects = drives::couplings(document, &mut tree, &mut notices)?;
     drives::tendons(document, &mut notices)?;
     let gravity = drives::gravity(document, &mut notices)?;
     let root = document.root();
@@ -111,8 +113,10 @@ fn read(document: &Expanded) -> Result<Found, MjcfError> {
         return Err(document.fault(root.place, MjcfFault::NoMovingJoint));
     }
     let name = root.attribute("model").map_or("robot", |name| &name.value);
-    let Tree { joints, bodies, base, links, joint_places, unknown, .. } = tree;
+    let Tree { joints, bodies, base, links, joint_places, unknown, references } = tree;
     let model = Model::new(name, base, joints, bodies).and_then(|model| model.with_gravity(gravity));
     let model = model.map_err(|error| document.fault(root.place, MjcfFault::Model(error)))?;
+    let around = Around { document, links: &links, references: &references, driven: &driven };
+    let model = chains::closed(model, &connects, &around, &mut notices)?;
     Ok(Found { model, notices: notices.list, compiler, links, joint_places, unknown })
 }

@@ -57,6 +57,13 @@ pub enum Loss {
         /// What it joins.
         between: String,
     },
+    /// A closed chain that the model does not hold.
+    Chain {
+        /// What it joins.
+        between: String,
+        /// Why not.
+        why: String,
+    },
     /// A coupling of two joints by more than a straight line.
     CouplingPolynomial {
         /// The joint that follows.
@@ -88,6 +95,7 @@ impl Loss {
             Self::OneSidedEffort { .. } => "one-sided-effort",
             Self::GravityCompensation { .. } => "gravity-compensation",
             Self::Constraint { .. } => "constraint",
+            Self::Chain { .. } => "chain",
             Self::CouplingPolynomial { .. } => "coupling-polynomial",
             Self::Tendon { .. } => "tendon",
             Self::Medium => "medium",
@@ -130,6 +138,12 @@ impl fmt::Display for Loss {
                 write!(
                     f,
                     "<{element}> under <equality> joins {between}, which the model does not hold: torques are those of the tree without it"
+                )
+            }
+            Self::Chain { between, why } => {
+                write!(
+                    f,
+                    "<connect> under <equality> closes a chain at {between}, which the model does not hold ({why}): torques are those of the tree without it"
                 )
             }
             Self::CouplingPolynomial { joint } => {

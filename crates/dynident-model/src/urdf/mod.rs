@@ -358,8 +358,8 @@ fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
         "robot" => Ok(document),
         other => {
             let hint = match other {
-                "sdf" => " (this is SDF: convert it)",
-                "mujoco" => " (this is MJCF)",
+                "sdf" => " (this is SDF, which is read as such from a file, or by `read_sdf`)",
+                "mujoco" => " (this is MJCF, which is read as such from a file, or by `read_mjcf`)",
                 "COLLADA" => " (this is a mesh)",
                 _ => "",
             };

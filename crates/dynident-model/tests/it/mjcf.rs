@@ -144,6 +144,39 @@ fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
     assert_eq!((robot.notices.len(), robot.notices[0].line), (1, 6));
 }
 
+/// A four-bar linkage: a crank of 1 m, a rod, and a rocker that the rod meets at `anchor`.
+fn linkage(actuator: &str, anchor: &str) -> String {
+    format!(
+        r#"<mujoco><worldbody>
+          <body name="crank"><joint name="drive" axis="0 1 0"/><geom size="0.1"/>
+            <body name="rod" pos="0 0 1"><joint name="rod_joint" axis="0 1 0"/><geom size="0.1"/></body></body>
+          <body name="rocker" pos="2 0 0"><joint name="rocker_joint" axis="0 1 0"/><geom size="0.1" pos="0 0 1"/></body>
+        </worldbody>
+        <equality><connect body1="rod" body2="rocker" anchor="{anchor}"/></equality>
+        <actuator>{actuator}</actuator></mujoco>"#
+    )
+}
+
+#[test]
+fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
+    let drive = r#"<motor joint="drive"/>"#;
+    let robot = read_mjcf(&linkage(drive, "2 0 0")).unwrap();
+    assert!(robot.notices.is_empty() && robot.model.dof() == 1, "{:?}", robot.notices);
+    let followers: Vec<_> = robot.model.followers().map(|(_, joint)| joint.mimic.clone().unwrap()).collect();
+    assert_eq!(followers, [Mimic::of("drive", -1.0, 0.0), Mimic::of("drive", 1.0, 0.0)]);
+    let all = r#"<motor joint="drive"/><motor joint="rod_joint"/><motor joint="rocker_joint"/>"#;
+    for (text, words) in [
+        (linkage("", "2 0 0"), "no actuator says which joints have a drive; name the others in [[robot.loop]]"),
+        (linkage(all, "2 0 0"), "every joint of the chain has an actuator"),
+        (linkage(drive, "2 0 0.3"), "no parallelogram"),
+        (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "there is no body `rokcer`"),
+    ] {
+        let robot = read_mjcf(&text).unwrap();
+        let said: Vec<String> = robot.notices.iter().map(|notice| notice.loss.to_string()).collect();
+        assert!(said.len() == 1 && said[0].contains(words) && robot.model.dof() == 3, "{words}: {said:?}");
+    }
+}
+
 #[test]
 fn a_line_of_equality_is_a_follower_and_more_is_said() {
     let text = r#"<mujoco><compiler angle="radian"/><worldbody>

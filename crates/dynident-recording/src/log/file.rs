@@ -113,6 +113,15 @@ impl LogTable for FileTable {
         Ok(found)
     }
 
+    fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), RecordingError> {
+        let rows = &mut self.rows;
+        self.table.all_rows(&mut |group, row| {
+            *rows += 1;
+            each(group, row);
+        })?;
+        Ok(())
+    }
+
     fn place(&self) -> LogPlace {
         match self.rows.checked_sub(1) {
             Some(row) => LogPlace::Row { log: self.label.clone(), row },

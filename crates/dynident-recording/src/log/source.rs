@@ -142,6 +142,21 @@ pub trait LogTable: fmt::Debug + Send {
     /// If it cannot be read.
     fn skip_row(&mut self) -> Result<bool, RecordingError>;
 
+    /// Reads all that is left: `each` row with the number of its group, whose columns it has, in the order in which
+    /// rows lie in the source. Not after [`select`](Self::select). Written anew only where there are several groups.
+    ///
+    /// # Errors
+    /// If a row is no row of numbers, behind those that were given.
+    fn all_rows(&mut self, each: &mut dyn FnMut(usize, &[f64])) -> Result<(), RecordingError> {
+        let columns = self.width();
+        self.select(&(0..columns).collect::<Vec<_>>());
+        let mut row = vec![0.0; columns];
+        while self.next_row(&mut row)? {
+            each(0, &row);
+        }
+        Ok(())
+    }
+
     /// Where the row last read stands; before the first one, where the columns are named.
     fn place(&self) -> LogPlace;
 

@@ -41,7 +41,7 @@ pub struct LogGroupContents {
     pub time: Option<String>,
     /// From the first stamp to the last.
     pub span_s: Option<f64>,
-    /// Steps by the span.
+    /// Steps by the span; holes of more than five mean steps are left out.
     pub rate_hz: Option<f64>,
 }
 

@@ -1,17 +1,19 @@
 //! What a recording holds.
 
 mod channel;
+mod clock;
 mod study_format;
 
 use crate::error::Error;
 use crate::jobs::columns::{time_unit_s, unit};
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 use channel::Tally;
+use clock::Clock;
+use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
-use dynident_recording::{LogSource, RecordingError};
 use std::path::Path;
 
-/// Reads a recording of any format, every group of columns once, and says what it holds. Memory does not grow with its
+/// Reads a recording of any format, once, and says what it holds. Memory does not grow with its
 /// length.
 ///
 /// # Errors
@@ -25,10 +27,12 @@ pub fn log_contents(path: &Path) -> Result<LogContents, Error> {
 
 fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     let log = FileLog::described_by_itself(path);
-    let (format, first) = log.open_with_format()?;
-    let names = column_names(first.as_ref());
-    let (groups, notes) = (first.groups(), first.notes());
-    drop(first);
+    let (format, mut table) = log.open_with_format()?;
+    let names = column_names(table.as_ref());
+    let (groups, notes) = (table.groups(), table.notes());
+    let times: Vec<_> = groups.iter().map(|group| time_column(group, &names[group.columns.clone()])).collect();
+    let mut read: Vec<Tallies> = groups.iter().map(|group| Tallies::new(group.columns.len())).collect();
+    table.all_rows(&mut |group, row| read[group].add(row, times[group].map(|(column, _)| column)))?;
     let mut found = LogContents {
         schema: LOG_SCHEMA.to_owned(),
         file: path.display().to_string(),
@@ -36,22 +40,17 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
         bytes: bytes(path)?,
         groups: Vec::new(),
         channels: Vec::new(),
-        truncated: None,
+        truncated: table.truncated().map(|place| place.to_string()),
         notes,
         study_format: String::new(),
     };
-    for (index, group) in groups.iter().enumerate() {
+    for (index, (group, Tallies { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
         let names = &names[group.columns.clone()];
-        let time = time_column(group, names);
-        let mut table = log.open()?;
-        let (tallies, rows) = tallies(table.as_mut(), group)?;
-        if let Some(place) = table.truncated() {
-            found.truncated = Some(place.to_string());
-        }
-        let seconds = time.and_then(|(column, unit_s)| Some((tallies[column].steps()?, unit_s)));
+        let time = times[index];
+        let seconds = time.and_then(|(column, unit_s)| Some((channels[column].steps()?, unit_s)));
         let span_s = seconds.map(|(span, unit_s)| span * unit_s);
-        let rate_hz = span_s.map(|span_s| (rows.saturating_sub(1)) as f64 / span_s);
-        found.channels.extend(tallies.iter().zip(names).map(|(tally, name)| LogChannel {
+        let rate_hz = seconds.and_then(|(span, unit_s)| Some(clock.rate(rows, span)? / unit_s));
+        found.channels.extend(channels.iter().zip(names).map(|(tally, name)| LogChannel {
             name: name.clone(),
             group: index,
             unit: unit(name).map(str::to_owned),
@@ -98,14 +97,24 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
     }
 }
 
-/// One pass over a group.
-fn tallies(table: &mut dyn LogTable, group: &LogGroup) -> Result<(Vec<Tally>, u64), RecordingError> {
-    table.select(&group.columns.clone().collect::<Vec<_>>());
-    let mut tallies = vec![Tally::default(); group.columns.len()];
-    let (mut row, mut rows) = (vec![0.0; group.columns.len()], 0);
-    while table.next_row(&mut row)? {
-        rows += 1;
-        tallies.iter_mut().zip(&row).for_each(|(tally, value)| tally.add(*value));
+/// A group under way.
+struct Tallies {
+    rows: u64,
+    channels: Vec<Tally>,
+    clock: Clock,
+}
+
+impl Tallies {
+    fn new(columns: usize) -> Self {
+        Self { rows: 0, channels: vec![Tally::default(); columns], clock: Clock::default() }
     }
-    Ok((tallies, rows))
+
+    /// A row, whose point in time is that of column `time`.
+    fn add(&mut self, row: &[f64], time: Option<usize>) {
+        self.rows += 1;
+        self.channels.iter_mut().zip(row).for_each(|(tally, value)| tally.add(*value));
+        if let Some(column) = time {
+            self.clock.add(row[column]);
+        }
+    }
 }

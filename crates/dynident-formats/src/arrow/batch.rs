@@ -1,0 +1,283 @@
+//! The columns of one batch of rows: buffers found, unpacked and checked, so that values can be taken without failing.
+
+use super::flat::Flat;
+use super::schema::{Cell, Leaf, List, Place};
+use crate::bytes::Bytes;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+
+/// Unpacked buffers of one batch at most, bytes: what is packed may claim to be anything.
+const MOST_UNPACKED: usize = 1 << 31;
+
+/// How buffers are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Packing {
+    Plain,
+    Lz4,
+    Zstd,
+}
+
+/// Where the columns of a batch are.
+#[derive(Debug)]
+pub(super) struct Batch {
+    pub(super) rows: usize,
+    /// Entries of each field.
+    entries: Vec<usize>,
+    /// Offset and length of each buffer, and how many buffers each field of views has beyond its first ones.
+    buffers: Vec<[i64; 2]>,
+    views: Vec<[i64; 1]>,
+    packing: Packing,
+    /// Where the buffers begin in the file, and the bytes of all.
+    begin: u64,
+    bytes: u64,
+}
+
+/// One column of a batch, in memory.
+#[derive(Debug)]
+pub(super) struct Loaded {
+    cell: Cell,
+    around: Vec<Flags>,
+    list: Option<(Flags, Offsets)>,
+    flags: Flags,
+    data: Vec<u8>,
+}
+
+/// Which entries are there; all, if there are no flags.
+#[derive(Debug)]
+struct Flags(Option<Vec<u8>>);
+
+#[derive(Debug)]
+enum Offsets {
+    Fixed(usize),
+    Each(Vec<usize>),
+}
+
+impl Flags {
+    fn has(&self, at: usize) -> bool {
+        self.0.as_ref().is_none_or(|flags| bit(flags, at))
+    }
+}
+
+/// Goes on reading at `at`; what lies near is in memory already.
+pub(super) fn move_to(reader: &mut BufReader<File>, at: u64) -> std::io::Result<()> {
+    let now = reader.stream_position()?;
+    reader.seek_relative(at as i64 - now as i64)
+}
+
+fn bit(bytes: &[u8], at: usize) -> bool {
+    bytes.get(at / 8).is_some_and(|byte| byte >> (at % 8) & 1 == 1)
+}
+
+impl Batch {
+    /// The batch that a message describes, its `bytes` of buffers at `begin`; or what is wrong with it.
+    pub(super) fn read(message: Flat, begin: u64, bytes: u64) -> Result<Self, String> {
+        let batch = message.table(2).ok_or("it says nothing of its columns")?;
+        let rows = usize::try_from(batch.i64(0)).map_err(|_| "its number of rows is negative")?;
+        let mut entries = Vec::new();
+        for [count, _] in batch.numbers::<2>(1) {
+            entries.push(usize::try_from(count).map_err(|_| "a column's number of entries is negative")?);
+        }
+        let packing = match batch.table(3) {
+            None => Packing::Plain,
+            Some(packing) => match (packing.u8(0), packing.u8(1)) {
+                (0, 0) => Packing::Lz4,
+                (1, 0) => Packing::Zstd,
+                (codec, method) => return Err(format!("it is packed in a way that is not known ({codec}, {method})")),
+            },
+        };
+        Ok(Self { rows, entries, buffers: batch.numbers(2), views: batch.numbers(4), packing, begin, bytes })
+    }
+
+    /// Reads a column; or says what is wrong with it. `left`: bytes that may still be unpacked.
+    fn load(&self, leaf: &Leaf, reader: &mut BufReader<File>, left: &mut usize) -> Result<Loaded, String> {
+        // What stands in groups, and lists, have one entry a row; entries of lists are as many as their field says.
+        let mut around = Vec::new();
+        for place in &leaf.around {
+            around.push(self.flags(*place, self.rows, reader, left)?);
+        }
+        let mut entries = self.rows;
+        let mut list = None;
+        if let Some((place, kind)) = leaf.list {
+            let flags = self.flags(place, self.rows, reader, left)?;
+            entries = *self.entries.get(leaf.value.node).ok_or("it lacks a field")?;
+            let offsets = match kind {
+                List::Fixed(length) if length.checked_mul(self.rows).is_some_and(|all| all <= entries) => {
+                    Offsets::Fixed(length)
+                }
+                List::Fixed(_) => return Err("it has fewer entries than its lists".to_owned()),
+                List::Offsets { wide } => self.offsets(place, wide, entries, reader, left)?,
+            };
+            list = Some((flags, offsets));
+        }
+        let flags = self.flags(leaf.value, entries, reader, left)?;
+        let data = self.buffer(leaf.value, 1, leaf.cell.bytes(entries), reader, left)?;
+        Ok(Loaded { cell: leaf.cell, around, list, flags, data })
+    }
+
+    /// The columns of `leaves` that are asked for.
+    pub(super) fn loaded(
+        &self,
+        leaves: &[Leaf],
+        asked_for: impl Fn(usize) -> bool,
+        reader: &mut BufReader<File>,
+    ) -> Result<Vec<Option<Loaded>>, (usize, String)> {
+        let mut left = MOST_UNPACKED;
+        let mut loaded = Vec::with_capacity(leaves.len());
+        for (index, leaf) in leaves.iter().enumerate() {
+            let column = asked_for(index).then(|| self.load(leaf, reader, &mut left)).transpose();
+            loaded.push(column.map_err(|problem| (index, problem))?);
+        }
+        Ok(loaded)
+    }
+
+    /// Number of the `which`-th buffer of a field.
+    fn number(&self, place: Place, which: usize) -> usize {
+        let views = self.views.iter().take(place.views);
+        let more = views.filter_map(|[count]| usize::try_from(*count).ok());
+        more.fold(place.buffer + which, usize::saturating_add)
+    }
+
+    fn flags(
+        &self,
+        place: Place,
+        entries: usize,
+        reader: &mut BufReader<File>,
+        left: &mut usize,
+    ) -> Result<Flags, String> {
+        // Where all are there, the buffer may be empty.
+        if self.buffers.get(self.number(place, 0)).is_some_and(|[_, length]| *length == 0) {
+            return Ok(Flags(None));
+        }
+        self.buffer(place, 0, Some(entries.div_ceil(8)), reader, left).map(|flags| Flags(Some(flags)))
+    }
+
+    fn offsets(
+        &self,
+        place: Place,
+        wide: bool,
+        entries: usize,
+        reader: &mut BufReader<File>,
+        left: &mut usize,
+    ) -> Result<Offsets, String> {
+        if self.rows == 0 {
+            return Ok(Offsets::Each(vec![0]));
+        }
+        let size = if wide { 8 } else { 4 };
+        let bytes = self.rows.checked_add(1).and_then(|count| count.checked_mul(size));
+        let data = self.buffer(place, 1, bytes, reader, left)?;
+        let mut bytes = Bytes::new(&data, false);
+        let mut next = || if wide { bytes.u64() } else { bytes.u32().map(u64::from) };
+        let mut offsets = Vec::with_capacity(data.len() / size);
+        while let Some(offset) = next() {
+            let last = offsets.last().copied().unwrap_or(0);
+            let inside = usize::try_from(offset).ok().filter(|offset| (last..=entries).contains(offset));
+            offsets.push(inside.ok_or_else(|| format!("list {} does not end in its entries", offsets.len()))?);
+        }
+        Ok(Offsets::Each(offsets))
+    }
+
+    /// The first `wanted` bytes of a buffer, unpacked.
+    fn buffer(
+        &self,
+        place: Place,
+        which: usize,
+        wanted: Option<usize>,
+        reader: &mut BufReader<File>,
+        left: &mut usize,
+    ) -> Result<Vec<u8>, String> {
+        let wanted = wanted.filter(|wanted| wanted <= left).ok_or("it would be larger than 2 GiB")?;
+        *left -= wanted;
+        let [offset, length] = *self.buffers.get(self.number(place, which)).ok_or("it lacks a buffer")?;
+        let (offset, length) = u64::try_from(offset).ok().zip(u64::try_from(length).ok()).ok_or("a negative place")?;
+        if offset.checked_add(length).is_none_or(|end| end > self.bytes) {
+            return Err("its buffer ends behind the batch".to_owned());
+        }
+        let problem = |error: std::io::Error| format!("its buffer cannot be read ({error})");
+        move_to(reader, self.begin + offset).map_err(problem)?;
+        let mut data = Vec::new();
+        let mut packed = reader.take(length);
+        let mut unpacked: Box<dyn Read + '_> = if self.packing == Packing::Plain || wanted == 0 {
+            Box::new(packed)
+        } else {
+            let mut claim = [0; 8];
+            packed.read_exact(&mut claim).map_err(problem)?;
+            match (i64::from_le_bytes(claim), self.packing) {
+                // Not worth packing.
+                (-1, _) => Box::new(packed),
+                (_, Packing::Lz4) => Box::new(lz4::Decoder::new(packed).map_err(problem)?),
+                (_, _) => {
+                    let mut decoder = zstd::stream::read::Decoder::new(packed).map_err(problem)?;
+                    decoder.window_log_max(27).map_err(problem)?;
+                    Box::new(decoder)
+                }
+            }
+        };
+        unpacked.by_ref().take(wanted as u64).read_to_end(&mut data).map_err(problem)?;
+        drop(unpacked);
+        if data.len() < wanted {
+            return Err(format!("its buffer has {} bytes of {wanted}", data.len()));
+        }
+        Ok(data)
+    }
+}
+
+impl Loaded {
+    /// Where entry `entry` of a row stands; `None` if it is missing.
+    fn place(&self, row: usize, entry: usize) -> Option<usize> {
+        if self.around.iter().any(|flags| !flags.has(row)) {
+            return None;
+        }
+        let at = match &self.list {
+            None => row,
+            Some((flags, _)) if !flags.has(row) => return None,
+            Some((_, offsets)) => {
+                let (begin, end) = offsets.range(row)?;
+                begin.checked_add(entry).filter(|at| *at < end)?
+            }
+        };
+        self.flags.has(at).then_some(at)
+    }
+
+    /// Entry `entry` of a row, points in time counted from `first`; NaN if it is missing.
+    pub(super) fn value(&self, row: usize, entry: usize, first: i64) -> f64 {
+        let Some(at) = self.place(row, entry) else { return f64::NAN };
+        match self.cell {
+            Cell::Flag => f64::from(u8::from(bit(&self.data, at))),
+            Cell::Number(number) => {
+                let bytes = self.data.get(at * number.size()..).unwrap_or_default();
+                Bytes::new(bytes, false).number(number).unwrap_or(f64::NAN)
+            }
+            Cell::Ticks { per_s, from_first, .. } => {
+                let first = if from_first { first } else { 0 };
+                self.ticks(at).map_or(f64::NAN, |ticks| (i128::from(ticks) - i128::from(first)) as f64 / per_s)
+            }
+        }
+    }
+
+    /// The whole number at `at`.
+    fn ticks(&self, at: usize) -> Option<i64> {
+        let Cell::Ticks { wide, .. } = self.cell else { return None };
+        let mut bytes = Bytes::new(self.data.get(at * if wide { 8 } else { 4 }..)?, false);
+        if wide { bytes.u64().map(|bits| bits as i64) } else { bytes.u32().map(|bits| i64::from(bits as i32)) }
+    }
+
+    /// The first of the first `rows` points in time that is there.
+    pub(super) fn first_ticks(&self, rows: usize) -> Option<i64> {
+        (0..rows).find_map(|row| self.ticks(self.place(row, 0)?))
+    }
+
+    /// Entries of the list in a row.
+    pub(super) fn length(&self, row: usize) -> usize {
+        let Some((_, offsets)) = &self.list else { return 1 };
+        offsets.range(row).map_or(0, |(begin, end)| end - begin)
+    }
+}
+
+impl Offsets {
+    fn range(&self, row: usize) -> Option<(usize, usize)> {
+        match self {
+            Self::Fixed(length) => Some((row.checked_mul(*length)?, row.checked_add(1)?.checked_mul(*length)?)),
+            Self::Each(offsets) => Some((*offsets.get(row)?, *offsets.get(row + 1)?)),
+        }
+    }
+}

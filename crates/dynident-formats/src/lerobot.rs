@@ -1,0 +1,286 @@
+//! LeRobot data sets: a folder with `meta/info.json` and Parquet files below `data`, one for each episode (version 2)
+//! or for several (version 3). Layout: <https://huggingface.co/docs/lerobot/lerobot-dataset-v3>.
+
+use crate::error::FileError;
+use crate::kind::FileFormat;
+use std::path::{Path, PathBuf};
+
+/// The description of a data set, within its folder.
+const INFO: &str = "meta/info.json";
+const FETCH: &str = "fetch the data set whole (`hf download`, or `git lfs pull`)";
+
+/// The folder of the data set that `path` names: itself, or that of its `meta/info.json`.
+pub(crate) fn folder(path: &Path) -> Option<&Path> {
+    if path.ends_with(INFO) && path.is_file() {
+        return path.parent()?.parent();
+    }
+    path.join(INFO).is_file().then_some(path)
+}
+
+/// Its description, then its tables in the order of their rows.
+pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let listed = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
+        let io = |source| FileError::Io { file: folder.to_owned(), source };
+        let entries = std::fs::read_dir(folder).map_err(io)?;
+        let mut found =
+            entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>().map_err(io)?;
+        // Numbers in names have as many digits as they need beyond three or six.
+        found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+        Ok(found)
+    };
+    let mut files = vec![folder.join(INFO)];
+    for chunk in listed(&folder.join("data"))?.iter().filter(|chunk| chunk.is_dir()) {
+        let tables = listed(chunk)?.into_iter().filter(|path| path.extension().is_some_and(|kind| kind == "parquet"));
+        files.extend(tables);
+    }
+    if files.len() > 1 {
+        return Ok(files);
+    }
+    Err(FileError::broken(folder, FileFormat::LeRobot, "data", "no chunk in it holds a Parquet file", FETCH))
+}
+
+#[cfg(not(all(feature = "json", feature = "parquet")))]
+pub(crate) fn open(folder: &Path) -> Result<Box<dyn crate::table::Table>, FileError> {
+    Err(FileError::NotBuilt { file: folder.to_owned(), format: "a LeRobot data set", feature: "parquet" })
+}
+
+#[cfg(all(feature = "json", feature = "parquet"))]
+pub(crate) use reading::open;
+
+#[cfg(all(feature = "json", feature = "parquet"))]
+mod reading {
+    use super::{FETCH, FileError, FileFormat, INFO, Path, PathBuf, files};
+    use crate::parquet;
+    use crate::recognition;
+    use crate::table::{ColumnGroup, Table};
+    use serde_json::Value;
+    use std::io::{BufReader, Read};
+
+    /// A description of thousands of features is shorter.
+    const LONGEST_INFO: u64 = 1 << 24;
+    /// Between episodes: no filter reaches across, and nobody takes it for a late sample.
+    const BETWEEN_EPISODES_S: f64 = 10.0;
+    const TIME: &str = "time";
+
+    /// The tables of a data set as one.
+    #[derive(Debug)]
+    struct DataSet {
+        folder: PathBuf,
+        parts: Vec<PathBuf>,
+        /// Number of the part under way, and the part.
+        current: usize,
+        part: Box<dyn Table>,
+        /// Columns as the parts call them, and as this table does; behind them stands the time.
+        own_names: Vec<String>,
+        names: Vec<String>,
+        notes: Vec<String>,
+        wanted: Vec<usize>,
+        clock: Option<Clock>,
+        /// What is read of each part, and one row of it.
+        read: Vec<usize>,
+        row: Vec<f64>,
+        total_rows: Option<u64>,
+    }
+
+    /// Time that goes on from episode to episode.
+    #[derive(Debug, Default)]
+    struct Clock {
+        stamp: usize,
+        episode: usize,
+        /// Added to the stamps of the episode under way.
+        offset_s: f64,
+        /// Episode and time of the last row.
+        last: Option<(f64, f64)>,
+    }
+
+    impl Clock {
+        fn time(&mut self, stamp: f64, episode: f64) -> f64 {
+            match self.last {
+                Some((under_way, last)) if under_way != episode => self.offset_s = last + BETWEEN_EPISODES_S - stamp,
+                _ => {}
+            }
+            let time = stamp + self.offset_s;
+            if time.is_finite() {
+                self.last = Some((episode, time));
+            }
+            time
+        }
+    }
+
+    pub(crate) fn open(folder: &Path) -> Result<Box<dyn Table>, FileError> {
+        let info = read_info(folder)?;
+        let parts: Vec<PathBuf> = files(folder)?.split_off(1);
+        let part = open_part(folder, &parts[0])?;
+        let own_names = part.names().unwrap_or_default().to_vec();
+        let mut names = with_entries_named(&own_names, &info["features"]);
+        let mut notes = part.notes();
+        let place = |wanted: &str| own_names.iter().position(|name| name == wanted);
+        let clock = match (place("timestamp"), place("episode_index"), place(TIME)) {
+            (Some(stamp), Some(episode), None) => {
+                names.push(TIME.to_owned());
+                notes.push(format!(
+                    "{TIME}: `timestamp` with one episode after the other, {BETWEEN_EPISODES_S} s between them; one \
+                     alone: `keep_where` by `episode_index`"
+                ));
+                Some(Clock { stamp, episode, ..Clock::default() })
+            }
+            _ => None,
+        };
+        if let (Some(path), Some(episodes)) = (info["data_path"].as_str(), info["total_episodes"].as_u64())
+            && path.contains("episode_index")
+            && episodes != parts.len() as u64
+        {
+            notes.push(format!("{} of {episodes} episodes are there", parts.len()));
+        }
+        let wanted = (0..names.len()).collect::<Vec<_>>();
+        let mut table = DataSet {
+            folder: folder.to_owned(),
+            parts,
+            current: 0,
+            part,
+            own_names,
+            names,
+            notes,
+            wanted: Vec::new(),
+            clock,
+            read: Vec::new(),
+            row: Vec::new(),
+            total_rows: info["total_frames"].as_u64(),
+        };
+        table.select(&wanted);
+        Ok(Box::new(table))
+    }
+
+    fn read_info(folder: &Path) -> Result<Value, FileError> {
+        let path = folder.join(INFO);
+        let mut text = Vec::new();
+        std::fs::File::open(&path)
+            .and_then(|file| file.take(LONGEST_INFO).read_to_end(&mut text))
+            .map_err(|source| FileError::Io { file: path.clone(), source })?;
+        let info: Result<Value, _> = serde_json::from_slice(&text);
+        let problem = match info {
+            Ok(info) if info["features"].is_object() => return Ok(info),
+            Ok(_) => "it has no `features`".to_owned(),
+            Err(error) => format!("it is not JSON ({error})"),
+        };
+        Err(FileError::broken(folder, FileFormat::LeRobot, INFO, problem, FETCH))
+    }
+
+    fn open_part(folder: &Path, path: &Path) -> Result<Box<dyn Table>, FileError> {
+        let io = |source| FileError::Io { file: path.to_owned(), source };
+        let head = recognition::head(&mut BufReader::new(std::fs::File::open(path).map_err(io)?)).map_err(io)?;
+        // What stands for a file that was not fetched is text.
+        if !head.starts_with(b"PAR1") {
+            let place = path.strip_prefix(folder).unwrap_or(path).display().to_string();
+            return Err(FileError::broken(folder, FileFormat::LeRobot, place, "it is no Parquet file", FETCH));
+        }
+        parquet::open(path)
+    }
+
+    /// Columns with the entries of lists by the names that `features` gives them: `action[elbow]` for `action[1]`.
+    fn with_entries_named(columns: &[String], features: &Value) -> Vec<String> {
+        let named = |column: &String| {
+            let (feature, entry) = column.strip_suffix(']')?.rsplit_once('[')?;
+            let names = entry_names(&features[feature]["names"])?;
+            let length = columns.iter().filter(|other| belongs(other, feature)).count();
+            let mut sorted = names.clone();
+            sorted.sort_unstable();
+            sorted.dedup();
+            let name = names.get(entry.parse::<usize>().ok()?)?;
+            (names.len() == length && sorted.len() == length).then(|| format!("{feature}[{name}]"))
+        };
+        columns.iter().map(|column| named(column).unwrap_or_else(|| column.clone())).collect()
+    }
+
+    fn belongs(column: &str, feature: &str) -> bool {
+        column.strip_prefix(feature).is_some_and(|rest| rest.starts_with('[') && !rest.contains('.'))
+    }
+
+    /// A list of texts, or the one list in a group: `{"motors": [..]}`.
+    fn entry_names(names: &Value) -> Option<Vec<&str>> {
+        let list = match names {
+            Value::Object(group) if group.len() == 1 => group.values().next()?,
+            other => other,
+        };
+        list.as_array()?.iter().map(Value::as_str).collect()
+    }
+
+    impl DataSet {
+        /// Reads a row of the parts into `row`; false at the end.
+        fn advance(&mut self) -> Result<bool, FileError> {
+            while !self.part.next_row(&mut self.row)? {
+                let Some(path) = self.parts.get(self.current + 1) else { return Ok(false) };
+                let mut part = open_part(&self.folder, path)?;
+                if part.names() != Some(&self.own_names) {
+                    let place = path.strip_prefix(&self.folder).unwrap_or(path).display().to_string();
+                    let problem = "its columns, or the lengths of its lists, are not those of the first file";
+                    let fix = "name the files of one kind each by itself";
+                    return Err(FileError::broken(&self.folder, FileFormat::LeRobot, place, problem, fix));
+                }
+                part.select(&self.read);
+                (self.part, self.current) = (part, self.current + 1);
+            }
+            Ok(true)
+        }
+
+        fn read_row(&mut self, values: Option<&mut [f64]>) -> Result<bool, FileError> {
+            if !self.advance()? {
+                return Ok(false);
+            }
+            let of = |column: usize| self.read.iter().position(|read| *read == column).map(|slot| self.row[slot]);
+            let time = self.clock.as_mut().and_then(|clock| Some(clock.time(of(clock.stamp)?, of(clock.episode)?)));
+            for (value, column) in values.into_iter().flatten().zip(&self.wanted) {
+                *value = if *column < self.own_names.len() { of(*column) } else { time }.unwrap_or(f64::NAN);
+            }
+            Ok(true)
+        }
+    }
+
+    impl Table for DataSet {
+        fn width(&self) -> usize {
+            self.names.len()
+        }
+
+        fn names(&self) -> Option<&[String]> {
+            Some(&self.names)
+        }
+
+        fn groups(&self) -> Vec<ColumnGroup> {
+            let time = self.clock.is_some().then(|| self.names.len() - 1);
+            vec![ColumnGroup { name: None, columns: 0..self.names.len(), time }]
+        }
+
+        fn select(&mut self, columns: &[usize]) {
+            self.wanted = columns.to_vec();
+            let own = self.own_names.len();
+            self.read = columns.iter().copied().filter(|column| *column < own).collect();
+            if let Some(clock) = &self.clock
+                && columns.contains(&own)
+            {
+                for column in [clock.stamp, clock.episode] {
+                    if !self.read.contains(&column) {
+                        self.read.push(column);
+                    }
+                }
+            }
+            self.row = vec![0.0; self.read.len()];
+            self.part.select(&self.read);
+        }
+
+        fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError> {
+            self.read_row(Some(values))
+        }
+
+        fn skip_row(&mut self) -> Result<bool, FileError> {
+            self.read_row(None)
+        }
+
+        fn notes(&self) -> Vec<String> {
+            self.notes.clone()
+        }
+
+        fn estimated_rows(&self) -> Option<u64> {
+            self.total_rows
+        }
+    }
+}
