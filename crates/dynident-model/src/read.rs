@@ -154,9 +154,6 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
         return Err(ReadError::NoDescription { path: named(), what, fix });
     }
     let mut text = decode(bytes, path)?;
-    if text.trim_start_matches('\u{feff}').trim().is_empty() {
-        return Err(ReadError::Empty { path: named() });
-    }
     if has_macros(&text) {
         let written_out = written_out(path, MAX_DESCRIPTION_BYTES).map_err(|failure| match failure {
             XacroFailure::TooLarge => ReadError::TooLarge { path: named() },
@@ -164,6 +161,22 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
         })?;
         text = written_out.unwrap_or(text);
     }
+    read_robot(text, path)
+}
+
+/// Reads the text of a robot description; what it is written in is told as by [`load_robot`], from the extension of
+/// `path` and the content. `path` is named in messages, and is where files that an MJCF includes are looked for; it
+/// need not exist.
+///
+/// # Errors
+/// If the text is empty or faulty; every message names `path`. Macros are refused: [`load_robot`] of a file has the
+/// program that writes them out.
+pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
+    let named = || path.to_owned();
+    if text.trim_start_matches('\u{feff}').trim().is_empty() {
+        return Err(ReadError::Empty { path: named() });
+    }
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let is_xml = match extension.as_deref() {
         Some("urdf" | "xml" | "xacro" | "mjcf" | "sdf" | "world") => true,
         Some("toml") => false,

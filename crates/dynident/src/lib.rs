@@ -5,6 +5,7 @@
 //! | read a study file | [`Study::load`], [`Study::parse`] |
 //! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
 //! | a finished model on other logs | [`validate()`] |
+//! | the torque of a finished model along a motion, with its band | [`TorquePredictor`] |
 //! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
 //! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
@@ -12,11 +13,13 @@
 //! | what a recording holds | [`log_contents()`] |
 //! | a study from a robot and its recordings | [`new_study()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
-//! | run, identify, run again | [`iterate_study()`] |
+//! | run, identify, run again | [`iterate_study()`]; on a robot that is a function: [`iterate_with_robot()`] |
 //! | the sections of a study, the parts of results | [`study`], [`result`] |
 //! | a progress bar | [`Progress`] in [`RunOptions`] |
 //!
-//! Who has samples in memory needs no study: [`identification`] takes arrays. The crates below are re-exported:
+//! A study may hold its samples and its robot itself ([`samples`](study::LogSection::samples),
+//! [`description`](study::RobotSection::description)). Who wants no study at all: [`identification`] takes arrays.
+//! The crates below are re-exported:
 //! [`model`], [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`],
 //! [`iteration`], [`export`].
 //!
@@ -66,15 +69,16 @@ pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
-pub use jobs::export::{export_model, export_payload, export_simulator};
+pub use jobs::export::{export_model, export_payload, export_result, export_simulator};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
-pub use jobs::iterate::{IterationWatch, iterate_study};
+pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
 pub use jobs::new_study::{NewStudy, new_study};
 pub use jobs::options::RunOptions;
+pub use jobs::predict::{PredictedTorque, TorquePredictor};
 pub use jobs::simulate::{Simulation, simulate_study};
-pub use jobs::validate::validate;
+pub use jobs::validate::{validate, validate_result};
 pub use output::{check_writable, write_whole};
 pub use output_set::OutputSet;
 pub use result::{

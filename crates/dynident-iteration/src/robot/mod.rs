@@ -5,6 +5,7 @@ mod client;
 mod conversation;
 mod envelope;
 mod folder;
+mod function;
 mod handover;
 mod log_table;
 mod process;
@@ -18,6 +19,7 @@ mod term_description;
 
 pub use envelope::{Envelope, EnvelopeSettings};
 pub use folder::{FolderRobot, FolderSettings};
+pub use function::{ControlledRun, FunctionRobot};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_table::{LogTableError, read_log_table};
 pub use process::ProcessRobot;

@@ -19,7 +19,7 @@ use std::time::Instant;
 
 type IsExpected = fn(&RobotFault) -> bool;
 
-fn model() -> Model {
+pub(crate) fn model() -> Model {
     load_robot(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf")).unwrap().model
 }
 

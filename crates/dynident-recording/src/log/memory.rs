@@ -124,7 +124,7 @@ impl JointSamples {
 /// assert_eq!((block.q[0][0], block.tau[0][2]), (core::f64::consts::FRAC_PI_2, 3.0 * 11.4));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct MemoryLog {
     label: Arc<str>,
     names: Option<Arc<[String]>>,
@@ -133,7 +133,6 @@ pub struct MemoryLog {
     values: Arc<Values>,
 }
 
-#[derive(Debug)]
 enum Values {
     /// Entry `row * width + column`.
     RowMajor(Vec<f64>),
@@ -188,6 +187,37 @@ impl MemoryLog {
         }
         Ok(Self { label: label.into(), names: names.map(Into::into), width, rows, values: Arc::new(values) })
     }
+
+    /// Names of the columns, if they have any.
+    pub fn names(&self) -> Option<&[String]> {
+        self.names.as_deref()
+    }
+
+    /// Whether both are clones of one table.
+    pub fn is_same_table(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.values, &other.values)
+    }
+
+    /// All numbers, row by row.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        (0..self.rows).flat_map(move |row| (0..self.width).map(move |column| self.number(row, column)))
+    }
+
+    fn number(&self, row: usize, column: usize) -> f64 {
+        match &*self.values {
+            Values::RowMajor(all) => all[row * self.width + column],
+            Values::Columns(columns) => columns[column][row],
+        }
+    }
+}
+
+/// Without the numbers.
+impl core::fmt::Debug for MemoryLog {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let mut shown = f.debug_struct("MemoryLog");
+        shown.field("label", &self.label).field("names", &self.names);
+        shown.field("width", &self.width).field("rows", &self.rows).finish_non_exhaustive()
+    }
 }
 
 impl LogSource for MemoryLog {
@@ -229,15 +259,7 @@ impl LogTable for MemoryTable {
         if !self.skip_row()? {
             return Ok(false);
         }
-        match &*self.log.values {
-            Values::RowMajor(all) => {
-                let row = &all[row * self.log.width..];
-                values.iter_mut().zip(&self.fields).for_each(|(value, field)| *value = row[*field]);
-            }
-            Values::Columns(columns) => {
-                values.iter_mut().zip(&self.fields).for_each(|(value, field)| *value = columns[*field][row]);
-            }
-        }
+        values.iter_mut().zip(&self.fields).for_each(|(value, &field)| *value = self.log.number(row, field));
         Ok(true)
     }
 

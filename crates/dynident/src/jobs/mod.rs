@@ -12,6 +12,7 @@ pub(crate) mod log;
 mod log_summary;
 pub(crate) mod new_study;
 pub(crate) mod options;
-pub(crate) mod provenance;
+pub(crate) mod predict;
+mod provenance;
 pub(crate) mod simulate;
 pub(crate) mod validate;

@@ -2,13 +2,13 @@
 
 use crate::error::Error;
 use crate::result::{InputFile, Provenance};
-use crate::study::{Folders, Study};
+use crate::study::{Folders, Study, StudyInput};
+use dynident_recording::LogSource;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs::File;
 use std::io::Read;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 use std::time::SystemTime;
 
 /// Hexadecimal digits of an identity.
@@ -16,20 +16,31 @@ const DIGITS: usize = 12;
 /// Read at once.
 const BLOCK: usize = 1 << 16;
 
-/// The provenance of a result of `study`: `read` are what else was read and what it is, a file twice or once.
+/// The provenance of a result of `study`: `read` are what else was read and what it is, each twice or once.
 ///
 /// # Errors
 /// [`Error::File`] for one that cannot be read again.
 pub(crate) fn provenance(
     study: &Study,
     study_path: &Path,
-    read: &[(&'static str, PathBuf)],
+    read: &[(&'static str, StudyInput)],
 ) -> Result<Provenance, Error> {
     let folder = study_path.parent().unwrap_or(Path::new(""));
-    let mut known = BTreeSet::new();
     let mut inputs = Vec::new();
-    for (what, path) in read.iter().filter(|(_, path)| known.insert(path)) {
-        inputs.push(input(what, path, folder)?);
+    for (index, (what, source)) in read.iter().enumerate() {
+        if read[..index].iter().any(|(_, earlier)| is_same(earlier, source)) {
+            continue;
+        }
+        inputs.push(match source {
+            StudyInput::File(path) => input(what, path, folder)?,
+            StudyInput::Samples(samples) => {
+                let numbers = samples.numbers().map(f64::to_le_bytes);
+                input_in_memory(what, &samples.label(), numbers)
+            }
+            StudyInput::Description(robot) => {
+                input_in_memory(what, &robot.path.display().to_string(), core::iter::once(&robot.text))
+            }
+        });
     }
     // A study may have been put together in memory, where the path is a name only.
     let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
@@ -45,7 +56,7 @@ pub(crate) fn provenance(
     Ok(Provenance { identity, version: version.to_owned(), command: None, study: own, inputs })
 }
 
-/// [`provenance()`] of a motion that is designed, simulated or iterated, with further files that were read.
+/// [`provenance()`] of a motion that is designed, simulated or iterated, with what else was read.
 ///
 /// # Errors
 /// As [`provenance()`].
@@ -53,11 +64,20 @@ pub(crate) fn motion_provenance(
     study: &Study,
     study_path: &Path,
     data: Option<&Path>,
-    further: &[(&'static str, &Path)],
+    further: &[(&'static str, StudyInput)],
 ) -> Result<Provenance, Error> {
     let mut read = study.motion_inputs(&Folders::new(study, study_path, data));
-    read.extend(further.iter().map(|(what, path)| (*what, path.to_path_buf())));
+    read.extend_from_slice(further);
     provenance(study, study_path, &read)
+}
+
+/// Whether both are one file or one table.
+fn is_same(a: &StudyInput, b: &StudyInput) -> bool {
+    match (a, b) {
+        (StudyInput::File(a), StudyInput::File(b)) => a == b,
+        (StudyInput::Samples(a), StudyInput::Samples(b)) => a.is_same_table(b),
+        _ => false,
+    }
 }
 
 /// [`provenance()`] beside a job, on a thread of its own if there may be more than one.
@@ -100,6 +120,22 @@ fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
     }
     let sha256 = hexadecimal(&hash.finalize());
     Ok(InputFile { what: what.to_owned(), file: seen_from(folder, path), bytes, sha256 })
+}
+
+/// Of what is in memory: numbers as IEEE 754 of eight bytes, least first, row by row; texts as UTF-8.
+fn input_in_memory<B: AsRef<[u8]>>(what: &str, label: &str, parts: impl Iterator<Item = B>) -> InputFile {
+    let (mut hash, mut block, mut bytes) = (Sha256::new(), Vec::with_capacity(2 * BLOCK), 0);
+    for part in parts {
+        block.extend_from_slice(part.as_ref());
+        if block.len() >= BLOCK {
+            hash.update(&block);
+            bytes += block.len() as u64;
+            block.clear();
+        }
+    }
+    hash.update(&block);
+    bytes += block.len() as u64;
+    InputFile { what: what.to_owned(), file: label.to_owned(), bytes, sha256: hexadecimal(&hash.finalize()) }
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {

@@ -21,9 +21,21 @@ pub fn validate(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
+    validate_result(&ResultFile::read(result_path)?, result_path, (study, study_path), options)
+}
+
+/// As [`validate()`] with a result that is in memory; messages call it `result_path`.
+///
+/// # Errors
+/// As [`validate()`].
+pub fn validate_result(
+    stored: &ResultFile,
+    result_path: &Path,
+    (study, study_path): (&Study, &Path),
+    options: &RunOptions<'_>,
+) -> Result<ValidationFile, Error> {
     study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let stored = ResultFile::read(result_path)?;
     let study = &stored.as_fitted(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let theta = stored.base_values(result_path, &robot.parametric)?;

@@ -16,6 +16,12 @@ use std::path::Path;
 /// # Errors
 /// A file that cannot be read, is no result, or is one of another version.
 pub(crate) fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+    part_of(&bytes, path)
+}
+
+/// The same from the text of a result.
+fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T, Error> {
     #[derive(Deserialize)]
     struct Schema {
         schema: String,
@@ -25,12 +31,11 @@ pub(crate) fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
         let (line, column) = (error.line(), error.column());
         wrong(format!("line {line}, column {column}: not a result of `identify`: {error}"))
     };
-    let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
-    let Schema { schema } = serde_json::from_slice(&bytes).map_err(not_a_result)?;
+    let Schema { schema } = serde_json::from_slice(bytes).map_err(not_a_result)?;
     if schema != RESULT_SCHEMA {
         return Err(wrong(format!("schema `{schema}`, not `{RESULT_SCHEMA}`: identify again with this version")));
     }
-    serde_json::from_slice(&bytes).map_err(not_a_result)
+    serde_json::from_slice(bytes).map_err(not_a_result)
 }
 
 impl ResultFile {
@@ -39,8 +44,17 @@ impl ResultFile {
     /// # Errors
     /// A file that cannot be read, is no result, or is one of another version.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        Self::parse(&bytes, path)
+    }
+
+    /// Reads the text of a result of `identify`; messages call it `path`.
+    ///
+    /// # Errors
+    /// A text that is no result, or one of another version.
+    pub fn parse(text: &[u8], path: &Path) -> Result<Self, Error> {
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-        let stored: Self = read_part(path)?;
+        let stored: Self = part_of(text, path)?;
         for joint in &stored.friction_choice {
             let mut terms = joint.drive.iter().flat_map(|drive| drive.terms.iter().flatten());
             terms

@@ -1,29 +1,64 @@
-//! The files that a study's motion is made from.
+//! What a study's results are made from.
 
-use super::{Folders, Study};
+use super::{Folders, Study, StudyLogSource, StudyRobot};
+use dynident_model::Robot;
+use dynident_recording::MemoryLog;
 use std::path::PathBuf;
 
+/// One thing that a result is made from.
+#[derive(Clone, Debug)]
+pub(crate) enum StudyInput {
+    /// A file.
+    File(PathBuf),
+    /// Samples in memory.
+    Samples(MemoryLog),
+    /// A description in memory.
+    Description(Box<Robot>),
+}
+
+impl From<StudyLogSource> for StudyInput {
+    fn from(source: StudyLogSource) -> Self {
+        match source {
+            StudyLogSource::File(path) => Self::File(path),
+            StudyLogSource::Memory(samples) => Self::Samples(samples),
+        }
+    }
+}
+
+/// Inputs, each with what it is.
+type NamedInputs = Vec<(&'static str, StudyInput)>;
+
 impl Study {
-    /// What a motion is designed, simulated or iterated from, with what each file is: the robot's description, the
-    /// result behind a prior, tables of torque, trajectories.
-    pub(crate) fn motion_inputs(&self, folders: &Folders) -> Vec<(&'static str, PathBuf)> {
+    /// What a motion is designed, simulated or iterated from, with what each is: the robot's description, the result
+    /// behind a prior, tables of torque, trajectories.
+    pub(crate) fn motion_inputs(&self, folders: &Folders) -> NamedInputs {
+        let robot = match &self.robot.description {
+            Some(robot) => Some(StudyInput::Description(robot.clone())),
+            None => folders.find(&self.robot.file, None).ok().map(StudyInput::File),
+        };
         let iteration = self.iteration.as_ref();
         let trajectories = iteration.and_then(|section| section.trajectory.as_ref()).into_iter();
         let legs = iteration.into_iter().flat_map(|section| &section.leg).filter_map(|leg| leg.trajectory.as_ref());
         let prior = self.design.as_ref().and_then(|design| design.prior.result.as_ref());
-        let robot = [("robot", &self.robot.file)].into_iter();
-        let named = robot
-            .chain(prior.map(|file| ("result", file)))
+        let named = prior
+            .map(|file| ("result", file))
+            .into_iter()
             .chain(trajectories.chain(legs).map(|file| ("trajectory", file)));
-        named
-            .filter_map(|(what, file)| Some((what, folders.find(file, None).ok()?)))
-            .chain(self.table_inputs(folders))
-            .collect()
+        let files = named.filter_map(|(what, file)| Some((what, StudyInput::File(folders.find(file, None).ok()?))));
+        robot.map(|robot| ("robot", robot)).into_iter().chain(files).chain(self.table_inputs(folders)).collect()
+    }
+
+    /// The description that `robot` was made from.
+    pub(crate) fn robot_input(&self, robot: &StudyRobot) -> StudyInput {
+        match &self.robot.description {
+            Some(description) => StudyInput::Description(description.clone()),
+            None => StudyInput::File(robot.robot.path.clone()),
+        }
     }
 
     /// The tables of torque that a model is made with, as far as they exist.
-    pub(crate) fn table_inputs(&self, folders: &Folders) -> Vec<(&'static str, PathBuf)> {
+    pub(crate) fn table_inputs(&self, folders: &Folders) -> NamedInputs {
         let files = self.torque.iter().filter_map(|torque| torque.table_file.as_ref());
-        files.filter_map(|file| Some(("torque", folders.find(file, None).ok()?))).collect()
+        files.filter_map(|file| Some(("torque", StudyInput::File(folders.find(file, None).ok()?)))).collect()
     }
 }

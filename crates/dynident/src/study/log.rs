@@ -3,7 +3,7 @@
 use super::arrays::exactly;
 use crate::error::StudyError;
 use dynident_identification::Role;
-use dynident_recording::{LogFormat, ReferenceSettings};
+use dynident_recording::{LogFormat, MemoryLog, ReferenceSettings};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -12,8 +12,11 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
-    /// The main file.
+    /// The main file; of samples in memory, what they are called.
     pub file: PathBuf,
+    /// The samples themselves, in place of a file's: a table whose columns `format` explains. Not written.
+    #[serde(skip)]
+    pub samples: Option<MemoryLog>,
     /// What it is called in reports; the file's name by default.
     #[serde(default)]
     pub name: Option<String>,

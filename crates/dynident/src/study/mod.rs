@@ -10,6 +10,7 @@ mod friction_keys;
 mod inputs;
 mod iteration;
 mod log;
+mod log_source;
 mod overlap;
 mod payload;
 mod physical;
@@ -28,10 +29,12 @@ pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use friction::{FrictionChoice, FrictionTerm};
+pub(crate) use inputs::StudyInput;
 pub use iteration::{
     Automatic, DifferentiatorKey, IterationSection, LegOrder, LegSection, MotionChoice, PriorChoice, RobotChoice,
 };
 pub use log::LogSection;
+pub(crate) use log_source::StudyLogSource;
 pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;
 pub use robot::{FollowSection, LoopSection, RobotSection};
@@ -133,6 +136,18 @@ pub struct Study {
     pub log: Vec<LogSection>,
 }
 
+/// What TOML cannot say is not said.
+fn drop_nulls(value: &mut serde_json::Value) {
+    match value {
+        serde_json::Value::Object(entries) => {
+            entries.retain(|_, entry| !entry.is_null());
+            entries.values_mut().for_each(drop_nulls);
+        }
+        serde_json::Value::Array(values) => values.iter_mut().for_each(drop_nulls),
+        _ => {}
+    }
+}
+
 /// Largest study file, bytes.
 const MAX_STUDY_BYTES: u64 = 4 << 20;
 
@@ -175,6 +190,28 @@ impl Study {
         })?;
         study.check().map_err(Error::study(path))?;
         Ok(study)
+    }
+
+    /// Builds a study from JSON with the keys of the TOML, null for one that is not there; `path` is named in messages,
+    /// and files are looked for beside it.
+    ///
+    /// # Errors
+    /// As [`parse`](Study::parse), without line and column.
+    pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
+        let wrong = |error: serde_json::Error| Error::study(path)(StudyError::Toml { problem: error.to_string() });
+        let mut value = serde_json::from_str(text).map_err(wrong)?;
+        drop_nulls(&mut value);
+        let study: Self = serde_json::from_value(value).map_err(wrong)?;
+        study.check().map_err(Error::study(path))?;
+        Ok(study)
+    }
+
+    /// The study as TOML, with every key that has a value. Samples and descriptions in memory are only named.
+    ///
+    /// # Errors
+    /// [`StudyError::Toml`] for a number that TOML does not have.
+    pub fn to_toml(&self) -> Result<String, StudyError> {
+        toml::to_string(self).map_err(|error| StudyError::Toml { problem: error.to_string() })
     }
 
     /// That there is a log, as fitting and testing need; a study for `design` may have none.

@@ -2,7 +2,7 @@
 
 use super::arrays::exactly;
 use crate::error::StudyError;
-use dynident_model::{LoopClosure, Mimic, MimicSource};
+use dynident_model::{LoopClosure, Mimic, MimicSource, Robot};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,8 +12,11 @@ use std::path::PathBuf;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
-    /// URDF, MJCF, SDF, or D-H table in TOML.
+    /// URDF, MJCF, SDF, or D-H table in TOML; of a description in memory, what it is called.
     pub file: PathBuf,
+    /// The description itself, in place of the file's. Not written.
+    #[serde(skip)]
+    pub description: Option<Box<Robot>>,
     /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints
     /// of the description that `lock` does not name, in the order of the tree.
     #[serde(default)]

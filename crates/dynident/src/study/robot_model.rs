@@ -28,7 +28,10 @@ impl StudyRobot {
     /// # Errors
     /// If the description cannot be read, or names in the study are not in it.
     pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
-        let robot = load_robot(folders.find(&study.robot.file, study.source.as_deref())?)?;
+        let robot = match &study.robot.description {
+            Some(robot) => (**robot).clone(),
+            None => load_robot(folders.find(&study.robot.file, study.source.as_deref())?)?,
+        };
         let in_study = Error::study::<ModelError>(study_path);
 
         // How it stands in the world.

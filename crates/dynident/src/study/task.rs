@@ -2,6 +2,7 @@
 //! friction is chosen.
 
 use super::friction::FrictionChoice;
+use super::log_source::StudyLogSource;
 use super::robot_model::drive_choice;
 use super::{EstimatorMethod, Folders, Study, StudyRobot};
 use crate::error::{Error, StudyError};
@@ -9,8 +10,8 @@ use dynident_identification::estimators::SimulatedLoopSettings;
 use dynident_identification::friction::{FrictionSearch, JointFriction};
 use dynident_identification::payload::Payload;
 use dynident_identification::{IdentificationSettings, IdentificationTask, Recording};
-use dynident_recording::{FilterError, Log, RecordingError, Reference};
-use std::path::{Path, PathBuf};
+use dynident_recording::{FilterError, RecordingError, Reference};
+use std::path::Path;
 use std::sync::Arc;
 
 impl Study {
@@ -29,37 +30,45 @@ impl Study {
         robot: &StudyRobot,
         folders: &Folders,
     ) -> Result<IdentificationTask, Error> {
-        let files = self.log_files(folders)?;
-        let recordings = self.recordings(robot, folders, &files)?;
+        let sources = self.log_sources(folders)?;
+        let recordings = self.recordings(robot, folders, &sources)?;
         let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
         (task.payloads, task.settings) = (self.payloads(), settings);
         Ok(task)
     }
 
-    /// All logs' files.
-    pub(crate) fn log_files(&self, folders: &Folders) -> Result<Vec<PathBuf>, Error> {
-        self.log.iter().map(|log| folders.find(&log.file, self.source.as_deref())).collect()
+    /// Where the samples of all logs are.
+    pub(crate) fn log_sources(&self, folders: &Folders) -> Result<Vec<StudyLogSource>, Error> {
+        (0..self.log.len()).map(|index| self.log_source(folders, index)).collect()
     }
 
-    /// The logs whose files are `files`.
+    /// Where the samples of log number `index` are.
+    pub(crate) fn log_source(&self, folders: &Folders, index: usize) -> Result<StudyLogSource, Error> {
+        match &self.log[index].samples {
+            Some(samples) => Ok(StudyLogSource::Memory(samples.clone())),
+            None => folders.find(&self.log[index].file, self.source.as_deref()).map(StudyLogSource::File),
+        }
+    }
+
+    /// The logs whose samples are in `sources`.
     pub(crate) fn recordings(
         &self,
         robot: &StudyRobot,
         folders: &Folders,
-        files: &[PathBuf],
+        sources: &[StudyLogSource],
     ) -> Result<Vec<Recording>, Error> {
-        files.iter().enumerate().map(|(index, file)| self.recording(robot, folders, index, file)).collect()
+        sources.iter().enumerate().map(|(index, source)| self.recording(robot, folders, index, source)).collect()
     }
 
-    /// Log number `index`, whose file is `file`.
+    /// Log number `index`, whose samples are in `source`.
     pub(crate) fn recording(
         &self,
         robot: &StudyRobot,
         folders: &Folders,
         index: usize,
-        file: &Path,
+        source: &StudyLogSource,
     ) -> Result<Recording, Error> {
-        let log = Log::file(file, self.format_of(index), &robot.log_joints);
+        let log = source.log(self.format_of(index), &robot.log_joints);
         let mut recording = Recording::training(self.log_name(index), log);
         recording.role = self.log[index].role;
         recording.payload.clone_from(&self.log[index].payload);

@@ -115,6 +115,11 @@ fn every_code_block_is_of_a_kind_that_is_checked() {
                             .unwrap_or_else(|error| panic!("{}: {error}", block.place));
                     }
                 }
+                ["python"] => assert!(
+                    include_str!("../../../../.ci/python.sh").contains(&format!("docs/src/{page}")),
+                    "{}: name the page in .ci/python.sh, so that its Python runs",
+                    block.place
+                ),
                 // Equations, pictures, output; commands.
                 ["text" | "sh"] => {}
                 ["rust"] => assert!(

@@ -18,6 +18,7 @@ mod estimators;
 mod excitation;
 mod exogeneity;
 mod friction_choice;
+mod in_memory;
 mod instruments;
 mod iteration_legs;
 mod iteration_report;

@@ -28,7 +28,7 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     let in_study = Error::identification::<IdentificationError>(study_path);
     let settings = study.settings(study_path, &robot)?;
     let task = study.task_with(settings, &robot, &folders)?;
-    study.check_overlap(&study.log_files(&folders)?).map_err(Error::study(study_path))?;
+    study.check_overlap(&study.log_sources(&folders)?).map_err(Error::study(study_path))?;
     let examined = examine_study(&task, options.execution()).map_err(in_study)?;
 
     let mut check = examined.diagnosis.as_ref().map_or_else(

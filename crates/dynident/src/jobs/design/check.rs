@@ -8,7 +8,7 @@ use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::seen_from;
-use crate::study::{Folders, Study, StudyRobot};
+use crate::study::{Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
 use dynident_excitation::{Family, Motion, grid};
@@ -67,7 +67,7 @@ pub fn check_trajectory(
     DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
         (study, study_path),
         options,
-        &[("trajectory", trajectory)],
+        &[("trajectory", StudyInput::File(trajectory.to_owned()))],
     )
 }
 
@@ -87,8 +87,8 @@ pub fn check_log(
     let index = log_called(study, name).map_err(Error::study(study_path))?;
     let mut setup = DesignSetup::for_log(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let file = folders.find(&study.log[index].file, study.source.as_deref())?;
-    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.robot, &folders), index, &file)?;
+    let source = study.log_source(&folders, index)?;
+    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.robot, &folders), index, &source)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
@@ -117,7 +117,7 @@ pub fn check_log(
     DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
         (study, study_path),
         options,
-        &[("log", &file)],
+        &[("log", source.into())],
     )
 }
 
@@ -141,11 +141,11 @@ fn pieces(
     study_path: &Path,
     (robot, folders): (&StudyRobot, &Folders),
     index: usize,
-    file: &Path,
+    source: &StudyLogSource,
 ) -> Result<(Vec<Given>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
-    let recording = study.recording(robot, folders, index, file)?;
+    let recording = study.recording(robot, folders, index, source)?;
     let mut settings = IdentificationSettings::default();
     settings.motion = study.motion.clone();
     let execution = Execution::default();
@@ -170,7 +170,7 @@ fn pieces(
         samples += block.rows;
         if samples > MAX_SAMPLES {
             let message = format!("log `{log}`: more than {MAX_SAMPLES} samples: give a part of it with time_range_s");
-            return Err(Error::States { path: file.to_owned(), line: 1, message });
+            return Err(Error::States { path: source.path(), line: 1, message });
         }
         if let Some(piece) = found.last_mut() {
             for (order, source) in [&block.q, &block.dq, &block.ddq].into_iter().enumerate() {
@@ -187,7 +187,7 @@ fn pieces(
         Given::new(times, Motion { samples, joints: dof, q, dq, ddq, dddq: Vec::new() })
     };
     let whole = found.into_iter().filter(|piece| piece[0].len() >= 2).map(given).collect::<Result<Vec<_>, _>>();
-    let none = |message: String| Error::States { path: file.to_owned(), line: 1, message };
+    let none = |message: String| Error::States { path: source.path(), line: 1, message };
     let pieces = whole.map_err(|error| none(format!("log `{log}`: {error}")))?;
     if pieces.is_empty() {
         return Err(none(format!("log `{log}`: no uninterrupted piece of two samples or more")));

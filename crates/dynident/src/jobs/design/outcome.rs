@@ -10,7 +10,7 @@ use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::pages::design as pictures;
 use crate::result::{DESIGN_SCHEMA, DesignFile, WindowedFile};
-use crate::study::{FamilyChoice, Study, StudyRobot};
+use crate::study::{FamilyChoice, Study, StudyInput, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::families::Given;
@@ -174,12 +174,12 @@ impl DesignOutcome {
         Self { file, robot, limits, history: origin.history, family: origin.motion }
     }
 
-    /// The outcome with what it comes from: of the study, and of further files that were read.
+    /// The outcome with what it comes from: of the study, and of what else was read.
     pub(super) fn with_provenance(
         mut self,
         (study, study_path): (&Study, &Path),
         options: &RunOptions<'_>,
-        further: &[(&'static str, &Path)],
+        further: &[(&'static str, StudyInput)],
     ) -> Result<Self, Error> {
         self.file.provenance = Some(motion_provenance(study, study_path, options.data.as_deref(), further)?);
         Ok(self)

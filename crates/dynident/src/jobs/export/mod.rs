@@ -27,10 +27,22 @@ pub fn export_model(
     data: Option<&Path>,
     target: Target,
 ) -> Result<Exported, Error> {
-    let stored = ResultFile::read(result_path)?;
-    let robot = robot_model(&stored, result_path, (study, study_path), data)?;
+    export_result(&ResultFile::read(result_path)?, result_path, (study, study_path), (data, target))
+}
+
+/// As [`export_model()`] with a result that is in memory; messages call it `result_path`.
+///
+/// # Errors
+/// As [`export_model()`].
+pub fn export_result(
+    stored: &ResultFile,
+    result_path: &Path,
+    (study, study_path): (&Study, &Path),
+    (data, target): (Option<&Path>, Target),
+) -> Result<Exported, Error> {
+    let robot = robot_model(stored, result_path, (study, study_path), data)?;
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
-    export(&robot, target, &reservations(&stored)).map_err(cannot)
+    export(&robot, target, &reservations(stored)).map_err(cannot)
 }
 
 /// What a user of the model has to know of the result.

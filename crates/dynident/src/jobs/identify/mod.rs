@@ -11,7 +11,7 @@ use crate::jobs::provenance::{beside, now, provenance, seen_from};
 use crate::result::{
     LogSummary, MethodSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult,
 };
-use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyRobot};
+use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
@@ -119,12 +119,12 @@ fn identified(
     }
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
-    let files = study.log_files(&folders)?;
-    study.check_overlap(&files).map_err(Error::study(study_path))?;
-    let mut read = vec![("robot", robot.robot.path.clone())];
+    let sources = study.log_sources(&folders)?;
+    study.check_overlap(&sources).map_err(Error::study(study_path))?;
+    let mut read = vec![("robot", study.robot_input(&robot))];
     read.extend(study.table_inputs(&folders));
-    read.extend(files.into_iter().map(|file| ("log", file)));
-    read.extend(arm.iter().map(|(path, _)| ("result", path.clone())));
+    read.extend(sources.into_iter().map(|source| ("log", StudyInput::from(source))));
+    read.extend(arm.iter().map(|(path, _)| ("result", StudyInput::File(path.clone()))));
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.

@@ -106,7 +106,8 @@ impl IterationSection {
         Ok(legs)
     }
 
-    /// The robots of one iteration: the simulator for each of its legs, or the one outside.
+    /// The robots of one iteration: the simulator for each of its legs, or the one outside; none where the caller
+    /// brings it.
     pub(super) fn robots(
         &self,
         (simulation, coupling): (&SimulationSection, &[CouplingSection]),
@@ -126,6 +127,7 @@ impl IterationSection {
                 }
                 vec![Box::new(FolderRobot::new(settings, joints)?)]
             }
+            RobotChoice::Function => Vec::new(),
             RobotChoice::Simulation => {
                 let mut simulation = simulation.clone();
                 // Runs of every leg count from 1: their noise is not to be the same.

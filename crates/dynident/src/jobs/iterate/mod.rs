@@ -95,6 +95,38 @@ pub fn iterate_study(
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
 ) -> Result<IterationsFile, Error> {
+    iterated((study, study_path), (out, resume), options, watch, None)
+}
+
+/// Makes a robot of the joints with these names.
+pub type RobotMaker<'a> = &'a mut dyn FnMut(&[String]) -> Box<dyn Robot>;
+
+/// As [`iterate_study`] with a robot of the caller's own in place of the study's: `robot` is given the joints' names,
+/// and what it makes is run as it is.
+///
+/// # Errors
+/// As [`iterate_study`], and legs that hold joints locked, which only the simulator does.
+pub fn iterate_with_robot(
+    study: &Study,
+    study_path: &Path,
+    (out, resume): (&Path, bool),
+    options: &RunOptions<'_>,
+    watch: &mut IterationWatch<'_>,
+    robot: RobotMaker<'_>,
+) -> Result<IterationsFile, Error> {
+    let mut study = study.clone();
+    study.iteration.get_or_insert_default().robot = RobotChoice::Function;
+    iterated((&study, study_path), (out, resume), options, watch, Some(robot))
+}
+
+fn iterated(
+    (study, study_path): (&Study, &Path),
+    (out, resume): (&Path, bool),
+    options: &RunOptions<'_>,
+    watch: &mut IterationWatch<'_>,
+    own_robot: Option<RobotMaker<'_>>,
+) -> Result<IterationsFile, Error> {
+    let mut own_robot = own_robot;
     let in_section = |why: StudyError| Error::section(study_path, "iteration")(why);
     let in_iteration = |error: IterationError| match error {
         IterationError::File { path, source } => Error::Output { path, source },
@@ -115,6 +147,9 @@ pub fn iterate_study(
         }
         _ => None,
     };
+    if section.robot == RobotChoice::Function && own_robot.is_none() {
+        return Err(in_section(StudyError::missing("robot", "a function has to be given: call iterate_with_robot")));
+    }
     section.check_legs(&robot).map_err(in_section)?;
     section.check_gains(study, &robot).map_err(in_section)?;
     section.redesign(study).map_err(in_section)?;
@@ -147,7 +182,7 @@ pub fn iterate_study(
     let trajectories = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
 
     // What is believed of the robot, what it runs, and what the file says of it.
-    let iterated = match section.prior {
+    let believed = match section.prior {
         PriorChoice::Description => robot.parametric.clone(),
         PriorChoice::None => {
             let zeros = vec![0.0; robot.nominal().len()];
@@ -179,7 +214,7 @@ pub fn iterate_study(
     for (number, members) in stages.iter().enumerate() {
         let own: Vec<_> = members.iter().map(|&leg| legs[leg].clone()).collect();
         let task = IterationTask {
-            robot: iterated.clone(),
+            robot: believed.clone(),
             legs: own,
             known: known.clone(),
             torque_limits: torque_limits.clone(),
@@ -190,6 +225,7 @@ pub fn iterate_study(
             None => iteration,
         };
         let mut robots = section.robots((&simulation, &study.coupling), &robot, number, members).map_err(in_section)?;
+        robots.extend(own_robot.iter_mut().map(|make| make(&robot.parametric.joint_names())));
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
         let leg = (!one).then_some(number + 1);
         let mut so_far = stores[number].records().map_err(in_iteration)?;

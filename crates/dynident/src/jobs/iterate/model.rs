@@ -7,7 +7,7 @@ use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::{now, provenance, seen_from};
 use crate::output_set::OutputSet;
 use crate::result::{BaseParameterResult, Timings};
-use crate::study::{Study, StudyRobot};
+use crate::study::{Study, StudyInput, StudyRobot};
 use dynident_identification::{IdentificationError, IdentificationTask, identify};
 use dynident_iteration::robot::{RunRequest, controller_json};
 use dynident_iteration::{Iteration, IterationError, IterationStore, ModelParameters, RunRecord, friction_chosen};
@@ -91,8 +91,8 @@ pub(super) fn robot_found(
     let in_study = Error::identification::<IdentificationError>(study_path);
     let mut found = identify(&task, options.execution()).map_err(&in_study)?;
     found.training.friction_choice = friction_chosen(&last.records);
-    let mut read = vec![("robot", robot.robot.path.clone())];
-    read.extend(logs.iter().map(|log| ("log", log.clone())));
+    let mut read = vec![("robot", study.robot_input(robot))];
+    read.extend(logs.iter().map(|log| ("log", StudyInput::File(log.clone()))));
     let timings = Timings {
         logs: found.times.logs_s,
         estimation: found.times.estimation_s,

@@ -36,6 +36,9 @@ pub enum RobotChoice {
     Process(ProcessSettings),
     /// A person: files out, a log in.
     Folder(FolderSettings),
+    /// A function of this process, which no file can name: [`iterate_with_robot`](crate::iterate_with_robot).
+    #[serde(skip)]
+    Function,
 }
 
 /// What is believed of the bodies before any run.

@@ -13,7 +13,7 @@ impl IterationSection {
     pub(crate) fn is_outside(&self) -> bool {
         match self.robot {
             RobotChoice::Simulation => false,
-            RobotChoice::Process(_) | RobotChoice::Folder(_) => true,
+            RobotChoice::Process(_) | RobotChoice::Folder(_) | RobotChoice::Function => true,
         }
     }
 
@@ -26,7 +26,7 @@ impl IterationSection {
         let controllers = [study.controller.as_ref(), self.model_free.as_ref(), self.first.as_ref()];
         let own_loop = controllers.into_iter().flatten().any(|controller| !controller.can_be_simulated());
         let steps = match &self.robot {
-            RobotChoice::Simulation => true,
+            RobotChoice::Simulation | RobotChoice::Function => true,
             RobotChoice::Process(process) => process.mode == ProcessMode::Step,
             RobotChoice::Folder(_) => false,
         };
@@ -114,7 +114,7 @@ impl IterationSection {
     pub(crate) fn of_runs(&self) -> Self {
         let mut own = self.clone();
         match &mut own.robot {
-            RobotChoice::Simulation => {}
+            RobotChoice::Simulation | RobotChoice::Function => {}
             RobotChoice::Process(process) => {
                 process.command.clear();
                 process.limits = ProcessLimits::default();

@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# python.sh SCRATCH: the package of Python as README installs it, in clean environments: with `python3` everything (tests, types, stubs, the book's page), with the oldest
+# Python that is here (3.10 or newer; NumPy 1.26) and the newest the tests alone. Other versions are looked for on the path and under PYENV_ROOT.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+scratch=$1
+# Megabytes of a wheel, as promised.
+most_bytes=15000000
+
+# interpreters: the Pythons that are here, `minor path`, the oldest first.
+interpreters() {
+    local path minor
+    for path in $(compgen -c python3 | sort -u | grep -E '^python3(\.[0-9]+)?$' || true) "${PYENV_ROOT:-$HOME/.pyenv}"/versions/*/bin/python3; do
+        minor=$("$path" -c 'import sys; print(sys.version_info[1] if sys.version_info[0] == 3 else 0)' 2>/dev/null) || continue
+        if [ "$minor" -ge 10 ] && "$path" -c 'import ensurepip, venv' 2>/dev/null; then
+            printf '%s %s\n' "$minor" "$(command -v "$path")"
+        fi
+    done | sort -n -k1,1 -u
+}
+
+# environment NAME PYTHON PACKAGE..: a clean environment with the package of this folder, as README installs it, and with others.
+environment() {
+    local name=$1 python=$2
+    shift 2
+    "$python" -m venv "$scratch/$name"
+    # shellcheck disable=SC2068
+    "$scratch/$name/bin/pip" install --quiet --disable-pip-version-check $@
+    "$scratch/$name/bin/pip" install --disable-pip-version-check --no-deps . >"$scratch/last" 2>&1 || { cat "$scratch/last"; exit 1; }
+}
+
+start=$SECONDS
+environment python python3 -r python/tests/requirements.txt
+printf '%4s s  pip install .\n' "$((SECONDS - start))"
+bytes=$(sed -n 's/.*filename=dynident.* size=\([0-9]*\) .*/\1/p' "$scratch/last")
+printf '        wheel of %s bytes\n' "$bytes"
+[ "$bytes" -lt "$most_bytes" ]
+here=$PWD
+program=$scratch/python/bin
+"$program/dynident" --version
+"$program/python" -m pytest -q -p no:cacheprovider python/tests
+(cd "$scratch" && "$program/mypy" --config-file "$here/pyproject.toml" -p dynident)
+(cd "$scratch" && "$program/stubtest" --mypy-config-file "$here/pyproject.toml" --allowlist "$here/python/tests/allowed.txt" dynident)
+"$program/python" .ci/python_pages.py docs/src/python.md
+
+while read -r minor path; do
+    case $minor in
+        "$(interpreters | head -n 1 | cut -d ' ' -f 1)") numpy='numpy==1.26.4' ;;
+        "$(interpreters | tail -n 1 | cut -d ' ' -f 1)") numpy='numpy' ;;
+        *) continue ;;
+    esac
+    [ "$minor" -le 12 ] || numpy=numpy
+    environment "python3.$minor" "$path" pytest==9.2.0 "$numpy"
+    printf '        %s: ' "$("$scratch/python3.$minor/bin/python" -c 'import sys, numpy; print("Python", sys.version.split()[0], "NumPy", numpy.__version__)')"
+    "$scratch/python3.$minor/bin/python" -m pytest -q -p no:cacheprovider python/tests
+done < <(interpreters)

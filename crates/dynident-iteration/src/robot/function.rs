@@ -1,0 +1,181 @@
+//! A robot that is a function of this process.
+
+use super::conversation::{empty_record, joint_major};
+use super::envelope::EnvelopeWatch;
+use super::{Breach, Envelope, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal, Stopping};
+use dynident_simulation::controllers::{Controller, Measured};
+use dynident_simulation::{Record, Reference, ReferenceSample, SimulationError};
+
+/// What a function drives its robot with: it asks for the torque of one sample after the other, and every sample that
+/// it asks with is the record.
+#[derive(Debug)]
+pub struct ControlledRun {
+    run: usize,
+    reference: Reference,
+    controller: Box<dyn Controller>,
+    envelope: Option<Envelope>,
+    stop: Option<StopSignal>,
+    target: ReferenceSample,
+    tau: Vec<f64>,
+    record: Record,
+    /// Why there is no further torque.
+    end: Option<RunEnd>,
+}
+
+/// Why a run is over before its last sample.
+#[derive(Debug)]
+enum RunEnd {
+    Interrupted,
+    Breach(Breach),
+    Fault(RobotFault),
+}
+
+impl ControlledRun {
+    fn new(request: &RunRequest<'_>, joints: &[String]) -> Result<Self, SimulationError> {
+        request.validate(joints.len())?;
+        let reference = request.reference.clone();
+        Ok(Self {
+            run: request.run,
+            controller: request.controller.build(joints.len(), request.model)?,
+            envelope: request.envelope.cloned(),
+            stop: request.stop.cloned(),
+            target: ReferenceSample::new(joints.len()),
+            tau: vec![0.0; joints.len()],
+            record: empty_record(joints, reference.rate_hz()),
+            reference,
+            end: None,
+        })
+    }
+
+    /// Number of the run, from 1.
+    pub fn run(&self) -> usize {
+        self.run
+    }
+
+    /// The motion to follow; its first sample is where the robot has to stand.
+    pub fn reference(&self) -> &Reference {
+        &self.reference
+    }
+
+    /// Samples that torque was asked for so far.
+    pub fn samples_done(&self) -> usize {
+        self.record.samples
+    }
+
+    /// The drives' torques, Nm (N), for the next sample, where the robot stands at `q` (rad, m) and moves with `dq`
+    /// (rad/s, m/s) at `time_s` by its own clock. None where the robot has to be stopped at once: the sample left the
+    /// envelope, a stop was asked for, a number is none, or the run has no further sample. The function then returns.
+    pub fn torque(&mut self, time_s: f64, q: &[f64], dq: &[f64]) -> Option<&[f64]> {
+        let sample = self.record.samples;
+        if self.end.is_some() || sample >= self.reference.samples() {
+            return None;
+        }
+        if let Err(end) = self.look_before(sample, time_s, q, dq) {
+            self.end = Some(end);
+            return None;
+        }
+        self.target.take(&self.reference, sample);
+        let due_s = sample as f64 / self.reference.rate_hz();
+        self.controller.torque(due_s, self.target.target(), Measured { q, dq }, &mut self.tau);
+        if self.tau.iter().any(|tau| !tau.is_finite()) {
+            self.end = Some(RunEnd::Fault(RobotFault::Torque { sample }));
+            return None;
+        }
+        self.record.times_s.push(time_s);
+        self.record.q.extend_from_slice(q);
+        self.record.tau.extend_from_slice(&self.tau);
+        self.record.samples += 1;
+        // Before the torque is given: one beyond the envelope never is.
+        let now = Record {
+            joints: self.record.joints.clone(),
+            rate_hz: self.record.rate_hz,
+            samples: 1,
+            times_s: vec![time_s],
+            q: q.to_vec(),
+            tau: self.tau.clone(),
+        };
+        if let Some(breach) = EnvelopeWatch::new(self.envelope.as_ref(), &self.reference).look(&now, Some(dq)) {
+            self.end = Some(RunEnd::Breach(breach));
+            return None;
+        }
+        Some(&self.tau)
+    }
+
+    fn look_before(&self, sample: usize, time_s: f64, q: &[f64], dq: &[f64]) -> Result<(), RunEnd> {
+        if self.stop.as_ref().is_some_and(StopSignal::is_requested) {
+            return Err(RunEnd::Interrupted);
+        }
+        let expected = self.tau.len();
+        for (what, values) in [("q", q), ("dq", dq)] {
+            if values.len() != expected {
+                let (what, found) = (what.to_owned(), values.len());
+                return Err(RunEnd::Fault(RobotFault::WrongJoints { sample, what, expected, found }));
+            }
+            if let Some(joint) = values.iter().position(|value| !value.is_finite()) {
+                return Err(RunEnd::Fault(RobotFault::NotANumber { sample, what: format!("{what}[{joint}]") }));
+            }
+        }
+        match self.record.times_s.last() {
+            _ if !time_s.is_finite() => Err(RunEnd::Fault(RobotFault::NotANumber { sample, what: "t_s".to_owned() })),
+            Some(&before_s) if time_s <= before_s => Err(RunEnd::Fault(RobotFault::Time { sample, time_s, before_s })),
+            _ => Ok(()),
+        }
+    }
+
+    fn ended(self, said: Result<(), String>) -> RobotRun {
+        let (end_s, duration_s) = (self.record.times_s.last().copied().unwrap_or(0.0), self.reference.duration_s());
+        let is_whole = self.record.samples == self.reference.samples();
+        let status = match (self.end, said) {
+            (Some(RunEnd::Interrupted), _) => RobotStatus::Interrupted { stopping: Stopping::Confirmed },
+            (Some(RunEnd::Breach(breach)), _) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed },
+            (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault },
+            (None, Err(reason)) => RobotStatus::Stopped { reason },
+            (None, Ok(())) if is_whole => RobotStatus::Done,
+            (None, Ok(())) => RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s } },
+        };
+        RobotRun { status, record: joint_major(self.record), truth: None }
+    }
+}
+
+/// A robot that is a function of this process: given the controlled run, it brings the robot to the first sample of the
+/// reference, asks for a torque at every sample and applies it, and returns when there is no further one. What it
+/// returns as an error stops the run with that reason.
+pub struct FunctionRobot<F> {
+    joints: Vec<String>,
+    function: F,
+}
+
+impl<F> FunctionRobot<F>
+where
+    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
+{
+    /// A robot of these joints, in the model's order. The function gives the run back with its outcome, so that it may
+    /// be lent to another language meanwhile.
+    pub fn new(joints: Vec<String>, function: F) -> Self {
+        Self { joints, function }
+    }
+}
+
+impl<F> core::fmt::Debug for FunctionRobot<F> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("FunctionRobot").field("joints", &self.joints).finish_non_exhaustive()
+    }
+}
+
+impl<F> Robot for FunctionRobot<F>
+where
+    F: FnMut(ControlledRun) -> (ControlledRun, Result<(), String>),
+{
+    fn name(&self) -> &'static str {
+        "function"
+    }
+
+    fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
+        let (run, said) = (self.function)(ControlledRun::new(request, &self.joints)?);
+        Ok(run.ended(said))
+    }
+}

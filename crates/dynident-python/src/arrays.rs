@@ -1,0 +1,172 @@
+//! Arrays of Python as numbers, and back.
+//!
+//! Vectors over joints stand in the last axis; whatever axes come before it count samples. What comes back has the same
+//! axes before its own, so that one posture gives a vector and a thousand give a table.
+
+use crate::pool::pool;
+use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::borrow::Cow;
+
+/// Numbers of a result from which on more than one thread is worth waking.
+const WORTH_THREADS: usize = 50_000;
+
+/// Numbers of an array, row-major, and its axes before the last.
+struct Samples<'py> {
+    array: PyReadonlyArrayDyn<'py, f64>,
+    lead: Vec<usize>,
+}
+
+impl<'py> Samples<'py> {
+    /// Anything that NumPy makes an array of, with `joints` entries in the last axis.
+    pub(crate) fn of(object: &Bound<'py, PyAny>, name: &str, joints: usize) -> PyResult<Self> {
+        let array = if let Ok(array) = object.cast::<PyArrayDyn<f64>>() {
+            array.clone()
+        } else {
+            let py = object.py();
+            let settings = PyDict::new(py);
+            settings.set_item("dtype", "float64")?;
+            let made = py.import("numpy")?.call_method("asarray", (object,), Some(&settings))?;
+            made.cast_into::<PyArrayDyn<f64>>()
+                .map_err(|_| PyValueError::new_err(format!("{name}: give an array of numbers")))?
+        };
+        let shape = array.shape();
+        match shape.split_last() {
+            Some((&last, lead)) if last == joints => {
+                let lead = lead.to_vec();
+                Ok(Self { array: array.readonly(), lead })
+            }
+            _ => Err(PyValueError::new_err(format!(
+                "{name} has the shape {shape:?}: the last axis needs {joints} entries, one for each joint"
+            ))),
+        }
+    }
+
+    /// The same axes as another array's.
+    pub(crate) fn like(self, other: &Self, name: &str) -> PyResult<Self> {
+        if self.lead == other.lead {
+            return Ok(self);
+        }
+        let (found, expected) = (&self.lead, &other.lead);
+        Err(PyValueError::new_err(format!("{name} has samples in {found:?}, where the first array has {expected:?}")))
+    }
+
+    /// The axes before the last.
+    pub(crate) fn lead(&self) -> &[usize] {
+        &self.lead
+    }
+
+    /// Number of samples.
+    pub(crate) fn count(&self) -> usize {
+        self.lead.iter().product()
+    }
+
+    /// All numbers, row-major; copied only where the array is not.
+    pub(crate) fn numbers(&self) -> Cow<'_, [f64]> {
+        match self.array.as_slice() {
+            // A slice is also what lies column by column without a gap.
+            Ok(numbers) if self.array.is_c_contiguous() => Cow::Borrowed(numbers),
+            _ => Cow::Owned(self.array.as_array().iter().copied().collect()),
+        }
+    }
+}
+
+/// An array with the samples' axes and its own.
+pub(crate) fn array<'py>(
+    py: Python<'py>,
+    lead: &[usize],
+    own: &[usize],
+    numbers: Vec<f64>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let shape: Vec<usize> = lead.iter().chain(own).copied().collect();
+    numbers.into_pyarray(py).reshape(shape)
+}
+
+/// A motion of `(..., n)` arrays, of which velocity and acceleration may be left out: at rest.
+pub(crate) struct Motion<'py> {
+    q: Samples<'py>,
+    dq: Option<Samples<'py>>,
+    ddq: Option<Samples<'py>>,
+}
+
+impl<'py> Motion<'py> {
+    pub(crate) fn of(
+        dof: usize,
+        q: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let q = Samples::of(q, "q", dof)?;
+        let other = |array: Option<&Bound<'py, PyAny>>, name: &str| {
+            array.map(|array| Samples::of(array, name, dof)?.like(&q, name)).transpose()
+        };
+        let (dq, ddq) = (other(dq, "dq")?, other(ddq, "ddq")?);
+        Ok(Self { q, dq, ddq })
+    }
+
+    /// The axes before the last.
+    pub(crate) fn lead(&self) -> &[usize] {
+        self.q.lead()
+    }
+
+    /// Number of samples.
+    pub(crate) fn count(&self) -> usize {
+        self.q.count()
+    }
+
+    /// An array with the samples' axes and `own` ones, which `work` fills row by row, without the interpreter's lock;
+    /// on several threads where that is worth it. The memory is NumPy's own: it knows how to ask for large pages.
+    pub(crate) fn fill(
+        &self,
+        py: Python<'py>,
+        own: &[usize],
+        work: impl FnOnce([&[f64]; 3], &mut [f64]) + Send,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let shape: Vec<usize> = self.lead().iter().chain(own).copied().collect();
+        let array = PyArrayDyn::<f64>::zeros(py, shape, false);
+        {
+            let mut lent = array.readwrite();
+            let out = lent.as_slice_mut().map_err(|error| PyValueError::new_err(error.to_string()))?;
+            self.compute(py, out.len(), |motion| work(motion, out));
+        }
+        Ok(array)
+    }
+
+    /// Runs `work`, which makes so many numbers, on the numbers, without the interpreter's lock; on several threads
+    /// where that is worth it.
+    pub(crate) fn compute<R: Send>(
+        &self,
+        py: Python<'py>,
+        results: usize,
+        work: impl FnOnce([&[f64]; 3]) -> R + Send,
+    ) -> R {
+        let q = self.q.numbers();
+        let rest = vec![0.0; if self.dq.is_none() || self.ddq.is_none() { q.len() } else { 0 }];
+        let dq = self.dq.as_ref().map(Samples::numbers);
+        let ddq = self.ddq.as_ref().map(Samples::numbers);
+        let (q, dq, ddq) = (&*q, dq.as_deref().unwrap_or(&rest), ddq.as_deref().unwrap_or(&rest));
+        let pool = if results < WORTH_THREADS { None } else { pool(py) };
+        py.detach(move || match pool {
+            Some(pool) => pool.install(|| work([q, dq, ddq])),
+            None => work([q, dq, ddq]),
+        })
+    }
+}
+
+/// Rows of samples as rows of joints.
+pub(crate) fn joint_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
+    let mut out = vec![0.0; rows.len()];
+    for (sample, row) in rows.chunks_exact(joints.max(1)).enumerate() {
+        for (joint, value) in row.iter().enumerate() {
+            out[joint * samples + sample] = *value;
+        }
+    }
+    out
+}
+
+/// Rows of joints as rows of samples.
+pub(crate) fn sample_major(rows: &[f64], samples: usize, joints: usize) -> Vec<f64> {
+    joint_major(rows, joints, samples)
+}

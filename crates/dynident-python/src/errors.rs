@@ -1,0 +1,61 @@
+//! Exceptions: what the Rust side says, with file, place and what to do in the message.
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+use std::path::Path;
+
+create_exception!(
+    dynident,
+    Error,
+    PyException,
+    "What went wrong, with the file, the place and what to do.\n\n`path`, `line` and `column` say where, None where there is no such place."
+);
+create_exception!(
+    dynident,
+    RobotError,
+    Error,
+    "A robot's description that cannot be read, or a name it does not have."
+);
+create_exception!(dynident, StudyError, Error, "A study that cannot be done as it is written.");
+create_exception!(dynident, LogError, Error, "A recording that cannot be read or used.");
+create_exception!(dynident, ResultError, Error, "A result that does not belong to its study, or cannot be exported.");
+
+create_exception!(dynident, StopRun, Error, "The robot has to be stopped: a run gives no further torque.");
+
+/// The exception of a description or of what is asked of it.
+pub(crate) fn robot(error: impl core::fmt::Display) -> PyErr {
+    RobotError::new_err(error.to_string())
+}
+
+/// The exception of recordings.
+pub(crate) fn log(error: impl core::fmt::Display) -> PyErr {
+    LogError::new_err(error.to_string())
+}
+
+/// The exception that a job's error is, with its place.
+pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
+    use dynident::Error as Job;
+    let message = error.to_string();
+    let (exception, path, line, column): (PyErr, Option<&Path>, Option<u64>, Option<u32>) = match error {
+        Job::StudyAt { path, line, column, .. } => {
+            (StudyError::new_err(message), Some(path), Some(u64::from(*line)), Some(*column))
+        }
+        Job::Study { path, .. } | Job::Identification { path, .. } => {
+            (StudyError::new_err(message), Some(path), None, None)
+        }
+        Job::Robot(_) => (RobotError::new_err(message), None, None, None),
+        Job::Recording { .. } | Job::NewStudy(_) => (LogError::new_err(message), None, None, None),
+        Job::States { path, line, .. } => (LogError::new_err(message), Some(path), Some(*line), None),
+        Job::Missing { file, .. } => (StudyError::new_err(message), Some(file), None, None),
+        Job::Result { path, .. } | Job::Export { path, .. } => (ResultError::new_err(message), Some(path), None, None),
+        Job::File { path, .. } | Job::Output { path, .. } => (Error::new_err(message), Some(path), None, None),
+        _ => (Error::new_err(message), None, None, None),
+    };
+    let value = exception.value(py);
+    // An exception takes any attribute.
+    let _ = value.setattr("path", path);
+    let _ = value.setattr("line", line);
+    let _ = value.setattr("column", column);
+    exception
+}

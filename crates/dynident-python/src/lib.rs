@@ -1,0 +1,41 @@
+//! **Dynident from Python**: the part of the package `dynident` that is Rust. Its other part, in `python/dynident`,
+//! holds what needs no speed: logs, tables, pictures.
+
+#![allow(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
+
+mod arrays;
+mod assembled;
+mod errors;
+mod function_robot;
+mod functions;
+mod jobs;
+mod model;
+mod pool;
+mod robot;
+mod study;
+
+/// The extension module.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::errors::{Error, LogError, ResultError, RobotError, StopRun, StudyError};
+    #[pymodule_export]
+    use crate::function_robot::Run;
+    #[pymodule_export]
+    use crate::functions::{
+        _check, _command, _design, _identify, _iterate, _log_contents, _simulate, _validate, _write_files,
+    };
+    #[pymodule_export]
+    use crate::model::FittedModel;
+    #[pymodule_export]
+    use crate::robot::Robot;
+    #[pymodule_export]
+    use crate::study::Study;
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn with_version(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,442 @@
+//! `Robot`: a description, and its dynamics over arrays.
+
+use crate::arrays::{Motion, array, joint_major};
+use crate::assembled::{assembled, json_of};
+use crate::errors;
+use dynident::dynamics::{
+    BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
+    forward_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, mass_matrix, regressor_panels,
+};
+use dynident::model::terms::JointMotion;
+use dynident::model::{DescriptionFormat, Model, Robot as Description, load_robot, read_robot};
+use dynident::{Folders, StudyRobot};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Samples of one block of a batch: enough for full lanes, little enough for the cache.
+const BLOCK: usize = 128;
+/// Rows of a regressor that are written at once: their pages fit into the first level of the address cache.
+const ROWS_AT_ONCE: usize = 16;
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
+
+/// A robot on a fixed base: links, joints, gravity.
+///
+/// Made by ``Robot.load(path)``, or ``from_urdf``, ``from_mjcf``, ``from_sdf``, ``from_dh`` of a path or a text.
+/// Keyword arguments are the keys of ``[robot]`` of a study: which joints move, what they follow, where gravity points.
+///
+/// Vectors over joints follow ``joint_names``; SI units, rad. All methods take one posture, shape ``(n,)``, or any
+/// number of them, shape ``(..., n)``, and give the axes before the last back.
+#[pyclass(frozen, module = "dynident")]
+pub(crate) struct Robot {
+    /// As read.
+    description: Description,
+    /// Keys of ``[robot]`` beside the file, as JSON.
+    settings: String,
+    /// With these in force.
+    model: Model,
+    /// Scratch memory of threads that have called.
+    singles: Mutex<Vec<Workspace>>,
+    batches: Mutex<Vec<BatchWorkspace>>,
+}
+
+impl Robot {
+    fn base(&self) -> BaseParameters {
+        BaseParameters::new(&self.model, &[], &BaseParameterSettings::default())
+    }
+
+    /// The description with the keys of ``[robot]`` in force.
+    fn new(py: Python<'_>, description: Description, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let settings = settings.map_or_else(|| Ok("{}".to_owned()), |settings| json_of(py, settings))?;
+        Self::with_settings(py, description, settings)
+    }
+
+    pub(crate) fn with_settings(py: Python<'_>, description: Description, settings: String) -> PyResult<Self> {
+        let path = description.path.clone();
+        let study = assembled(py, &study_of(&path, &settings)?, &path, Some(description.clone()), Vec::new())?;
+        let folders = Folders::new(&study, &path, None);
+        let made = StudyRobot::new(&study, &path, &folders).map_err(|error| errors::job(py, &error))?;
+        let model = made.model().clone();
+        Ok(Self { description, settings, model, singles: Mutex::default(), batches: Mutex::default() })
+    }
+
+    /// What was read, before any key is in force.
+    pub(crate) fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Lends scratch memory to `work`. Nobody waits for it: a process that was forked while another thread held the
+    /// lock would wait for ever.
+    fn with_single<R>(&self, work: impl FnOnce(&mut Workspace) -> R) -> R {
+        lend(&self.singles, || Workspace::new(&self.model), work)
+    }
+
+    fn with_batch<R>(&self, work: impl FnOnce(&mut BatchWorkspace) -> R) -> R {
+        lend(&self.batches, || BatchWorkspace::new(&self.model), work)
+    }
+
+    /// `each(row, numbers)` for every sample, where `numbers` are the `size` ones of its result in `out`.
+    fn for_each(&self, out: &mut [f64], size: usize, each: impl Fn(&mut Workspace, usize, &mut [f64]) + Sync) {
+        in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
+            self.with_single(|workspace| {
+                for (row, numbers) in block.chunks_exact_mut(size.max(1)).enumerate() {
+                    each(workspace, number * BLOCK + row, numbers);
+                }
+            });
+        });
+    }
+
+    /// `each(motion, numbers)` for blocks of samples, whose motion stands joint by joint.
+    fn for_blocks(
+        &self,
+        [q, dq, ddq]: [&[f64]; 3],
+        (out, size): (&mut [f64], usize),
+        each: impl Fn(&mut BatchWorkspace, &JointMotion<'_>, &mut [f64]) + Sync,
+    ) {
+        let dof = self.model.dof();
+        in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
+            let samples = block.len() / size.max(1);
+            let first = number * BLOCK * dof;
+            let of = |rows: &[f64]| joint_major(&rows[first..first + samples * dof], samples, dof);
+            let (q, dq, ddq) = (of(q), of(dq), of(ddq));
+            let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
+            self.with_batch(|workspace| each(workspace, &motion, block));
+        });
+    }
+}
+
+fn lend<W, R>(kept: &Mutex<Vec<W>>, make: impl FnOnce() -> W, work: impl FnOnce(&mut W) -> R) -> R {
+    let lent = kept.try_lock().ok().and_then(|mut all| all.pop());
+    let mut workspace = lent.unwrap_or_else(make);
+    let result = work(&mut workspace);
+    if let Ok(mut all) = kept.try_lock() {
+        all.push(workspace);
+    }
+    result
+}
+
+/// The sections of a study of nothing but a robot.
+fn study_of(path: &Path, settings: &str) -> PyResult<String> {
+    let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
+    let mut section: serde_json::Map<String, serde_json::Value> = serde_json::from_str(settings).map_err(wrong)?;
+    section.insert("file".to_owned(), path.display().to_string().into());
+    serde_json::to_string(&serde_json::json!({ "robot": section })).map_err(wrong)
+}
+
+/// A description of the format `wanted`: `source` is its text if it holds one, else the file's path.
+fn described(
+    source: &str,
+    wanted: DescriptionFormat,
+    name: &str,
+    is_text: impl FnOnce(&str) -> bool,
+) -> PyResult<Description> {
+    let found = if is_text(source) {
+        read_robot(source.to_owned(), Path::new(name)).map_err(errors::robot)?
+    } else {
+        load_robot(source).map_err(errors::robot)?
+    };
+    if found.format == wanted {
+        Ok(found)
+    } else {
+        Err(errors::robot(format!("{}: is {:?}, not {wanted:?}: use Robot.load", found.path.display(), found.format)))
+    }
+}
+
+/// Whether a text is XML and no path.
+fn is_xml(text: &str) -> bool {
+    text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
+}
+
+/// Hands out blocks of samples, to all threads of the pool that this runs in, if any.
+fn in_blocks(out: &mut [f64], size: usize, each: impl Fn((usize, &mut [f64])) + Sync) {
+    let chunk = (BLOCK * size).max(1);
+    if rayon::current_thread_index().is_none() {
+        out.chunks_mut(chunk).enumerate().for_each(each);
+    } else {
+        out.par_chunks_mut(chunk).enumerate().for_each(&each);
+    }
+}
+
+#[pymethods]
+impl Robot {
+    /// Reads a description: URDF, MJCF, SDF or a D-H table in TOML, told by its content.
+    #[staticmethod]
+    #[pyo3(signature = (path, **settings))]
+    fn load(py: Python<'_>, path: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        Self::new(py, load_robot(&path).map_err(errors::robot)?, settings)
+    }
+
+    /// A robot of a URDF: a path, or the text itself.
+    #[staticmethod]
+    #[pyo3(signature = (source, **settings))]
+    fn from_urdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        Self::new(py, described(&source, DescriptionFormat::Urdf, "robot.urdf", is_xml)?, settings)
+    }
+
+    /// A robot of MuJoCo's MJCF: a path, or the text itself.
+    #[staticmethod]
+    #[pyo3(signature = (source, **settings))]
+    fn from_mjcf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        Self::new(py, described(&source, DescriptionFormat::Mjcf, "robot.xml", is_xml)?, settings)
+    }
+
+    /// A robot of Gazebo's SDF: a path, or the text itself.
+    #[staticmethod]
+    #[pyo3(signature = (source, **settings))]
+    fn from_sdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        Self::new(py, described(&source, DescriptionFormat::Sdf, "robot.sdf", is_xml)?, settings)
+    }
+
+    /// A robot of a Denavit-Hartenberg table in TOML: a path, or the text itself, which has more than one line.
+    #[staticmethod]
+    #[pyo3(signature = (source, **settings))]
+    fn from_dh(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = source.to_string_lossy();
+        let is_text = |source: &str| source.contains('\n');
+        Self::new(py, described(&source, DescriptionFormat::Dh, "robot.toml", is_text)?, settings)
+    }
+
+    /// The inverse of ``__reduce__``.
+    #[staticmethod]
+    fn _restore(py: Python<'_>, text: String, path: PathBuf, settings: String) -> PyResult<Self> {
+        Self::with_settings(py, read_robot(text, &path).map_err(errors::robot)?, settings)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, PathBuf, String))> {
+        let own = slf.get();
+        let state = (own.description.text.clone(), own.description.path.clone(), own.settings.clone());
+        Ok((slf.get_type().getattr("_restore")?, state))
+    }
+
+    /// The keys of ``[robot]`` that are in force beside the file, as JSON.
+    #[getter]
+    fn _settings(&self) -> &str {
+        &self.settings
+    }
+
+    /// The robot's name.
+    #[getter]
+    fn name(&self) -> &str {
+        self.model.name()
+    }
+
+    /// The file that it was read from; of a text a name only.
+    #[getter]
+    fn path(&self) -> &Path {
+        &self.description.path
+    }
+
+    /// The text of the description.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.description.text
+    }
+
+    /// Names of the degrees of freedom, base to tip: the order of all vectors.
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        self.model.joints().iter().map(|joint| joint.name.clone()).collect()
+    }
+
+    /// Names of the moving bodies: the order of the regressor's blocks of ten columns.
+    #[getter]
+    fn body_names(&self) -> Vec<String> {
+        self.model.bodies().iter().map(|body| body.name().to_owned()).collect()
+    }
+
+    /// Degrees of freedom.
+    #[getter]
+    fn n(&self) -> usize {
+        self.model.dof()
+    }
+
+    /// Ten inertial parameters of each body in its frame, shape ``(bodies, 10)``: ``m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
+    /// Iyz, Izz`` about the frame's origin, kg, kg m, kg m². Zeros where the description has none.
+    #[getter]
+    fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        array(py, &[self.model.body_count()], &[10], self.model.parameter_vector())
+    }
+
+    /// The same robot with the named joints held, ``{name: position}`` in rad or m.
+    fn locked(&self, py: Python<'_>, positions: BTreeMap<String, f64>) -> PyResult<Self> {
+        let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
+        let mut settings: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(&self.settings).map_err(wrong)?;
+        let held = settings.entry("lock").or_insert_with(|| serde_json::json!({}));
+        if let Some(held) = held.as_object_mut() {
+            held.extend(positions.into_iter().map(|(name, at)| (name, at.into())));
+        }
+        let settings = serde_json::to_string(&settings).map_err(wrong)?;
+        Self::with_settings(py, self.description.clone(), settings)
+    }
+
+    /// Joint torques of a motion, Nm (N): ``M(q) ddq + C(q, dq) dq + g(q)`` of the rigid bodies. Shapes ``(..., n)``;
+    /// without ``dq`` or ``ddq`` these are zero.
+    #[pyo3(signature = (q, dq=None, ddq=None))]
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let dof = self.model.dof();
+        let motion = Motion::of(dof, q, dq, ddq)?;
+        motion.fill(py, &[dof], |numbers, out| {
+            self.for_blocks(numbers, (out, dof), |workspace, motion, out| {
+                let mut tau = vec![0.0; out.len()];
+                inverse_dynamics_batch(&self.model, workspace, motion, &mut tau);
+                for (sample, row) in out.chunks_exact_mut(dof.max(1)).enumerate() {
+                    for (joint, to) in row.iter_mut().enumerate() {
+                        *to = tau[joint * motion.samples + sample];
+                    }
+                }
+            });
+        })
+    }
+
+    /// Torques that hold the robot at rest, Nm (N), shape ``(..., n)``.
+    fn gravity<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+        self.inverse_dynamics(py, q, None, None)
+    }
+
+    /// Accelerations under torques, rad/s² (m/s²), shape ``(..., n)``.
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        dq: &Bound<'py, PyAny>,
+        tau: &Bound<'py, PyAny>,
+    ) -> PyResult<Array<'py>> {
+        let dof = self.model.dof();
+        // The torque takes the place of the acceleration.
+        let motion = Motion::of(dof, q, Some(dq), Some(tau))?;
+        motion.fill(py, &[dof], |[q, dq, tau], out| {
+            self.for_each(out, dof, |workspace, row, out| {
+                let of = row * dof..(row + 1) * dof;
+                let (q, dq, tau) = (&q[of.clone()], &dq[of.clone()], &tau[of]);
+                out.copy_from_slice(forward_dynamics(&self.model, workspace, q, dq, tau));
+            });
+        })
+    }
+
+    /// Mass matrices ``M(q)``, kg m² (kg m, kg), shape ``(..., n, n)``.
+    fn mass_matrix<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+        let dof = self.model.dof();
+        let motion = Motion::of(dof, q, None, None)?;
+        motion.fill(py, &[dof, dof], |[q, ..], out| {
+            self.for_each(out, dof * dof, |workspace, row, out| {
+                out.copy_from_slice(mass_matrix(&self.model, workspace, &q[row * dof..(row + 1) * dof]));
+            });
+        })
+    }
+
+    /// Derivatives of the torques by position, velocity and acceleration: three arrays of shape ``(..., n, n)``, row =
+    /// torque, column = what it is derived by.
+    #[pyo3(signature = (q, dq=None, ddq=None))]
+    fn derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Matrices<'py>> {
+        let dof = self.model.dof();
+        let motion = Motion::of(dof, q, dq, ddq)?;
+        let (count, size) = (motion.count(), dof * dof);
+        let all = motion.compute(py, 3 * count * size, |[q, dq, ddq]| {
+            let mut all = vec![0.0; 3 * count * size];
+            self.for_each(&mut all, 3 * size, |workspace, row, out| {
+                let of = row * dof..(row + 1) * dof;
+                let found =
+                    inverse_dynamics_derivatives(&self.model, workspace, &q[of.clone()], &dq[of.clone()], &ddq[of]);
+                out[..size].copy_from_slice(found.by_position);
+                out[size..2 * size].copy_from_slice(found.by_velocity);
+                out[2 * size..].copy_from_slice(found.by_acceleration);
+            });
+            all
+        });
+        let part = |which: usize| {
+            let rows = all.chunks_exact((3 * size).max(1));
+            let numbers = rows.flat_map(|row| &row[which * size..(which + 1) * size]).copied().collect();
+            array(py, motion.lead(), &[dof, dof], numbers)
+        };
+        Ok((part(0)?, part(1)?, part(2)?))
+    }
+
+    /// The regressor ``Y(q, dq, ddq)`` with ``Y @ inertial_parameters.ravel() == tau``, shape ``(..., n, 10 bodies)``.
+    #[pyo3(signature = (q, dq=None, ddq=None))]
+    fn regressor<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let (dof, columns) = (self.model.dof(), self.model.inertial_count());
+        let motion = Motion::of(dof, q, dq, ddq)?;
+        let layout = PanelLayout::new(&self.model, all_columns(&self.model, &[]));
+        motion.fill(py, &[dof, columns], |numbers, out| {
+            self.for_blocks(numbers, (out, dof * columns), |workspace, motion, out| {
+                let mut panels = Panels::default();
+                regressor_panels(&self.model, workspace, &layout, motion, &mut panels);
+                for joint in 0..dof {
+                    // A few rows at a time, or every number written is a page of its own.
+                    for (part, rows) in out.chunks_mut(ROWS_AT_ONCE * dof * columns).enumerate() {
+                        let from = part * ROWS_AT_ONCE;
+                        for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+                            let entries = &panels.joint(joint)[place * motion.samples + from..];
+                            for (row, entry) in rows.chunks_exact_mut(dof * columns).zip(entries) {
+                                row[joint * columns + column] = *entry;
+                            }
+                        }
+                    }
+                }
+            });
+        })
+    }
+
+    /// The base parameters of the bodies: what torque can tell, as sums of inertial parameters.
+    #[getter]
+    fn base_parameters(&self) -> Vec<String> {
+        self.base().expressions()
+    }
+
+    /// The matrix of shape ``(base parameters, 10 bodies)`` with ``base_projection @ inertial_parameters.ravel()`` the
+    /// values of ``base_parameters``.
+    #[getter]
+    fn base_projection<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let (base, columns) = (self.base(), self.model.inertial_count());
+        let rows = base.count();
+        let mut numbers = vec![0.0; rows * columns];
+        for column in 0..columns {
+            let mut one = vec![0.0; columns];
+            one[column] = 1.0;
+            for (row, value) in base.values(&one).into_iter().enumerate() {
+                numbers[row * columns + column] = value;
+            }
+        }
+        array(py, &[rows], &[columns], numbers)
+    }
+
+    /// Places of the regressor's columns that stand for the base parameters:
+    /// ``regressor(...)[..., base_columns] @ values == tau``.
+    #[getter]
+    fn base_columns(&self) -> Vec<usize> {
+        self.base().independent().to_vec()
+    }
+
+    fn __repr__(&self) -> String {
+        let joints = self.model.dof();
+        format!("Robot({:?}, {joints} joints, {} bodies)", self.model.name(), self.model.body_count())
+    }
+}

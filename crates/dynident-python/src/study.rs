@@ -1,0 +1,162 @@
+//! `Study`: robot, drives, logs and settings of a job, from a file or from memory.
+
+use crate::arrays::array;
+use crate::assembled::assembled;
+use crate::errors;
+use crate::robot::Robot;
+use dynident::model::read_robot;
+use dynident::recording::{LogSource, MemoryLog};
+use numpy::{PyArrayDyn, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use std::path::{Path, PathBuf};
+
+/// Samples of one log: names of the columns, and the columns.
+type Samples<'py> = (Vec<String>, Vec<PyReadonlyArray1<'py, f64>>);
+
+/// A study: robot, drives, logs and settings, as ``[robot]``, ``[drive]``, ``[[log]]`` and so on of a study file.
+///
+/// Read with ``Study.load(path)`` or ``Study.parse(text)``; put together from objects with ``dynident.study(...)``.
+#[pyclass(frozen, module = "dynident")]
+pub(crate) struct Study {
+    pub(crate) study: dynident::Study,
+    pub(crate) path: PathBuf,
+}
+
+impl Study {
+    /// The study and where it stands, as jobs take it on another thread.
+    pub(crate) fn owned(&self) -> (dynident::Study, PathBuf) {
+        (self.study.clone(), self.path.clone())
+    }
+}
+
+#[pymethods]
+impl Study {
+    /// Reads a study file.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let study = dynident::Study::load(&path).map_err(|error| errors::job(py, &error))?;
+        Ok(Self { study, path })
+    }
+
+    /// Reads the text of a study; files that it names are looked for beside ``path``, which need not exist.
+    #[staticmethod]
+    #[pyo3(signature = (text, path=PathBuf::from("<study>")))]
+    fn parse(py: Python<'_>, text: &str, path: PathBuf) -> PyResult<Self> {
+        let study = dynident::Study::parse(text, &path).map_err(|error| errors::job(py, &error))?;
+        Ok(Self { study, path })
+    }
+
+    /// Sections as JSON, with a robot and with samples in memory: one entry for each log, None for one in a file.
+    #[staticmethod]
+    #[pyo3(signature = (sections, path, robot, samples))]
+    fn _assemble(
+        py: Python<'_>,
+        sections: &str,
+        path: PathBuf,
+        robot: Option<&Bound<'_, Robot>>,
+        samples: Vec<Option<(String, Samples<'_>)>>,
+    ) -> PyResult<Self> {
+        let tables = samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose());
+        let tables = tables.collect::<PyResult<Vec<_>>>()?;
+        let description = robot.map(|robot| robot.get().description().clone());
+        Ok(Self { study: assembled(py, sections, &path, description, tables)?, path })
+    }
+
+    /// The inverse of ``__reduce__``.
+    #[staticmethod]
+    fn _restore(
+        py: Python<'_>,
+        sections: &str,
+        path: PathBuf,
+        description: Option<(String, PathBuf)>,
+        samples: Vec<Option<(String, Samples<'_>)>>,
+    ) -> PyResult<Self> {
+        let tables = samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose());
+        let tables = tables.collect::<PyResult<Vec<_>>>()?;
+        let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
+        Ok(Self { study: assembled(py, sections, &path, robot, tables)?, path })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let description = own.study.robot.description.as_ref().map(|robot| (robot.text.clone(), robot.path.clone()));
+        let mut samples = Vec::new();
+        for log in &own.study.log {
+            samples.push(log.samples.as_ref().map(|table| columns(py, table)).transpose()?);
+        }
+        let state = (own.to_json()?, own.path.clone(), description, samples);
+        Ok((slf.get_type().getattr("_restore")?, state.into_pyobject(py)?))
+    }
+
+    /// The file that it was read from; ``<study>`` for one in memory. Files that it names are looked for beside it.
+    #[getter]
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What reports call it, None for the file's name.
+    #[getter]
+    fn name(&self) -> Option<&str> {
+        self.study.name.as_deref()
+    }
+
+    /// Names of the logs.
+    #[getter]
+    fn log_names(&self) -> Vec<String> {
+        (0..self.study.log.len()).map(|index| self.study.log_name(index)).collect()
+    }
+
+    /// The robot in memory, before any key is in force; None for one in a file.
+    fn _robot(&self, py: Python<'_>) -> PyResult<Option<Robot>> {
+        let description = self.study.robot.description.as_deref().cloned();
+        description.map(|description| Robot::with_settings(py, description, "{}".to_owned())).transpose()
+    }
+
+    /// Whether everything that it names lies in files, so that its TOML says all.
+    #[getter]
+    fn is_in_files(&self) -> bool {
+        self.study.robot.description.is_none() && self.study.log.iter().all(|log| log.samples.is_none())
+    }
+
+    /// All sections as JSON.
+    fn to_json(&self) -> PyResult<String> {
+        serde_json::to_string(&self.study).map_err(|error| errors::Error::new_err(error.to_string()))
+    }
+
+    /// The study as TOML. Samples and descriptions in memory are only named in it.
+    fn to_toml(&self) -> PyResult<String> {
+        self.study.to_toml().map_err(|error| errors::StudyError::new_err(error.to_string()))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Study({:?}, {} logs)", self.path.display().to_string(), self.study.log.len())
+    }
+}
+
+/// A table of columns. Each is copied once: a job runs on beside whoever owns the arrays.
+fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog> {
+    let columns = columns
+        .iter()
+        .map(|column| match column.as_slice() {
+            Ok(numbers) => numbers.to_vec(),
+            Err(_) => column.as_array().iter().copied().collect(),
+        })
+        .collect();
+    MemoryLog::columns(label, Some(names), columns).map_err(errors::log)
+}
+
+/// Label, names and columns of a table.
+#[allow(clippy::type_complexity, reason = "what `_restore` takes")]
+fn columns<'py>(
+    py: Python<'py>,
+    table: &MemoryLog,
+) -> PyResult<(String, (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>))> {
+    let names = table.names().map(<[String]>::to_vec).unwrap_or_default();
+    let (width, numbers): (usize, Vec<f64>) = (names.len().max(1), table.numbers().collect());
+    let of = |column: usize| {
+        let own: Vec<f64> = numbers.iter().skip(column).step_by(width).copied().collect();
+        array(py, &[own.len()], &[], own)
+    };
+    Ok((table.label(), (names.clone(), (0..names.len()).map(of).collect::<PyResult<Vec<_>>>()?)))
+}

@@ -1,0 +1,129 @@
+//! The torque that a finished model asks for along a motion.
+
+use crate::error::Error;
+use crate::result::ResultFile;
+use crate::study::{Folders, Study, StudyRobot};
+use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
+use dynident_estimation::student_half_width;
+use dynident_identification::RegressorModel;
+use dynident_model::terms::JointMotion;
+use nalgebra::{DMatrix, DVector};
+use std::path::Path;
+
+/// Samples of one block: enough for full lanes, little enough for the cache.
+const BLOCK: usize = 128;
+
+/// A finished model that predicts torque.
+///
+/// The prediction of joint j in one sample is `τ̂_j = W_j θ`, with the base parameters θ of the physically consistent
+/// set where the result has one. Its 95 % band, `± t √(W_j V W_jᵀ + σ_j²)`, is for a torque that is filtered as in the
+/// fit: V is the covariance of the estimate, σ_j the standard deviation of the joint's filtered residual. Base
+/// parameters that no log excites have no variance in V: the band is none of motion that needs them.
+#[derive(Clone, Debug)]
+pub struct TorquePredictor {
+    model: RegressorModel,
+    theta: Vec<f64>,
+    covariance: DMatrix<f64>,
+    joint_sigma: Vec<f64>,
+    width: f64,
+}
+
+/// Torques along a motion, joint-major as the motion is, Nm (N).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PredictedTorque {
+    /// The prediction.
+    pub tau: Vec<f64>,
+    /// Half the width of its 95 % band.
+    pub half_width_95: Vec<f64>,
+}
+
+impl TorquePredictor {
+    /// The model of a result; messages call it `result_path`. `study` is the study that it was made with; `data` a
+    /// folder in which its robot is looked for as well.
+    ///
+    /// # Errors
+    /// If the result does not belong to the study's robot, or holds numbers that are not finite.
+    pub fn new(
+        stored: &ResultFile,
+        result_path: &Path,
+        (study, study_path): (&Study, &Path),
+        data: Option<&Path>,
+    ) -> Result<Self, Error> {
+        let wrong = |message: &str| Error::Result { path: result_path.to_owned(), message: message.to_owned() };
+        let study = &stored.as_fitted(study);
+        let robot = StudyRobot::new(study, study_path, &Folders::new(study, study_path, data))?;
+        let free = stored.base_values(result_path, &robot.parametric)?;
+        let model = stored.regressor_model(result_path, &robot.parametric)?;
+        let theta = stored.consistent_values(result_path)?.unwrap_or(free);
+        let (rows, n) = (&stored.base_parameter_covariance, theta.len());
+        if rows.len() != n || rows.iter().any(|row| row.len() != n || row.iter().any(|value| !value.is_finite())) {
+            return Err(wrong("base_parameter_covariance is not one finite number for each pair of base parameters"));
+        }
+        let joint_sigma: Vec<f64> = stored.joints.iter().map(|joint| joint.residual_std_nm).collect();
+        if joint_sigma.len() != model.dof() || joint_sigma.iter().any(|sigma| !sigma.is_finite()) {
+            return Err(wrong("residual_std_nm is not one finite number for each joint"));
+        }
+        let equations = stored.training.samples * model.dof();
+        Ok(Self {
+            covariance: DMatrix::from_fn(n, n, |row, column| rows[row][column]),
+            width: student_half_width(0.95, equations.saturating_sub(n).max(1) as f64),
+            model,
+            theta,
+            joint_sigma,
+        })
+    }
+
+    /// Degrees of freedom.
+    pub fn dof(&self) -> usize {
+        self.model.dof()
+    }
+
+    /// Names of the joints, in the order of the motion.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.model.joint_names()
+    }
+
+    /// The torque along `motion`, whose samples follow one another in time (friction with memory begins at rest).
+    ///
+    /// # Panics
+    /// If the motion does not hold [`dof`](Self::dof) joints.
+    pub fn predict(&self, motion: &JointMotion<'_>) -> PredictedTorque {
+        let (dof, samples, layout) = (self.dof(), motion.samples, self.model.layout());
+        assert_eq!(motion.q.len(), dof * samples, "the motion needs {dof} joints");
+        let mut workspace = BatchWorkspace::new(self.model.model());
+        let mut history = TermHistory::new(self.model.load_parameters.clone());
+        let mut panels = Panels::default();
+        let mut found = PredictedTorque { tau: vec![0.0; dof * samples], half_width_95: vec![0.0; dof * samples] };
+        // Of each joint's own columns.
+        let own: Vec<(DMatrix<f64>, DVector<f64>)> = (0..dof)
+            .map(|joint| {
+                let columns = layout.joint_columns(joint);
+                let theta = DVector::from_iterator(columns.len(), columns.iter().map(|&column| self.theta[column]));
+                let covariance = self.covariance.select_columns(columns).select_rows(columns);
+                (covariance, theta)
+            })
+            .collect();
+        for from in (0..samples).step_by(BLOCK) {
+            let count = BLOCK.min(samples - from);
+            let part = |all: &[f64]| -> Vec<f64> {
+                all.chunks_exact(samples).flat_map(|joint| &joint[from..from + count]).copied().collect()
+            };
+            let (q, dq, ddq) = (part(motion.q), part(motion.dq), part(motion.ddq));
+            let block = JointMotion { samples: count, q: &q, dq: &dq, ddq: &ddq };
+            regressor_panels_following(self.model.model(), &mut workspace, layout, &block, &mut history, &mut panels);
+            for (joint, (covariance, theta)) in own.iter().enumerate() {
+                let panel = &panels.joint(joint)[..theta.len() * count];
+                let rows = nalgebra::DMatrixView::from_slice(panel, count, theta.len());
+                let (tau, spread) = (rows * theta, rows * covariance);
+                let at = joint * samples + from;
+                found.tau[at..at + count].copy_from_slice(tau.as_slice());
+                for sample in 0..count {
+                    let variance = spread.row(sample).dot(&rows.row(sample)).max(0.0);
+                    let sigma = self.joint_sigma[joint];
+                    found.half_width_95[at + sample] = self.width * (variance + sigma * sigma).sqrt();
+                }
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,44 @@
+"""Robot dynamic identification: from a description and logs to a dynamic model with error bars.
+
+>>> import dynident
+>>> arm = dynident.Robot.load("arm.urdf")                               # doctest: +SKIP
+>>> log = dynident.Log.from_arrays(t, q, tau)                           # doctest: +SKIP
+>>> model = dynident.identify(arm, [log.fraction(0.0, 0.65), log.fraction(0.7, 1.0).validating()])  # doctest: +SKIP
+>>> tau = model.predict(q, dq, ddq)                                     # doctest: +SKIP
+"""
+
+from ._iterate import Iteration, iterate
+from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
+from ._log import Log
+from ._model import Model
+from ._native import Error, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, __version__
+from ._study import study, with_logs
+
+__all__ = [
+    "Check",
+    "Design",
+    "Error",
+    "Iteration",
+    "Log",
+    "LogError",
+    "Model",
+    "ProblemWarning",
+    "ResultError",
+    "Robot",
+    "RobotError",
+    "Run",
+    "Simulation",
+    "StopRun",
+    "Study",
+    "StudyError",
+    "__version__",
+    "check",
+    "design",
+    "identify",
+    "iterate",
+    "log_contents",
+    "simulate",
+    "study",
+    "validate",
+    "with_logs",
+]

@@ -1,0 +1,224 @@
+"""The jobs: check, identify, validate, design, simulate."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._log import Log
+from ._model import Model
+from ._native import Robot, Study
+from ._progress import Line, Progress, is_watched
+from ._study import study as make_study
+from ._study import with_logs
+
+Found = TypeVar("Found")
+
+
+class ProblemWarning(UserWarning):
+    """What stands against a result: whoever loads the model into a robot should know it."""
+
+
+def _study_of(study: Study | Robot | str | PathLike[str], logs: Log | Iterable[Log] | None, sections: Any) -> Study:
+    if isinstance(study, Study):
+        if sections:
+            raise TypeError(f"{', '.join(sections)}: a study has its sections already")
+        return study if logs is None else with_logs(study, logs)
+    if isinstance(study, Robot):
+        return make_study(study, () if logs is None else logs, **sections)
+    path = fspath(study)
+    if logs is None and not sections and path.endswith(".toml"):
+        return Study.load(path)
+    return make_study(Robot.load(path), () if logs is None else logs, **sections)
+
+
+def _watched(progress: bool | Progress | None, job: Callable[[Progress | None], Found]) -> Found:
+    if progress is False or (progress is None and not is_watched()):
+        return job(None)
+    if callable(progress):
+        return job(progress)
+    line = Line()
+    try:
+        return job(line)
+    finally:
+        line.end()
+
+
+def identify(
+    study: Study | Robot | str | PathLike[str],
+    logs: Log | Iterable[Log] | None = None,
+    *,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+    **sections: Any,
+) -> Model:
+    """Fits a dynamic model to recordings and tests it on those that were held out.
+
+    ``study`` is a ``Study``, the path of one, or a robot (an object or a description's path) with ``logs`` and sections
+    as ``dynident.study`` takes them. The result is the same, bit for bit, as that of ``dynident identify`` for the
+    same study, for any number of threads. What stands against the model is warned of as ``ProblemWarning`` and stands
+    in ``Model.problems``. ``progress`` shows where the job is: by default on a terminal and in a notebook; a callable
+    hears ``(stage, rows done, rows in all or None)``.
+
+    Raises ``StudyError``, ``RobotError`` or ``LogError`` with file, place and what to do. Ctrl-C ends it.
+    """
+    whole = _study_of(study, logs, sections)
+    model = Model(_watched(progress, lambda hear: _native._identify(whole, threads, hear)))
+    for problem in model.problems:
+        warnings.warn(problem, ProblemWarning, stacklevel=2)
+    return model
+
+
+def check(
+    study: Study | Robot | str | PathLike[str],
+    logs: Log | Iterable[Log] | None = None,
+    *,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+    **sections: Any,
+) -> Check:
+    """Examines a study against its robot and its logs before any fit is believed: units, signs, order of joints,
+    mounting, clock, and more. Each finding names the key to write. Arguments as of ``identify``.
+    """
+    whole = _study_of(study, logs, sections)
+    return Check(json.loads(_watched(progress, lambda hear: _native._check(whole, threads, hear))))
+
+
+def validate(
+    model: Model,
+    logs: Log | Iterable[Log] | Study | None = None,
+    *,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+) -> dict[str, Any]:
+    """Tests a finished model on logs (or those of a study) that it was not fitted to; without any on the held-out ones of
+    its own study. ``dynident validate --json`` as a dictionary, with the error of every joint.
+    """
+    if logs is None:
+        whole = model.study
+    else:
+        whole = logs if isinstance(logs, Study) else with_logs(model.study, logs)
+    text = _watched(progress, lambda hear: _native._validate(model._native, whole, threads, hear))
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What ``check`` found."""
+
+    result: dict[str, Any]
+    """``dynident check --json`` as a dictionary."""
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """All findings, the gravest first: ``level``, ``kind``, ``what``, ``evidence``, ``write``."""
+        found: list[dict[str, Any]] = self.result["check"]["findings"]
+        return found
+
+    @property
+    def ok(self) -> bool:
+        """Whether no finding is a problem."""
+        return all(finding["level"] != "problem" for finding in self.findings)
+
+    def __str__(self) -> str:
+        def line(finding: dict[str, Any]) -> str:
+            write = "; ".join(change["line"] for change in finding["write"])
+            return f"{finding['level']}: {finding['what']}: {finding['evidence']}" + (f" Write: {write}" if write else "")
+
+        return "\n".join(map(line, self.findings)) or "study, robot and logs fit together"
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A motion to record."""
+
+    result: dict[str, Any]
+    """``design.json`` as a dictionary."""
+    csv: str
+    """``trajectory.csv``."""
+    svg: str
+    """A picture: position, velocity, acceleration and torque of every joint over time."""
+    time_s: npt.NDArray[np.float64]
+    """Times, shape ``(samples,)``."""
+    q: npt.NDArray[np.float64]
+    """Positions, rad (m), shape ``(samples, n)``."""
+    dq: npt.NDArray[np.float64]
+    """Velocities, rad/s (m/s), shape ``(samples, n)``."""
+    ddq: npt.NDArray[np.float64]
+    """Accelerations, rad/s² (m/s²), shape ``(samples, n)``."""
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every limit is kept; what was not checked stands in ``result["not_checked"]``."""
+        return bool(self.result["feasible"])
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+
+def design(
+    study: Study | Robot | str | PathLike[str],
+    *,
+    rate_hz: float | None = None,
+    threads: int | None = None,
+    **sections: Any,
+) -> Design:
+    """Finds the motion that says most about a robot inside every limit. ``study`` is a ``Study``, the path of one, or a
+    robot with sections (``design={...}``); ``rate_hz`` is the rate of the arrays.
+    """
+    whole = _study_of(study, None, sections)
+    text, csv, svg, time_s, (q, dq, ddq) = _native._design(whole, rate_hz, threads)
+    return Design(json.loads(text), csv, svg, time_s, q, dq, ddq)
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """One run of a simulated robot."""
+
+    truth: dict[str, Any]
+    """``truth.json`` as a dictionary: what truly was."""
+    csv: str
+    """The log as the command writes it."""
+    time_s: npt.NDArray[np.float64]
+    """Times, shape ``(samples,)``."""
+    q: npt.NDArray[np.float64]
+    """Measured positions, rad (m), shape ``(samples, n)``."""
+    tau: npt.NDArray[np.float64]
+    """Measured torques, Nm (N), shape ``(samples, n)``."""
+
+    def log(self, name: str = "simulated", role: Any = "identify") -> Log:
+        """The samples as a log."""
+        return Log.from_arrays(self.time_s, self.q, self.tau, name=name, role=role)
+
+
+def simulate(
+    study: Study | Robot | str | PathLike[str], *, threads: int | None = None, **sections: Any
+) -> Simulation:
+    """Lets the simulated robot of a study (``[simulation]``) run its trajectory (``[iteration] trajectory``, or its
+    ``[design]``) under its ``[controller]``.
+    """
+    whole = _study_of(study, None, sections)
+    truth, csv = _native._simulate(whole, threads)
+    header, _, body = csv.partition("\n")
+    names = header.split(",")
+    table = np.fromstring(body.replace("\n", ","), sep=",").reshape(-1, len(names)) if body else np.empty((0, len(names)))
+    of = {
+        symbol: table[:, [k for k, name in enumerate(names) if name.rstrip("0123456789") == symbol]]
+        for symbol in ("q", "tau")
+    }
+    return Simulation(json.loads(truth), csv, table[:, names.index("t_s")], of["q"], of["tau"])
+
+
+def log_contents(file: str | PathLike[str]) -> dict[str, Any]:
+    """What a recording holds: its format, and its channels with rates and ranges."""
+    found: dict[str, Any] = json.loads(_native._log_contents(fspath(file)))
+    return found

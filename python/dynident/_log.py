@@ -1,0 +1,222 @@
+"""Recordings: arrays, tables of pandas, files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from ._native import LogError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Role = Literal["identify", "validate"]
+Channel = str | Sequence[str | int] | Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """One recording: samples in memory or a file, what its columns mean, what it is for.
+
+    Made by ``Log.from_arrays``, ``Log.from_pandas`` or ``Log.read``. Joints stand in the robot's order unless the robot
+    was given ``joints``. Nothing is read before a job needs it.
+    """
+
+    name: str
+    """What it is called in results and messages."""
+    format: Mapping[str, Any] = field(default_factory=dict)
+    """What its columns mean: the keys of ``[format]`` of a study."""
+    role: Role = "identify"
+    """Fitted to, or tested on."""
+    payload: str | None = None
+    """The payload that it was recorded with, by name."""
+    file: str | None = None
+    """The file, if it is one."""
+    columns: Mapping[str, npt.NDArray[np.float64]] | None = None
+    """Samples in memory by column, if it is none."""
+    part: Mapping[str, Any] = field(default_factory=dict)
+    """Which rows: ``rows``, ``fraction``, ``time_range_s``, ``drop_rows``, ``drop_time_s`` of ``[[log]]``."""
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time_s: npt.ArrayLike | None,
+        q: npt.ArrayLike,
+        tau: npt.ArrayLike,
+        *,
+        dq: npt.ArrayLike | None = None,
+        ddq: npt.ArrayLike | None = None,
+        temperature_c: npt.ArrayLike | None = None,
+        rate_hz: float | None = None,
+        name: str = "log",
+        role: Role = "identify",
+        payload: str | None = None,
+        **format: Any,
+    ) -> Log:
+        """A log of arrays in SI: ``q`` and ``tau`` of shape ``(samples, n)``, rad and Nm (m and N).
+
+        ``time_s`` of shape ``(samples,)`` in seconds, or None with ``rate_hz``. ``dq`` and ``ddq`` (rad/s, rad/s²) are
+        compared with what the positions say, never fitted to. Further keyword arguments are keys of ``[format]``, as
+        ``torque={"unit": "A", "scale": 11.4}`` or ``missing="drop"``.
+
+        >>> import numpy as np, dynident
+        >>> t = np.arange(0.0, 2.0, 0.01)
+        >>> dynident.Log.from_arrays(t, np.sin(t)[:, None], np.cos(t)[:, None]).samples
+        200
+        """
+        columns: dict[str, npt.NDArray[np.float64]] = {}
+        if (time_s is None) == (rate_hz is None):
+            raise LogError(f"{name}: give either time_s or rate_hz")
+        channels: dict[str, Any] = {}
+        if time_s is None:
+            channels["rate_hz"] = rate_hz
+        else:
+            columns["t_s"] = np.asarray(time_s, dtype=np.float64).reshape(-1)
+            channels["time"] = {"column": "t_s"}
+        groups = [
+            ("position", "q", q, "rad"),
+            ("torque", "tau", tau, "N m"),
+            ("velocity", "dq", dq, "rad/s"),
+            ("acceleration", "ddq", ddq, "rad/s^2"),
+            ("temperature", "temperature", temperature_c, None),
+        ]
+        for key, symbol, values, _ in groups:
+            if values is None:
+                continue
+            table = np.asarray(values, dtype=np.float64)
+            if table.ndim == 1:
+                table = table[:, None]
+            if table.ndim != 2:
+                raise LogError(f"{name}: {key} has the shape {table.shape}, not (samples, joints)")
+            names = [f"{symbol}{joint + 1}" for joint in range(table.shape[1])]
+            columns.update({column: table[:, joint] for joint, column in enumerate(names)})
+            channels[key] = {"columns": names}
+        for key, value in format.items():
+            own = channels.get(key)
+            channels[key] = {**own, **value} if isinstance(own, dict) and isinstance(value, Mapping) else value
+        return cls(name=name, format=channels, role=role, payload=payload, columns=columns)
+
+    @classmethod
+    def from_pandas(
+        cls,
+        table: pd.DataFrame,
+        position: Channel,
+        torque: Channel,
+        *,
+        time: str | Mapping[str, Any] | None = None,
+        name: str = "log",
+        role: Role = "identify",
+        payload: str | None = None,
+        **format: Any,
+    ) -> Log:
+        """A log of a data frame. ``position`` and ``torque`` name its columns: a list, a pattern as ``"q{1..6}"``, or a
+        mapping with units as in ``[format]``: ``{"columns": "q{1..6}_deg", "unit": "deg"}``.
+
+        ``time`` names the column of seconds, or is ``{"column": "t", "unit": "ms"}``; without it the index is the time
+        if it is a number or a date, else give ``rate_hz``. Further keyword arguments are keys of ``[format]``.
+        """
+        channels = _channels(position, torque, time, format)
+        columns: dict[str, npt.NDArray[np.float64]] = {}
+        for column in table.columns:
+            values = table[column]
+            if values.dtype.kind in "fiub":
+                columns[str(column)] = np.ascontiguousarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
+        if "time" not in channels and "rate_hz" not in channels:
+            index = table.index.to_numpy()
+            if index.dtype.kind == "M":
+                seconds = (index - index[0]) / np.timedelta64(1, "s")
+            elif index.dtype.kind == "f":
+                seconds = index
+            else:
+                raise LogError(f"{name}: give time, the column of seconds, or rate_hz")
+            columns["index_s"] = np.asarray(seconds, dtype=np.float64)
+            channels["time"] = {"column": "index_s"}
+        return cls(name=name, format=channels, role=role, payload=payload, columns=columns)
+
+    @classmethod
+    def read(
+        cls,
+        file: str | PathLike[str],
+        position: Channel,
+        torque: Channel,
+        *,
+        time: str | Mapping[str, Any] | None = None,
+        name: str | None = None,
+        role: Role = "identify",
+        payload: str | None = None,
+        **format: Any,
+    ) -> Log:
+        """A log of a file in any format that the command reads (CSV, Parquet, MCAP, rosbag2, MAT, HDF5, npy, ...), told
+        by its content; ``dynident.log_contents(file)`` says what it holds. Columns as in ``from_pandas``.
+        """
+        path = fspath(file)
+        stem = path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+        channels = _channels(position, torque, time, format)
+        return cls(name=name or stem, format=channels, role=role, payload=payload, file=path)
+
+    @property
+    def samples(self) -> int | None:
+        """Number of samples in memory; None for a file."""
+        return None if self.columns is None else len(next(iter(self.columns.values())))
+
+    def validating(self) -> Log:
+        """The same to test on."""
+        return replace(self, role="validate")
+
+    def rows(self, first: int, end: int) -> Log:
+        """The part from row ``first`` up to but without row ``end``, 0-based."""
+        return replace(self, part={**self._other_parts(), "rows": [first, end]}, name=f"{self.name} [{first}:{end}]")
+
+    def fraction(self, begin: float, end: float) -> Log:
+        """The part between two shares of its rows, as ``log.fraction(0.0, 0.65)``."""
+        return replace(
+            self,
+            part={**self._other_parts(), "fraction": [begin, end]},
+            name=f"{self.name} [{100 * begin:.0f} % .. {100 * end:.0f} %]",
+        )
+
+    def _other_parts(self) -> dict[str, Any]:
+        return {key: value for key, value in self.part.items() if key not in ("rows", "fraction", "time_range_s")}
+
+    def _section(self) -> dict[str, Any]:
+        """``[[log]]`` of a study."""
+        section: dict[str, Any] = {
+            "file": self.file or self.name,
+            "name": self.name,
+            "role": self.role,
+            "format": dict(self.format),
+            **self.part,
+        }
+        if self.payload is not None:
+            section["payload"] = self.payload
+        return section
+
+    def _samples(self) -> tuple[str, tuple[list[str], list[npt.NDArray[np.float64]]]] | None:
+        if self.columns is None:
+            return None
+        return self.name, (list(self.columns), list(self.columns.values()))
+
+    def __repr__(self) -> str:
+        where = self.file if self.columns is None else f"{self.samples} samples"
+        return f"Log({self.name!r}, {where}, {self.role})"
+
+
+def _channels(
+    position: Channel, torque: Channel, time: str | Mapping[str, Any] | None, further: Mapping[str, Any]
+) -> dict[str, Any]:
+    channels: dict[str, Any] = {"position": _group(position), "torque": _group(torque)}
+    if time is not None:
+        channels["time"] = {"column": time} if isinstance(time, str) else dict(time)
+    for key, value in further.items():
+        is_group = key in ("velocity", "acceleration", "temperature")
+        channels[key] = _group(value) if is_group else value
+    return channels
+
+
+def _group(channel: Channel) -> dict[str, Any]:
+    return dict(channel) if isinstance(channel, Mapping) else {"columns": channel}

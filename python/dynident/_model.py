@@ -1,0 +1,229 @@
+"""An identified model."""
+
+from __future__ import annotations
+
+import html
+import json
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._native import FittedModel, Robot, Study, _write_files
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+class Model:
+    """A dynamic model with error bars and its proof: what ``identify`` gives.
+
+    ``result`` is all that ``result.json`` holds. Models are pickled without the samples that they were fitted to.
+    """
+
+    def __init__(self, native: FittedModel) -> None:
+        self._native = native
+
+    @classmethod
+    def load(cls, folder: str | PathLike[str], study: Study | str | PathLike[str]) -> Model:
+        """The model in a folder that ``dynident identify`` or ``save`` wrote, with its study."""
+        place = Path(folder)
+        own = study if isinstance(study, Study) else Study.load(study)
+
+        def text(name: str) -> str | None:
+            return (place / name).read_text(encoding="utf-8") if (place / name).is_file() else None
+
+        names = ("identified.urdf", "identified.toml", "identified.xml", "identified.sdf")
+        json_text = (place / "result.json").read_text(encoding="utf-8")
+        return cls(FittedModel.of(json_text, own, [text(name) for name in names], text("report.html") or ""))
+
+    @cached_property
+    def result(self) -> dict[str, Any]:
+        """``result.json`` as a dictionary; its keys stand in ``docs/schemas/result.json``."""
+        found: dict[str, Any] = json.loads(self._native.json)
+        return found
+
+    @property
+    def study(self) -> Study:
+        """The study that it was made with."""
+        return self._native.study
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Names of the joints, in the order of all vectors."""
+        return self._native.joint_names
+
+    @property
+    def problems(self) -> list[str]:
+        """What stands against it; empty if nothing does."""
+        found: list[str] = self.result["problems"]
+        return found
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing stands against it."""
+        return not self.problems
+
+    @property
+    def names(self) -> list[str]:
+        """The base parameters, as sums: ``Izz1 + 0.49 m2``."""
+        return [one["expression"] for one in self.result["base_parameters"]]
+
+    def _numbers(self, key: str) -> npt.NDArray[np.float64]:
+        values = [one[key] for one in self.result["base_parameters"]]
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+    @property
+    def values(self) -> npt.NDArray[np.float64]:
+        """The estimates of the base parameters, in the order of ``names``."""
+        return self._numbers("value")
+
+    @property
+    def std(self) -> npt.NDArray[np.float64]:
+        """Their standard deviations."""
+        return self._numbers("std")
+
+    @property
+    def half_width_95(self) -> npt.NDArray[np.float64]:
+        """Half the widths of their 95 % intervals."""
+        return self._numbers("half_width_95")
+
+    @property
+    def covariance(self) -> npt.NDArray[np.float64]:
+        """Their covariance, shape ``(base parameters, base parameters)``."""
+        return np.array(self.result["base_parameter_covariance"], dtype=np.float64)
+
+    @property
+    def bodies(self) -> dict[str, npt.NDArray[np.float64]]:
+        """By body the ten inertial parameters in its frame, physically consistent: ``m, mx, my, mz, Ixx, Ixy, Ixz, Iyy,
+        Iyz, Izz`` about the frame's origin, kg, kg m, kg m².
+        """
+        return {body["name"]: np.array(body["parameters"], dtype=np.float64) for body in self.result["bodies"]}
+
+    @property
+    def friction(self) -> dict[str, dict[str, float]]:
+        """By joint the values of its friction, drive inertia and offset, by symbol."""
+        return {
+            joint["name"]: {term["symbol"]: term["value"] for term in joint["laws"]} for joint in self.result["joints"]
+        }
+
+    @property
+    def validation_error_percent(self) -> dict[str, float | None]:
+        """By held-out log ``100 ‖τ - τ̂‖ / ‖τ‖`` of the model that is written."""
+
+        def error(log: dict[str, Any]) -> float | None:
+            found: float | None = (log["physical"] or log)["relative_error_percent"]
+            return found
+
+        return {log["log"]: error(log) for log in self.result["validation"]}
+
+    def predict(
+        self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float64]:
+        """Torques along a motion, Nm (N), friction included; shapes ``(..., n)``, samples in the order of time."""
+        return self._native.predict(q, dq, ddq)[0]
+
+    def predict_with_band(
+        self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """The same with half the width of the 95 % band of a torque that is filtered as in the fit:
+        ``t sqrt(w V wᵀ + σ²)``.
+        """
+        return self._native.predict(q, dq, ddq)
+
+    def robot(self) -> Robot:
+        """A robot with the identified bodies; raises ``ResultError`` where there is no description to write them into."""
+        return Robot.from_urdf(self.to_urdf())
+
+    def export(self, form: str) -> str:
+        """The model as ``c``, ``cpp``, ``rust``, ``python``, ``matlab``, ``mjcf``, ``urdf``, ``sdf``, ``ros2-yaml`` or
+        ``json``; what the form cannot hold stands in a comment.
+        """
+        return self._native.export(form)[0]
+
+    def to_urdf(self) -> str:
+        """The user's URDF with the new values (of another description, one that describes the same robot)."""
+        return self._native.urdf or self.export("urdf")
+
+    def to_mjcf(self) -> str:
+        """The user's MJCF with the new values, or one that describes the same robot."""
+        return self._native.mjcf or self.export("mjcf")
+
+    def to_sdf(self) -> str:
+        """The user's SDF with the new values, or one that describes the same robot."""
+        return self._native.sdf or self.export("sdf")
+
+    def to_c(self) -> str:
+        """A C99 header: inverse dynamics, gravity, mass matrix, friction, forward dynamics."""
+        return self.export("c")
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The base parameters as a table."""
+        import pandas as pd
+
+        return pd.DataFrame.from_records(self.result["base_parameters"]).set_index("expression")
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Writes ``result.json``, ``report.html`` and the description with the new values, as ``dynident identify``."""
+        native = self._native
+        texts = {
+            "identified.urdf": native.urdf,
+            "identified.toml": native.table,
+            "identified.xml": native.mjcf,
+            "identified.sdf": native.sdf,
+            "report.html": native.report,
+            "result.json": json.dumps(self.result, indent=2) + "\n",
+        }
+        _write_files(fspath(folder), texts)
+
+    def plot_parameters(self) -> Figure:
+        """Base parameters with their 95 % intervals beside the description's values."""
+        from ._plots import parameters
+
+        return parameters(self)
+
+    def plot_prediction(self, time_s: npt.ArrayLike, q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike, tau: npt.ArrayLike | None = None) -> Figure:
+        """Torque of every joint over time with its 95 % band, and what was measured if given."""
+        from ._plots import prediction
+
+        return prediction(self, time_s, q, dq, ddq, tau)
+
+    def _repr_html_(self) -> str:
+        result = self.result
+
+        def row(cells: list[str], tag: str = "td") -> str:
+            return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+        verdict = "no problem found" if self.ok else f"{len(self.problems)} problem(s)"
+        parts = [f"<b>{html.escape(result['name'])}</b>: {len(self.names)} base parameters, {verdict}"]
+        parts += [f"<div style='color:#b00'>PROBLEM: {html.escape(problem)}</div>" for problem in self.problems]
+        errors = self.validation_error_percent
+        if errors:
+            lines = [[log, "-" if error is None else f"{error:.2f} %"] for log, error in errors.items()]
+            parts.append("<table>" + row(["held-out log", "error"], "th") + "".join(map(row, lines)) + "</table>")
+        numbers = zip(self.names, self.values, self.half_width_95, self.result["base_parameters"], strict=True)
+        lines = [
+            [name, f"{value:.4g}", f"± {bar:.2g}" if one["excited"] else "nominal: not excited", one["unit"]]
+            for name, value, bar, one in numbers
+        ]
+        parts.append(
+            "<details><summary>base parameters (95 %)</summary><table>" + "".join(map(row, lines)) + "</table></details>"
+        )
+        return "".join(parts)
+
+    def __getstate__(self) -> FittedModel:
+        return self._native
+
+    def __setstate__(self, native: FittedModel) -> None:
+        self._native = native
+
+    def __repr__(self) -> str:
+        errors = ", ".join(
+            f"{log}: {'-' if error is None else f'{error:.2f} %'}" for log, error in self.validation_error_percent.items()
+        )
+        verdict = "" if self.ok else f", {len(self.problems)} problem(s)"
+        return f"Model({self.result['name']!r}, {len(self.names)} base parameters, held out {errors or 'nothing'}{verdict})"

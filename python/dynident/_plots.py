@@ -1,0 +1,65 @@
+"""Pictures with matplotlib, where it is installed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ._model import Model
+
+
+def parameters(model: Model) -> Figure:
+    """Base parameters over their 95 % intervals: each divided by its own size, so that one axis holds all."""
+    from matplotlib.figure import Figure
+
+    entries = [one for one in model.result["base_parameters"] if one["excited"]]
+    values = np.array([one["value"] for one in entries], dtype=np.float64)
+    bars = np.array([one["half_width_95"] for one in entries], dtype=np.float64)
+    size = np.maximum(np.abs(values), bars)
+    size[size == 0.0] = 1.0
+    figure = Figure(figsize=(8, 0.8 + 0.22 * len(entries)), layout="constrained")
+    axes = figure.subplots()
+    places = np.arange(len(entries))
+    axes.errorbar(values / size, places, xerr=bars / size, fmt="o", markersize=3, capsize=2, label="estimate, 95 %")
+    prior = np.array([np.nan if one["prior"] is None else one["prior"] for one in entries], dtype=np.float64)
+    if np.isfinite(prior).any():
+        axes.plot(np.clip(prior / size, -3.0, 3.0), places, "x", markersize=4, label="description")
+    axes.set_yticks(places, [one["expression"] if len(one["expression"]) < 50 else one["symbol"] for one in entries])
+    axes.invert_yaxis()
+    axes.set_xlabel("value over its size")
+    axes.legend(loc="best")
+    return figure
+
+
+def prediction(
+    model: Model,
+    time_s: npt.ArrayLike,
+    q: npt.ArrayLike,
+    dq: npt.ArrayLike,
+    ddq: npt.ArrayLike,
+    tau: npt.ArrayLike | None,
+) -> Figure:
+    """Torque of every joint over time with its 95 % band."""
+    from matplotlib.figure import Figure
+
+    predicted, half = model.predict_with_band(q, dq, ddq)
+    time = np.asarray(time_s, dtype=np.float64)
+    joints = model.joint_names
+    figure = Figure(figsize=(8, 1.6 * len(joints)), layout="constrained")
+    all_axes = figure.subplots(len(joints), 1, sharex=True, squeeze=False)[:, 0]
+    measured = None if tau is None else np.asarray(tau, dtype=np.float64)
+    for joint, axes in enumerate(all_axes):
+        if measured is not None:
+            axes.plot(time, measured[:, joint], color="0.6", linewidth=0.8, label="measured")
+        axes.plot(time, predicted[:, joint], linewidth=1.0, label="predicted")
+        low, high = predicted[:, joint] - half[:, joint], predicted[:, joint] + half[:, joint]
+        axes.fill_between(time, low, high, alpha=0.25, label="95 %")
+        axes.set_ylabel(f"{joints[joint]}\nNm")
+    all_axes[0].legend(loc="upper right", fontsize="small")
+    all_axes[-1].set_xlabel("time, s")
+    return figure

@@ -1,0 +1,236 @@
+"""From arrays, tables and files to a model."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import csv
+import json
+import multiprocessing
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import motion
+
+import dynident
+
+DRIVE = {"viscous": True, "coulomb": "none", "offset": False}
+
+
+@pytest.fixture(scope="module")
+def model(planar: dynident.Robot, planar_logs: list[dynident.Log]) -> dynident.Model:
+    return dynident.identify(planar, planar_logs, drive=DRIVE, friction="stated")
+
+
+def test_arrays_to_a_model(model: dynident.Model, planar: dynident.Robot) -> None:
+    assert model.ok, model.problems
+    assert set(model.validation_error_percent) == {"run 2"}
+    assert model.validation_error_percent["run 2"] < 1.0
+    friction = {symbol: value for joint in model.friction.values() for symbol, value in joint.items()}
+    truth = dict(zip(planar.base_parameters, planar.base_projection @ planar.inertial_parameters.ravel(), strict=True))
+    truth |= {"fv1": 0.8, "fv2": 0.4}
+    off = [abs(value - truth[name]) / bar for name, value, bar in zip(model.names, model.values, model.std, strict=True)]
+    # Of eight values one beyond four standard deviations happens in one of 2,000 draws, and the draw is fixed.
+    assert max(off) < 4.0, dict(zip(model.names, off, strict=True))
+    assert abs(friction["fv1"] - 0.8) < 0.01
+    assert model.covariance.shape == (len(model.names),) * 2
+    np.testing.assert_allclose(np.sqrt(np.diag(model.covariance)), model.std, rtol=1e-12)
+
+
+def test_prediction_is_the_dynamics_of_what_was_found(model: dynident.Model) -> None:
+    _, q, dq, ddq = motion(2, seed=5)
+    tau, half = model.predict_with_band(q, dq, ddq)
+    assert tau.shape == half.shape == q.shape
+    assert (half > 0).all()
+    found = model.robot()
+    viscous = [joint[f"fv{k + 1}"] for k, joint in enumerate(model.friction.values())]
+    np.testing.assert_allclose(tau, found.inverse_dynamics(q, dq, ddq) + dq * viscous, atol=1e-9)
+    np.testing.assert_array_equal(model.predict(q[3], dq[3], ddq[3]), tau[3])
+
+
+def test_pickled_models_and_studies_are_the_same(model: dynident.Model, planar_logs: list[dynident.Log]) -> None:
+    again = pickle.loads(pickle.dumps(model))
+    assert again.result == model.result
+    _, q, dq, ddq = motion(2, seed=5)
+    np.testing.assert_array_equal(again.predict(q, dq, ddq), model.predict(q, dq, ddq))
+    assert again.to_c() == model.to_c()
+    study = dynident.study(model.robot(), planar_logs, drive=DRIVE, friction="stated")
+    twice = [dynident.identify(one, threads=1) for one in (study, pickle.loads(pickle.dumps(study)))]
+    np.testing.assert_array_equal(twice[0].values, twice[1].values)
+
+
+def test_models_are_saved_and_loaded(model: dynident.Model, tmp_path: Path, planar_logs: list[dynident.Log]) -> None:
+    model.save(tmp_path)
+    again = dynident.Model.load(tmp_path, model.study)
+    assert again.result == model.result
+    tested = dynident.validate(again, planar_logs[1])
+    errors = [one["validation"][0]["physical"]["relative_error_percent"] for one in (tested, model.result)]
+    assert errors[0] == pytest.approx(errors[1], abs=1e-9)
+    assert "<table" in model._repr_html_()
+    assert "held out run 2" in repr(model)
+
+
+def test_every_form_is_written(model: dynident.Model) -> None:
+    for form in ["c", "cpp", "rust", "python", "matlab", "mjcf", "urdf", "sdf", "ros2-yaml", "json"]:
+        assert len(model.export(form)) > 200, form
+    with pytest.raises(dynident.ResultError, match="no form `java`"):
+        model.export("java")
+    assert dynident.Robot.from_mjcf(model.to_mjcf()).n == dynident.Robot.from_sdf(model.to_sdf()).n == 2
+
+
+def test_a_file_a_table_and_arrays_are_one(
+    planar: dynident.Robot, planar_logs: list[dynident.Log], model: dynident.Model, tmp_path: Path
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    columns = planar_logs[0].columns
+    assert columns is not None
+    file = tmp_path / "run.csv"
+    with file.open("w", newline="") as out:
+        writer = csv.writer(out)
+        writer.writerow(columns)
+        writer.writerows([map(repr, row) for row in np.array(list(columns.values())).T.tolist()])
+    read = dynident.Log.read(file, "q{1..2}", "tau{1..2}", time="t_s", name="run 1")
+    table = dynident.Log.from_pandas(pandas.read_csv(file), "q{1..2}", ["tau1", "tau2"], time="t_s")
+    indexed = dynident.Log.from_pandas(pandas.read_csv(file).set_index("t_s"), "q{1..2}", "tau{1..2}")
+    for log in [read, table, indexed]:
+        found = dynident.identify(planar, [log, planar_logs[1]], drive=DRIVE, friction="stated")
+        np.testing.assert_array_equal(found.values, model.values)
+    degrees = {column: np.degrees(values) if column.startswith("q") else values for column, values in columns.items()}
+    turned = dynident.Log.from_pandas(
+        pandas.DataFrame(degrees), {"columns": "q{1..2}", "unit": "deg"}, "tau{1..2}", time="t_s"
+    )
+    found = dynident.identify(planar, [turned, planar_logs[1]], drive=DRIVE, friction="stated")
+    np.testing.assert_allclose(found.values, model.values, rtol=1e-9, atol=1e-9)
+    assert dynident.log_contents(file)["channels"][0]["name"] == "t_s"
+
+
+def test_the_command_gives_the_same_bits(root: Path, tmp_path: Path) -> None:
+    study = root / "examples" / "ur10_simulated.toml"
+    command = [sys.executable, "-m", "dynident", "identify", str(study), "--out", str(tmp_path / "out"), "--quiet"]
+    subprocess.run(command, check=True)
+    from_command = json.loads((tmp_path / "out" / "result.json").read_text())
+    from_python = dynident.identify(study, threads=1).result
+    for result in (from_command, from_python):
+        result.pop("timings_s")
+        result["provenance"].pop("command")
+    assert from_python == from_command
+
+
+def test_parts_of_one_recording(planar: dynident.Robot, planar_logs: list[dynident.Log]) -> None:
+    log = planar_logs[0]
+    parts = [log.fraction(0.0, 0.6), log.fraction(0.65, 1.0).validating()]
+    assert dynident.identify(planar, parts, drive=DRIVE, friction="stated").validation_error_percent
+    with pytest.raises(dynident.StudyError, match="has samples of it"):
+        dynident.identify(planar, [log, log.validating()], drive=DRIVE)
+
+
+def test_a_problem_is_warned_of(planar: dynident.Robot, planar_logs: list[dynident.Log]) -> None:
+    reversed_torque = [
+        dynident.Log.from_arrays(
+            log.columns["t_s"],
+            np.stack([log.columns["q1"], log.columns["q2"]], axis=1),
+            np.stack([log.columns["tau1"], -log.columns["tau2"]], axis=1),
+            name=log.name,
+            role=log.role,
+        )
+        for log in planar_logs
+        if log.columns is not None
+    ]
+    with pytest.warns(dynident.ProblemWarning):
+        found = dynident.identify(planar, reversed_torque, drive=DRIVE, friction="stated")
+    assert not found.ok
+    examined = dynident.check(planar, reversed_torque, drive=DRIVE, friction="stated")
+    assert not examined.ok
+    assert "torque" in str(examined)
+    assert dynident.check(planar, planar_logs, drive=DRIVE, friction="stated").ok
+
+
+def test_exceptions_say_where(planar: dynident.Robot, planar_logs: list[dynident.Log], tmp_path: Path) -> None:
+    with pytest.raises(dynident.StudyError, match="unknown field `coulom`"):
+        dynident.identify(planar, planar_logs, drive={"coulom": "sign"})
+    with pytest.raises(dynident.LogError, match="one of time_s or rate_hz|either time_s or rate_hz"):
+        dynident.Log.from_arrays(None, np.zeros((3, 2)), np.zeros((3, 2)))
+    short = dynident.Log.from_arrays(np.arange(10.0), np.zeros((10, 3)), np.zeros((10, 3)))
+    with pytest.raises(dynident.Error, match="3|joint"):
+        dynident.identify(planar, short)
+    bad = tmp_path / "study.toml"
+    bad.write_text("[robot]\nfile = 3\n")
+    with pytest.raises(dynident.StudyError) as raised:
+        dynident.Study.load(bad)
+    assert (str(raised.value.path), raised.value.line) == (str(bad), 2)
+    with pytest.raises(TypeError, match="sections already"):
+        dynident.identify(dynident.study(planar, planar_logs), drive=DRIVE)
+
+
+def test_progress_is_heard(planar: dynident.Robot) -> None:
+    logs = []
+    for seed, role in [(1, "identify"), (2, "validate")]:
+        t, q, dq, ddq = motion(2, seconds=600.0, seed=seed)
+        logs.append(dynident.Log.from_arrays(t, q, planar.inverse_dynamics(q, dq, ddq), name=str(seed), role=role))
+    heard = []
+    dynident.identify(planar, logs, progress=lambda stage, done, total: heard.append((stage, done, total)))
+    assert heard
+    assert all(isinstance(stage, str) and done >= 0 for stage, done, _ in heard)
+
+
+LONG = """
+import signal, sys, time, dynident
+# Who starts this in the background may have it ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+study = dynident.Study.load(sys.argv[1])
+print("begun", flush=True)
+begin = time.monotonic()
+try:
+    while True:
+        dynident.identify(study)
+except KeyboardInterrupt:
+    print("interrupted after", time.monotonic() - begin, flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to send")
+def test_ctrl_c_ends_a_job(root: Path) -> None:
+    study = str(root / "examples" / "ur10_simulated.toml")
+    with subprocess.Popen([sys.executable, "-c", LONG, study], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        try:
+            # It answers within a fraction of a second; a busy machine gets a minute.
+            answer, _ = process.communicate(timeout=60)
+        finally:
+            process.kill()
+        assert answer.startswith("interrupted after")
+        assert process.returncode == 0
+
+
+def _values(study: dynident.Study) -> list[float]:
+    return dynident.identify(study, threads=2).values.tolist()
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="the system does not fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_threads_and_processes_give_the_same(planar: dynident.Robot, planar_logs: list[dynident.Log]) -> None:
+    study = dynident.study(planar, planar_logs, drive=DRIVE, friction="stated")
+    expected = _values(study)
+    with concurrent.futures.ThreadPoolExecutor(3) as threads:
+        assert all(found == expected for found in threads.map(_values, [study] * 3))
+    for method in ["fork", "spawn"]:
+        context = multiprocessing.get_context(method)
+        with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
+            assert all(found == expected for found in processes.map(_values, [study] * 2, timeout=300))
+
+
+def test_pictures(model: dynident.Model) -> None:
+    pytest.importorskip("matplotlib")
+    t, q, dq, ddq = motion(2, seed=5)
+    assert model.plot_parameters().axes
+    assert len(model.plot_prediction(t, q, dq, ddq, model.predict(q, dq, ddq)).axes) == 2
+    pytest.importorskip("pandas")
+    assert model.to_pandas().loc["fv1", "value"] == pytest.approx(0.8, abs=0.01)

@@ -1,0 +1,127 @@
+"""Design, simulation, and the iteration on a robot that is a function of Python."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynident
+
+DESIGN = {
+    "family": {"kind": "fourier", "harmonics": 3},
+    "duration_s": 6.0,
+    "limits": {"joints": [{"joint": f"joint{k}", "position": [-1.5, 1.5], "speed": 2.0, "acceleration": 8.0} for k in (1, 2)]},
+}
+
+
+def test_design_and_simulate(planar: dynident.Robot) -> None:
+    found = dynident.design(planar, design=DESIGN, rate_hz=200.0)
+    assert found.feasible
+    assert np.abs(found.dq).max() <= 2.0 + 1e-9
+    # Sampled derivatives of a smooth motion: second order in the step of 5 ms.
+    np.testing.assert_allclose(np.gradient(found.q, found.time_s, axis=0)[2:-2], found.dq[2:-2], atol=1e-2)
+    assert found.svg.startswith("<svg")
+    run = dynident.simulate(planar, design=DESIGN, simulation={"rate_hz": 500.0})
+    assert run.truth["done"]
+    assert run.q.shape == run.tau.shape == (run.truth["samples"], 2)
+    again = dynident.identify(planar, run.log(), drive={"viscous": False, "coulomb": "none", "offset": False}, friction="stated")
+    assert len(again.values) == len(planar.base_parameters)
+
+
+class Arm:
+    """The planar arm with other masses and friction, by its own forward dynamics."""
+
+    def __init__(self, robot: dynident.Robot) -> None:
+        self.robot = robot
+        self.runs = 0
+
+    def __call__(self, run: dynident.Run) -> None:
+        self.runs += 1
+        period, inner = 1.0 / run.rate_hz, 4
+        q, dq = run.q[0].copy(), run.dq[0].copy()
+        for sample in range(run.samples):
+            tau = run.torque(sample * period, q, dq)
+            for _ in range(inner):
+                ddq = self.robot.forward_dynamics(q, dq, tau - dq * [0.8, 0.4])
+                dq = dq + ddq * period / inner
+                q = q + dq * period / inner
+
+
+ITERATION = {
+    "model_free": {"kind": "joint-pd", "kp": [100.0, 40.0], "kd": [20.0, 8.0]},
+    "rate_hz": 250.0,
+    "max_runs": 4,
+    "settled": {"tracking_tolerance": 5e-3},
+    "rehearsal": {"uncertainty_percent": 20.0},
+}
+SECTIONS = {
+    "design": DESIGN,
+    "drive": {"viscous": True, "coulomb": "none", "offset": False},
+    "controller": {"kind": "computed-torque", "kp": 100.0, "kd": 20.0},
+    "iteration": ITERATION,
+}
+
+
+def test_a_function_is_a_robot(planar: dynident.Robot, root: Path, tmp_path: Path) -> None:
+    text = (root / "robots" / "planar2r.urdf").read_text()
+    truth = dynident.Robot.from_urdf(text)
+    arm, heard = Arm(truth), []
+    found = dynident.iterate(planar, tmp_path, robot=arm, heard=lambda run, error: heard.append((run, error)), **SECTIONS)
+    assert arm.runs == len(found.runs) == len(heard)
+    assert heard[-1][1] < 0.2 * heard[0][1], heard
+    friction = found.model().friction
+    assert friction["joint1"]["fv1"] == pytest.approx(0.8, rel=0.05)
+    assert friction["joint2"]["fv2"] == pytest.approx(0.4, rel=0.05)
+    # Called again it goes on where it ended: nothing is run twice.
+    dynident.iterate(planar, tmp_path, robot=arm, **SECTIONS)
+    assert arm.runs == len(heard)
+
+
+def test_what_a_robot_raises_is_raised(planar: dynident.Robot, tmp_path: Path) -> None:
+    def broken(run: dynident.Run) -> None:
+        run.torque(0.0, run.q[0], run.dq[0])
+        raise ConnectionError("the cable is out")
+
+    with pytest.raises(ConnectionError, match="the cable is out"):
+        dynident.iterate(planar, tmp_path, robot=broken, **SECTIONS)
+    assert json.loads((tmp_path / "iterations.json").read_text())["converged"] is False
+
+
+def test_a_robot_that_leaves_its_envelope_is_stopped(planar: dynident.Robot, tmp_path: Path) -> None:
+    asked = []
+
+    def running_away(run: dynident.Run) -> None:
+        for sample in range(run.samples):
+            asked.append(sample)
+            run.torque(sample / run.rate_hz, run.q[0] + 0.01 * sample, run.dq[0])
+
+    found = dynident.iterate(planar, tmp_path, robot=running_away, **SECTIONS)
+    assert not found.converged
+    assert len(asked) < 100
+    assert "envelope" in found.result["reason"]
+    with pytest.raises(dynident.ResultError, match="no model was found"):
+        found.model()
+
+
+def test_a_program_needs_leave(root: Path, tmp_path: Path) -> None:
+    study = dynident.Study.load(root / "examples" / "iterate_ur10_mujoco.toml")
+    with pytest.raises(dynident.StudyError, match="allow_command=True"):
+        dynident.iterate(study, tmp_path)
+
+
+def test_mujoco_is_a_robot(planar: dynident.Robot, root: Path, tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    from dynident.mujoco import MujocoRobot
+
+    model = mujoco.MjModel.from_xml_path(str(root / "robots" / "planar2r.urdf"))
+    model.opt.timestep = 1e-3
+    model.dof_damping[:] = 0.8, 0.4
+    # What the description says, and `coulomb = "none"` does not.
+    model.dof_frictionloss[:] = 0.0
+    found = dynident.iterate(planar, tmp_path, robot=MujocoRobot(model, noise=1e-6), **SECTIONS)
+    friction = found.model().friction
+    assert friction["joint1"]["fv1"] == pytest.approx(0.8, rel=0.05)
+    assert found.runs[-1]["max_tracking_error_rad"]

@@ -1,0 +1,124 @@
+"""Dynamics over arrays: shapes, and identities that no implementation can fake."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import multiprocessing
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import motion
+
+import dynident
+
+
+def test_shapes_follow_the_samples(ur10: dynident.Robot) -> None:
+    q = np.random.default_rng(0).normal(size=(3, 4, 6))
+    n, bodies = ur10.n, len(ur10.body_names)
+    assert ur10.inverse_dynamics(q[0, 0]).shape == (n,)
+    assert ur10.inverse_dynamics(q, q, q).shape == (3, 4, n)
+    assert ur10.mass_matrix(q).shape == (3, 4, n, n)
+    assert ur10.regressor(q, q, q).shape == (3, 4, n, 10 * bodies)
+    assert [part.shape for part in ur10.derivatives(q)] == [(3, 4, n, n)] * 3
+    assert ur10.gravity(np.zeros((0, n))).shape == (0, n)
+    assert ur10.gravity([0.0] * n).shape == (n,)
+
+
+def test_the_equation_of_motion_holds(ur10: dynident.Robot) -> None:
+    _, q, dq, ddq = motion(6, seconds=2.0)
+    tau = ur10.inverse_dynamics(q, dq, ddq)
+    bias = ur10.inverse_dynamics(q, dq)
+    rebuilt = np.einsum("sij,sj->si", ur10.mass_matrix(q), ddq) + bias
+    # Rounding of torques of 100 Nm.
+    np.testing.assert_allclose(rebuilt, tau, atol=1e-11)
+    np.testing.assert_allclose(ur10.forward_dynamics(q, dq, tau), ddq, atol=1e-8)
+    np.testing.assert_allclose(ur10.regressor(q, dq, ddq) @ ur10.inertial_parameters.ravel(), tau, atol=1e-11)
+    base = ur10.base_projection @ ur10.inertial_parameters.ravel()
+    regressor = ur10.regressor(q, dq, ddq)[..., ur10.base_columns]
+    # Columns that are sums of others by structure, to 1e-9 of the largest.
+    np.testing.assert_allclose(regressor @ base, tau, atol=1e-6)
+    step = 1e-6
+    by_q, by_dq, by_ddq = ur10.derivatives(q[7], dq[7], ddq[7])
+    for joint in range(6):
+        one = step * np.eye(6)[joint]
+        for found, (a, b) in [
+            (by_q, ((q[7] + one, dq[7], ddq[7]), (q[7] - one, dq[7], ddq[7]))),
+            (by_dq, ((q[7], dq[7] + one, ddq[7]), (q[7], dq[7] - one, ddq[7]))),
+            (by_ddq, ((q[7], dq[7], ddq[7] + one), (q[7], dq[7], ddq[7] - one))),
+        ]:
+            # Differences of torques of 100 Nm over 2e-6: rounding of 1e-8.
+            difference = (ur10.inverse_dynamics(*a) - ur10.inverse_dynamics(*b)) / (2 * step)
+            np.testing.assert_allclose(found[:, joint], difference, atol=1e-6)
+
+
+def test_batches_equal_single_calls_whatever_the_layout(ur10: dynident.Robot) -> None:
+    _, q, dq, ddq = motion(6, seconds=20.0, rate_hz=100.0)
+    whole = ur10.inverse_dynamics(q, dq, ddq)
+    fortran = ur10.inverse_dynamics(np.asfortranarray(q), dq[:, ::1], ddq.astype(">f8"))
+    np.testing.assert_array_equal(whole, fortran)
+    # Lanes add in another order than single calls.
+    single = np.array([ur10.inverse_dynamics(*row) for row in zip(q[:50], dq[:50], ddq[:50], strict=True)])
+    np.testing.assert_allclose(whole[:50], single, atol=1e-12)
+    np.testing.assert_array_equal(ur10.inverse_dynamics(q.tolist(), dq.tolist(), ddq.tolist()), whole)
+
+
+def test_pinocchio_says_the_same(ur10: dynident.Robot, root: Path) -> None:
+    pinocchio = pytest.importorskip("pinocchio")
+    model = pinocchio.buildModelFromUrdf(str(root / "robots" / "ur10.urdf"))
+    data = model.createData()
+    _, q, dq, ddq = motion(6, seconds=0.5)
+    theirs = np.array([pinocchio.rnea(model, data, *row) for row in zip(q, dq, ddq, strict=True)])
+    np.testing.assert_allclose(ur10.inverse_dynamics(q, dq, ddq), theirs, rtol=1e-12, atol=1e-12)
+
+
+def test_descriptions_as_text_and_keys_of_a_study(root: Path, ur10: dynident.Robot) -> None:
+    text = (root / "robots" / "ur10.urdf").read_text()
+    assert dynident.Robot.from_urdf(text).joint_names == ur10.joint_names
+    held = dynident.Robot.from_urdf(root / "robots" / "ur10.urdf", lock={"elbow_joint": 0.5})
+    assert held.n == 5
+    assert held.joint_names == ur10.locked({"elbow_joint": 0.5}).joint_names
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
+    np.testing.assert_allclose(held.gravity(q), np.delete(ur10.gravity(np.insert(q, 2, 0.5)), 2), atol=1e-12)
+    hanging = dynident.Robot.from_urdf(text, gravity_m_s2=[0.0, 0.0, 9.81])
+    np.testing.assert_allclose(hanging.gravity(np.ones(6)), -ur10.gravity(np.ones(6)), atol=1e-12)
+    with pytest.raises(dynident.RobotError, match="not Mjcf"):
+        dynident.Robot.from_mjcf(text)
+
+
+def test_what_is_wrong_is_said(ur10: dynident.Robot, root: Path) -> None:
+    with pytest.raises(dynident.RobotError, match=r"nowhere\.urdf: cannot be read"):
+        dynident.Robot.load("nowhere.urdf")
+    with pytest.raises(ValueError, match="last axis needs 6 entries"):
+        ur10.gravity(np.zeros(5))
+    with pytest.raises(ValueError, match="dq has samples in"):
+        ur10.inverse_dynamics(np.zeros((2, 6)), np.zeros((3, 6)))
+    with pytest.raises(dynident.StudyError, match="unknown field `gravity`"):
+        dynident.Robot.load(root / "robots" / "ur10.urdf", gravity=9.81)  # type: ignore[call-arg]
+    with pytest.raises(dynident.StudyError, match="no_such_joint"):
+        ur10.locked({"no_such_joint": 0.0})
+
+
+def test_pickled_robots_are_the_same(ur10: dynident.Robot) -> None:
+    robot = ur10.locked({"wrist_3_joint": 0.2})
+    again = pickle.loads(pickle.dumps(robot))
+    q = np.random.default_rng(0).normal(size=(100, 5))
+    np.testing.assert_array_equal(again.inverse_dynamics(q, q, q), robot.inverse_dynamics(q, q, q))
+
+
+def _regressor_sum(robot: dynident.Robot) -> float:
+    _, q, dq, ddq = motion(6)
+    return float(np.abs(robot.regressor(q, dq, ddq)).sum())
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="the system does not fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_threads_and_forked_processes(ur10: dynident.Robot) -> None:
+    # Large enough for the pool, so that a child has to make its own.
+    expected = _regressor_sum(ur10)
+    with concurrent.futures.ThreadPoolExecutor(4) as threads:
+        assert set(threads.map(_regressor_sum, [ur10] * 8)) == {expected}
+    context = multiprocessing.get_context("fork")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
+        assert set(processes.map(_regressor_sum, [ur10] * 4, timeout=120)) == {expected}
