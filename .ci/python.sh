@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# python.sh SCRATCH: the package of Python as README installs it, in clean environments: with `python3` everything (tests, types, stubs, the book's page), with the oldest
+# python.sh SCRATCH: the package of Python as README installs it, in clean environments: with `python3` everything (tests, types, stubs, the book's page, the notebooks), with the oldest
 # Python that is here (3.10 or newer; NumPy 1.26) and the newest the tests alone. Other versions are looked for on the path and under PYENV_ROOT.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -41,6 +41,7 @@ program=$scratch/python/bin
 (cd "$scratch" && "$program/mypy" --config-file "$here/pyproject.toml" -p dynident)
 (cd "$scratch" && "$program/stubtest" --mypy-config-file "$here/pyproject.toml" --allowlist "$here/python/tests/allowed.txt" dynident)
 "$program/python" .ci/python_pages.py docs/src/python.md
+"$program/python" .ci/notebooks.py
 
 while read -r minor path; do
     case $minor in
