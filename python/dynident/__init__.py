@@ -7,17 +7,19 @@
 >>> tau = model.predict(q, dq, ddq)                                     # doctest: +SKIP
 """
 
+from . import fleet
 from ._iterate import Iteration, iterate
 from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
 from ._log import Log
 from ._model import Model
-from ._native import Error, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, __version__
+from ._native import Error, Factors, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, __version__
 from ._study import study, with_logs
 
 __all__ = [
     "Check",
     "Design",
     "Error",
+    "Factors",
     "Iteration",
     "Log",
     "LogError",
@@ -34,6 +36,7 @@ __all__ = [
     "__version__",
     "check",
     "design",
+    "fleet",
     "identify",
     "iterate",
     "log_contents",

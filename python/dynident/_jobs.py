@@ -52,6 +52,12 @@ def _watched(progress: bool | Progress | None, job: Callable[[Progress | None], 
         line.end()
 
 
+def _warned(model: Model) -> Model:
+    for problem in model.problems:
+        warnings.warn(problem, ProblemWarning, stacklevel=3)
+    return model
+
+
 def identify(
     study: Study | Robot | str | PathLike[str],
     logs: Log | Iterable[Log] | None = None,
@@ -71,10 +77,7 @@ def identify(
     Raises ``StudyError``, ``RobotError`` or ``LogError`` with file, place and what to do. Ctrl-C ends it.
     """
     whole = _study_of(study, logs, sections)
-    model = Model(_watched(progress, lambda hear: _native._identify(whole, threads, hear)))
-    for problem in model.problems:
-        warnings.warn(problem, ProblemWarning, stacklevel=2)
-    return model
+    return _warned(Model(_watched(progress, lambda hear: _native._identify(whole, threads, hear))))
 
 
 def check(

@@ -8,6 +8,7 @@ from typing_extensions import Unpack
 
 __all__ = [
     "Error",
+    "Factors",
     "FittedModel",
     "LogError",
     "ResultError",
@@ -21,10 +22,15 @@ __all__ = [
     "_check",
     "_command",
     "_design",
+    "_drift",
+    "_factors_errors",
     "_identify",
+    "_identify_factors",
     "_iterate",
     "_log_contents",
+    "_reduce",
     "_simulate",
+    "_spread",
     "_validate",
     "_write_files",
 ]
@@ -197,3 +203,34 @@ def _iterate(
 def _log_contents(path: str | PathLike[str]) -> str: ...
 def _write_files(folder: str | PathLike[str], texts: Mapping[str, str | None]) -> None: ...
 def _command(arguments: Sequence[str]) -> int: ...
+
+@final
+class Factors:
+    @staticmethod
+    def from_bytes(bytes: bytes) -> Factors: ...
+    def to_bytes(self) -> bytes: ...
+    @staticmethod
+    def merged(parts: Sequence[Factors]) -> Factors: ...
+    def _at(self, places: Sequence[int]) -> Factors: ...
+    @property
+    def _logs(self) -> list[tuple[str, str | None, float | None, str, int]]: ...
+    @property
+    def study(self) -> Study: ...
+    def __len__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+def _reduce(
+    study: Study,
+    like: FittedModel | None = None,
+    arm: str | None = None,
+    recorded_at_s: float | None = None,
+    segments: int = 16,
+    threads: int | None = None,
+    progress: _Progress | None = None,
+) -> Factors: ...
+def _identify_factors(factors: Factors, threads: int | None = None, progress: _Progress | None = None) -> FittedModel: ...
+def _factors_errors(factors: Factors, model: FittedModel) -> list[float | None]: ...
+def _spread(names: Sequence[str], values: _Array, std: _Array, false_alarm: float) -> str: ...
+def _drift(
+    names: Sequence[str], values: _Array, std: _Array, times: Sequence[float], false_alarm: float
+) -> str: ...

@@ -49,6 +49,7 @@ pub mod consistent;
 pub mod diagnostics;
 mod error;
 pub mod factor;
+pub mod fleet;
 pub mod linear;
 pub mod nonlinear;
 pub mod uncertainty;
@@ -60,8 +61,8 @@ pub use diagnostics::{
 };
 pub use error::EstimationError;
 pub use factor::{
-    InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings, SegmentedFactor,
-    TriangularFactor, Unexcited, unexcited_columns,
+    FactorShape, InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings, SegmentShape,
+    SegmentedFactor, TriangularFactor, Unexcited, unexcited_columns,
 };
 pub use linear::{
     CrossProblem, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict,

@@ -5,6 +5,7 @@ use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
 use crate::recording::LogError;
+use crate::reduced::ReduceError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
 use thiserror::Error;
@@ -34,6 +35,9 @@ pub enum IdentificationError {
     /// Knowledge of bodies that are not there.
     #[error("[estimator.physical]: {0}")]
     Consistency(ConsistencyError),
+    /// Logs that cannot be reduced to factors.
+    #[error(transparent)]
+    Reduce(#[from] ReduceError),
     /// Intervals of parameters that cannot be had.
     #[error("estimator.intervals: {0}")]
     Intervals(ConsistencyError),

@@ -182,12 +182,44 @@ impl TrainingPasses<'_> {
     pub(crate) fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let columns = self.columns(&model)?;
         let started = Instant::now();
-        let mut logs = self.read(&model)?;
-        self.add_noise(&model, &mut logs)?;
+        let logs = self.factors(&model)?;
         let read_s = started.elapsed().as_secs_f64();
+        let mut rows = self.assembled(model, columns, logs)?;
+        rows.timings_s[0] += read_s;
+        Ok(rows)
+    }
+
+    /// The recordings as factors, with what noise adds to them.
+    pub(crate) fn factors(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
+        let mut logs = self.read(model)?;
+        self.add_noise(model, &mut logs)?;
+        Ok(logs)
+    }
+
+    /// The rows that factors made elsewhere hold.
+    pub(crate) fn of_factors(
+        &self,
+        model: RegressorModel,
+        logs: Vec<LogFactors>,
+    ) -> Result<Training, IdentificationError> {
+        let columns = self.columns(&model)?;
+        let mut rows = self.assembled(model, columns, logs)?;
+        if self.settings.log_noise == LogNoise::Own {
+            rows.problem = weighted_by_log(&self.settings.estimation, rows.problem)?;
+        }
+        Ok(rows)
+    }
+
+    /// Factors of all logs over one set of columns.
+    fn assembled(
+        &self,
+        model: RegressorModel,
+        columns: LoadColumns,
+        logs: Vec<LogFactors>,
+    ) -> Result<Training, IdentificationError> {
         let started = Instant::now();
         let problem = self.problem(&model, &columns, &logs)?;
-        let timings_s = [read_s, started.elapsed().as_secs_f64()];
+        let timings_s = [0.0, started.elapsed().as_secs_f64()];
         let joints = joints_with_rows(&logs, model.dof());
         Ok(Training { model, joints, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s })
     }

@@ -33,6 +33,11 @@ pub(crate) fn log(error: impl core::fmt::Display) -> PyErr {
     LogError::new_err(error.to_string())
 }
 
+/// The exception of factors.
+pub(crate) fn factors(error: impl core::fmt::Display) -> PyErr {
+    ResultError::new_err(error.to_string())
+}
+
 /// The exception that a job's error is, with its place.
 pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
     use dynident::Error as Job;
@@ -48,7 +53,9 @@ pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
         Job::Recording { .. } | Job::NewStudy(_) => (LogError::new_err(message), None, None, None),
         Job::States { path, line, .. } => (LogError::new_err(message), Some(path), Some(*line), None),
         Job::Missing { file, .. } => (StudyError::new_err(message), Some(file), None, None),
-        Job::Result { path, .. } | Job::Export { path, .. } => (ResultError::new_err(message), Some(path), None, None),
+        Job::Result { path, .. } | Job::Export { path, .. } | Job::Factors { path, .. } => {
+            (ResultError::new_err(message), Some(path), None, None)
+        }
         Job::File { path, .. } | Job::Output { path, .. } => (Error::new_err(message), Some(path), None, None),
         _ => (Error::new_err(message), None, None, None),
     };

@@ -30,7 +30,7 @@ fn json(value: &impl serde::Serialize) -> Result<String, Error> {
 }
 
 /// Runs `job` of a study beside the interpreter.
-fn of_study<T: Send + 'static>(
+pub(crate) fn of_study<T: Send + 'static>(
     study: &Bound<'_, Study>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,

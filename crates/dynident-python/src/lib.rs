@@ -6,6 +6,7 @@
 mod arrays;
 mod assembled;
 mod errors;
+mod factors;
 mod function_robot;
 mod functions;
 mod jobs;
@@ -19,6 +20,8 @@ mod study;
 mod _native {
     #[pymodule_export]
     use crate::errors::{Error, LogError, ResultError, RobotError, StopRun, StudyError};
+    #[pymodule_export]
+    use crate::factors::{_drift, _factors_errors, _identify_factors, _reduce, _spread, Factors};
     #[pymodule_export]
     use crate::function_robot::Run;
     #[pymodule_export]

@@ -5,6 +5,7 @@
 //! | read a study file | [`Study::load`], [`Study::parse`] |
 //! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
 //! | a finished model on other logs | [`validate()`] |
+//! | logs to factors, many of them to one model without the logs | [`reduce()`], [`Factors`], [`identify_factors()`], [`factors_errors()`] |
 //! | the torque of a finished model along a motion, with its band | [`TorquePredictor`] |
 //! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
 //! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters, JSON; drives for a simulator; a payload for a controller | [`export_model()`], [`export_simulator()`], [`export_payload()`] |
@@ -44,7 +45,9 @@
 #[cfg(doctest)]
 pub mod book;
 mod cpu_time;
+mod digest;
 mod error;
+pub mod factors;
 mod inputs;
 mod jobs;
 mod output;
@@ -65,6 +68,7 @@ pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
 pub use error::{Error, Expected, NewStudyError, StudyError};
+pub use factors::{FactorLog, Factors, FactorsError};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
@@ -77,6 +81,7 @@ pub use jobs::log::log_contents;
 pub use jobs::new_study::{NewStudy, new_study};
 pub use jobs::options::RunOptions;
 pub use jobs::predict::{PredictedTorque, TorquePredictor};
+pub use jobs::reduce::{ReduceSettings, factors_errors, identify_factors, reduce};
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::{validate, validate_result};
 pub use output::{check_writable, write_whole};

@@ -13,6 +13,7 @@ mod problem;
 mod rank;
 mod reflect;
 mod segmented;
+mod stored;
 mod triangular;
 
 pub use excitation::{Unexcited, unexcited_columns};
@@ -23,5 +24,6 @@ pub use rank::{FixedColumn, RankReport, RankSettings};
 pub(crate) use rank::{Solution, Split, report, solve, solved_values, split};
 pub(crate) use reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 pub use segmented::{SegmentSettings, SegmentedFactor};
+pub use stored::{FactorShape, SegmentShape};
 pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
 pub(crate) use triangular::{check_columns, check_weight};

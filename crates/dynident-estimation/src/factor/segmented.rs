@@ -55,7 +55,7 @@ const fn most_rows(columns: usize) -> usize {
 
 /// One segment: its rows while they are few, then their factor.
 #[derive(Clone, Debug, PartialEq)]
-enum Segment {
+pub(super) enum Segment {
     /// Row by row, columns + 1 numbers each.
     Rows(Vec<f64>),
     Factor(TriangularFactor),
@@ -106,6 +106,27 @@ impl SegmentedFactor {
         })
     }
 
+    /// The factor of these segments.
+    pub(super) fn of_segments(
+        (columns, rows): (usize, usize),
+        (max_segments, length_rows): (usize, usize),
+        segments: Vec<Segment>,
+    ) -> Self {
+        Self { columns, max_segments, length_rows, rows, segments, workspace: FactorWorkspace::default() }
+    }
+
+    pub(super) fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    pub(super) fn max_segments(&self) -> usize {
+        self.max_segments
+    }
+
+    pub(super) fn length_rows(&self) -> usize {
+        self.length_rows
+    }
+
     /// Regressor columns (without the torque).
     pub fn columns(&self) -> usize {
         self.columns
@@ -150,7 +171,7 @@ impl SegmentedFactor {
     }
 
     /// Merges neighbours and doubles the length.
-    fn halve(&mut self) {
+    pub(super) fn halve(&mut self) {
         let mut merged = Vec::with_capacity(self.max_segments);
         let mut old = std::mem::take(&mut self.segments).into_iter();
         while let Some(mut first) = old.next() {
@@ -300,7 +321,7 @@ impl SegmentedFactor {
 }
 
 impl Segment {
-    fn rows(&self, columns: usize) -> usize {
+    pub(super) fn rows(&self, columns: usize) -> usize {
         match self {
             Self::Rows(values) => values.len() / (columns + 1),
             Self::Factor(factor) => factor.rows(),

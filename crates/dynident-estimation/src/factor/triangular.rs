@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 pub const BLOCK_ROWS: usize = 256;
 
 /// The largest magnitude that can be squared and summed without overflow.
-const LARGEST: f64 = 1.0e140;
+pub(super) const LARGEST: f64 = 1.0e140;
 
 /// The upper triangular R of `[W | τ] = Q·R` (a square-root information array): `RᵀR = [W | τ]ᵀ[W | τ]`.
 ///
@@ -91,6 +91,15 @@ impl TriangularFactor {
         let mut factor = Self::new(columns);
         factor.absorb(panel, rows)?;
         Ok(factor)
+    }
+
+    /// The factor with this triangle, packed by rows.
+    pub(super) fn of_triangle(columns: usize, rows: usize, triangle: Vec<f64>) -> Self {
+        Self { columns, rows, triangle }
+    }
+
+    pub(super) fn triangle(&self) -> &[f64] {
+        &self.triangle
     }
 
     /// Regressor columns (without the torque).

@@ -8,7 +8,7 @@ pub use motion_record::MotionRecord;
 
 use dynident_model::Model;
 use dynident_recording::log::OneOrMany;
-use dynident_recording::{Log, MotionSettings, MotionStream, Reference};
+use dynident_recording::{Log, MotionBlock, MotionSettings, MotionStream, Reference};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -74,6 +74,13 @@ impl Recording {
     /// A motion that is made already, to fit to.
     pub fn of_motion(name: impl Into<String>, motion: MotionRecord) -> Self {
         Self::new(name.into(), Role::Identify, Samples::Motion(Box::new(motion)))
+    }
+
+    /// A log to fit to of which only factors are left: a name, and no sample to pass over.
+    pub fn without_samples(name: String) -> Self {
+        let motion = Arc::new(MotionBlock::default());
+        let record = MotionRecord { label: name.clone(), motion, usable: Vec::new(), windows: None, raw: None };
+        Self::of_motion(name, record)
     }
 
     fn new(name: String, role: Role, samples: Samples) -> Self {

@@ -6,6 +6,7 @@ mod study;
 pub use new_study::NewStudyError;
 pub use study::{Expected, StudyError};
 
+use crate::factors::FactorsError;
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
 use dynident_model::ReadError;
@@ -85,6 +86,14 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong, and the fix.
         message: String,
+    },
+    /// Factors of logs that cannot be read or put together.
+    #[error("{}: {source}", path.display())]
+    Factors {
+        /// The file, or the study.
+        path: PathBuf,
+        /// What is wrong.
+        source: FactorsError,
     },
     /// Recordings from which no study can be written.
     #[error(transparent)]

@@ -14,5 +14,6 @@ pub(crate) mod new_study;
 pub(crate) mod options;
 pub(crate) mod predict;
 mod provenance;
+pub(crate) mod reduce;
 pub(crate) mod simulate;
 pub(crate) mod validate;

@@ -1,11 +1,12 @@
 //! What was read for a result, and one short name for it all.
 
+use crate::digest::hexadecimal;
 use crate::error::Error;
+use crate::factors::Factors;
 use crate::result::{InputFile, Provenance};
 use crate::study::{Folders, Study, StudyInput};
 use dynident_recording::LogSource;
 use sha2::{Digest, Sha256};
-use std::fmt::Write;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path};
@@ -44,6 +45,24 @@ pub(crate) fn provenance(
     }
     // A study may have been put together in memory, where the path is a name only.
     let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
+    Ok(identified_by(study, own, inputs))
+}
+
+/// The provenance of a result of reduced logs.
+pub(crate) fn factors_provenance(factors: &Factors) -> Provenance {
+    let robot = factors.study.robot.description.iter();
+    let robot =
+        robot.map(|robot| input_in_memory("robot", &robot.path.display().to_string(), [&robot.text].into_iter()));
+    let logs = factors.logs().iter().map(|log| InputFile {
+        what: "log".to_owned(),
+        file: log.log.name.clone(),
+        bytes: log.numbers_bytes(),
+        sha256: log.sha256.clone(),
+    });
+    identified_by(&factors.study, None, robot.chain(logs).collect())
+}
+
+fn identified_by(study: &Study, own: Option<InputFile>, inputs: Vec<InputFile>) -> Provenance {
     let version = env!("CARGO_PKG_VERSION");
     let mut identity = Sha256::new();
     identity.update(version);
@@ -53,7 +72,7 @@ pub(crate) fn provenance(
     }
     let mut identity = hexadecimal(&identity.finalize());
     identity.truncate(DIGITS);
-    Ok(Provenance { identity, version: version.to_owned(), command: None, study: own, inputs })
+    Provenance { identity, version: version.to_owned(), command: None, study: own, inputs }
 }
 
 /// [`provenance()`] of a motion that is designed, simulated or iterated, with what else was read.
@@ -136,14 +155,6 @@ fn input_in_memory<B: AsRef<[u8]>>(what: &str, label: &str, parts: impl Iterator
     hash.update(&block);
     bytes += block.len() as u64;
     InputFile { what: what.to_owned(), file: label.to_owned(), bytes, sha256: hexadecimal(&hash.finalize()) }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 /// The way from a folder to a file, with `/`; the file's name alone where there is none (another drive).

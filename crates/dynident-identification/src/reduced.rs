@@ -1,0 +1,275 @@
+//! Logs reduced to their factors: a fit of many logs that need not lie in one place.
+//!
+//! [`reduce`] turns each log into its triangles, wherever it lies; [`identify_reduced`] makes the model of the triangles
+//! alone, as [`identify`](crate::identify()) would of the logs. For that, nothing may be left that is chosen by looking
+//! at the samples again: cut-off and friction are stated, the estimator is least squares.
+
+use crate::between_logs::with_variation;
+use crate::error::IdentificationError;
+use crate::estimators::{Estimation, Estimator, estimate};
+use crate::examination::{friction_signs, sign_evidence};
+use crate::execution::Execution;
+use crate::fitted::StageTimes;
+use crate::identify::{Identification, TrainingExamination, consistent_stage};
+use crate::lag::LagChoice;
+use crate::logs::{Logs, of_role};
+use crate::recording::{Recording, Role};
+use crate::regressor_model::RegressorModel;
+use crate::rows::LogStatistics;
+use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings, OffsetChoice};
+use crate::task::IdentificationTask;
+use crate::training::{LogFactors, TrainingPasses};
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::{EstimationError, SegmentedFactor};
+use std::time::Instant;
+use thiserror::Error;
+
+/// Why logs cannot be reduced to factors: something is to be chosen from the samples of all of them.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ReduceError {
+    /// The cut-off is left to the logs.
+    #[error(
+        "the cut-off is left to the logs, and each would have its own: state motion.differentiator.cutoff_hz, or reduce like a model that was identified from some of them"
+    )]
+    Cutoff,
+    /// Friction is left to the logs.
+    #[error(
+        "the friction of joint {joint} is left to the logs: state it (drive.friction = \"stated\" and its terms), or reduce like a model that was identified from some of them"
+    )]
+    Friction {
+        /// The first such joint.
+        joint: String,
+    },
+    /// Friction that grows with the load needs the samples again.
+    #[error("load-dependent friction needs the samples again, with the load of the fit before: leave it out")]
+    Load,
+    /// Payloads, gains or offsets make columns of single logs.
+    #[error("{what} cannot be had from reduced logs: identify them from the logs themselves")]
+    Columns {
+        /// What is asked for.
+        what: &'static str,
+    },
+    /// An estimator that goes back to the samples.
+    #[error("estimator.method = \"{method}\" goes back to the samples: give \"weighted\" or \"ordinary\"")]
+    Estimator {
+        /// Its name.
+        method: &'static str,
+    },
+}
+
+/// A log of which its factors are left.
+#[derive(Clone, Debug)]
+pub struct ReducedLog {
+    /// What it is called.
+    pub name: String,
+    /// One factor of `[W | τ]` for each joint, cut into time segments; columns as
+    /// [`joint_columns`](dynident_dynamics::PanelLayout::joint_columns) of the model's layout.
+    pub factors: Vec<SegmentedFactor>,
+    /// What noise of the positions adds to the rows, likewise; none where the log does not show its noise.
+    pub noise: Option<Vec<SegmentedFactor>>,
+    /// How it was read, without the report on its clock and its samples.
+    pub statistics: LogStatistics,
+}
+
+/// Reduces every recording of the task with the role [`Identify`](Role::Identify) to factors of at most `segments`
+/// segments for each joint. Memory does not grow with the length of a log. More segments make better error bars where
+/// logs are few; where there are many logs, each is a segment, and one will do. A lag of the torque is taken off where
+/// the settings state it.
+///
+/// # Errors
+/// [`ReduceError`] where something is left to be chosen; recordings that cannot be read.
+pub fn reduce(
+    task: &IdentificationTask,
+    segments: usize,
+    execution: Execution<'_>,
+) -> Result<Vec<ReducedLog>, IdentificationError> {
+    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let model = RegressorModel::from(robot.clone());
+    is_reducible(&model, settings)?;
+    if !payloads.is_empty() {
+        return Err(ReduceError::Columns { what: "payloads" }.into());
+    }
+    execution.install(|| {
+        let training = of_role(recordings, Role::Identify);
+        let filters = (&settings.motion, &settings.parallel_filter);
+        let logs = Logs::new(robot.model(), recordings, filters, &[], None, execution)?;
+        let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
+        let reduced = passes.factors(&model)?.into_iter().map(|log| {
+            let few = |factors: Vec<SegmentedFactor>, most: usize| {
+                factors.iter().map(|factor| factor.with_at_most(most)).collect::<Result<Vec<_>, EstimationError>>()
+            };
+            Ok(ReducedLog {
+                name: recordings[log.index].name.clone(),
+                factors: few(log.factors, segments)?,
+                // Nobody asks when the noise was.
+                noise: log.noise.map(|noise| few(noise, 1)).transpose()?,
+                statistics: LogStatistics { report: None, ..log.statistics },
+            })
+        });
+        reduced.collect()
+    })
+}
+
+/// The model that explains reduced logs: the estimate with what varies between logs in its bars, consistent
+/// parameters, signs of torque and friction. As [`identify`](crate::identify()), but for what only samples show: delays,
+/// torque over time, other readings of a doubtful log, tests on held-out motion. The result does not depend on where
+/// the logs were reduced; of their order it depends by rounding.
+///
+/// # Errors
+/// [`ReduceError`] as [`reduce`]; factors of other columns; as [`identify`](crate::identify()).
+pub fn identify_reduced(
+    robot: &ParametricModel,
+    settings: &IdentificationSettings,
+    reduced: &[&ReducedLog],
+    execution: Execution<'_>,
+) -> Result<Identification, IdentificationError> {
+    if reduced.is_empty() {
+        return Err(IdentificationError::NoTrainingLog);
+    }
+    let model = RegressorModel::from(robot.clone());
+    is_reducible(&model, settings)?;
+    settings.check_names(robot).map_err(IdentificationError::Consistency)?;
+    execution.install(|| identified(model, &without_second_look(settings), reduced, execution))
+}
+
+fn identified(
+    model: RegressorModel,
+    settings: &IdentificationSettings,
+    reduced: &[&ReducedLog],
+    execution: Execution<'_>,
+) -> Result<Identification, IdentificationError> {
+    let started = Instant::now();
+    let recordings: Vec<Recording> = reduced.iter().map(|log| Recording::without_samples(log.name.clone())).collect();
+    let training: Vec<usize> = (0..recordings.len()).collect();
+    let filters = (&settings.motion, &settings.parallel_filter);
+    let logs = Logs::new(model.model(), &recordings, filters, &[], None, execution)?;
+    let factors = reduced.iter().enumerate().map(|(index, log)| log_factors(&model, index, log));
+    let factors = factors.collect::<Result<Vec<_>, _>>()?;
+    let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
+    let training_rows = passes.of_factors(model, factors)?;
+    let Estimation { mut estimate, .. } = estimate(&training_rows.rows((&logs, settings), &training), None)?;
+    let noise_half_width_95 = estimate.half_width_95.clone();
+    let varied = with_variation(&training_rows, &settings.estimation.weighted(), &estimate);
+    let between_logs = varied.map(|(wider, between)| {
+        estimate = wider;
+        between
+    });
+    let consistent = consistent_stage((&logs, settings), &training_rows, &estimate)?;
+    let dof = training_rows.model.dof();
+    let examination = TrainingExamination {
+        delays: vec![vec![None; dof]; recordings.len()],
+        traces: Vec::new(),
+        pooled_delays: vec![None; dof],
+        sign: sign_evidence(&training_rows.model.parametric, &training_rows.problem, &estimate),
+        friction_signs: friction_signs(&training_rows.model, &training_rows.problem, &estimate),
+    };
+    Ok(Identification {
+        payloads: Vec::new(),
+        motion: logs.motion.clone(),
+        cutoff: None,
+        motion_hz: None,
+        estimator: settings.estimation.estimator.clone(),
+        estimation: Estimation::plain(estimate),
+        essential: None,
+        consistent,
+        examination,
+        held_out: Vec::new(),
+        diagnosis: None,
+        torque_lag: LagChoice::default(),
+        between_logs,
+        noise_half_width_95,
+        times: StageTimes { estimation_s: started.elapsed().as_secs_f64(), ..StageTimes::default() },
+        training: training_rows,
+    })
+}
+
+/// Whether all that makes rows is stated.
+fn is_reducible(model: &RegressorModel, settings: &IdentificationSettings) -> Result<(), ReduceError> {
+    if let Some(search) = settings.friction.first() {
+        return Err(ReduceError::Friction { joint: search.joint.clone() });
+    }
+    if settings.motion.differentiator.wants_cutoff() {
+        return Err(ReduceError::Cutoff);
+    }
+    if model.needs_load() {
+        return Err(ReduceError::Load);
+    }
+    if settings.gains == GainChoice::Unknown {
+        return Err(ReduceError::Columns { what: "unknown gains" });
+    }
+    if settings.offsets == OffsetChoice::PerLog {
+        return Err(ReduceError::Columns { what: "offsets of single logs" });
+    }
+    match &settings.estimation.estimator {
+        Estimator::Ordinary | Estimator::Weighted | Estimator::Auto(_) => Ok(()),
+        other => Err(ReduceError::Estimator { method: other.name() }),
+    }
+}
+
+/// The settings without what would look at samples again.
+fn without_second_look(settings: &IdentificationSettings) -> IdentificationSettings {
+    let mut own = settings.clone();
+    if let Estimator::Auto(_) = own.estimation.estimator {
+        own.estimation.estimator = Estimator::Weighted;
+    }
+    own.estimation.exogeneity_test = None;
+    own.estimation.examine_exogeneity = false;
+    own.diagnosis = DiagnosisChoice::Never;
+    own
+}
+
+/// The factors of a reduced log, if they are this model's.
+fn log_factors(model: &RegressorModel, index: usize, log: &ReducedLog) -> Result<LogFactors, EstimationError> {
+    let fits = |what: &str, factors: &[SegmentedFactor]| {
+        let mismatch = |what: String, expected, found| Err(EstimationError::Mismatch { what, expected, found });
+        if factors.len() != model.dof() {
+            return mismatch(format!("log {}: joints with {what}", log.name), model.dof(), factors.len());
+        }
+        for (joint, factor) in factors.iter().enumerate() {
+            let expected = model.layout().joint_columns(joint).len();
+            if factor.columns() != expected {
+                let what = format!("log {}, joint {}: columns of its {what}", log.name, model.joint_names()[joint]);
+                return mismatch(what, expected, factor.columns());
+            }
+        }
+        Ok(())
+    };
+    fits("factors", &log.factors)?;
+    log.noise.as_ref().map_or(Ok(()), |noise| fits("noise", noise))?;
+    Ok(LogFactors {
+        index,
+        factors: log.factors.clone(),
+        statistics: log.statistics.clone(),
+        noise: log.noise.clone(),
+        nominal_agreement: None,
+    })
+}
+
+/// The part of the torque of reduced logs that base parameters `theta` leave unexplained: `‖τ − Wθ‖ / ‖τ‖` of every
+/// log, percent; none for a log without torque. From factors, so without a look at the samples, and exact.
+///
+/// # Errors
+/// Factors of other columns.
+pub fn reduced_errors(
+    robot: &ParametricModel,
+    theta: &[f64],
+    reduced: &[&ReducedLog],
+) -> Result<Vec<Option<f64>>, EstimationError> {
+    let model = RegressorModel::from(robot.clone());
+    let columns = model.layout().columns().len();
+    if theta.len() != columns {
+        let what = "base parameters of the model".to_owned();
+        return Err(EstimationError::Mismatch { what, expected: columns, found: theta.len() });
+    }
+    let of_log = |(index, log): (usize, &&ReducedLog)| {
+        let (mut error, mut torque) = (0.0, 0.0);
+        for (joint, factor) in log_factors(&model, index, log)?.factors.iter().enumerate() {
+            let own: Vec<f64> = model.layout().joint_columns(joint).iter().map(|&column| theta[column]).collect();
+            let total = factor.total();
+            error += total.residual_sum_of_squares(&own)?;
+            torque += total.torque_norm().powi(2);
+        }
+        Ok((torque > 0.0).then(|| 100.0 * (error / torque).sqrt()))
+    };
+    reduced.iter().enumerate().map(of_log).collect()
+}
