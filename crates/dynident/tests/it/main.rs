@@ -17,6 +17,7 @@ mod drive_gains;
 mod estimators;
 mod excitation;
 mod exogeneity;
+mod factors;
 mod friction_choice;
 mod in_memory;
 mod instruments;
