@@ -67,8 +67,8 @@ pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
-pub use error::{Error, Expected, NewStudyError, StudyError};
-pub use factors::{FactorLog, Factors, FactorsError};
+pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError};
+pub use factors::{FactorLog, Factors};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};

@@ -1,12 +1,13 @@
 //! Everything that can stop a job, each with the file, the place and the fix in its message.
 
+mod factors;
 mod new_study;
 mod study;
 
+pub use factors::FactorsError;
 pub use new_study::NewStudyError;
 pub use study::{Expected, StudyError};
 
-use crate::factors::FactorsError;
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
 use dynident_model::ReadError;

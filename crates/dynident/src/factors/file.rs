@@ -13,7 +13,8 @@
 //!     32                   SHA-256 of all before
 //! ```
 
-use super::{FactorLog, Factors, FactorsError};
+use super::{FactorLog, Factors};
+use crate::error::FactorsError;
 use crate::study::Study;
 use dynident_estimation::{FactorShape, SegmentedFactor};
 use dynident_identification::ReducedLog;

@@ -1,12 +1,10 @@
 //! **Logs as factors**: what many logs of a kind of robot say, in a form that is small, that can be put together in any
 //! order, and that a model is made from without the logs.
 
-mod error;
 mod file;
 
-pub use error::FactorsError;
-
 use crate::digest::hexadecimal;
+use crate::error::FactorsError;
 use crate::study::Study;
 use dynident_identification::ReducedLog;
 use sha2::{Digest, Sha256};

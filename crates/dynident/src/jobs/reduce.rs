@@ -1,7 +1,7 @@
 //! Logs to factors, and factors to a model: identification of many logs that need not lie in one place.
 
-use crate::error::Error;
-use crate::factors::{FactorLog, Factors, FactorsError, name_alone};
+use crate::error::{Error, FactorsError};
+use crate::factors::{FactorLog, Factors, name_alone};
 use crate::jobs::identify::{IdentificationOutcome, Made, written};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::{factors_provenance, now};
