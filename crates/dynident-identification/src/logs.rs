@@ -34,6 +34,7 @@ pub struct Logs<'a> {
     pub filter: &'a ParallelFilterSettings,
     /// How the job runs.
     pub execution: Execution<'a>,
+    /// Empty where nothing is kept between passes.
     kept: Vec<OnceLock<KeptLog>>,
     /// What the spectra of the deciding logs say, where the cut-off was left to them.
     spectra: Vec<LogSpectrum>,
@@ -91,6 +92,13 @@ impl<'a> Logs<'a> {
         self
     }
 
+    /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
+    #[must_use]
+    pub(crate) fn without_keeping(mut self) -> Self {
+        self.kept.clear();
+        self
+    }
+
     /// The same with held-out figures for the band that a motion cut-off of `motion_hz` makes; `None` for that of the
     /// fit.
     #[must_use]
@@ -124,7 +132,7 @@ impl<'a> Logs<'a> {
             reader_thread: false,
             most_samples: None,
             progress: self.execution.progress,
-            kept: Some(&self.kept[index]),
+            kept: self.kept.get(index),
         }
     }
 

@@ -92,7 +92,7 @@ pub fn reduce(
     execution.install(|| {
         let training = of_role(recordings, Role::Identify);
         let filters = (&settings.motion, &settings.parallel_filter);
-        let logs = Logs::new(robot.model(), recordings, filters, &[], None, execution)?;
+        let logs = Logs::new(robot.model(), recordings, filters, &[], None, execution)?.without_keeping();
         let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
         let reduced = passes.factors(&model)?.into_iter().map(|log| {
             let few = |factors: Vec<SegmentedFactor>, most: usize| {

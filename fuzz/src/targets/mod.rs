@@ -23,7 +23,7 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 20] = [
+pub(crate) const TARGETS: [Target; 21] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
     Target { name: "sdf", repetitions: 20, new: parsers::sdf },
@@ -40,6 +40,7 @@ pub(crate) const TARGETS: [Target; 20] = [
     Target { name: "matlab", repetitions: 10, new: formats::any },
     Target { name: "states", repetitions: 20, new: parsers::states },
     Target { name: "result", repetitions: 10, new: parsers::result },
+    Target { name: "factors", repetitions: 10, new: parsers::factors },
     Target { name: "design", repetitions: 20, new: parsers::design },
     Target { name: "iterations", repetitions: 10, new: parsers::iterations },
     Target { name: "protocol", repetitions: 40, new: parsers::protocol },

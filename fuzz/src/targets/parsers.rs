@@ -10,7 +10,8 @@ use dynident::model::{
 };
 use dynident::recording::log::{ChannelGroup, ColumnRef, Columns, TimeColumn};
 use dynident::recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
-use dynident::{DesignFile, Quantity, ResultFile, Study};
+use dynident::{DesignFile, Factors, Quantity, ResultFile, Study};
+use sha2::{Digest, Sha256};
 use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -260,6 +261,17 @@ pub(crate) fn result() -> io::Result<Box<dyn Run>> {
     of_file("result.json", |path| match ResultFile::read(path) {
         Ok(_) => true,
         Err(error) => said(&error),
+    })
+}
+
+/// A file of factors, its hash made anew: without it every mutated file would be refused for its hash.
+pub(crate) fn factors() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let hash = Sha256::digest(input);
+        match Factors::from_bytes(&[input, &hash[..]].concat()) {
+            Ok(factors) => factors.to_bytes().is_ok(),
+            Err(error) => said(&error),
+        }
     })
 }
 
