@@ -40,9 +40,9 @@ pub(crate) const TARGETS: [Target; 21] = [
     Target { name: "matlab", repetitions: 10, new: formats::any },
     Target { name: "states", repetitions: 20, new: parsers::states },
     Target { name: "result", repetitions: 10, new: parsers::result },
-    Target { name: "factors", repetitions: 10, new: parsers::factors },
     Target { name: "design", repetitions: 20, new: parsers::design },
     Target { name: "iterations", repetitions: 10, new: parsers::iterations },
     Target { name: "protocol", repetitions: 40, new: parsers::protocol },
     Target { name: "jobs", repetitions: 1, new: jobs::jobs },
+    Target { name: "factors", repetitions: 10, new: parsers::factors },
 ];

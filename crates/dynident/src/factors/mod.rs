@@ -112,7 +112,7 @@ impl Factors {
         let mut all = parts.next().ok_or(FactorsError::Empty)?;
         let kind = all.kind()?;
         for part in parts {
-            all.is_like(&kind, &part.kind()?)?;
+            is_one_kind(&kind, &part.kind()?)?;
             all.logs.extend(part.logs);
         }
         all.logs = in_order(all.logs);
@@ -129,16 +129,16 @@ impl Factors {
         kind["name"] = serde_json::Value::Null;
         Ok(kind)
     }
+}
 
-    /// Whether `other` is of this kind.
-    fn is_like(&self, kind: &serde_json::Value, other: &serde_json::Value) -> Result<(), FactorsError> {
-        if kind == other {
-            return Ok(());
-        }
-        let differs = |key: &&String| kind.get(*key) != other.get(*key);
-        let sections = kind.as_object().map(|sections| sections.keys().filter(differs).cloned().collect());
-        Err(FactorsError::Unlike { sections: sections.unwrap_or_default() })
+/// That factors of two kinds can be put together: they are of one.
+fn is_one_kind(kind: &serde_json::Value, other: &serde_json::Value) -> Result<(), FactorsError> {
+    if kind == other {
+        return Ok(());
     }
+    let differs = |key: &&String| kind.get(*key) != other.get(*key);
+    let sections = kind.as_object().map(|sections| sections.keys().filter(differs).cloned().collect());
+    Err(FactorsError::Unlike { sections: sections.unwrap_or_default() })
 }
 
 /// Logs by their keys, each once.

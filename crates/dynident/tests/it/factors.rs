@@ -101,7 +101,10 @@ fn what_is_left_to_the_logs_is_refused_with_the_key() {
             other => panic!("{other:?}"),
         }
     };
-    assert!(said(&|study| study.motion = Default::default()).contains("motion.differentiator.cutoff_hz"));
+    assert!(
+        said(&|study| study.motion = dynident::recording::MotionSettings::default())
+            .contains("motion.differentiator.cutoff_hz")
+    );
     assert!(said(&|study| study.drive.friction = None).contains("drive.friction = \"stated\""));
     let huber = dynident::study::EstimatorMethod::Huber;
     assert!(said(&|study| study.estimator.method = huber).contains("estimator.method = \"huber\""));
