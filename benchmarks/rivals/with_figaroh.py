@@ -64,6 +64,20 @@ def identify(urdf, configuration, train, kind=UR10, wls=False, decimate=False):
 # end user
 
 
+class GradientUR10(UR10):
+    """Leaves the derivatives to FIGAROH's pipeline: central differences of the filtered positions."""
+
+    def load_trajectory_data(self, data_source=None):
+        table = pd.read_csv(data_source or self.train)
+        return {
+            "timestamps": table["t"].to_numpy().reshape(-1, 1),
+            "positions": table[[f"q{i}" for i in range(6)]].to_numpy(),
+            "velocities": None,
+            "accelerations": None,
+            "torques": table[[f"tau{i}" for i in range(6)]].to_numpy(),
+        }
+
+
 class ExactUR10(UR10):
     """Takes velocities and accelerations as the recording has them, and filters nothing: what the reference case does."""
 
