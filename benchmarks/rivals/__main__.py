@@ -67,7 +67,9 @@ class Figures:
             self.measured.append(percent(tau, measured))
 
     def numbers(self):
-        middle = lambda values: float(np.median(values)) if values else None
+        def middle(values):
+            return float(np.median(values)) if values else None
+
         return dict(
             runs=len(self.seconds),
             seconds_min=min(self.seconds),
@@ -86,12 +88,12 @@ class Figures:
 
 @contextlib.contextmanager
 def timed(figures):
-    """Adds the seconds of a run; what it prints is not shown."""
+    """Adds the seconds of the processor that a run takes; what it prints is not shown."""
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        begin = time.perf_counter()
+        begin = time.process_time()
         yield
-        figures.seconds.append(time.perf_counter() - begin)
+        figures.seconds.append(time.process_time() - begin)
 
 
 BEST = dict(kind=with_figaroh.GradientUR10, wls=True, decimate=True)
@@ -209,7 +211,10 @@ def arm(seeds, rounds, quick):
 
 
 def number(value, digits=2):
-    return "" if value is None else f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+    """Short for a table: so many digits, or all before the point; beyond a thousand nothing but that."""
+    if value is None:
+        return ""
+    return "> 1000" if value > 1000 else f"{value:.{digits}g}" if value < 10**digits else f"{value:.0f}"
 
 
 def row(words, numbers, measured):
@@ -239,7 +244,7 @@ def table(ur10_found, arm_found):
         f"{machine['date']}, {machine['cpu']} ({machine['cores']} cores, one used; load {machine['load']}), Python {platform.python_version()}, {versions}.",
         "Lines of a user's program: " + ", ".join(f"{name} {count}" for name, count in used.items()) + ".",
     ]
-    head = "| {} | s: least (median) | held out, %: median (most) | worst joint, % | {}error / bar, rms | truth inside 95 % | refused or warned |"
+    head = "| {} | processor s: least (median) | held out, %: median (most) | worst joint, % | {}error / bar, rms | truth inside 95 % | refused or warned |"
     for level, figures in ur10_found.items():
         effort, position = ur10_example.NOISE[level]
         out += ["", f"UR10, noise of {100 * effort:g} % on the torques and {position:g} rad on the positions:", ""]

@@ -1,7 +1,7 @@
 """The arm of mujoco.sysid's tutorial and its recording, made anew: five joints under open-loop torques, armatures unknown.
 
-The tutorial is the notebook that stands beside the package in MuJoCo's repository, "Robot Arm: Identifying Joint Armature". Arm, torques, length, rate, seed
-and noise are the tutorial's numbers; the samples come from MuJoCo itself, as there.
+The tutorial is the notebook beside the package (`python/mujoco/sysid/sysid.ipynb` of github.com/google-deepmind/mujoco), "Robot Arm: Identifying Joint Armature".
+Arm, torques, length, rate and noise are its numbers; the samples come from MuJoCo itself, as there.
 """
 from dataclasses import dataclass
 
@@ -31,7 +31,6 @@ class Recording:
     """What was, and the positions as recorded; torques are commanded and exact, as in the tutorial."""
 
     t: np.ndarray
-    state: np.ndarray
     q: np.ndarray
     dq: np.ndarray
     ddq: np.ndarray
@@ -72,7 +71,6 @@ def record(name, noise_rad, seed):
     t = np.arange(int(DURATION_S * RATE_HZ)) / RATE_HZ
     tau = np.column_stack([a * np.sin(2 * np.pi * f * t + phase) for a, f, phase in TORQUES[name]])
     q, dq, ddq = np.zeros((3, len(t), len(JOINTS)))
-    state = np.concatenate([[0.0], data.qpos, data.qvel])
     for row, torque in enumerate(tau):
         q[row], dq[row] = data.qpos, data.qvel
         data.ctrl = torque
@@ -81,7 +79,7 @@ def record(name, noise_rad, seed):
         mujoco.mj_step(model, data)
     if np.abs(q).max() > 3.14:
         raise RuntimeError(f"{name}: the arm runs into its limits")
-    return Recording(t, state, q, dq, ddq, tau, q + np.random.default_rng(seed).normal(0.0, noise_rad, q.shape))
+    return Recording(t, q, dq, ddq, tau, q + np.random.default_rng(seed).normal(0.0, noise_rad, q.shape))
 
 
 def inverse(model, q, dq, ddq):

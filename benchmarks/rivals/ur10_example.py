@@ -1,9 +1,9 @@
 """The data of FIGAROH's own UR10 example, rebuilt from its published numbers.
 
-The example (`identification_reference.py` of figaroh-examples, which the README of FIGAROH 1.0.2 begins with) has a robot of which the truth is known: the
-inertias of a UR10e with camera and tool, each moved at random. What is published of it is numbers: the truth, the rest points of the motion that was fitted to
-(FIGAROH's own optimiser found them), the Fourier coefficients of the held-out one, the seeds of the noise. `rebuild` makes the samples of these, and refuses if
-the torques are not the published ones.
+The example (`examples/ur10/identification_reference.py` of github.com/thanhndv212/figaroh-examples, which the README of FIGAROH 1.0.2 begins with) has a robot
+of which the truth is known: the inertias of a UR10e with camera and tool, each moved at random. Its folder `data/truth` (`manifest.json` of commit 98345176 and
+`truth_parameters.csv`) has the numbers: the truth, the rest points of the motion to fit to (FIGAROH's own optimiser found them), the Fourier coefficients of the
+held-out one, levels and seeds of the noise. `rebuild` makes the samples of these, and refuses if the torques are not the published ones.
 """
 from dataclasses import dataclass
 
@@ -125,8 +125,8 @@ def between_rests():
     t = np.arange((len(WAYPOINTS) - 1) * int(INTERVAL_S * RATE_HZ)) / RATE_HZ
     piece = (t // INTERVAL_S).astype(int)
     s = (t / INTERVAL_S - piece)[:, None]
-    from_, way = WAYPOINTS[piece], np.diff(WAYPOINTS, axis=0)[piece]
-    q = from_ + way * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    start, way = WAYPOINTS[piece], np.diff(WAYPOINTS, axis=0)[piece]
+    q = start + way * (10 * s**3 - 15 * s**4 + 6 * s**5)
     dq = way * (30 * s**2 - 60 * s**3 + 30 * s**4) / INTERVAL_S
     return t, q, dq, way * (60 * s - 180 * s**2 + 120 * s**3) / INTERVAL_S**2
 
