@@ -46,6 +46,12 @@ program=$scratch/python/bin
 
 # One wheel for every Python: pip links it anew each time that it builds it.
 "$program/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$scratch/wheel" .
+# Beside FIGAROH and mujoco.sysid, once and short.
+environment rivals python3 "$scratch"/wheel/dynident-*.whl -r benchmarks/rivals/requirements.txt
+start=$SECONDS
+"$scratch/rivals/bin/python" -W ignore benchmarks/rivals --quick --out "$scratch/rivals_compared" >"$scratch/last" 2>&1 || { cat "$scratch/last"; exit 1; }
+printf '%4s s  benchmarks/rivals --quick\n' "$((SECONDS - start))"
+
 while read -r minor path; do
     case $minor in
         "$(interpreters | head -n 1 | cut -d ' ' -f 1)") numpy='numpy==1.26.4' ;;
