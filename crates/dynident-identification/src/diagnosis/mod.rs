@@ -93,8 +93,9 @@ pub(crate) fn has_jumps(report: &ImportReport) -> bool {
 }
 
 /// Compares readings of the recordings `training`, and looks for loads in the held-out ones beside the base parameters
-/// `theta`, where these are given. Where no reading explains half of the torque and the cut-off was left to the data,
-/// slower parts of the motion are tried: noise may cover what tells readings apart.
+/// `theta`, where these are given. Where no reading explains half of the torque, or none is a robot of the description,
+/// and the cut-off was left to the data, slower parts of the motion are tried: noise of the positions, which grows with
+/// frequency as no mistake does, may cover what tells readings apart, or be all that is left.
 ///
 /// # Errors
 /// Recordings that cannot be read, too few rows.
@@ -105,7 +106,8 @@ pub fn diagnose(
     theta: Option<&[f64]>,
 ) -> Result<Diagnosis, DiagnosisError> {
     let found = diagnosed((logs, settings), robot, training, theta)?;
-    let is_explained = found.search.best.is_some() || found.search.believed().left_of_all <= MOSTLY_NOISE;
+    let is_explained =
+        found.search.best.is_some() || (found.search.believed().left_of_all <= MOSTLY_NOISE && !found.is_unexplained());
     let Some(cutoff_hz) = logs.motion.differentiator.cutoff_hz().filter(|_| !is_explained) else { return Ok(found) };
     if !settings.motion.differentiator.wants_cutoff() {
         return Ok(found);
@@ -115,7 +117,8 @@ pub fn diagnose(
         let (model, cutoff_hz) = (robot.model(), Some(share * cutoff_hz));
         let slower = Logs::new(model, logs.recordings, settings.filters(), training, cutoff_hz, logs.execution)?;
         let again = diagnosed((&slower, settings), robot, training, None)?;
-        if again.search.best.is_some() {
+        let is_noise_alone = found.is_unexplained() && !again.is_unexplained();
+        if again.search.best.is_some() || is_noise_alone {
             return Ok(again);
         }
     }

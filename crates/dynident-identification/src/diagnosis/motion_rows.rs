@@ -53,18 +53,21 @@ impl MotionRows {
                     decimator.finish();
                 }
             }
+            // What rests on samples that the filter invented beyond the ends of a piece is no motion.
+            let [begin, behind] = block.unsettled;
+            let settled = begin..block.rows.saturating_sub(behind).max(begin);
             panel.clear();
             for values in [&block.q, &block.dq, &block.ddq, &block.tau] {
                 for &place in &places {
-                    panel.extend_from_slice(block.joint(values, place));
+                    panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
                 }
             }
             let (count, filtered) = match &mut decimator {
                 Some(decimator) => {
-                    let count = decimator.push(&panel, block.rows, &mut out);
+                    let count = decimator.push(&panel, settled.len(), &mut out);
                     (count, &out)
                 }
-                None => (block.rows, &panel),
+                None => (settled.len(), &panel),
             };
             for (quantity, to) in rows.quantities_mut().into_iter().enumerate() {
                 for (joint, to) in to.iter_mut().enumerate() {
