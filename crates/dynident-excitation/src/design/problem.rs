@@ -1,6 +1,7 @@
 //! Criterion and limits of a trajectory, as an optimiser takes them.
 
 use super::DesignTask;
+use super::column_units::ColumnUnits;
 use super::metric::Metric;
 use crate::criteria::Criterion;
 use crate::information::Information;
@@ -25,6 +26,7 @@ pub(super) struct Problem<'a> {
     /// Added to every value of each row, so that what is kept on samples is kept between them.
     margins: &'a [f64],
     criterion: &'a dyn Criterion,
+    units: &'a ColumnUnits,
     times: &'a [f64],
     weight: f64,
     information: Information<'a>,
@@ -48,7 +50,7 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         task: &'a DesignTask<'a>,
         margins: &'a [f64],
-        criterion: &'a dyn Criterion,
+        (criterion, units): (&'a dyn Criterion, &'a ColumnUnits),
         times: &'a [f64],
         weight: f64,
         shaped: bool,
@@ -71,6 +73,7 @@ impl<'a> Problem<'a> {
             task,
             margins,
             criterion,
+            units,
             times,
             weight,
             parameters: Vec::new(),
@@ -129,7 +132,7 @@ impl ConstrainedProblem for Problem<'_> {
             return f64::INFINITY;
         }
         let information = self.information.of(&self.motion, self.weight);
-        if let Some((value, derivative)) = self.criterion.value_and_derivative(&information) {
+        if let Some((value, derivative)) = self.units.value_and_derivative(self.criterion, &information) {
             self.by_information = Some(derivative);
             value
         } else {
@@ -151,6 +154,10 @@ impl ConstrainedProblem for Problem<'_> {
             self.information.apply_adjoint(&self.motion, self.weight, derivative, &mut self.adjoint);
         }
         self.task.family.apply_adjoint(&self.parameters, self.times, &self.adjoint, gradient);
+    }
+
+    fn objective_scale(&self, _objective: f64) -> f64 {
+        self.criterion.gradient_scale(self.task.layout.columns().len())
     }
 
     fn prepare_metric(&mut self, known: &CurvatureFacts<'_>) -> bool {
