@@ -1,7 +1,8 @@
-//! Nothing depends on the size of the robot or on units: the same motion of a robot a thousand times as heavy or a
-//! hundred times as long gives the same model, scaled, with the same bars, choices and findings.
+//! Nothing depends on the size of the robot or on units: the same motion of a robot a thousand times as heavy or
+//! long gives the same model, scaled, with the same bars, choices and findings.
 
 mod check;
+mod crane;
 mod design;
 mod identify;
 mod iterate;
@@ -19,12 +20,11 @@ struct Scale {
 
 const AS_IT_IS: Scale = Scale { mass: 1.0, length: 1.0, time: 1.0 };
 
-/// A watch gear and a crane; links of half a millimetre and of sixty metres. Time is not among them: the choice of the
-/// cut-off looks at pieces of eight seconds. Nor are links of a kilometre, beside which a kilogram square metre counts
-/// as rounding of the description.
+/// A watch gear and a crane; links of half a millimetre and of half a kilometre. Time is not among them: the choice of
+/// the cut-off looks at pieces of eight seconds.
 fn scales() -> [Scale; 4] {
     let [watch, crane] = [1e-3, 1e3].map(|mass| Scale { mass, ..AS_IT_IS });
-    let [short, long] = [1e-3, 1e2].map(|length| Scale { length, ..AS_IT_IS });
+    let [short, long] = [1e-3, 1e3].map(|length| Scale { length, ..AS_IT_IS });
     [watch, crane, short, long]
 }
 
@@ -58,7 +58,11 @@ impl Scale {
             text = times(&text, key, length);
         }
         text = times(&text, "velocity=\"", time.recip());
-        times(&text, "effort=\"", self.torque())
+        text = times(&text, "damping=\"", self.torque() * time);
+        for key in ["effort=\"", "friction=\""] {
+            text = times(&text, key, self.torque());
+        }
+        text
     }
 
     /// The keys of `[robot]` for a description of this scale.
