@@ -57,7 +57,8 @@ pub(super) fn identifiable_directions<'a>(
     let (mut functionals, mut first_row, mut carry) = (Vec::new(), vec![0], Vec::new());
     for (j, joint) in model.joints().iter().enumerate() {
         let motion = Harmonics::of(joint, &units);
-        let arriving = arriving_twists((model, &units), j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
+        let arriving =
+            arriving_twists((model, &units), j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
         // Conditions on this body's composite by its own joint, with the constants of the terms beside them.
         let own = arriving.iter().map(|w| (power(model, j, w), term_constants((model, &units), terms, j, w, slots)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.

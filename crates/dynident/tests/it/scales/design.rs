@@ -77,7 +77,11 @@ fn compare(scale: Scale, found: &DesignFile, expected: &DesignFile) -> Vec<Strin
         differences.compare("inflation", (found.inflation, expected.inflation), TOLERANCE * expected.inflation);
     }
     let all_words = |file: &DesignFile| -> Vec<String> {
-        [&file.diagnosis, &file.assumed, &file.not_checked, &file.notes].into_iter().flatten().map(|s| words(s)).collect()
+        [&file.diagnosis, &file.assumed, &file.not_checked, &file.notes]
+            .into_iter()
+            .flatten()
+            .map(|s| words(s))
+            .collect()
     };
     differences.equal("words", &all_words(found), &all_words(expected));
     differences.found
