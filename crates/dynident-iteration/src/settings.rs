@@ -93,10 +93,10 @@ pub enum StartWith {
 }
 
 /// When an iteration has converged: see [`Shortfall`](super::Shortfall) for what must be met, and by what it is judged.
-/// Parameters stand still with `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|`
-/// and `s ≤ most_uncertain · max|θ|`, where θ_k is what is known after run k. Sizes of different parameters are compared
-/// by the torque that they make along the motion, as a share of each joint's: a mass and a moment of inertia have no
-/// other common measure.
+/// Parameters stand still with `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance ·
+/// max|θ|` and `s ≤ most_uncertain · max|θ|`, where θ_k is what is known after run k. Sizes of different parameters are
+/// compared by the torque that they make along the motion, as a share of each joint's: a mass and a moment of inertia
+/// have no other common measure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]

@@ -15,9 +15,9 @@ use nalgebra::DMatrix;
 const PLACE_SCALE: f64 = 5.0;
 
 /// No step leads deeper into an obstacle than this share of its limit (arm's lengths for a floor): penalties alone do
-/// not keep a long step from ending on its other side. Chosen on the UR10 of the examples, whose wrist crosses its column by
-/// breaking it by 18 %: an obstacle that can be crossed by breaking it less is not held by it. A wall at 0.1 stopped
-/// descents early.
+/// not keep a long step from ending on its other side. Chosen on the UR10 of the examples, whose wrist crosses its
+/// column by breaking it by 18 %: an obstacle that can be crossed by breaking it less is not held by it. A wall at 0.1
+/// stopped descents early.
 const WALL: f64 = 0.16;
 
 /// Criterion and limits of one trajectory as functions of the family's parameters.

@@ -17,7 +17,9 @@ fn trajectory(scale: Scale) -> String {
         let t = sample as f64 / RATE_HZ;
         write!(text, "\n{:e}", t * scale.time).unwrap();
         for (order, values) in motion.at(t).iter().enumerate() {
-            values.iter().for_each(|x| write!(text, ",{:e}", x / scale.time.powi(order as i32)).unwrap());
+            for x in values {
+                write!(text, ",{:e}", x / scale.time.powi(order as i32)).unwrap();
+            }
         }
     }
     text + "\n"
