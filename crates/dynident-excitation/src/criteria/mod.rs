@@ -35,10 +35,9 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
         1.0
     }
 
-    /// What searches measure gradients by: ten times the [`scale`](Criterion::scale), about what criteria come to in SI
-    /// units (log det 435 of 43 columns). Not the value itself: to a logarithm the unit of every parameter adds.
+    /// What searches measure gradients by. Not the value itself: to a logarithm the unit of every parameter adds.
     fn gradient_scale(&self, columns: usize) -> f64 {
-        10.0 * self.scale(columns)
+        self.scale(columns)
     }
 
     /// Whether other units of the columns change the value by a constant only, the same for all informations.
