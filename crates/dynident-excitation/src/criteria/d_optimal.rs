@@ -23,11 +23,6 @@ impl Criterion for DOptimal {
         columns as f64
     }
 
-    /// About what `log det D` comes to in SI units: 435 for 43 columns.
-    fn gradient_scale(&self, columns: usize) -> f64 {
-        10.0 * self.scale(columns)
-    }
-
     fn is_free_of_units(&self) -> bool {
         true
     }
