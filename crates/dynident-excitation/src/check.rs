@@ -36,8 +36,8 @@ pub struct LimitReport {
     pub joint: String,
     /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for a column `2 - distance /
     /// least`, for two links 1 plus the lack of distance as a share of their radii and clearance (of 5 % of the arm's
-    /// length at least), for the floor 1 plus the metres below it (for shapes: arm's lengths). Infinite if the motion
-    /// is not finite: in JSON the largest number, 1.8e308.
+    /// length at least), for the floor 1 plus the arm's lengths below it. Infinite if the motion is not finite: in
+    /// JSON the largest number, 1.8e308.
     #[serde(serialize_with = "largest_for_infinite", deserialize_with = "infinite_for_largest")]
     #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub worst_ratio: f64,
@@ -65,7 +65,7 @@ enum Probe {
     Torque { joint: usize, limit: f64 },
     Power { joint: usize, limit: f64 },
     Axis { point: Point, axis: usize, lower: f64, upper: f64 },
-    Floor { point: Point, height_m: f64 },
+    Floor { point: Point, height_m: f64, length_m: f64 },
     FloorLink { link: Link, height_m: f64, length_m: f64 },
     Column { point: Point, x: f64, y: f64, radius_m: f64, top_m: f64 },
     Pair(Box<Pair>),
@@ -195,12 +195,12 @@ fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, L
         }
     }
     if let Some(floor) = &limits.floor {
+        let length_m = arm_length_m(model);
         if floor.shapes.is_empty() || !floor.points.is_empty() {
             for (name, point) in points(model, &floor.points) {
-                add(LimitKind::Floor, name, Probe::Floor { point, height_m: floor.height_m });
+                add(LimitKind::Floor, name, Probe::Floor { point, height_m: floor.height_m, length_m });
             }
         }
-        let length_m = arm_length_m(model);
         for (name, link) in links(model, &floor.shapes) {
             let height_m = floor.height_m - floor.lowered_m.get(&name).copied().unwrap_or(0.0);
             add(LimitKind::Floor, name, Probe::FloorLink { link, height_m, length_m });
@@ -318,7 +318,9 @@ impl Probe {
             Self::Axis { point, axis, lower, upper } => {
                 band(at(point)[*axis], *lower + point.radius_m, *upper - point.radius_m)
             }
-            Self::Floor { point, height_m } => 1.0 + (*height_m - (at(point)[2] - point.radius_m)),
+            Self::Floor { point, height_m, length_m } => {
+                1.0 + (*height_m - (at(point)[2] - point.radius_m)) / *length_m
+            }
             Self::FloorLink { link, height_m, length_m } => {
                 1.0 + link.below_m(placements, *height_m, (worst - 1.0) * *length_m) / *length_m
             }

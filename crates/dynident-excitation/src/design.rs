@@ -7,6 +7,7 @@
 
 pub(crate) mod assess;
 mod clear_starts;
+mod column_units;
 mod metric;
 mod problem;
 mod restoration;
@@ -178,7 +179,7 @@ pub fn design(
     let evaluations = AtomicU64::new(0);
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let coarse = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
-    let rounds = Rounds { task, times: &coarse, logged: logged.len(), shaped: true };
+    let rounds = Rounds::new(task, &coarse, logged.len(), true);
     let watch_all = watch;
     let stopped = AtomicBool::new(false);
     let over = || stopped.load(Ordering::Relaxed) || late();
@@ -238,7 +239,7 @@ pub fn design(
     // none, the least broken one.
     let criterion = last;
     let fine = grid(task.family.duration_s(), 2 * coarse.len() - 1);
-    let rounds = Rounds { task, times: &fine, logged: logged.len(), shaped: true };
+    let rounds = Rounds::new(task, &fine, logged.len(), true);
     let mut state = best.ok_or(OptimiserError::Start)?.state.on_twice_the_samples(coarse.len());
     let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
     for _ in 0..POLISHES {

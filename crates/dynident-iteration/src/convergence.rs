@@ -70,12 +70,12 @@ pub enum Shortfall {
     },
     /// A parameter that is hardly known.
     #[error(
-        "the error bar of {parameter} is {percent:.0} % of the largest parameter, {allowed_percent:.0} % are allowed"
+        "the error bar of {parameter} makes {percent:.0} % of the torque of the largest parameter, {allowed_percent:.0} % are allowed"
     )]
     ParameterUncertain {
         /// The base parameter.
         parameter: String,
-        /// Its error bar (one standard deviation) as a share of the largest parameter.
+        /// The torque of its error bar (one standard deviation) as a share of what the largest parameter makes.
         percent: f64,
         /// The widest that is allowed.
         allowed_percent: f64,
@@ -193,10 +193,13 @@ impl Shortfall {
     }
 }
 
-/// Names that sentences take.
+/// Names that sentences take, and how much parameters count.
 pub(crate) struct Names {
     pub(crate) joints: Vec<String>,
     pub(crate) parameters: Vec<String>,
+    /// Of each parameter, the torque that one of its unit makes along the last motion, as a share of the joints' own;
+    /// empty where the last run shows no torque.
+    pub(crate) shares: Vec<f64>,
 }
 
 /// What is not met after the last of `records`; nothing if the iteration has converged.
@@ -298,13 +301,14 @@ fn parameters(
     names: &Names,
 ) {
     let limits = &settings.settled;
-    let largest = largest(new);
+    let share = |k: usize| names.shares.get(k).copied().unwrap_or(0.0);
+    let largest = new.values.iter().enumerate().fold(0.0_f64, |most, (k, value)| most.max(value.abs() * share(k)));
     let count = new.values.len().min(old.values.len());
     let name =
         |place: usize| names.parameters.get(place).cloned().unwrap_or_else(|| format!("parameter {}", place + 1));
     let moved = |k: usize| {
-        let beyond = (new.values[k] - old.values[k]).abs() - limits.parameter_tolerance * largest;
-        let bar = new.std[k].hypot(old.std[k]);
+        let beyond = share(k) * (new.values[k] - old.values[k]).abs() - limits.parameter_tolerance * largest;
+        let bar = share(k) * new.std[k].hypot(old.std[k]);
         if beyond <= 0.0 { 0.0 } else { beyond / bar.max(f64::MIN_POSITIVE) }
     };
     let most = (0..count).map(|k| (k, moved(k))).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -312,28 +316,23 @@ fn parameters(
         let (parameter, allowed) = (name(k), limits.parameter_sigmas);
         found.push(Shortfall::ParameterMoves { parameter, bars, allowed });
     }
-    let widest = (0..count).map(|k| (k, new.std[k].max(old.std[k]))).max_by(|a, b| a.1.total_cmp(&b.1));
+    let widest = (0..count).map(|k| (k, share(k) * new.std[k].max(old.std[k]))).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, bar)) = widest.filter(|(_, bar)| *bar > limits.most_uncertain * largest) {
         let (percent, allowed_percent) = (100.0 * bar / largest.max(f64::MIN_POSITIVE), 100.0 * limits.most_uncertain);
         found.push(Shortfall::ParameterUncertain { parameter: name(k), percent, allowed_percent });
     }
 }
 
-fn largest(estimate: &RunEstimate) -> f64 {
-    estimate.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()))
-}
-
 /// Whether a further run of the same motion would tell little: the last two good runs have one model-based controller,
 /// no parameter moved beyond its bars or is hardly known, and tracking is inside the tolerance or no longer falls.
-pub(crate) fn stands_still(records: &[RunRecord], settings: &IterationSettings) -> bool {
+pub(crate) fn stands_still(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> bool {
     let [.., before, last] = records else { return false };
     if !(before.accepted && last.accepted && last.controller.model.is_some() && last.controller.damping == 1.0) {
         return false;
     }
     let (Some(old), Some(new)) = (before.knowledge(), last.knowledge()) else { return false };
     let mut moving = Vec::new();
-    let names = Names { joints: Vec::new(), parameters: Vec::new() };
-    parameters(&mut moving, (old, new), settings, &names);
+    parameters(&mut moving, (old, new), settings, names);
     let limits = &settings.settled;
     let (now, then) = (last.tracking_error(), before.tracking_error());
     moving.is_empty() && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)

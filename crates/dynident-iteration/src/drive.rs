@@ -8,6 +8,7 @@ use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
+use crate::parameter_shares::parameter_shares;
 use crate::planner::{MotionPlanner, PlannedMotion};
 use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
@@ -111,7 +112,7 @@ impl Iteration {
     /// Records of another robot.
     pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
         let robot = self.robot(records)?;
-        let next = policy::next(records, &self.settings, robot.nominal(), &names(&robot));
+        let next = policy::next(records, &self.settings, robot.nominal(), &self.names(&robot, records)?);
         if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) =
             next
             && let Some(reason) = self.beyond_torque(records)?
@@ -127,7 +128,20 @@ impl Iteration {
     /// Records of another robot.
     pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<Shortfall>, IterationError> {
         let robot = self.robot(records)?;
-        Ok(shortfalls(records, &self.settings, &names(&robot)))
+        Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))
+    }
+
+    /// Names, and how much each parameter counts along the motion of the last run.
+    fn names(&self, robot: &ParametricModel, records: &[RunRecord]) -> Result<Names, IterationError> {
+        let shown = records.last().and_then(|last| Some((last, last.evidence.as_ref()?)));
+        let shares = match shown {
+            Some((last, evidence)) => {
+                let torque_rms: Vec<f64> = evidence.joints.iter().map(|joint| joint.torque_rms).collect();
+                parameter_shares(robot, &self.legs_of(last)?, &torque_rms)
+            }
+            None => Vec::new(),
+        };
+        Ok(Names { joints: robot.joint_names(), parameters: robot.base().expressions(), shares })
     }
 
     /// Where the trajectories ask for more torque than the joints have, by the last good model.
@@ -392,7 +406,7 @@ impl Iteration {
 
     /// Whether the run counts as good.
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
-        let names = names(&*self.robot(before)?);
+        let names = self.names(&*self.robot(before)?, before)?;
         let following = following_limits(&self.legs_of(record)?, self.task.robot.dof());
         match policy::verdict(record, before, &self.settings, (&following, &names)) {
             Ok(()) => record.accepted = true,
@@ -466,11 +480,6 @@ impl Iteration {
         };
         records.iter().copied().map(one).collect()
     }
-}
-
-/// The names of a robot's joints and base parameters.
-fn names(robot: &ParametricModel) -> Names {
-    Names { joints: robot.joint_names(), parameters: robot.base().expressions() }
 }
 
 /// Runs, identifies and runs again until all has settled: the first run by a controller without a model or by the

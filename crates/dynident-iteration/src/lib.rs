@@ -79,6 +79,7 @@ mod good_log;
 mod leg;
 mod model_parameters;
 mod motion;
+mod parameter_shares;
 mod planner;
 mod planning;
 mod policy;

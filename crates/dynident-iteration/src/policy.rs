@@ -74,7 +74,7 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     }
     // Once more before it is said: the second of two runs that stand still was made with the model of the first.
     let earlier = &records[..records.len() - 1];
-    if stands_still(records, settings) && (!settings.reject || stands_still(earlier, settings)) {
+    if stands_still(records, settings, names) && (!settings.reject || stands_still(earlier, settings, names)) {
         return Next::Finished(IterationStatus::Settled);
     }
     if !settings.reject {

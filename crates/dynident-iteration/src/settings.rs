@@ -93,18 +93,20 @@ pub enum StartWith {
 }
 
 /// When an iteration has converged: see [`Shortfall`](super::Shortfall) for what must be met, and by what it is judged.
-/// Parameters stand still with `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|`
-/// and `s ≤ most_uncertain · max|θ|`, where θ_k is what is known after run k.
+/// Parameters stand still with `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance ·
+/// max|θ|` and `s ≤ most_uncertain · max|θ|`, where θ_k is what is known after run k. Sizes of different parameters are
+/// compared by the torque that they make along the motion, as a share of each joint's: a mass and a moment of inertia
+/// have no other common measure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SettledSettings {
     /// Error bars within which a change counts as none. Default 3.
     pub parameter_sigmas: f64,
-    /// Share of the largest parameter within which a change counts as none. Default 1e-6.
+    /// Share of the largest parameter (by its torque) within which a change counts as none. Default 1e-6.
     pub parameter_tolerance: f64,
-    /// Widest error bar (one standard deviation) as a share of the largest parameter: what is known worse than that
-    /// cannot be said to stand still. Default 0.1.
+    /// Widest error bar (one standard deviation) as a share of the largest parameter, both by their torque: what is
+    /// known worse than that cannot be said to stand still. Default 0.1.
     pub most_uncertain: f64,
     /// Tracking error that is good enough, rad (m): the largest distance of every joint from its trajectory. Default
     /// 1e-4.

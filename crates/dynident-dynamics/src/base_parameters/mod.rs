@@ -12,6 +12,7 @@ mod determination;
 mod expression;
 mod numerical;
 mod one_joint_motions;
+mod own_units;
 mod structural;
 
 pub(crate) use declared::{DeclaredFault, fault};
@@ -20,7 +21,7 @@ pub use numerical::{NumericalRank, numerical_rank};
 pub use one_joint_motions::numerical_rank_by_body;
 
 use self::expression::Digits;
-use crate::independent_columns::{IndependentColumns, split_columns};
+use crate::independent_columns::IndependentColumns;
 use crate::regressor_panels::{Column, all_columns};
 use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
@@ -57,8 +58,7 @@ impl BaseParameters {
         let split = if model.coupling().is_some() {
             coupled::independent_columns(model, terms, settings.tolerance)
         } else {
-            let directions = structural::identifiable_directions(model, terms, settings.tolerance);
-            split_columns(&directions, settings.tolerance)
+            structural::identifiable_directions(model, terms, settings.tolerance).split(settings.tolerance)
         };
         let split = declared::regrouped(model, &columns, split, settings.tolerance);
         Self { columns, split }

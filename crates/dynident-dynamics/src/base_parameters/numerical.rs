@@ -105,7 +105,7 @@ fn reach_of_torque(model: &Model, joint: usize, length: f64) -> f64 {
 
 /// The longest way from one joint to the next, m; 1 where all stand in one place. Where the first stands does not
 /// matter.
-fn longest_link_m(model: &Model) -> f64 {
+pub(super) fn longest_link_m(model: &Model) -> f64 {
     let links = model.tree_joints().iter().filter(|joint| joint.parent.is_some());
     let longest = links.map(|joint| joint.placement.translation.norm()).fold(0.0, f64::max);
     if longest > 0.0 { longest } else { 1.0 }

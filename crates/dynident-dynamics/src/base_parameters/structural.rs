@@ -17,7 +17,8 @@
 //! Slotine, *A geometric characterization of observability in inertial parameter identification* (2024); drive
 //! inertias, couplings and offsets join as constants in single entries.
 
-use crate::independent_columns::Columns;
+use super::own_units::OwnUnits;
+use crate::independent_columns::{Columns, IndependentColumns, split_columns};
 use crate::inverse_dynamics::inertial_wrench;
 use dynident_model::terms::{MotionFunction, TorqueTerm};
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
@@ -29,10 +30,11 @@ type Vector10 = SVector<f64, 10>;
 
 /// Rows over all columns (bodies, then terms) whose span is what torques depend on: those that each body gives, base to
 /// tip, then those of friction. A body's rows have entries for it, for the bodies further out and for the terms; they
-/// are kept where they arise and carried outward column by column.
+/// are kept where they arise and carried outward column by column. All in the robot's [`OwnUnits`].
 pub(super) struct IdentifiableDirections<'a> {
     model: &'a Model,
-    terms: usize,
+    terms: &'a [TorqueTerm],
+    units: OwnUnits,
     /// Of each body: its functionals of its ten composite parameters, with the constants of the terms beside them.
     functionals: Vec<Vec<DVector<f64>>>,
     /// Of each body: row of its first functional; the last is where the rows of friction begin.
@@ -46,18 +48,19 @@ pub(super) struct IdentifiableDirections<'a> {
 /// The directions that `model` and `terms` allow to be determined, where a share below `tolerance` counts as none.
 pub(super) fn identifiable_directions<'a>(
     model: &'a Model,
-    terms: &[TorqueTerm],
+    terms: &'a [TorqueTerm],
     tolerance: f64,
 ) -> IdentifiableDirections<'a> {
-    let (dof, slots) = (model.dof(), source_slots(model, terms));
+    let (dof, slots, units) = (model.dof(), source_slots(model, terms), OwnUnits::of(model));
     let mut twists: Vec<Vec<ArrivingTwist>> = Vec::with_capacity(dof);
     let mut composites: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
     let (mut functionals, mut first_row, mut carry) = (Vec::new(), vec![0], Vec::new());
     for (j, joint) in model.joints().iter().enumerate() {
-        let motion = Harmonics::of(joint);
-        let arriving = arriving_twists(model, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
+        let motion = Harmonics::of(joint, &units);
+        let arriving =
+            arriving_twists((model, &units), j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
         // Conditions on this body's composite by its own joint, with the constants of the terms beside them.
-        let own = arriving.iter().map(|w| (power(model, j, w), term_constants(terms, j, w, slots)));
+        let own = arriving.iter().map(|w| (power(model, j, w), term_constants((model, &units), terms, j, w, slots)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.
         let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
@@ -78,7 +81,23 @@ pub(super) fn identifiable_directions<'a>(
         carry.push(motion.inertia[0].transpose());
     }
     let friction = friction_conditions(terms);
-    IdentifiableDirections { model, terms: terms.len(), functionals, first_row, carry, friction }
+    IdentifiableDirections { model, terms, units, functionals, first_row, carry, friction }
+}
+
+impl IdentifiableDirections<'_> {
+    /// The split of all columns, with the regrouping in SI units.
+    pub(super) fn split(&self, tolerance: f64) -> IndependentColumns {
+        let mut split = split_columns(self, tolerance);
+        let of_bodies = (0..10 * self.model.dof()).map(|column| self.units.of_body(column % 10));
+        let of_terms = self.terms.iter().map(|term| self.units.of_term(self.model, term));
+        let units: Vec<f64> = of_bodies.chain(of_terms).collect();
+        for (mut factors, &column) in split.regrouping.column_iter_mut().zip(&split.dependent) {
+            for (factor, &base) in factors.iter_mut().zip(&split.independent) {
+                *factor *= units[base] / units[column];
+            }
+        }
+        split
+    }
 }
 
 impl Columns for IdentifiableDirections<'_> {
@@ -115,7 +134,7 @@ impl Columns for IdentifiableDirections<'_> {
             }
             blocks[j] = block;
         }
-        for term in 0..self.terms {
+        for term in 0..self.terms.len() {
             let constants = self.functionals.iter().flatten().map(|v| v[10 + term]);
             take(&constants.chain(self.friction.iter().map(|row| row[term])).collect::<Vec<f64>>());
         }
@@ -148,12 +167,13 @@ struct Harmonics {
 }
 
 impl Harmonics {
-    fn of(joint: &Joint) -> Self {
+    fn of(joint: &Joint, units: &OwnUnits) -> Self {
+        let placement = |q: f64| units.placement(joint.transform(units.reach(joint.turns()) * q));
         if joint.turns() {
             // Five equidistant angles resolve the harmonics 1, cos, sin, cos 2q, sin 2q exactly.
             let angles: [f64; 5] = core::array::from_fn(|k| core::f64::consts::TAU * k as f64 / 5.0);
-            let twists = angles.map(|q| twist_to_child(&joint.transform(q)));
-            let inertias = angles.map(|q| inertia_to_parent(&joint.transform(q)));
+            let twists = angles.map(|q| twist_to_child(&placement(q)));
+            let inertias = angles.map(|q| inertia_to_parent(&placement(q)));
             let weight = |k: usize, harmonic: usize| {
                 let phase = angles[k] * harmonic.div_ceil(2) as f64;
                 match harmonic {
@@ -167,7 +187,7 @@ impl Harmonics {
                 inertia: (0..5).map(|h| (0..5).map(|k| inertias[k] * weight(k, h)).sum()).collect(),
             }
         } else {
-            let [back, rest, forth] = [-1.0, 0.0, 1.0].map(|q| joint.transform(q));
+            let [back, rest, forth] = [-1.0, 0.0, 1.0].map(placement);
             let (b, r, f) = (inertia_to_parent(&back), inertia_to_parent(&rest), inertia_to_parent(&forth));
             Self {
                 twist: vec![twist_to_child(&rest), (twist_to_child(&forth) - twist_to_child(&back)) * 0.5],
@@ -201,7 +221,7 @@ fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
 
 /// A spanning set of the twists that arrive at joint `j`.
 fn arriving_twists(
-    model: &Model,
+    (model, units): (&Model, &OwnUnits),
     j: usize,
     motion: &Harmonics,
     parent: Option<&[ArrivingTwist]>,
@@ -226,7 +246,7 @@ fn arriving_twists(
     let size = gravity.norm().max(f64::MIN_POSITIVE);
     let at_base = [ArrivingTwist {
         twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
-        source: mark(slots) / size,
+        source: mark(slots) / units.gravity(size),
     }];
     let from: &[ArrivingTwist] = match parent {
         Some(parent) => parent,
@@ -264,7 +284,13 @@ fn power(model: &Model, j: usize, w: &ArrivingTwist) -> Vector10 {
 }
 
 /// What the terms add to the entry of joint `j` that `w` stands for.
-fn term_constants(terms: &[TorqueTerm], j: usize, w: &ArrivingTwist, slots: usize) -> DVector<f64> {
+fn term_constants(
+    (model, units): (&Model, &OwnUnits),
+    terms: &[TorqueTerm],
+    j: usize,
+    w: &ArrivingTwist,
+    slots: usize,
+) -> DVector<f64> {
     DVector::from_fn(terms.len(), |x, _| {
         let term = &terms[x];
         if !term.acts_on(j) {
@@ -272,7 +298,8 @@ fn term_constants(terms: &[TorqueTerm], j: usize, w: &ArrivingTwist, slots: usiz
         }
         let inward = term.joints().into_iter().filter(|k| *k <= j);
         let inertia: f64 = inward.map(|k| w.source[k % slots] * term.mass_matrix_entry(j, k)).sum();
-        inertia + w.source[slots] * term.constant_torque(j)
+        let constant = term.constant_torque(j);
+        if constant == 0.0 { inertia } else { inertia + w.source[slots] * constant * units.constant(model, term, j) }
     })
 }
 

@@ -23,6 +23,10 @@ impl Criterion for DOptimal {
         columns as f64
     }
 
+    fn is_free_of_units(&self) -> bool {
+        true
+    }
+
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
         self.value_and_derivative(information).map(|(value, _)| value)
     }

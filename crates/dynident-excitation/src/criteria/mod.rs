@@ -35,6 +35,16 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
         1.0
     }
 
+    /// What searches measure gradients by. Not the value itself: to a logarithm the unit of every parameter adds.
+    fn gradient_scale(&self, columns: usize) -> f64 {
+        self.scale(columns)
+    }
+
+    /// Whether other units of the columns change the value by a constant only, the same for all informations.
+    fn is_free_of_units(&self) -> bool {
+        false
+    }
+
     /// Whether many short searches find more than few long ones.
     fn has_many_optima(&self) -> bool {
         false

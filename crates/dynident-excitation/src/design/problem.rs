@@ -1,6 +1,7 @@
 //! Criterion and limits of a trajectory, as an optimiser takes them.
 
 use super::DesignTask;
+use super::column_units::ColumnUnits;
 use super::metric::Metric;
 use crate::criteria::Criterion;
 use crate::information::Information;
@@ -13,10 +14,10 @@ use nalgebra::DMatrix;
 /// back, but not to the other side of an obstacle.
 const PLACE_SCALE: f64 = 5.0;
 
-/// No step leads deeper into an obstacle than this share of its limit (metres for a floor): penalties alone do not keep
-/// a long step from ending on its other side. Chosen on the UR10 of the examples, whose wrist crosses its column by
-/// breaking it by 18 %: an obstacle that can be crossed by breaking it less is not held by it. A wall at 0.1 stopped
-/// descents early.
+/// No step leads deeper into an obstacle than this share of its limit (arm's lengths for a floor): penalties alone do
+/// not keep a long step from ending on its other side. Chosen on the UR10 of the examples, whose wrist crosses its
+/// column by breaking it by 18 %: an obstacle that can be crossed by breaking it less is not held by it. A wall at 0.1
+/// stopped descents early.
 const WALL: f64 = 0.16;
 
 /// Criterion and limits of one trajectory as functions of the family's parameters.
@@ -25,6 +26,7 @@ pub(super) struct Problem<'a> {
     /// Added to every value of each row, so that what is kept on samples is kept between them.
     margins: &'a [f64],
     criterion: &'a dyn Criterion,
+    units: &'a ColumnUnits,
     times: &'a [f64],
     weight: f64,
     information: Information<'a>,
@@ -48,7 +50,7 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         task: &'a DesignTask<'a>,
         margins: &'a [f64],
-        criterion: &'a dyn Criterion,
+        (criterion, units): (&'a dyn Criterion, &'a ColumnUnits),
         times: &'a [f64],
         weight: f64,
         shaped: bool,
@@ -71,6 +73,7 @@ impl<'a> Problem<'a> {
             task,
             margins,
             criterion,
+            units,
             times,
             weight,
             parameters: Vec::new(),
@@ -129,7 +132,7 @@ impl ConstrainedProblem for Problem<'_> {
             return f64::INFINITY;
         }
         let information = self.information.of(&self.motion, self.weight);
-        if let Some((value, derivative)) = self.criterion.value_and_derivative(&information) {
+        if let Some((value, derivative)) = self.units.value_and_derivative(self.criterion, &information) {
             self.by_information = Some(derivative);
             value
         } else {
@@ -151,6 +154,10 @@ impl ConstrainedProblem for Problem<'_> {
             self.information.apply_adjoint(&self.motion, self.weight, derivative, &mut self.adjoint);
         }
         self.task.family.apply_adjoint(&self.parameters, self.times, &self.adjoint, gradient);
+    }
+
+    fn objective_scale(&self, _objective: f64) -> f64 {
+        self.criterion.gradient_scale(self.task.layout.columns().len())
     }
 
     fn prepare_metric(&mut self, known: &CurvatureFacts<'_>) -> bool {

@@ -43,6 +43,11 @@ impl Criterion for Anything {
     fn scale(&self, _: usize) -> f64 {
         50.0
     }
+
+    /// There is no value: gradients are those of violations, which are shares of limits.
+    fn gradient_scale(&self, _: usize) -> f64 {
+        1.0
+    }
 }
 
 /// The best motion, if need be after a search for the limits alone: from the best so far and from random starts, until
@@ -66,7 +71,7 @@ pub(crate) fn restored(
         stop(&DesignProgress { round: "restoration", value, violation, evaluations: evaluations as u64 })
     };
     // Without a criterion nothing says how long a step may be where no limit pushes.
-    let [plain, rounds] = [false, true].map(|shaped| Rounds { task, times: fine, logged: logged.len(), shaped });
+    let [plain, rounds] = [false, true].map(|shaped| Rounds::new(task, fine, logged.len(), shaped));
     for start in 0..=STARTS {
         let mut parameters =
             if start == 0 { best.parameters.clone() } else { task.family.random(&positions, &speeds, &mut random) };

@@ -1,6 +1,7 @@
 //! One round of a search: every start a good part of the way, the best of them to the end.
 
 use super::DesignTask;
+use super::column_units::ColumnUnits;
 use super::problem::Problem;
 use crate::criteria::Criterion;
 use crate::optimisers::{
@@ -28,11 +29,11 @@ const VIOLATION_WEIGHT: f64 = 10.0;
 
 /// The grid of a round, and the samples that it stands for.
 pub(super) struct Rounds<'a> {
-    pub(super) task: &'a DesignTask<'a>,
-    pub(super) times: &'a [f64],
-    pub(super) logged: usize,
-    /// Whether the curvature of limits is made use of.
-    pub(super) shaped: bool,
+    task: &'a DesignTask<'a>,
+    times: &'a [f64],
+    logged: usize,
+    shaped: bool,
+    units: ColumnUnits,
 }
 
 /// Where a start ended.
@@ -51,6 +52,14 @@ pub(super) struct Candidate {
 pub(super) struct RoundResult {
     pub(super) best: Candidate,
     pub(super) evaluations: usize,
+}
+
+impl<'a> Rounds<'a> {
+    /// On the samples `times`, which stand for `logged` ones; `shaped` if the curvature of limits is made use of.
+    pub(super) fn new(task: &'a DesignTask<'a>, times: &'a [f64], logged: usize, shaped: bool) -> Self {
+        let units = ColumnUnits::new(task, times, logged as f64 / times.len() as f64);
+        Self { task, times, logged, shaped, units }
+    }
 }
 
 impl Rounds<'_> {
@@ -102,7 +111,7 @@ impl Rounds<'_> {
     ) -> Result<Vec<AugmentedLagrangianResult>, OptimiserError> {
         let weight = self.logged as f64 / self.times.len() as f64;
         let result = multi_start(
-            || Problem::new(self.task, margins, criterion, self.times, weight, self.shaped),
+            || Problem::new(self.task, margins, (criterion, &self.units), self.times, weight, self.shaped),
             starts,
             settings,
             |progress| {

@@ -134,7 +134,7 @@ fn with_wider(
     wide: f64,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(f64, Vec<f64>)>, OptimiserError> {
-    let search = Rounds { task, times: fine, logged: fine.len(), shaped: false };
+    let search = Rounds::new(task, fine, fine.len(), false);
     let mut random = Random::new(settings.seed ^ 0x51a6);
     let (positions, speeds) = ranges(task.limits);
     // What is kept on samples is kept between them, nearly.

@@ -4,6 +4,7 @@ use super::description::{BoxLimit, ColumnLimit, FloorLimit};
 use super::error::LimitError;
 use super::kind::{Constraint, LimitKind};
 use super::link_points::{BodyPoint, body_points};
+use super::pairs::arm_length_m;
 use super::term::{Inputs, Pull, Term};
 use super::validate::middle_and_half;
 use dynident_model::{Model, Vec3};
@@ -13,8 +14,8 @@ use dynident_model::{Model, Vec3};
 enum Room {
     /// `|p[axis] - middle| / half - 1`.
     Slab { axis: usize, middle: f64, half: f64 },
-    /// `lowest - p_z`, per metre.
-    Above { lowest: f64 },
+    /// `(lowest - p_z) / length`.
+    Above { lowest: f64, length: f64 },
     /// `1 - |p_xy - axis| / least`, or `(top - p_z) / least` where that is less: beside a column or above it.
     Outside { axis: [f64; 2], least: f64, top: f64 },
 }
@@ -43,9 +44,9 @@ impl Room {
                 gradient[axis] = (place[axis] - middle).signum() / half;
                 (place[axis] - middle).abs() / half - 1.0
             }
-            Self::Above { lowest } => {
-                gradient[2] = -1.0;
-                lowest - place[2]
+            Self::Above { lowest, length } => {
+                gradient[2] = -1.0 / length;
+                (lowest - place[2]) / length
             }
             Self::Outside { axis, least, top } => {
                 let (x, y) = (place[0] - axis[0], place[1] - axis[1]);
@@ -93,16 +94,17 @@ impl PlaceLimits {
         Ok(Self(rows))
     }
 
-    /// A floor: one row per point.
+    /// A floor: one row per point, by arm's lengths.
     pub(crate) fn floor(model: &Model, limit: &FloorLimit) -> Result<Self, LimitError> {
         if limit.points.is_empty() && !limit.shapes.is_empty() {
             return Ok(Self(Vec::new()));
         }
+        let length = arm_length_m(model).max(1e-9);
         let row = |point: BodyPoint| {
             let lowest = limit.height_m + point.radius_m;
             let subject = point.name.clone();
-            let constraint = Constraint { kind: LimitKind::Floor, subject, middle: lowest, size: 1.0, unit: "m" };
-            (point, Room::Above { lowest }, constraint)
+            let constraint = Constraint { kind: LimitKind::Floor, subject, middle: lowest, size: length, unit: "m" };
+            (point, Room::Above { lowest, length }, constraint)
         };
         Ok(Self(body_points(model, &limit.points, "the floor")?.into_iter().map(row).collect()))
     }

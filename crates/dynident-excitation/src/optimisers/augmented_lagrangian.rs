@@ -26,6 +26,10 @@ pub(crate) trait ConstrainedProblem {
     /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most
     /// weights are zero.
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
+    /// What gradients are measured by, at an objective f: max(1, |f|), for an objective whose zero has a meaning.
+    fn objective_scale(&self, objective: f64) -> f64 {
+        objective.abs().max(1.0)
+    }
     /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last
     /// [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton matrix starts at every step. Returns
     /// whether there is a model.
@@ -54,7 +58,8 @@ pub(crate) struct CurvatureFacts<'a> {
 pub(crate) struct AugmentedLagrangianSettings {
     /// A point is feasible if no constraint is violated by more. Default 1e-8.
     pub feasibility_tolerance: f64,
-    /// Converged if the projected gradient of the Lagrangian has no entry above this times max(1, |f|). Default 1e-6.
+    /// Converged if the projected gradient of the Lagrangian has no entry above this times
+    /// [`objective_scale`](ConstrainedProblem::objective_scale). Default 1e-6.
     pub optimality_tolerance: f64,
     /// Evaluations at most. Default 20,000.
     pub max_evaluations: usize,
@@ -219,7 +224,7 @@ pub(crate) fn augmented_lagrangian(
     let mut last_measure = f64::INFINITY;
     let mut status = AugmentedLagrangianStatus::IterationLimit;
     while search.outer < settings.max_outer_iterations {
-        let scale = search.objective.abs().max(1.0);
+        let scale = search.problem.objective_scale(search.objective);
         let wanted = tolerance.max(settings.optimality_tolerance) * scale;
         let effort = Effort { tolerance: wanted, iterations: settings.max_inner_iterations, memory: settings.memory };
         let (end, stationarity) = projected_lbfgs(&mut search, &bounds, &mut x, &effort);
@@ -231,7 +236,7 @@ pub(crate) fn augmented_lagrangian(
         search.value(&x);
         search.outer += 1;
         let measure = search.update_multipliers();
-        let scale = search.objective.abs().max(1.0);
+        let scale = search.problem.objective_scale(search.objective);
         let within = measure <= settings.feasibility_tolerance;
         if within && stationarity <= settings.optimality_tolerance * scale {
             status = AugmentedLagrangianStatus::Converged;

@@ -100,7 +100,7 @@ fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -
         limit.power_w = Some(peak(LimitKind::Power));
     }
     if let Some(floor) = &mut limits.floor {
-        // The ratio is one plus the metres below; a hair of 5 mm as room.
+        // The ratio is one plus the arm's lengths below; a hair of 5 mm as room.
         let deepest = reports.iter().filter(|report| report.kind == LimitKind::Floor);
         floor.height_m = 0.995 - deepest.fold(f64::NEG_INFINITY, |worst, report| worst.max(report.worst_ratio));
     }

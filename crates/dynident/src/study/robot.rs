@@ -71,8 +71,9 @@ pub struct LoopSection {
     pub passive: Vec<String>,
 }
 
-/// Largest component of gravity: beyond it the unit must be wrong, and numbers run away.
-const MAX_GRAVITY_M_S2: f64 = 1000.0;
+/// Largest component of gravity, beyond which numbers run away. Robots in millimetres have 9810, and in milliseconds a
+/// thousandth of a thousandth of it.
+const MAX_GRAVITY_M_S2: f64 = 1e9;
 
 impl FollowSection {
     /// What the joint follows.
@@ -98,7 +99,7 @@ impl RobotSection {
             return Err(StudyError::Numbers {
                 key: "robot.gravity_m_s2".to_owned(),
                 values: gravity.to_vec(),
-                expected: "finite numbers in m/s^2, at most 1000 in size",
+                expected: "finite numbers in m/s^2, at most 1e9 in size",
             });
         }
         if self.base_rpy_rad.is_some() && self.base_rpy_deg.is_some() {
