@@ -1,0 +1,213 @@
+//! The estimate that a batch would give, after every sample.
+
+use crate::error::{OnlineError, check, check_positive};
+use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, TermHistory, regressor_panels_following};
+use dynident_estimation::{FactorWorkspace, TriangularFactor};
+use dynident_model::terms::JointMotion;
+use nalgebra::{Cholesky, DMatrix};
+
+/// A weight above which all rows are scaled back: far from what squares to infinity.
+const LARGEST_GROWTH: f64 = 1e30;
+
+/// How samples count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OnlineSettings {
+    /// Standard deviation of each joint's torque error, Nm (N): rows are divided by it.
+    pub torque_std_nm: Vec<f64>,
+    /// Samples after which a sample counts half; none forgets nothing.
+    pub half_life_samples: Option<f64>,
+    /// Samples that tell as much as one with an independent error: residuals that are correlated in time say less than
+    /// their number. 1 for independent ones.
+    pub samples_per_independent: f64,
+}
+
+impl OnlineSettings {
+    /// Independent errors of these sizes, nothing forgotten.
+    pub fn new(torque_std_nm: Vec<f64>) -> Self {
+        Self { torque_std_nm, half_life_samples: None, samples_per_independent: 1.0 }
+    }
+
+    /// That the settings can be met.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn validate(&self) -> Result<(), OnlineError> {
+        check_positive("torque_std_nm", &self.torque_std_nm)?;
+        check_positive("half_life_samples", self.half_life_samples.as_slice())?;
+        if !(self.samples_per_independent >= 1.0 && self.samples_per_independent.is_finite()) {
+            let fix = "give 1 or more";
+            return Err(OnlineError::Number {
+                what: "samples_per_independent",
+                value: self.samples_per_independent,
+                fix,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What is known before the first sample.
+#[derive(Clone, Debug)]
+pub struct StartingPoint {
+    /// Base parameters.
+    pub values: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+}
+
+/// A recursive estimate of base parameters in square-root form.
+///
+/// Every sample gives one row `w_j/σ_j`, `τ_j/σ_j` for each joint, which goes into the triangle of all before
+/// (a [`TriangularFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so that no number of samples makes
+/// the covariance indefinite, and without forgetting it is the batch estimate to rounding. Bierman, Factorization
+/// Methods for Discrete Sequential Estimation (1977), ch. IV.
+#[derive(Clone, Debug)]
+pub struct OnlineEstimator {
+    model: ParametricModel,
+    settings: OnlineSettings,
+    factor: TriangularFactor,
+    /// What new rows are multiplied by: old ones weigh less because new ones weigh more.
+    growth: f64,
+    growth_per_sample: f64,
+    samples: u64,
+    workspace: BatchWorkspace,
+    history: TermHistory,
+    panels: Panels,
+    reflectors: FactorWorkspace,
+    rows: Vec<f64>,
+}
+
+impl OnlineEstimator {
+    /// An estimator for a robot, from what is known of it; without a start the first samples alone say what it is, and
+    /// [`values`](Self::values) are none until they do.
+    ///
+    /// # Errors
+    /// Settings or a start that do not belong to the robot, a covariance that is none.
+    pub fn new(
+        model: ParametricModel,
+        settings: OnlineSettings,
+        start: Option<&StartingPoint>,
+    ) -> Result<Self, OnlineError> {
+        settings.validate()?;
+        let (dof, columns) = (model.dof(), model.layout().columns().len());
+        if settings.torque_std_nm.len() != dof {
+            let found = settings.torque_std_nm.len();
+            return Err(OnlineError::Length { what: "torque_std_nm", expected: dof, found });
+        }
+        let mut factor = TriangularFactor::new(columns);
+        if let Some(start) = start {
+            factor.absorb(&starting_rows(start, columns)?, columns)?;
+        }
+        let growth_per_sample = settings.half_life_samples.map_or(1.0, |half| 0.5_f64.powf(-0.5 / half));
+        Ok(Self {
+            workspace: BatchWorkspace::new(model.model()),
+            rows: vec![0.0; dof * (columns + 1)],
+            history: TermHistory::default(),
+            panels: Panels::default(),
+            reflectors: FactorWorkspace::default(),
+            growth: 1.0,
+            growth_per_sample,
+            samples: 0,
+            factor,
+            settings,
+            model,
+        })
+    }
+
+    /// The robot.
+    pub fn model(&self) -> &ParametricModel {
+        &self.model
+    }
+
+    /// Samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The triangle of all rows, the start among them. With forgetting it is multiplied by a growing number.
+    pub fn factor(&self) -> &TriangularFactor {
+        &self.factor
+    }
+
+    /// Takes a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Allocates nothing
+    /// after the first one.
+    ///
+    /// # Errors
+    /// A vector of another length or a number that is none: nothing has changed then.
+    pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<(), OnlineError> {
+        let dof = self.model.dof();
+        for (what, values) in [("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)] {
+            check(what, values, dof)?;
+        }
+        let motion = JointMotion { samples: 1, q, dq, ddq };
+        let (model, layout) = (self.model.model(), self.model.layout());
+        regressor_panels_following(
+            model,
+            &mut self.workspace,
+            layout,
+            &motion,
+            &mut self.history,
+            &mut self.panels,
+        );
+        let columns = layout.columns().len();
+        self.rows.fill(0.0);
+        for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
+            let weight = self.growth / std;
+            for (&column, entry) in layout.joint_columns(joint).iter().zip(self.panels.joint(joint)) {
+                self.rows[column * dof + joint] = weight * entry;
+            }
+            self.rows[columns * dof + joint] = weight * tau;
+        }
+        self.factor.absorb_with(&mut self.reflectors, &self.rows, dof)?;
+        self.samples += 1;
+        self.growth *= self.growth_per_sample;
+        if self.growth > LARGEST_GROWTH {
+            self.factor = self.factor.scaled(1.0 / self.growth)?;
+            self.growth = 1.0;
+        }
+        Ok(())
+    }
+
+    /// The base parameters now, in `out`; false while the samples do not determine them.
+    ///
+    /// # Panics
+    /// If `out` has not one entry for each base parameter.
+    pub fn values(&self, out: &mut [f64]) -> bool {
+        let columns = self.factor.columns();
+        assert_eq!(out.len(), columns, "one entry for each base parameter");
+        let largest = (0..columns).map(|k| self.factor.entry(k, k)).fold(0.0, f64::max);
+        for row in (0..columns).rev() {
+            let pivot = self.factor.entry(row, row);
+            if !(pivot > 1e-12 * largest) {
+                return false;
+            }
+            let known: f64 = (row + 1..columns).map(|k| self.factor.entry(row, k) * out[k]).sum();
+            out[row] = (self.factor.entry(row, columns) - known) / pivot;
+        }
+        true
+    }
+
+    /// Their covariance, `κ (RᵀR)⁻¹` of rows with unit variance, κ the samples per independent one; none while the
+    /// samples do not determine them. Allocates.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let now = self.growth / self.growth_per_sample;
+        let triangle = self.factor.regressor_triangle() / now;
+        let columns = triangle.ncols();
+        let inverse = triangle.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
+        let covariance = &inverse * inverse.transpose() * self.settings.samples_per_independent;
+        covariance.iter().all(|value| value.is_finite()).then_some(covariance)
+    }
+}
+
+/// The rows that say what is known before: `L⁻¹ θ = L⁻¹ θ₀` with `V = L Lᵀ`.
+fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, OnlineError> {
+    check("values of the start", &start.values, columns)?;
+    if start.covariance.shape() != (columns, columns) {
+        let found = start.covariance.nrows();
+        return Err(OnlineError::Length { what: "covariance of the start", expected: columns, found });
+    }
+    let lower = Cholesky::new(start.covariance.clone()).ok_or(OnlineError::Covariance)?.l();
+    let root = lower.solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?;
+    let right = &root * nalgebra::DVector::from_column_slice(&start.values);
+    Ok(root.iter().chain(right.iter()).copied().collect())
+}

@@ -1,0 +1,22 @@
+//! **Does the model still hold, now?** One sample at a time, without allocation: the parameters as the newest samples
+//! have them, what touches the robot, what it carries, and whether the model has drifted.
+//!
+//! | task | take |
+//! | --- | --- |
+//! | velocities and accelerations of positions that come one by one | [`DelayedDerivatives`] |
+//! | the estimate that a batch would give, after every sample | [`OnlineEstimator`] |
+//! | a collision, a payload, a hand on the arm | [`ContactMonitor`] |
+//!
+//! Everything is for one robot, a [`ParametricModel`](dynident_dynamics::ParametricModel), and for samples at one rate.
+
+#![forbid(unsafe_code)]
+
+mod contact;
+mod derivatives;
+mod error;
+mod estimator;
+
+pub use contact::{Contact, ContactMonitor, ContactSettings, Look, Residuals};
+pub use derivatives::{DelayedDerivatives, DelayedSample};
+pub use error::OnlineError;
+pub use estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
