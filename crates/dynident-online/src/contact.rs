@@ -103,7 +103,11 @@ impl ContactMonitor {
             check("residuals of a joint", residuals, residuals.len())?;
             if (residuals.len() as f64) < least {
                 let fix = "give at least ten times the longest time constant";
-                return Err(OnlineError::Number { what: "samples of the calibration", value: residuals.len() as f64, fix });
+                return Err(OnlineError::Number {
+                    what: "samples of the calibration",
+                    value: residuals.len() as f64,
+                    fix,
+                });
             }
             let looks = [settings.collision_s, settings.payload_s];
             let found = looks.map(|constant_s| Watched::new(residuals, constant_s, settings.rate_hz));

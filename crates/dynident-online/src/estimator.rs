@@ -61,7 +61,7 @@ pub struct StartingPoint {
 /// (a [`TriangularFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so that no number of samples makes
 /// the covariance indefinite, and without forgetting it is the batch estimate to rounding. Bierman, Factorization
 /// Methods for Discrete Sequential Estimation (1977), ch. IV.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct OnlineEstimator {
     model: ParametricModel,
     settings: OnlineSettings,
@@ -141,14 +141,7 @@ impl OnlineEstimator {
         }
         let motion = JointMotion { samples: 1, q, dq, ddq };
         let (model, layout) = (self.model.model(), self.model.layout());
-        regressor_panels_following(
-            model,
-            &mut self.workspace,
-            layout,
-            &motion,
-            &mut self.history,
-            &mut self.panels,
-        );
+        regressor_panels_following(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
         let columns = layout.columns().len();
         self.rows.fill(0.0);
         for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
