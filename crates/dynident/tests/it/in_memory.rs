@@ -58,6 +58,8 @@ fn samples_in_memory_give_the_bits_of_the_files() {
         for key in ["timings_s", "provenance", "logs", "robot", "name"] {
             value.as_object_mut().unwrap().remove(key).unwrap();
         }
+        // The errors that it predicts go by the number of rows, which of a text file is known about.
+        value["method"].as_object_mut().unwrap().remove("cutoff").unwrap();
         value
     };
     let [serde_json::Value::Object(a), serde_json::Value::Object(b)] =
