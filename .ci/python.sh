@@ -18,18 +18,18 @@ interpreters() {
     done | sort -n -k1,1 -u
 }
 
-# environment NAME PYTHON PACKAGE..: a clean environment with the package of this folder, as README installs it, and with others.
+# environment NAME PYTHON PACKAGE OTHERS..: a clean environment with the package (`.` as README installs it, or a wheel) and with others.
 environment() {
-    local name=$1 python=$2
-    shift 2
+    local name=$1 python=$2 package=$3
+    shift 3
     "$python" -m venv "$scratch/$name"
     # shellcheck disable=SC2068
     "$scratch/$name/bin/pip" install --quiet --disable-pip-version-check $@
-    "$scratch/$name/bin/pip" install --disable-pip-version-check --no-deps . >"$scratch/last" 2>&1 || { cat "$scratch/last"; exit 1; }
+    "$scratch/$name/bin/pip" install --disable-pip-version-check --no-deps "$package" >"$scratch/last" 2>&1 || { cat "$scratch/last"; exit 1; }
 }
 
 start=$SECONDS
-environment python python3 -r python/tests/requirements.txt
+environment python python3 . -r python/tests/requirements.txt
 printf '%4s s  pip install .\n' "$((SECONDS - start))"
 bytes=$(sed -n 's/.*filename=dynident.* size=\([0-9]*\) .*/\1/p' "$scratch/last")
 printf '        wheel of %s bytes\n' "$bytes"
@@ -43,6 +43,8 @@ program=$scratch/python/bin
 "$program/python" .ci/python_pages.py docs/src/python.md
 "$program/python" .ci/notebooks.py
 
+# One wheel for every Python: pip links it anew each time that it builds it.
+"$program/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$scratch/wheel" .
 while read -r minor path; do
     case $minor in
         "$(interpreters | head -n 1 | cut -d ' ' -f 1)") numpy='numpy==1.26.4' ;;
@@ -50,7 +52,7 @@ while read -r minor path; do
         *) continue ;;
     esac
     [ "$minor" -le 12 ] || numpy=numpy
-    environment "python3.$minor" "$path" pytest==9.2.0 "$numpy"
+    environment "python3.$minor" "$path" "$scratch"/wheel/dynident-*.whl pytest==9.2.0 "$numpy"
     printf '        %s: ' "$("$scratch/python3.$minor/bin/python" -c 'import sys, numpy; print("Python", sys.version.split()[0], "NumPy", numpy.__version__)')"
     "$scratch/python3.$minor/bin/python" -m pytest -q -p no:cacheprovider python/tests
 done < <(interpreters)

@@ -79,13 +79,13 @@ class Log:
             columns["t_s"] = np.asarray(time_s, dtype=np.float64).reshape(-1)
             channels["time"] = {"column": "t_s"}
         groups = [
-            ("position", "q", q, "rad"),
-            ("torque", "tau", tau, "N m"),
-            ("velocity", "dq", dq, "rad/s"),
-            ("acceleration", "ddq", ddq, "rad/s^2"),
-            ("temperature", "temperature", temperature_c, None),
+            ("position", "q", q),
+            ("torque", "tau", tau),
+            ("velocity", "dq", dq),
+            ("acceleration", "ddq", ddq),
+            ("temperature", "temperature", temperature_c),
         ]
-        for key, symbol, values, _ in groups:
+        for key, symbol, values in groups:
             if values is None:
                 continue
             table = np.asarray(values, dtype=np.float64)

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+DESCRIPTIONS = ("identified.urdf", "identified.toml", "identified.xml", "identified.sdf")
+"""Files of the description with the new values: URDF, D-H table, MJCF, SDF."""
+
 
 class Model:
     """A dynamic model with error bars and its proof: what ``identify`` gives.
@@ -37,9 +40,8 @@ class Model:
         def text(name: str) -> str | None:
             return (place / name).read_text(encoding="utf-8") if (place / name).is_file() else None
 
-        names = ("identified.urdf", "identified.toml", "identified.xml", "identified.sdf")
         json_text = (place / "result.json").read_text(encoding="utf-8")
-        return cls(FittedModel.of(json_text, own, [text(name) for name in names], text("report.html") or ""))
+        return cls(FittedModel.of(json_text, own, [text(name) for name in DESCRIPTIONS], text("report.html") or ""))
 
     @cached_property
     def result(self) -> dict[str, Any]:
@@ -147,15 +149,15 @@ class Model:
 
     def to_urdf(self) -> str:
         """The user's URDF with the new values (of another description, one that describes the same robot)."""
-        return self._native.urdf or self.export("urdf")
+        return self._native.descriptions[0] or self.export("urdf")
 
     def to_mjcf(self) -> str:
         """The user's MJCF with the new values, or one that describes the same robot."""
-        return self._native.mjcf or self.export("mjcf")
+        return self._native.descriptions[2] or self.export("mjcf")
 
     def to_sdf(self) -> str:
         """The user's SDF with the new values, or one that describes the same robot."""
-        return self._native.sdf or self.export("sdf")
+        return self._native.descriptions[3] or self.export("sdf")
 
     def to_c(self) -> str:
         """A C99 header: inverse dynamics, gravity, mass matrix, friction, forward dynamics."""
@@ -169,13 +171,9 @@ class Model:
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Writes ``result.json``, ``report.html`` and the description with the new values, as ``dynident identify``."""
-        native = self._native
         texts = {
-            "identified.urdf": native.urdf,
-            "identified.toml": native.table,
-            "identified.xml": native.mjcf,
-            "identified.sdf": native.sdf,
-            "report.html": native.report,
+            **dict(zip(DESCRIPTIONS, self._native.descriptions, strict=True)),
+            "report.html": self._native.report,
             "result.json": json.dumps(self.result, indent=2) + "\n",
         }
         _write_files(fspath(folder), texts)

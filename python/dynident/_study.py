@@ -31,8 +31,9 @@ def study(
     ``simulation``, ``iteration``. Unknown keys raise ``StudyError``.
 
     >>> import dynident
-    >>> arm = dynident.Robot.from_dh("examples/robots/pendulum.toml")  # doctest: +SKIP
-    >>> dynident.study(arm, drive={"drive_inertia": True})  # doctest: +SKIP
+    >>> own = dynident.study("robots/planar2r.urdf", drive={"drive_inertia": True})
+    >>> own.log_names, "drive_inertia = true" in own.to_toml()
+    ([], True)
     """
     robot = robot if isinstance(robot, Robot) else Robot.load(robot)
     logs = [logs] if isinstance(logs, Log) else list(logs)
@@ -57,8 +58,7 @@ def with_logs(own: Study, logs: Log | Iterable[Log]) -> Study:
     logs = [logs] if isinstance(logs, Log) else list(logs)
     content = json.loads(own.to_json())
     content["log"] = [log._section() for log in logs]
-    robot = own._robot()
-    return Study._assemble(_json(content), own.path, robot, [log._samples() for log in logs])
+    return own._with_sections(_json(content), [log._samples() for log in logs])
 
 
 def _json(content: Mapping[str, Any]) -> str:

@@ -1,17 +1,18 @@
 //! The jobs of the command as functions: a study in, JSON and models out.
 
+use crate::arrays::{array, sample_major};
 use crate::errors;
 use crate::function_robot::{Raised, robot_of};
-use crate::jobs::{run, run_to_its_stop, threads as threads_or_all};
-use crate::model::{Descriptions, FittedModel};
+use crate::jobs::{Watch, run, run_to_its_stop, threads as threads_or_all};
+use crate::model::{FittedModel, RESULT};
 use crate::study::Study;
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
 use dynident::iteration::{RobotRun, RunRecord, StopSignal};
 use dynident::{
-    Error, IdentificationOutcome, IterationWatch, OutputSet, RunOptions, check, design_study, identify, iterate_study,
-    iterate_with_robot, log_contents, simulate_study, validate_result,
+    Error, IterationWatch, OutputSet, RunOptions, check, design_study, identify, iterate_study, iterate_with_robot,
+    log_contents, simulate_study, validate_result,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -28,22 +29,36 @@ fn json(value: &impl serde::Serialize) -> Result<String, Error> {
         .map_err(|error| Error::Result { path: PathBuf::from("<result>"), message: error.to_string() })
 }
 
+/// Runs `job` of a study beside the interpreter.
+fn of_study<T: Send + 'static>(
+    study: &Bound<'_, Study>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+    job: impl FnOnce(dynident::Study, PathBuf, &RunOptions<'_>, &Watch) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    let (own, path) = study.get().owned();
+    let threads = threads_or_all(threads);
+    run(study.py(), threads, progress, move |watch| {
+        job(own, path, &RunOptions { data: None, threads, progress: watch }, watch)
+    })
+}
+
+/// Whether a search goes on.
+fn unless(is_over: bool) -> ControlFlow<()> {
+    if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
 /// Fits a study's model to its logs and tests it on the held-out ones.
 #[pyfunction]
 #[pyo3(signature = (study, threads=None, progress=None))]
 pub(crate) fn _identify(
-    py: Python<'_>,
     study: &Bound<'_, Study>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<FittedModel> {
-    let (study, path) = study.get().owned();
-    let threads = threads_or_all(threads);
-    run(py, threads, progress, move |watch| {
-        let outcome = identify(&study, &path, &RunOptions { data: None, threads, progress: watch })?;
-        let report = outcome.report()?;
-        let IdentificationOutcome { result, urdf, table, mjcf, sdf, .. } = outcome;
-        FittedModel::new(study, path, json(&result)?, Descriptions { urdf, table, mjcf, sdf }, report)
+    of_study(study, threads, progress, |study, path, options, _| {
+        let outcome = identify(&study, &path, options)?;
+        Ok(FittedModel::found(study, path, outcome))
     })
 }
 
@@ -51,82 +66,60 @@ pub(crate) fn _identify(
 #[pyfunction]
 #[pyo3(signature = (study, threads=None, progress=None))]
 pub(crate) fn _check(
-    py: Python<'_>,
     study: &Bound<'_, Study>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
-    let (study, path) = study.get().owned();
-    let threads = threads_or_all(threads);
-    run(py, threads, progress, move |watch| {
-        json(&check(&study, &path, &RunOptions { data: None, threads, progress: watch })?)
-    })
+    of_study(study, threads, progress, |study, path, options, _| json(&check(&study, &path, options)?))
 }
 
 /// Tests a model on the logs of a study: JSON.
 #[pyfunction]
 #[pyo3(signature = (model, study, threads=None, progress=None))]
 pub(crate) fn _validate(
-    py: Python<'_>,
     model: &Bound<'_, FittedModel>,
     study: &Bound<'_, Study>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
-    let (study, path) = study.get().owned();
-    let threads = threads_or_all(threads);
     let result = model.get().result().clone();
-    run(py, threads, progress, move |watch| {
-        let options = RunOptions { data: None, threads, progress: watch };
-        json(&validate_result(&result, Path::new("<model>"), (&study, &path), &options)?)
+    of_study(study, threads, progress, move |study, path, options, _| {
+        json(&validate_result(&result, Path::new(RESULT), (&study, &path), options)?)
     })
 }
 
-/// Designs the motion that a study asks for: JSON, the trajectory as CSV and its picture as SVG, and at `rate_hz` the
-/// times with position, velocity and acceleration, joint by joint.
+/// A designed motion: JSON, the trajectory as CSV, its picture as SVG, the times, and position, velocity and
+/// acceleration.
+type Designed<'py> = (String, String, String, Array<'py>, [Array<'py>; 3]);
+
+/// Designs the motion that a study asks for, sampled at `rate_hz`.
 #[pyfunction]
 #[pyo3(signature = (study, rate_hz=None, threads=None))]
-#[allow(clippy::type_complexity, reason = "the parts of a design")]
 pub(crate) fn _design<'py>(
-    py: Python<'py>,
     study: &Bound<'py, Study>,
     rate_hz: Option<f64>,
     threads: Option<usize>,
-) -> PyResult<(String, String, String, Array<'py>, [Array<'py>; 3])> {
-    let (study, path) = study.get().owned();
-    let threads = threads_or_all(threads);
-    let (file, csv, svg, times_s, motion) = run(py, threads, None, move |watch| {
-        let hear =
-            |_: &DesignProgress| if watch.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let outcome = design_study(&study, &path, &RunOptions { data: None, threads, progress: watch }, hear)?;
+) -> PyResult<Designed<'py>> {
+    let (file, csv, svg, times_s, motion) = of_study(study, threads, None, move |study, path, options, watch| {
+        let outcome = design_study(&study, &path, options, |_| unless(watch.is_cancelled()))?;
         let (times_s, motion) = outcome.sampled(rate_hz.unwrap_or(outcome.file.rate_hz));
         let cannot = |error: ExportError| Error::Result { path: path.clone(), message: error.to_string() };
         let sampled = Sampled { joints: &outcome.file.joints, times_s: &times_s, motion: &motion };
         let csv = trajectory_csv(&sampled).map_err(cannot)?;
         Ok((json(&outcome.file)?, csv, outcome.preview_svg()?, times_s, motion))
     })?;
-    let (samples, joints) = (motion.samples, motion.joints);
-    let rows = |values: &[f64]| {
-        crate::arrays::array(py, &[samples], &[joints], crate::arrays::sample_major(values, samples, joints))
-    };
+    let (py, samples, joints) = (study.py(), motion.samples, motion.joints);
+    let rows = |values: &[f64]| array(py, &[samples], &[joints], sample_major(values, samples, joints));
     let parts = [rows(&motion.q)?, rows(&motion.dq)?, rows(&motion.ddq)?];
-    Ok((file, csv, svg, crate::arrays::array(py, &[samples], &[], times_s)?, parts))
+    Ok((file, csv, svg, array(py, &[samples], &[], times_s)?, parts))
 }
 
 /// Runs a study's trajectory on its simulated robot: the truth as JSON, the log as CSV.
 #[pyfunction]
 #[pyo3(signature = (study, threads=None))]
-pub(crate) fn _simulate(
-    py: Python<'_>,
-    study: &Bound<'_, Study>,
-    threads: Option<usize>,
-) -> PyResult<(String, String)> {
-    let (study, path) = study.get().owned();
-    let threads = threads_or_all(threads);
-    run(py, threads, None, move |watch| {
-        let hear =
-            |_: &DesignProgress| if watch.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let done = simulate_study(&study, &path, &RunOptions { data: None, threads, progress: watch }, &hear)?;
+pub(crate) fn _simulate(study: &Bound<'_, Study>, threads: Option<usize>) -> PyResult<(String, String)> {
+    of_study(study, threads, None, |study, path, options, watch| {
+        let done = simulate_study(&study, &path, options, &|_| unless(watch.is_cancelled()))?;
         Ok((json(&done.file)?, done.log))
     })
 }
@@ -150,8 +143,7 @@ pub(crate) fn _iterate(
     let (asked, kept) = (stop.clone(), raised.clone());
     let found = run_to_its_stop(py, threads, &stop, move |watch| {
         let options = RunOptions { data: None, threads, progress: watch };
-        let design =
-            |_: &DesignProgress| if asked.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let design = |_: &DesignProgress| unless(asked.is_requested());
         let mut made = |record: &RunRecord, _: &[RobotRun]| {
             if let Some(heard) = &heard {
                 kept.keep(Python::attach(|py| {

@@ -36,6 +36,10 @@ mod _native {
 
     #[pymodule_init]
     fn with_version(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        // Also of those that are raised without a place.
+        for place in ["path", "line", "column"] {
+            module.py().get_type::<crate::errors::Error>().setattr(place, module.py().None())?;
+        }
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -1,60 +1,68 @@
 //! `FittedModel`: what an identification found, with its study.
 
 use crate::arrays::{Motion, array, joint_major, sample_major};
-use crate::assembled::assembled;
 use crate::errors;
 use crate::study::Study;
 use dynident::export::Target;
-use dynident::model::read_robot;
+use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
-use dynident::{ResultFile, TorquePredictor, export_result};
+use dynident::{IdentificationOutcome, ResultFile, TorquePredictor, export_result, identification_report};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// What messages call a result in memory.
-const RESULT: &str = "<model>";
+pub(crate) const RESULT: &str = "<model>";
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// The description with the new values, in the forms that the result has.
-#[derive(Clone, Default)]
-pub(crate) struct Descriptions {
-    pub(crate) urdf: Option<String>,
-    pub(crate) table: Option<String>,
-    pub(crate) mjcf: Option<String>,
-    pub(crate) sdf: Option<String>,
-}
+/// The description with the new values: URDF, D-H table, MJCF, SDF, as far as the result has them.
+type Descriptions = [Option<String>; 4];
 
-/// A result with its study: what ``dynident.Model`` stands on.
+/// What rebuilds a pickled model.
+type Reduced<'py> = (Bound<'py, PyAny>, (String, Study, Descriptions, String));
+
+/// A result with its study: what ``dynident.Model`` stands on. What takes time and may never be asked for is made when
+/// it is: the page, and what predicts.
 #[pyclass(frozen, module = "dynident._native")]
 pub(crate) struct FittedModel {
     study: dynident::Study,
     path: PathBuf,
     result: ResultFile,
-    /// The result as it is written.
-    json: String,
     descriptions: Descriptions,
-    report: String,
-    predictor: TorquePredictor,
+    page: Page,
+    predictor: OnceLock<TorquePredictor>,
+}
+
+/// The page of a result.
+enum Page {
+    /// To be made of the torques over time, which no result holds.
+    Of(Vec<LogTrace>),
+    /// As it was written.
+    Written(String),
 }
 
 impl FittedModel {
-    pub(crate) fn new(
-        study: dynident::Study,
-        path: PathBuf,
-        json: String,
-        descriptions: Descriptions,
-        report: String,
-    ) -> Result<Self, dynident::Error> {
-        let name = Path::new(RESULT);
-        let result = ResultFile::parse(json.as_bytes(), name)?;
-        let predictor = TorquePredictor::new(&result, name, (&study, &path), None)?;
-        Ok(Self { study, path, result, json, descriptions, report, predictor })
+    /// What an identification of this study has found.
+    pub(crate) fn found(study: dynident::Study, path: PathBuf, outcome: IdentificationOutcome) -> Self {
+        let IdentificationOutcome { result, urdf, table, mjcf, sdf, traces, .. } = outcome;
+        let descriptions = [urdf, table, mjcf, sdf];
+        Self { study, path, result, descriptions, page: Page::Of(traces), predictor: OnceLock::new() }
     }
 
     pub(crate) fn result(&self) -> &ResultFile {
         &self.result
+    }
+
+    fn predictor(&self, py: Python<'_>) -> PyResult<&TorquePredictor> {
+        if self.predictor.get().is_none() {
+            let made = TorquePredictor::new(&self.result, Path::new(RESULT), (&self.study, &self.path), None);
+            // Another thread may have been faster with the same.
+            let _ = self.predictor.set(made.map_err(|error| errors::job(py, &error))?);
+        }
+        self.predictor.get().ok_or_else(|| errors::Error::new_err("the model predicts nothing"))
     }
 }
 
@@ -65,60 +73,46 @@ impl FittedModel {
     #[staticmethod]
     fn of(
         py: Python<'_>,
-        json: String,
+        json: &str,
         study: &Bound<'_, Study>,
-        descriptions: [Option<String>; 4],
+        descriptions: Descriptions,
         report: String,
     ) -> PyResult<Self> {
         let (study, path) = study.get().owned();
-        let [urdf, table, mjcf, sdf] = descriptions;
-        let descriptions = Descriptions { urdf, table, mjcf, sdf };
-        Self::new(study, path, json, descriptions, report).map_err(|error| errors::job(py, &error))
-    }
-
-    /// The inverse of ``__reduce__``.
-    #[staticmethod]
-    fn _restore(
-        py: Python<'_>,
-        study: (String, PathBuf, Option<(String, PathBuf)>),
-        json: String,
-        descriptions: [Option<String>; 4],
-        report: String,
-    ) -> PyResult<Self> {
-        let ((sections, path, description), [urdf, table, mjcf, sdf]) = (study, descriptions);
-        let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
-        let study = assembled(py, &sections, &path, robot, Vec::new())?;
-        let descriptions = Descriptions { urdf, table, mjcf, sdf };
-        Self::new(study, path, json, descriptions, report).map_err(|error| errors::job(py, &error))
+        let result = ResultFile::parse(json.as_bytes(), Path::new(RESULT));
+        let result = result.map_err(|error| errors::job(py, &error))?;
+        let page = Page::Written(report);
+        let made = Self { study, path, result, descriptions, page, predictor: OnceLock::new() };
+        // That study and result belong together.
+        made.predictor(py)?;
+        Ok(made)
     }
 
     /// Without the samples that it was fitted to.
-    #[allow(clippy::type_complexity, reason = "what `_restore` takes")]
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(
-        Bound<'py, PyAny>,
-        ((String, PathBuf, Option<(String, PathBuf)>), String, [Option<String>; 4], String),
-    )> {
-        let own = slf.get();
-        let description = own.study.robot.description.as_ref().map(|robot| (robot.text.clone(), robot.path.clone()));
-        let sections = serde_json::to_string(&own.study).map_err(|error| errors::Error::new_err(error.to_string()))?;
-        let Descriptions { urdf, table, mjcf, sdf } = own.descriptions.clone();
-        let state =
-            ((sections, own.path.clone(), description), own.json.clone(), [urdf, table, mjcf, sdf], own.report.clone());
-        Ok((slf.get_type().getattr("_restore")?, state))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let (py, own) = (slf.py(), slf.get());
+        let mut study = own.study();
+        study.study.log.iter_mut().for_each(|log| log.samples = None);
+        let state = (own.json()?, study, own.descriptions.clone(), own.report(py)?.into_owned());
+        Ok((slf.get_type().getattr("of")?, state))
     }
 
     /// `result.json`.
     #[getter]
-    fn json(&self) -> &str {
-        &self.json
+    fn json(&self) -> PyResult<String> {
+        serde_json::to_string(&self.result).map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
     /// The page with all figures, HTML.
     #[getter]
-    fn report(&self) -> &str {
-        &self.report
+    fn report(&self, py: Python<'_>) -> PyResult<Cow<'_, str>> {
+        match &self.page {
+            Page::Written(text) => Ok(Cow::Borrowed(text)),
+            Page::Of(traces) => {
+                let made = identification_report(&self.result, traces);
+                made.map(Cow::Owned).map_err(|error| errors::job(py, &error))
+            }
+        }
     }
 
     /// The study that it was made with.
@@ -127,34 +121,16 @@ impl FittedModel {
         Study { study: self.study.clone(), path: self.path.clone() }
     }
 
-    /// The URDF with the new values, or None.
+    /// The description with the new values, URDF, D-H table, MJCF and SDF; None for what the result does not have.
     #[getter]
-    fn urdf(&self) -> Option<&str> {
-        self.descriptions.urdf.as_deref()
-    }
-
-    /// The user's D-H table with the new values, or None.
-    #[getter]
-    fn table(&self) -> Option<&str> {
-        self.descriptions.table.as_deref()
-    }
-
-    /// The user's MJCF with the new values, or None.
-    #[getter]
-    fn mjcf(&self) -> Option<&str> {
-        self.descriptions.mjcf.as_deref()
-    }
-
-    /// The user's SDF with the new values, or None.
-    #[getter]
-    fn sdf(&self) -> Option<&str> {
-        self.descriptions.sdf.as_deref()
+    fn descriptions(&self) -> Descriptions {
+        self.descriptions.clone()
     }
 
     /// Names of the joints.
     #[getter]
     fn joint_names(&self) -> Vec<String> {
-        self.predictor.joint_names()
+        self.result.joints.iter().map(|joint| joint.name.clone()).collect()
     }
 
     /// Torque along a motion and half the width of its 95 % band, both of shape ``(..., n)``.
@@ -166,12 +142,13 @@ impl FittedModel {
         dq: Option<&Bound<'py, PyAny>>,
         ddq: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Array<'py>, Array<'py>)> {
-        let dof = self.predictor.dof();
+        let predictor = self.predictor(py)?;
+        let dof = predictor.dof();
         let motion = Motion::of(dof, q, dq, ddq)?;
         let samples = motion.count();
         let found = motion.compute(py, 0, |numbers| {
             let [q, dq, ddq] = numbers.map(|rows| joint_major(rows, samples, dof));
-            self.predictor.predict(&JointMotion { samples, q: &q, dq: &dq, ddq: &ddq })
+            predictor.predict(&JointMotion { samples, q: &q, dq: &dq, ddq: &ddq })
         });
         let rows = |values: &[f64]| array(py, motion.lead(), &[dof], sample_major(values, samples, dof));
         Ok((rows(&found.tau)?, rows(&found.half_width_95)?))

@@ -16,7 +16,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 /// Samples of one block of a batch: enough for full lanes, little enough for the cache.
 const BLOCK: usize = 128;
@@ -41,14 +41,16 @@ pub(crate) struct Robot {
     settings: String,
     /// With these in force.
     model: Model,
+    /// Of the bodies, once somebody has asked.
+    base: OnceLock<BaseParameters>,
     /// Scratch memory of threads that have called.
     singles: Mutex<Vec<Workspace>>,
     batches: Mutex<Vec<BatchWorkspace>>,
 }
 
 impl Robot {
-    fn base(&self) -> BaseParameters {
-        BaseParameters::new(&self.model, &[], &BaseParameterSettings::default())
+    fn base(&self) -> &BaseParameters {
+        self.base.get_or_init(|| BaseParameters::new(&self.model, &[], &BaseParameterSettings::default()))
     }
 
     /// The description with the keys of ``[robot]`` in force.
@@ -57,13 +59,14 @@ impl Robot {
         Self::with_settings(py, description, settings)
     }
 
-    pub(crate) fn with_settings(py: Python<'_>, description: Description, settings: String) -> PyResult<Self> {
+    fn with_settings(py: Python<'_>, description: Description, settings: String) -> PyResult<Self> {
         let path = description.path.clone();
         let study = assembled(py, &study_of(&path, &settings)?, &path, Some(description.clone()), Vec::new())?;
         let folders = Folders::new(&study, &path, None);
         let made = StudyRobot::new(&study, &path, &folders).map_err(|error| errors::job(py, &error))?;
         let model = made.model().clone();
-        Ok(Self { description, settings, model, singles: Mutex::default(), batches: Mutex::default() })
+        let (base, singles, batches) = (OnceLock::new(), Mutex::default(), Mutex::default());
+        Ok(Self { description, settings, model, base, singles, batches })
     }
 
     /// What was read, before any key is in force.

@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 /// Samples of one log: names of the columns, and the columns.
 type Samples<'py> = (Vec<String>, Vec<PyReadonlyArray1<'py, f64>>);
 
+/// The same on the way back.
+type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
+
 /// A study: robot, drives, logs and settings, as ``[robot]``, ``[drive]``, ``[[log]]`` and so on of a study file.
 ///
 /// Read with ``Study.load(path)`` or ``Study.parse(text)``; put together from objects with ``dynident.study(...)``.
@@ -57,10 +60,8 @@ impl Study {
         robot: Option<&Bound<'_, Robot>>,
         samples: Vec<Option<(String, Samples<'_>)>>,
     ) -> PyResult<Self> {
-        let tables = samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose());
-        let tables = tables.collect::<PyResult<Vec<_>>>()?;
         let description = robot.map(|robot| robot.get().description().clone());
-        Ok(Self { study: assembled(py, sections, &path, description, tables)?, path })
+        Ok(Self { study: assembled(py, sections, &path, description, tables(samples)?)?, path })
     }
 
     /// The inverse of ``__reduce__``.
@@ -72,10 +73,8 @@ impl Study {
         description: Option<(String, PathBuf)>,
         samples: Vec<Option<(String, Samples<'_>)>>,
     ) -> PyResult<Self> {
-        let tables = samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose());
-        let tables = tables.collect::<PyResult<Vec<_>>>()?;
         let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
-        Ok(Self { study: assembled(py, sections, &path, robot, tables)?, path })
+        Ok(Self { study: assembled(py, sections, &path, robot, tables(samples)?)?, path })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
@@ -107,16 +106,16 @@ impl Study {
         (0..self.study.log.len()).map(|index| self.study.log_name(index)).collect()
     }
 
-    /// The robot in memory, before any key is in force; None for one in a file.
-    fn _robot(&self, py: Python<'_>) -> PyResult<Option<Robot>> {
-        let description = self.study.robot.description.as_deref().cloned();
-        description.map(|description| Robot::with_settings(py, description, "{}".to_owned())).transpose()
-    }
-
-    /// Whether everything that it names lies in files, so that its TOML says all.
-    #[getter]
-    fn is_in_files(&self) -> bool {
-        self.study.robot.description.is_none() && self.study.log.iter().all(|log| log.samples.is_none())
+    /// The same robot with other sections: JSON, and samples as for ``_assemble``.
+    fn _with_sections(
+        &self,
+        py: Python<'_>,
+        sections: &str,
+        samples: Vec<Option<(String, Samples<'_>)>>,
+    ) -> PyResult<Self> {
+        let robot = self.study.robot.description.as_deref().cloned();
+        let study = assembled(py, sections, &self.path, robot, tables(samples)?)?;
+        Ok(Self { study, path: self.path.clone() })
     }
 
     /// All sections as JSON.
@@ -134,6 +133,11 @@ impl Study {
     }
 }
 
+/// The tables of logs.
+fn tables(samples: Vec<Option<(String, Samples<'_>)>>) -> PyResult<Vec<Option<MemoryLog>>> {
+    samples.into_iter().map(|table| table.map(|(label, table)| memory_log(&label, table)).transpose()).collect()
+}
+
 /// A table of columns. Each is copied once: a job runs on beside whoever owns the arrays.
 fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog> {
     let columns = columns
@@ -147,11 +151,7 @@ fn memory_log(label: &str, (names, columns): Samples<'_>) -> PyResult<MemoryLog>
 }
 
 /// Label, names and columns of a table.
-#[allow(clippy::type_complexity, reason = "what `_restore` takes")]
-fn columns<'py>(
-    py: Python<'py>,
-    table: &MemoryLog,
-) -> PyResult<(String, (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>))> {
+fn columns<'py>(py: Python<'py>, table: &MemoryLog) -> PyResult<(String, Columns<'py>)> {
     let names = table.names().map(<[String]>::to_vec).unwrap_or_default();
     let (width, numbers): (usize, Vec<f64>) = (names.len().max(1), table.numbers().collect());
     let of = |column: usize| {

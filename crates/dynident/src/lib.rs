@@ -81,6 +81,7 @@ pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::{validate, validate_result};
 pub use output::{check_writable, write_whole};
 pub use output_set::OutputSet;
+pub use pages::identification::identification_report;
 pub use result::{
     CheckFile, DesignFile, Inspection, IterationsFile, LogContents, ResultFile, SimulationFile, ValidationFile,
 };

@@ -18,6 +18,8 @@ pub struct ControlledRun {
     target: ReferenceSample,
     tau: Vec<f64>,
     record: Record,
+    /// The newest sample alone: with its velocities that is all that an envelope looks at.
+    now: Record,
     /// Why there is no further torque.
     end: Option<RunEnd>,
 }
@@ -42,6 +44,13 @@ impl ControlledRun {
             target: ReferenceSample::new(joints.len()),
             tau: vec![0.0; joints.len()],
             record: empty_record(joints, reference.rate_hz()),
+            now: Record {
+                samples: 1,
+                times_s: vec![0.0],
+                q: vec![0.0; joints.len()],
+                tau: vec![0.0; joints.len()],
+                ..empty_record(joints, reference.rate_hz())
+            },
             reference,
             end: None,
         })
@@ -86,15 +95,10 @@ impl ControlledRun {
         self.record.tau.extend_from_slice(&self.tau);
         self.record.samples += 1;
         // Before the torque is given: one beyond the envelope never is.
-        let now = Record {
-            joints: self.record.joints.clone(),
-            rate_hz: self.record.rate_hz,
-            samples: 1,
-            times_s: vec![time_s],
-            q: q.to_vec(),
-            tau: self.tau.clone(),
-        };
-        if let Some(breach) = EnvelopeWatch::new(self.envelope.as_ref(), &self.reference).look(&now, Some(dq)) {
+        self.now.times_s[0] = time_s;
+        self.now.q.copy_from_slice(q);
+        self.now.tau.copy_from_slice(&self.tau);
+        if let Some(breach) = EnvelopeWatch::new(self.envelope.as_ref(), &self.reference).look(&self.now, Some(dq)) {
             self.end = Some(RunEnd::Breach(breach));
             return None;
         }

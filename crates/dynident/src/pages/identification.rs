@@ -16,8 +16,12 @@ use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Rep
 /// Base parameters up to which their correlations are drawn.
 const MOST_CORRELATIONS: usize = 80;
 
-/// The whole page.
-pub(crate) fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<String, Error> {
+/// The page of a result, with torque over time: what [`IdentificationOutcome::report`](crate::IdentificationOutcome)
+/// gives, for who keeps only these two.
+///
+/// # Errors
+/// [`Error::Report`], which would be a defect of this program.
+pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<String, Error> {
     let mut page = Report::new(&r.name).subtitle(format!(
         "{}: {} joints, {} base parameters; estimator {}, error bars {}",
         r.robot.name,

@@ -124,9 +124,8 @@ fn iterated(
     (out, resume): (&Path, bool),
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
-    own_robot: Option<RobotMaker<'_>>,
+    mut own_robot: Option<RobotMaker<'_>>,
 ) -> Result<IterationsFile, Error> {
-    let mut own_robot = own_robot;
     let in_section = |why: StudyError| Error::section(study_path, "iteration")(why);
     let in_iteration = |error: IterationError| match error {
         IterationError::File { path, source } => Error::Output { path, source },
