@@ -60,8 +60,8 @@ pub use diagnostics::{
 };
 pub use error::EstimationError;
 pub use factor::{
-    FactorWorkspace, InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings,
-    SegmentedFactor, TriangularFactor, Unexcited, unexcited_columns,
+    FactorWorkspace, InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, RecursiveFactor,
+    SegmentSettings, SegmentedFactor, TriangularFactor, Unexcited, unexcited_columns,
 };
 pub use linear::{
     CrossProblem, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict,

@@ -1,8 +1,8 @@
 //! The estimate that a batch would give, after every sample.
 
 use crate::error::{OnlineError, check, check_positive};
-use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, TermHistory, regressor_panels_following};
-use dynident_estimation::{FactorWorkspace, TriangularFactor};
+use dynident_dynamics::{Panels, ParametricModel, TermHistory, Workspace, regressor_panels_of_sample};
+use dynident_estimation::{RecursiveFactor, TriangularFactor};
 use dynident_model::terms::JointMotion;
 use nalgebra::{Cholesky, DMatrix};
 
@@ -58,23 +58,21 @@ pub struct StartingPoint {
 /// A recursive estimate of base parameters in square-root form.
 ///
 /// Every sample gives one row `w_j/σ_j`, `τ_j/σ_j` for each joint, which goes into the triangle of all before
-/// (a [`TriangularFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so that no number of samples makes
+/// (a [`RecursiveFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so that no number of samples makes
 /// the covariance indefinite, and without forgetting it is the batch estimate to rounding. Bierman, Factorization
 /// Methods for Discrete Sequential Estimation (1977), ch. IV.
 #[derive(Debug)]
 pub struct OnlineEstimator {
     model: ParametricModel,
     settings: OnlineSettings,
-    factor: TriangularFactor,
+    factor: RecursiveFactor,
     /// What new rows are multiplied by: old ones weigh less because new ones weigh more.
     growth: f64,
     growth_per_sample: f64,
     samples: u64,
-    workspace: BatchWorkspace,
+    workspace: Workspace,
     history: TermHistory,
     panels: Panels,
-    reflectors: FactorWorkspace,
-    rows: Vec<f64>,
 }
 
 impl OnlineEstimator {
@@ -94,17 +92,17 @@ impl OnlineEstimator {
             let found = settings.torque_std_nm.len();
             return Err(OnlineError::Length { what: "torque_std_nm", expected: dof, found });
         }
-        let mut factor = TriangularFactor::new(columns);
+        let first = |joint| model.layout().joint_columns(joint).iter().copied().min().unwrap_or(columns);
+        let begins: Vec<usize> = (0..dof).map(first).collect();
+        let mut factor = RecursiveFactor::new(columns, &begins);
         if let Some(start) = start {
-            factor.absorb(&starting_rows(start, columns)?, columns)?;
+            factor.start_from(&TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?)?;
         }
         let growth_per_sample = settings.half_life_samples.map_or(1.0, |half| 0.5_f64.powf(-0.5 / half));
         Ok(Self {
-            workspace: BatchWorkspace::new(model.model()),
-            rows: vec![0.0; dof * (columns + 1)],
+            workspace: Workspace::new(model.model()),
             history: TermHistory::default(),
             panels: Panels::default(),
-            reflectors: FactorWorkspace::default(),
             growth: 1.0,
             growth_per_sample,
             samples: 0,
@@ -125,7 +123,7 @@ impl OnlineEstimator {
     }
 
     /// The triangle of all rows, the start among them. With forgetting it is multiplied by a growing number.
-    pub fn factor(&self) -> &TriangularFactor {
+    pub fn factor(&self) -> &RecursiveFactor {
         &self.factor
     }
 
@@ -141,21 +139,20 @@ impl OnlineEstimator {
         }
         let motion = JointMotion { samples: 1, q, dq, ddq };
         let (model, layout) = (self.model.model(), self.model.layout());
-        regressor_panels_following(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
+        regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
         let columns = layout.columns().len();
-        self.rows.fill(0.0);
         for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
             let weight = self.growth / std;
             for (&column, entry) in layout.joint_columns(joint).iter().zip(self.panels.joint(joint)) {
-                self.rows[column * dof + joint] = weight * entry;
+                self.factor.set(joint, column, weight * entry);
             }
-            self.rows[columns * dof + joint] = weight * tau;
+            self.factor.set(joint, columns, weight * tau);
         }
-        self.factor.absorb_with(&mut self.reflectors, &self.rows, dof)?;
+        self.factor.absorb()?;
         self.samples += 1;
         self.growth *= self.growth_per_sample;
         if self.growth > LARGEST_GROWTH {
-            self.factor = self.factor.scaled(1.0 / self.growth)?;
+            self.factor.scale(1.0 / self.growth)?;
             self.growth = 1.0;
         }
         Ok(())
@@ -166,25 +163,14 @@ impl OnlineEstimator {
     /// # Panics
     /// If `out` has not one entry for each base parameter.
     pub fn values(&self, out: &mut [f64]) -> bool {
-        let columns = self.factor.columns();
-        assert_eq!(out.len(), columns, "one entry for each base parameter");
-        let largest = (0..columns).map(|k| self.factor.entry(k, k)).fold(0.0, f64::max);
-        for row in (0..columns).rev() {
-            let pivot = self.factor.entry(row, row);
-            if !(pivot > 1e-12 * largest) {
-                return false;
-            }
-            let known: f64 = (row + 1..columns).map(|k| self.factor.entry(row, k) * out[k]).sum();
-            out[row] = (self.factor.entry(row, columns) - known) / pivot;
-        }
-        true
+        self.factor.solve(out)
     }
 
     /// Their covariance, `κ (RᵀR)⁻¹` of rows with unit variance, κ the samples per independent one; none while the
     /// samples do not determine them. Allocates.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let now = self.growth / self.growth_per_sample;
-        let triangle = self.factor.regressor_triangle() / now;
+        let triangle = self.factor.to_triangular().regressor_triangle() / now;
         let columns = triangle.ncols();
         let inverse = triangle.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
         let covariance = &inverse * inverse.transpose() * self.settings.samples_per_independent;

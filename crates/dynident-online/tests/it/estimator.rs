@@ -143,12 +143,12 @@ fn too_few_samples_determine_nothing_and_bad_ones_change_nothing() {
     let [q, dq, ddq, tau] = &samples.states[0];
     estimator.add(q, dq, ddq, tau).unwrap();
     assert!(!estimator.values(&mut values));
-    let before = estimator.factor().clone();
+    let before = estimator.factor().to_triangular();
     assert!(matches!(estimator.add(&q[1..], dq, ddq, tau), Err(OnlineError::Length { .. })));
     let mut bad = tau.clone();
     bad[3] = f64::NAN;
     assert!(matches!(estimator.add(q, dq, ddq, &bad), Err(OnlineError::Number { .. })));
-    assert_eq!((estimator.factor(), estimator.samples()), (&before, 1));
+    assert_eq!((estimator.factor().to_triangular(), estimator.samples()), (before.clone(), 1));
     let columns = before.columns();
     let start = StartingPoint { values: vec![0.0; columns], covariance: -DMatrix::identity(columns, columns) };
     let refused = OnlineEstimator::new(self::robot(), OnlineSettings::new(STD.to_vec()), Some(&start));
