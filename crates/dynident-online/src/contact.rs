@@ -16,9 +16,9 @@ pub struct ContactSettings {
 }
 
 impl ContactSettings {
-    /// 20 ms and 2 s, one false alarm in ten hours.
+    /// 20 ms and 2 s, one false alarm in twenty hours.
     pub fn new(rate_hz: f64) -> Self {
-        Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.1 }
+        Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.05 }
     }
 
     /// That the settings can be met.
@@ -122,6 +122,33 @@ impl ContactMonitor {
         Ok(Self { means: levels.clone(), settings, levels, thresholds, samples: 0 })
     }
 
+    /// A monitor by what a model says of itself: `std_nm`, the standard deviation of each joint's residual (half the
+    /// width of its 95 % band over 1.96), and the time over which residuals forget themselves.
+    ///
+    /// Noise with a correlation `exp(−t/τ)` through a mean of time constant T has the variance `σ² τ/(τ + T)` and
+    /// crosses its level upwards `ν₀ = 1/(2π √(τ T))` times a second (Rice, as above, of a spectrum of two poles). What
+    /// a model does not explain goes with the motion, so that τ is that of the motion, a second or so, and not that of
+    /// the sensors' noise: the longer, the higher the thresholds. Where undisturbed motion can be recorded, thresholds
+    /// by [`new`](Self::new) are better.
+    ///
+    /// # Errors
+    /// Settings that cannot be met; deviations or a time that are not positive.
+    pub fn from_band(settings: ContactSettings, std_nm: &[f64], correlation_s: f64) -> Result<Self, OnlineError> {
+        settings.validate()?;
+        check_positive("std_nm", std_nm)?;
+        check_positive("correlation_s", &[correlation_s])?;
+        let each = settings.false_alarms_per_hour / (2.0 * std_nm.len().max(1) as f64);
+        let looks = [settings.collision_s, settings.payload_s];
+        let of = |std: &f64| {
+            looks.map(|constant_s| {
+                let crossings_hz = 1.0 / (core::f64::consts::TAU * (correlation_s * constant_s).sqrt());
+                std * (correlation_s / (correlation_s + constant_s)).sqrt() * rice(2.0 * 3600.0 * crossings_hz / each)
+            })
+        };
+        let levels = vec![[0.0; 2]; std_nm.len()];
+        Ok(Self { means: levels.clone(), thresholds: std_nm.iter().map(of).collect(), settings, levels, samples: 0 })
+    }
+
     /// For each joint its thresholds, of collision and of payload, Nm (N).
     pub fn thresholds_nm(&self) -> &[[f64; 2]] {
         &self.thresholds
@@ -198,9 +225,13 @@ impl Watched {
     fn threshold(&self, rate_hz: f64, samples: usize, per_hour: f64) -> f64 {
         let seen_s = samples as f64 / rate_hz;
         let crossings_hz = self.crossings.max(1) as f64 / seen_s;
-        let height = |times: f64| (2.0 * times.max(core::f64::consts::E).ln()).sqrt();
-        let expected = self.std * height(2.0 * crossings_hz * seen_s);
+        let expected = self.std * rice(2.0 * crossings_hz * seen_s);
         let heavier = (self.largest / expected).max(1.0);
-        heavier * self.std * height(2.0 * 3600.0 * crossings_hz / per_hour)
+        heavier * self.std * rice(2.0 * 3600.0 * crossings_hz / per_hour)
     }
+}
+
+/// The height, in standard deviations, that a Gaussian process exceeds once in so many crossings of its level.
+fn rice(crossings: f64) -> f64 {
+    (2.0 * crossings.max(core::f64::consts::E).ln()).sqrt()
 }

@@ -1,6 +1,7 @@
 //! What can be wrong with samples and settings.
 
 use dynident_estimation::EstimationError;
+use dynident_identification::consistent::ConsistencyError;
 use thiserror::Error;
 
 /// Why a sample or a setting cannot be used. A refused sample changes nothing.
@@ -30,6 +31,15 @@ pub enum OnlineError {
     /// A covariance that is none.
     #[error("the covariance of the start is not positive definite: give that of an identified model")]
     Covariance,
+    /// Friction that follows a temperature.
+    #[error("joint {joint}: its friction follows its temperature, which samples do not have: identify without it")]
+    Temperature {
+        /// The joint.
+        joint: String,
+    },
+    /// No consistent parameters.
+    #[error(transparent)]
+    Consistency(#[from] ConsistencyError),
     /// Rows that a factor refuses.
     #[error(transparent)]
     Rows(#[from] EstimationError),

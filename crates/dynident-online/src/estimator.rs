@@ -1,8 +1,11 @@
 //! The estimate that a batch would give, after every sample.
 
 use crate::error::{OnlineError, check, check_positive};
-use dynident_dynamics::{Panels, ParametricModel, TermHistory, Workspace, regressor_panels_of_sample};
-use dynident_estimation::{RecursiveFactor, TriangularFactor};
+use dynident_dynamics::{Panels, TermHistory, Workspace, regressor_panels_of_sample};
+use dynident_estimation::consistent::PhysicalFit;
+use dynident_estimation::{LinearProblem, RecursiveFactor, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_identification::RegressorModel;
+use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
 use dynident_model::terms::JointMotion;
 use nalgebra::{Cholesky, DMatrix};
 
@@ -63,7 +66,7 @@ pub struct StartingPoint {
 /// Methods for Discrete Sequential Estimation (1977), ch. IV.
 #[derive(Debug)]
 pub struct OnlineEstimator {
-    model: ParametricModel,
+    model: RegressorModel,
     settings: OnlineSettings,
     factor: RecursiveFactor,
     /// What new rows are multiplied by: old ones weigh less because new ones weigh more.
@@ -76,17 +79,23 @@ pub struct OnlineEstimator {
 }
 
 impl OnlineEstimator {
-    /// An estimator for a robot, from what is known of it; without a start the first samples alone say what it is, and
-    /// [`values`](Self::values) are none until they do.
+    /// An estimator for a robot (a [`ParametricModel`](dynident_dynamics::ParametricModel), or one with what
+    /// identification has added to it), from what is known of it; without a start the first samples alone say what it
+    /// is, and [`values`](Self::values) are none until they do.
     ///
     /// # Errors
-    /// Settings or a start that do not belong to the robot, a covariance that is none.
+    /// Settings or a start that do not belong to the robot, a covariance that is none; friction that follows a
+    /// temperature, which samples do not have.
     pub fn new(
-        model: ParametricModel,
+        model: impl Into<RegressorModel>,
         settings: OnlineSettings,
         start: Option<&StartingPoint>,
     ) -> Result<Self, OnlineError> {
         settings.validate()?;
+        let model = model.into();
+        if let Some(joint) = model.joint_that_needs_temperature() {
+            return Err(OnlineError::Temperature { joint: model.joint_names().swap_remove(joint) });
+        }
         let (dof, columns) = (model.dof(), model.layout().columns().len());
         if settings.torque_std_nm.len() != dof {
             let found = settings.torque_std_nm.len();
@@ -99,9 +108,9 @@ impl OnlineEstimator {
             factor.start_from(&TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?)?;
         }
         let growth_per_sample = settings.half_life_samples.map_or(1.0, |half| 0.5_f64.powf(-0.5 / half));
-        Ok(Self {
+        let mut made = Self {
             workspace: Workspace::new(model.model()),
-            history: TermHistory::default(),
+            history: TermHistory::new(model.load_parameters.clone()),
             panels: Panels::default(),
             growth: 1.0,
             growth_per_sample,
@@ -109,11 +118,16 @@ impl OnlineEstimator {
             factor,
             settings,
             model,
-        })
+        };
+        // What grows with the first sample has its size before it.
+        let rest = vec![0.0; dof];
+        made.see(&rest, &rest, &rest);
+        made.restart();
+        Ok(made)
     }
 
     /// The robot.
-    pub fn model(&self) -> &ParametricModel {
+    pub fn model(&self) -> &RegressorModel {
         &self.model
     }
 
@@ -122,13 +136,49 @@ impl OnlineEstimator {
         self.samples
     }
 
-    /// The triangle of all rows, the start among them. With forgetting it is multiplied by a growing number.
+    /// The triangle of all rows, the start among them. With forgetting it is multiplied by a growing number,
+    /// which [`information`](Self::information) takes out.
     pub fn factor(&self) -> &RecursiveFactor {
         &self.factor
     }
 
-    /// Takes a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Allocates nothing
-    /// after the first one.
+    /// How samples count.
+    pub fn settings(&self) -> &OnlineSettings {
+        &self.settings
+    }
+
+    /// The regressor of a motion's next sample.
+    fn see(&mut self, q: &[f64], dq: &[f64], ddq: &[f64]) {
+        let motion = JointMotion { samples: 1, q, dq, ddq };
+        let (model, layout) = (self.model.model(), self.model.layout());
+        regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
+    }
+
+    /// The next sample begins a motion: friction with memory starts at rest.
+    pub fn restart(&mut self) {
+        self.history.restart();
+    }
+
+    /// Torque of the last sample by base parameters `values`, for each joint in `out`, as the drive's log would have
+    /// it, Nm (N). Allocates nothing.
+    ///
+    /// # Panics
+    /// If `values` has not one entry for each base parameter, or `out` for each joint.
+    pub fn torque(&self, values: &[f64], out: &mut [f64]) {
+        let layout = self.model.layout();
+        assert_eq!((values.len(), out.len()), (layout.columns().len(), self.model.dof()), "parameters and joints");
+        for (joint, out) in out.iter_mut().enumerate() {
+            let columns = layout.joint_columns(joint).iter().zip(self.panels.joint(joint));
+            *out = columns.map(|(&column, entry)| values[column] * entry).sum::<f64>() / self.gain(joint);
+        }
+    }
+
+    /// What logged torque of a joint is multiplied by.
+    fn gain(&self, joint: usize) -> f64 {
+        self.model.torque_gains.get(joint).copied().unwrap_or(1.0)
+    }
+
+    /// Takes a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Allocates nothing.
     ///
     /// # Errors
     /// A vector of another length or a number that is none: nothing has changed then.
@@ -137,16 +187,16 @@ impl OnlineEstimator {
         for (what, values) in [("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)] {
             check(what, values, dof)?;
         }
-        let motion = JointMotion { samples: 1, q, dq, ddq };
-        let (model, layout) = (self.model.model(), self.model.layout());
-        regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
+        self.see(q, dq, ddq);
+        let layout = self.model.layout();
         let columns = layout.columns().len();
         for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
             let weight = self.growth / std;
+            let gain = self.gain(joint);
             for (&column, entry) in layout.joint_columns(joint).iter().zip(self.panels.joint(joint)) {
                 self.factor.set(joint, column, weight * entry);
             }
-            self.factor.set(joint, columns, weight * tau);
+            self.factor.set(joint, columns, weight * gain * tau);
         }
         self.factor.absorb()?;
         self.samples += 1;
@@ -169,12 +219,37 @@ impl OnlineEstimator {
     /// Their covariance, `κ (RᵀR)⁻¹` of rows with unit variance, κ the samples per independent one; none while the
     /// samples do not determine them. Allocates.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        let now = self.growth / self.growth_per_sample;
-        let triangle = self.factor.to_triangular().regressor_triangle() / now;
+        let triangle = self.information().regressor_triangle();
         let columns = triangle.ncols();
         let inverse = triangle.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
-        let covariance = &inverse * inverse.transpose() * self.settings.samples_per_independent;
+        let covariance = &inverse * inverse.transpose();
         covariance.iter().all(|value| value.is_finite()).then_some(covariance)
+    }
+
+    /// `R/√κ` without what forgetting has multiplied it by: `(RᵀR)⁻¹` is the covariance. Allocates.
+    pub fn information(&self) -> TriangularFactor {
+        let scale = self.growth_per_sample / self.growth / self.settings.samples_per_independent.sqrt();
+        // Both are positive and finite: growth is kept below a bound.
+        self.factor.to_triangular().scaled(scale).unwrap_or_else(|_| self.factor.to_triangular())
+    }
+
+    /// The parameters of all bodies and terms that can be real and explain what was seen best, as
+    /// [`consistent_parameters`] finds them from the factors of logs; all joints' rows count as those of one, in units
+    /// of their noise. Takes milliseconds and allocates: not for the loop that controls.
+    ///
+    /// # Errors
+    /// As [`consistent_parameters`].
+    pub fn consistent(&self, settings: &ConsistencySettings) -> Result<PhysicalFit, OnlineError> {
+        let factor = self.information();
+        let size = factor.columns() + 1;
+        let panel: Vec<f64> =
+            (0..size).flat_map(|c| (0..size).map(move |r| (r, c))).map(|(r, c)| factor.entry(r, c)).collect();
+        let mut rows = SegmentedFactor::new(size - 1, SegmentSettings::for_rows(size))?;
+        rows.absorb(&panel, size)?;
+        let names = self.model.parametric.base().expressions();
+        let mut problem = LinearProblem::new(names, vec!["all joints".into()]);
+        problem.add("online", 0, (0..size - 1).collect(), rows)?;
+        Ok(consistent_parameters(&self.model.parametric, &problem, &[1.0], settings)?)
     }
 }
 

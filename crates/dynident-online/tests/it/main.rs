@@ -1,5 +1,7 @@
 //! The online crate against the batch, and against simulated contact.
 
+mod consistent;
 mod contact;
 mod derivatives;
+mod drift;
 mod estimator;
