@@ -40,7 +40,7 @@ program=$scratch/python/bin
 "$program/python" -m pytest -q -p no:cacheprovider python/tests
 (cd "$scratch" && "$program/mypy" --config-file "$here/pyproject.toml" -p dynident)
 (cd "$scratch" && "$program/stubtest" --mypy-config-file "$here/pyproject.toml" --allowlist "$here/python/tests/allowed.txt" dynident)
-"$program/python" .ci/python_pages.py docs/src/python.md
+"$program/python" .ci/python_pages.py docs/src/python.md docs/src/online.md
 "$program/python" .ci/notebooks.py
 
 # One wheel for every Python: pip links it anew each time that it builds it.

@@ -11,7 +11,7 @@ from ._iterate import Iteration, iterate
 from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
 from ._log import Log
 from ._model import Model
-from ._native import Error, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, __version__
+from ._native import Error, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, Watch, __version__
 from ._study import study, with_logs
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "StopRun",
     "Study",
     "StudyError",
+    "Watch",
     "__version__",
     "check",
     "design",

@@ -105,7 +105,9 @@ impl OnlineEstimator {
         let begins: Vec<usize> = (0..dof).map(first).collect();
         let mut factor = RecursiveFactor::new(columns, &begins);
         if let Some(start) = start {
-            factor.start_from(&TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?)?;
+            // What is known counts as it says, however many samples tell as much as one.
+            let rows = TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?;
+            factor.start_from(&rows.scaled(settings.samples_per_independent.sqrt())?)?;
         }
         let growth_per_sample = settings.half_life_samples.map_or(1.0, |half| 0.5_f64.powf(-0.5 / half));
         let mut made = Self {

@@ -3,6 +3,7 @@
 //!
 //! | task | take |
 //! | --- | --- |
+//! | all of it, by an identified model | [`Watch`] |
 //! | velocities and accelerations of positions that come one by one | [`DelayedDerivatives`] |
 //! | the estimate that a batch would give, after every sample | [`OnlineEstimator`] |
 //! | a collision, a payload, a hand on the arm | [`ContactMonitor`] |
@@ -18,9 +19,11 @@ mod derivatives;
 mod drift;
 mod error;
 mod estimator;
+mod watch;
 
 pub use contact::{Contact, ContactMonitor, ContactSettings, Look, Residuals};
 pub use derivatives::{DelayedDerivatives, DelayedSample};
 pub use drift::{DriftAlarm, DriftMonitor, DriftSettings};
 pub use error::OnlineError;
 pub use estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
+pub use watch::{Watch, WatchSettings};

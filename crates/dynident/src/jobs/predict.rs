@@ -7,6 +7,7 @@ use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_fo
 use dynident_estimation::student_half_width;
 use dynident_identification::RegressorModel;
 use dynident_model::terms::JointMotion;
+use dynident_online::{OnlineError, StartingPoint, Watch, WatchSettings};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 
@@ -81,6 +82,16 @@ impl TorquePredictor {
     /// Names of the joints, in the order of the motion.
     pub fn joint_names(&self) -> Vec<String> {
         self.model.joint_names()
+    }
+
+    /// A watch over the robot by this model: its reference are the base parameters that predict, with the covariance of
+    /// the estimate; the band is that of filtered torque.
+    ///
+    /// # Errors
+    /// As [`Watch::new`].
+    pub fn watch(&self, settings: &WatchSettings) -> Result<Watch, OnlineError> {
+        let reference = StartingPoint { values: self.theta.clone(), covariance: self.covariance.clone() };
+        Watch::new(self.model.clone(), reference, &self.joint_sigma, settings)
     }
 
     /// The torque along `motion`, whose samples follow one another in time (friction with memory begins at rest).
