@@ -83,8 +83,6 @@ pub struct ContactMonitor {
     levels: Vec<[f64; 2]>,
     thresholds: Vec<[f64; 2]>,
     means: Vec<[f64; 2]>,
-    /// Samples since the start, as far as the looks count them.
-    samples: u64,
 }
 
 impl ContactMonitor {
@@ -119,7 +117,7 @@ impl ContactMonitor {
             }
             thresholds.push(heights);
         }
-        Ok(Self { means: levels.clone(), settings, levels, thresholds, samples: 0 })
+        Ok(Self { means: levels.clone(), settings, levels, thresholds })
     }
 
     /// A monitor by what a model says of itself: `std_nm`, the standard deviation of each joint's residual (half the
@@ -146,7 +144,7 @@ impl ContactMonitor {
             })
         };
         let levels = vec![[0.0; 2]; std_nm.len()];
-        Ok(Self { means: levels.clone(), thresholds: std_nm.iter().map(of).collect(), settings, levels, samples: 0 })
+        Ok(Self { means: levels.clone(), thresholds: std_nm.iter().map(of).collect(), settings, levels })
     }
 
     /// For each joint its thresholds, of collision and of payload, Nm (N).
@@ -161,7 +159,6 @@ impl ContactMonitor {
     /// Residuals of another number than the joints', or that are no numbers: nothing has changed then.
     pub fn add(&mut self, residuals: &[f64]) -> Result<Option<Contact>, OnlineError> {
         check("residuals", residuals, self.means.len())?;
-        self.samples += 1;
         let gains = [self.settings.collision_s, self.settings.payload_s].map(|s| gain(s, self.settings.rate_hz));
         let (mut strongest, mut most) = (None, 1.0);
         for (joint, residual) in residuals.iter().enumerate() {
@@ -181,7 +178,6 @@ impl ContactMonitor {
     /// Forgets what was seen: the next sample begins a motion.
     pub fn restart(&mut self) {
         self.means.clone_from(&self.levels);
-        self.samples = 0;
     }
 }
 

@@ -65,11 +65,12 @@ pub struct DriftAlarm {
 /// both estimates in the metric of the sum of their covariances, and what they do not determine adds nothing.
 ///
 /// Errors are neither white nor of the size that was thought, so T is measured where the model is true: from n checks,
-/// its mean m and variance v. As a sum of squares of Gaussian numbers of any correlation T is close to `m χ²_ν / ν` with
-/// `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check, its mean found from n
-/// others, follows `F(ν, n ν)`. For ν the least is taken that the scatter of n checks allows with 95 %. The threshold is
-/// the quantile of that F that is exceeded `f Δ` times, f the false alarms allowed in a time and Δ the time from check
-/// to check. Motions with other speeds or loads than those of learning have other errors: learn on what will be watched.
+/// its mean m and variance v. As a sum of squares of Gaussian numbers of any correlation T is close to `m χ²_ν / ν`
+/// with `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check, its mean found
+/// from n others, follows `F(ν, n ν)`. For ν the least is taken that the scatter of n checks allows with 95 %. The
+/// threshold is the quantile of that F that is exceeded `f Δ` times, f the false alarms allowed in a time and Δ the
+/// time from check to check. Motions with other speeds or loads than those of learning have other errors: learn on
+/// what will be watched.
 #[derive(Clone, Debug)]
 pub struct DriftMonitor {
     settings: DriftSettings,

@@ -1,7 +1,7 @@
 //! All of it around one robot: from what is measured to alarms.
 
 use crate::contact::{Contact, ContactMonitor, ContactSettings, Residuals};
-use crate::derivatives::DelayedDerivatives;
+use crate::derivatives::{DelayedDerivatives, DelayedSample};
 use crate::drift::{DriftAlarm, DriftMonitor, DriftSettings};
 use crate::error::{OnlineError, check_positive};
 use crate::estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
@@ -138,12 +138,8 @@ impl Watch {
     /// # Errors
     /// As [`OnlineEstimator::add`]: nothing has changed then.
     pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
-        self.estimator.add(q, dq, ddq, tau)?;
-        self.estimator.torque(&self.reference, &mut self.residuals);
-        for (residual, tau) in self.residuals.iter_mut().zip(tau) {
-            *residual = tau - *residual;
-        }
-        self.contact.add(&self.residuals)
+        let Self { estimator, reference, residuals, contact, .. } = self;
+        look(estimator, (reference, residuals), contact, [q, dq, ddq, tau])
     }
 
     /// Takes positions and torques as they were measured; velocities and accelerations are those of
@@ -152,13 +148,9 @@ impl Watch {
     /// # Errors
     /// As [`add`](Self::add).
     pub fn add_measured(&mut self, q: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
-        let Some(sample) = self.derivatives.add(q, tau)? else { return Ok(None) };
-        self.estimator.add(&sample.q, &sample.dq, &sample.ddq, &sample.tau)?;
-        self.estimator.torque(&self.reference, &mut self.residuals);
-        for (residual, tau) in self.residuals.iter_mut().zip(&sample.tau) {
-            *residual = tau - *residual;
-        }
-        self.contact.add(&self.residuals)
+        let Self { derivatives, estimator, reference, residuals, contact, .. } = self;
+        let Some(DelayedSample { q, dq, ddq, tau }) = derivatives.add(q, tau)? else { return Ok(None) };
+        look(estimator, (reference, residuals), contact, [q, dq, ddq, tau])
     }
 
     /// Whether it is time for [`check_drift`](Self::check_drift).
@@ -224,4 +216,19 @@ impl Watch {
     pub fn delay_samples(&self) -> usize {
         self.derivatives.delay_samples()
     }
+}
+
+/// A sample for the estimate, and its residual by the reference for the monitor.
+fn look(
+    estimator: &mut OnlineEstimator,
+    (reference, residuals): (&[f64], &mut [f64]),
+    contact: &mut ContactMonitor,
+    [q, dq, ddq, tau]: [&[f64]; 4],
+) -> Result<Option<Contact>, OnlineError> {
+    estimator.add(q, dq, ddq, tau)?;
+    estimator.torque(reference, residuals);
+    for (residual, tau) in residuals.iter_mut().zip(tau) {
+        *residual = tau - *residual;
+    }
+    contact.add(residuals)
 }

@@ -29,8 +29,8 @@ const LARGEST: f64 = 1.0e140;
 
 /// The upper triangular R of all rows `[W | τ]` so far, of which every sample brings as many as there are joints.
 ///
-/// The same factor as a [`TriangularFactor`] to rounding, in a form for which a sample is cheap: 4·rows·(columns + 1)²/2
-/// operations less what rows that begin late leave out, no allocation.
+/// The same factor as a [`TriangularFactor`] to rounding, in a form for which a sample is cheap: 2·rows·(columns + 1)²
+/// operations less what rows that begin late leave out, and no allocation.
 ///
 /// ```
 /// use dynident_estimation::RecursiveFactor;
@@ -294,9 +294,9 @@ impl Kernel for TriangleOnRows<'_> {
     }
 }
 
-/// Two reflectors of two rows of the triangle and `M` rows: made of their own columns, number by number, then applied to
-/// eight columns after eight, which stay in registers for both. Columns before their own in the first line hold rounding
-/// of earlier reflectors: it is reflected too, which bounds it, and never read.
+/// Two reflectors of two rows of the triangle and `M` rows: made of their own columns, number by number, then applied
+/// to eight columns after eight, which stay in registers for both. Columns before their own in the first line hold
+/// rounding of earlier reflectors: it is reflected too, which bounds it, and never read.
 #[inline(always)]
 fn reflect<T: Lane, const M: usize>(triangle: &mut [Chunk], lines: &mut [Line], within: usize) {
     let count = lines.len();
