@@ -121,26 +121,44 @@ impl ContactMonitor {
     }
 
     /// A monitor by what a model says of itself: `std_nm`, the standard deviation of each joint's residual (half the
-    /// width of its 95 % band over 1.96), and the time over which residuals forget themselves.
+    /// width of its 95 % band over 1.96), the time over which residuals forget themselves, and the cut-off `band_hz` of
+    /// the filter behind which they were measured, if there was one.
     ///
     /// Noise with a correlation `exp(−t/τ)` through a mean of time constant T has the variance `σ² τ/(τ + T)` and
     /// crosses its level upwards `ν₀ = 1/(2π √(τ T))` times a second (Rice, as above, of a spectrum of two poles). What
     /// a model does not explain goes with the motion, so that τ is that of the motion, a second or so, and not that of
-    /// the sensors' noise: the longer, the higher the thresholds. Where undisturbed motion can be recorded, thresholds
-    /// by [`new`](Self::new) are better.
+    /// the sensors' noise: the longer, the higher the thresholds. A filter of cut-off B hides noise that a mean of less
+    /// than `1/(4 B)` lets through. If all of σ² were white it would be `σ² min(1/(4 T), rate/2)/B` in the mean, of
+    /// which samples cross their level `rate acos(e^(−1/(T rate)))/2π` times a second; whichever threshold is higher
+    /// holds. Where undisturbed motion can be recorded, thresholds by [`new`](Self::new) are better.
     ///
     /// # Errors
-    /// Settings that cannot be met; deviations or a time that are not positive.
-    pub fn from_band(settings: ContactSettings, std_nm: &[f64], correlation_s: f64) -> Result<Self, OnlineError> {
+    /// Settings that cannot be met; deviations, a time or a cut-off that are not positive.
+    pub fn from_band(
+        settings: ContactSettings,
+        std_nm: &[f64],
+        correlation_s: f64,
+        band_hz: Option<f64>,
+    ) -> Result<Self, OnlineError> {
         settings.validate()?;
+        check_positive("band_hz", band_hz.as_slice())?;
         check_positive("std_nm", std_nm)?;
         check_positive("correlation_s", &[correlation_s])?;
         let each = settings.false_alarms_per_hour / (2.0 * std_nm.len().max(1) as f64);
-        let looks = [settings.collision_s, settings.payload_s];
+        let (looks, rate_hz) = ([settings.collision_s, settings.payload_s], settings.rate_hz);
         let of = |std: &f64| {
             looks.map(|constant_s| {
-                let crossings_hz = 1.0 / (core::f64::consts::TAU * (correlation_s * constant_s).sqrt());
-                std * (correlation_s / (correlation_s + constant_s)).sqrt() * rice(2.0 * 3600.0 * crossings_hz / each)
+                let height = |share: f64, crossings_hz: f64| share.sqrt() * rice(2.0 * 3600.0 * crossings_hz / each);
+                let slow = height(
+                    correlation_s / (correlation_s + constant_s),
+                    1.0 / (core::f64::consts::TAU * (correlation_s * constant_s).sqrt()),
+                );
+                let white = band_hz.map_or(0.0, |band_hz| {
+                    let kept = (-1.0 / (constant_s * rate_hz)).exp();
+                    let share = (0.25 / constant_s).min(0.5 * rate_hz) / band_hz;
+                    height(share, rate_hz * kept.acos() / core::f64::consts::TAU)
+                });
+                std * slow.max(white)
             })
         };
         let levels = vec![[0.0; 2]; std_nm.len()];

@@ -19,6 +19,8 @@ pub struct WatchSettings {
     pub half_life_s: Option<f64>,
     /// Time over which residuals forget themselves, s: see [`ContactMonitor::from_band`].
     pub correlation_s: f64,
+    /// Cut-off of the filter behind which the residuals' deviations were measured, Hz; none for samples as they come.
+    pub band_hz: Option<f64>,
     /// Samples on each side of the one whose derivatives are taken: see [`DelayedDerivatives`].
     pub half_window: usize,
     /// False alarms of drift in an hour.
@@ -33,6 +35,7 @@ impl WatchSettings {
             contact: ContactSettings::new(rate_hz),
             half_life_s: Some(15.0),
             correlation_s: 1.0,
+            band_hz: None,
             half_window: 10,
             drift_alarms_per_hour: 0.1,
         }
@@ -96,12 +99,15 @@ impl Watch {
         settings: &WatchSettings,
     ) -> Result<Self, OnlineError> {
         let rate_hz = settings.contact.rate_hz;
-        let contact = ContactMonitor::from_band(settings.contact.clone(), std_nm, settings.correlation_s)?;
+        let contact =
+            ContactMonitor::from_band(settings.contact.clone(), std_nm, settings.correlation_s, settings.band_hz)?;
         check_positive("half_life_s", settings.half_life_s.as_slice())?;
         let online = OnlineSettings {
             half_life_samples: settings.half_life_s.map(|half| half * rate_hz),
-            // Of noise with a correlation of e^(-t/τ).
-            samples_per_independent: (2.0 * settings.correlation_s * rate_hz).max(1.0),
+            // Of noise with a correlation of e^(-t/τ), or white up to the filter's cut-off.
+            samples_per_independent: (2.0 * settings.correlation_s * rate_hz)
+                .max(settings.band_hz.map_or(1.0, |band_hz| 0.5 * rate_hz / band_hz))
+                .max(1.0),
             ..OnlineSettings::new(std_nm.to_vec())
         };
         // An estimate that forgets is compared with the reference, and must not hold it.

@@ -132,7 +132,7 @@ impl RecursiveFactor {
             let place = group * MOST_ROWS + bad % MOST_ROWS;
             let row = self.places.iter().position(|&at| at == place).unwrap_or(0);
             let chunk = self.lines[bad / MOST_ROWS][bad % MOST_ROWS].0;
-            let within = chunk.iter().position(|value| !(value.abs() <= LARGEST)).unwrap_or(0);
+            let within = chunk.iter().position(|value| value.is_nan() || value.abs() > LARGEST).unwrap_or(0);
             self.lines.fill([Chunk::ZERO; MOST_ROWS]);
             let column = line * CHUNK_ROWS + within;
             return Err(EstimationError::Unusable { row, column, value: chunk[within], limit: LARGEST });
@@ -192,7 +192,7 @@ impl RecursiveFactor {
                 }
             }
             let pivot = self.at(row, row);
-            if !(pivot > 1e-12 * largest) {
+            if pivot.is_nan() || pivot <= 1e-12 * largest {
                 return false;
             }
             out[row] = (self.at(row, self.columns) - known) / pivot;
@@ -251,7 +251,8 @@ impl Kernel for FindUnusable<'_> {
         if usable {
             return None;
         }
-        self.0.as_flattened().iter().position(|chunk| chunk.0.iter().any(|value| !(value.abs() <= LARGEST)))
+        let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
+        self.0.as_flattened().iter().position(|chunk| chunk.0.iter().any(bad))
     }
 }
 

@@ -213,15 +213,32 @@ fn the_band_of_a_model_gives_the_thresholds_of_its_noise() {
     let settings = ContactSettings { false_alarms_per_hour: 10.0, ..ContactSettings::new(RATE_HZ) };
     let measured = ContactMonitor::new(settings.clone(), &calibration(8, 3600.0)).unwrap();
     let correlation_s = -1.0 / (RATE_HZ * 0.7_f64.ln());
-    let stated = ContactMonitor::from_band(settings.clone(), &STD, correlation_s).unwrap();
+    let stated = ContactMonitor::from_band(settings.clone(), &STD, correlation_s, None).unwrap();
     for (measured, stated) in measured.thresholds_nm().iter().zip(stated.thresholds_nm()) {
         for look in 0..2 {
             // Samples 8 ms apart are not quite time that flows, and the largest of an hour raises what is measured.
             assert!((stated[look] / measured[look] - 1.0).abs() < 0.25, "{stated:?} and {measured:?}");
         }
     }
-    assert!(ContactMonitor::from_band(settings.clone(), &[0.0; 6], 1.0).is_err());
-    assert!(ContactMonitor::from_band(settings, &STD, f64::NAN).is_err());
+    assert!(ContactMonitor::from_band(settings.clone(), &[0.0; 6], 1.0, None).is_err());
+    assert!(ContactMonitor::from_band(settings.clone(), &STD, f64::NAN, None).is_err());
+    assert!(ContactMonitor::from_band(settings, &STD, 1.0, Some(0.0)).is_err());
+}
+
+#[test]
+fn noise_that_a_filter_hid_is_reckoned_with() {
+    // White noise of 1 Nm at 125 Hz. Behind a filter of 4 Hz its deviation is √(4/62.5): what the model knows of it.
+    let settings = ContactSettings { false_alarms_per_hour: 10.0, ..ContactSettings::new(RATE_HZ) };
+    let mut random = Random::new(11);
+    let white = (0..450_000).map(|_| (0..12).map(|_| random.uniform(-0.5, 0.5)).sum()).collect();
+    let measured = ContactMonitor::new(settings.clone(), &Residuals { joints: vec![white] }).unwrap();
+    let known = (4.0 / (0.5 * RATE_HZ)).sqrt();
+    let stated = ContactMonitor::from_band(settings.clone(), &[known], 0.1, Some(4.0)).unwrap();
+    let [measured, stated] = [measured, stated].map(|monitor| monitor.thresholds_nm()[0][0]);
+    // A mean over two samples and a half lets through a little less than its 12.5 Hz; the largest of an hour stood out.
+    assert!((stated / measured - 1.0).abs() < 0.2, "{stated} and {measured}");
+    let blind = ContactMonitor::from_band(settings, &[known], 0.1, None).unwrap();
+    assert!(blind.thresholds_nm()[0][0] < 0.7 * measured);
 }
 
 #[test]
