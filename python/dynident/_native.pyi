@@ -17,6 +17,7 @@ __all__ = [
     "StopRun",
     "Study",
     "StudyError",
+    "Watch",
     "__version__",
     "_check",
     "_command",

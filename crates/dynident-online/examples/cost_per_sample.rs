@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let coulomb = Some(CoulombShape::Smooth { width: 0.02 });
     let choice = DriveChoice { coulomb, viscous: true, offset: true, drive_inertia: true };
     // Of the robot's parameters, as many as stand in the promise.
-    let terms = terms_per_joint(&model, |_| choice.clone());
+    let terms = terms_per_joint(&model, |_| choice);
     let robot = (0..terms.len())
         .rev()
         .filter_map(|count| ParametricModel::new(model.clone(), terms[..count].to_vec()).ok())

@@ -54,7 +54,7 @@ impl OnlineSettings {
 pub struct StartingPoint {
     /// Base parameters.
     pub values: Vec<f64>,
-    /// Their covariance.
+    /// Their covariance; zeros for what was held where it is.
     pub covariance: DMatrix<f64>,
 }
 
@@ -262,7 +262,16 @@ fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, Onli
         let found = start.covariance.nrows();
         return Err(OnlineError::Length { what: "covariance of the start", expected: columns, found });
     }
-    let lower = Cholesky::new(start.covariance.clone()).ok_or(OnlineError::Covariance)?.l();
+    // What an identification held where it was has no variance: it counts as known a thousand times better than the
+    // best of the others.
+    let mut covariance = start.covariance.clone();
+    let least = covariance.diagonal().iter().copied().filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
+    for held in 0..columns {
+        if least.is_finite() && covariance.column(held).iter().all(|entry| *entry == 0.0) {
+            covariance[(held, held)] = 1e-6 * least;
+        }
+    }
+    let lower = Cholesky::new(covariance).ok_or(OnlineError::Covariance)?.l();
     let root = lower.solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?;
     let right = &root * nalgebra::DVector::from_column_slice(&start.values);
     Ok(root.iter().chain(right.iter()).copied().collect())

@@ -59,7 +59,7 @@ fn nothing_is_allocated_from_the_first_sample_on() {
     let model = load_robot(repository("robots/panda_arm7.urdf")).unwrap().model;
     let coulomb = Some(CoulombShape::Smooth { width: 0.02 });
     let choice = DriveChoice { coulomb, viscous: true, offset: false, drive_inertia: true };
-    let robot = ParametricModel::new(model.clone(), terms_per_joint(&model, |_| choice.clone())).unwrap();
+    let robot = ParametricModel::new(model.clone(), terms_per_joint(&model, |_| choice)).unwrap();
     let (dof, columns) = (robot.dof(), robot.layout().columns().len());
     let mut random = Random::new(1);
     let mut draw = |count: usize| -> Vec<f64> { (0..count).map(|_| random.uniform(-1.0, 1.0)).collect() };

@@ -155,3 +155,24 @@ fn too_few_samples_determine_nothing_and_bad_ones_change_nothing() {
     assert!(matches!(refused, Err(OnlineError::Covariance)));
     assert!(OnlineEstimator::new(self::robot(), OnlineSettings::new(vec![0.1; 3]), None).is_err());
 }
+
+#[test]
+fn what_was_held_stays_and_the_rest_goes_on() {
+    let robot = robot();
+    let (samples, columns) = (samples(&robot, 300, 6), robot.layout().columns().len());
+    let held = [3, 20];
+    let covariance = DMatrix::from_fn(columns, columns, |i, j| if i == j && !held.contains(&i) { 0.04 } else { 0.0 });
+    let start = StartingPoint { values: vec![0.1; columns], covariance };
+    let estimator = fed(OnlineSettings::new(STD.to_vec()), &samples, Some(&start));
+    let mut values = vec![0.0; columns];
+    assert!(estimator.values(&mut values));
+    let std: Vec<f64> = estimator.covariance().unwrap().diagonal().iter().map(|variance| variance.sqrt()).collect();
+    for (column, (value, std)) in values.iter().zip(&std).enumerate() {
+        if held.contains(&column) {
+            // A thousandth of 0.2, and some hundreds of such deviations that the samples pull with.
+            assert!((value - 0.1).abs() < 0.05 && *std < 2.1e-4, "{value} and {std}");
+        } else {
+            assert!((value - 0.1).abs() > 1e-6 && *std < 0.2);
+        }
+    }
+}
