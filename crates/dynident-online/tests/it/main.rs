@@ -1,4 +1,5 @@
 //! The online crate against the batch, and against simulated contact.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod consistent;
 mod contact;
