@@ -271,8 +271,32 @@ fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, Onli
             covariance[(held, held)] = 1e-6 * least;
         }
     }
-    let lower = Cholesky::new(covariance).ok_or(OnlineError::Covariance)?.l();
-    let root = lower.solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?;
+    let root = match Cholesky::new(covariance.clone()) {
+        Some(own) => {
+            own.l().solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?
+        }
+        None => inverse_root(&covariance)?,
+    };
     let right = &root * nalgebra::DVector::from_column_slice(&start.values);
     Ok(root.iter().chain(right.iter()).copied().collect())
+}
+
+/// `V^(-1/2)` of a covariance without full rank, as one from fewer segments than parameters is: what it does not know
+/// of a direction is no knowledge, and no direction counts as known better than a hundredth of the worst, in units of
+/// the parameters' own deviations.
+fn inverse_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
+    const LEAST_SHARE: f64 = 1e-4;
+    let std = covariance.diagonal().map(f64::sqrt);
+    if !std.iter().all(|value| *value > 0.0 && value.is_finite()) {
+        return Err(OnlineError::Covariance);
+    }
+    let correlation = DMatrix::from_fn(std.len(), std.len(), |i, j| covariance[(i, j)] / (std[i] * std[j]));
+    let eigen = correlation.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    // Rounding of a rank that is not full, and no more.
+    if eigen.eigenvalues.min() < -1e-9 * largest {
+        return Err(OnlineError::Covariance);
+    }
+    let scale = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE * largest).sqrt());
+    Ok(DMatrix::from_fn(std.len(), std.len(), |i, j| eigen.eigenvectors[(j, i)] / (scale[i] * std[j])))
 }

@@ -176,3 +176,20 @@ fn what_was_held_stays_and_the_rest_goes_on() {
         }
     }
 }
+
+#[test]
+fn a_covariance_of_few_segments_is_a_start() {
+    let robot = robot();
+    let (samples, columns) = (samples(&robot, 200, 8), robot.layout().columns().len());
+    let mut random = Random::new(9);
+    let scores = DMatrix::from_fn(columns, columns / 2, |_, _| random.uniform(-0.1, 0.1));
+    let start = StartingPoint { values: vec![0.1; columns], covariance: &scores * scores.transpose() };
+    let estimator = fed(OnlineSettings::new(STD.to_vec()), &samples, Some(&start));
+    let before = OnlineEstimator::new(robot, OnlineSettings::new(STD.to_vec()), Some(&start)).unwrap();
+    let (before, after) = (before.covariance().unwrap(), estimator.covariance().unwrap());
+    for column in 0..columns {
+        // No parameter is known better than was said, but for what its floor adds, and samples add knowledge.
+        assert!(before[(column, column)] >= 0.999 * start.covariance[(column, column)]);
+        assert!(after[(column, column)] < before[(column, column)]);
+    }
+}
