@@ -12,7 +12,20 @@ from ._iterate import Iteration, iterate
 from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
 from ._log import Log
 from ._model import Model
-from ._native import Error, Factors, LogError, ResultError, Robot, RobotError, Run, StopRun, Study, StudyError, __version__
+from ._native import (
+    Error,
+    Factors,
+    LogError,
+    ResultError,
+    Robot,
+    RobotError,
+    Run,
+    StopRun,
+    Study,
+    StudyError,
+    Watch,
+    __version__,
+)
 from ._study import study, with_logs
 
 __all__ = [
@@ -33,6 +46,7 @@ __all__ = [
     "StopRun",
     "Study",
     "StudyError",
+    "Watch",
     "__version__",
     "check",
     "design",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ._native import FittedModel, Robot, Study, _write_files
+from ._native import FittedModel, Robot, Study, Watch, _write_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,6 +136,37 @@ class Model:
         ``t sqrt(w V wᵀ + σ²)``.
         """
         return self._native.predict(q, dq, ddq)
+
+    def online(
+        self,
+        *,
+        rate_hz: float,
+        forgetting_s: float | None = 15.0,
+        correlation_s: float | None = None,
+        collision_s: float | None = None,
+        payload_s: float | None = None,
+        contact_alarms_per_hour: float | None = None,
+        drift_alarms_per_hour: float | None = None,
+        half_window: int | None = None,
+    ) -> Watch:
+        """A watch over the robot that this model is of: contact, payload and drift, sample by sample.
+
+        ``forgetting_s`` is the time after which a sample counts half; with None the estimate goes on from this model
+        for ever, and drift is not looked for. ``correlation_s`` is the time over which residuals forget themselves (1);
+        ``collision_s`` (0.02) and ``payload_s`` (2) are the time constants of both looks; false alarms in an hour are
+        ``contact_alarms_per_hour`` (0.05) and ``drift_alarms_per_hour`` (0.1). Derivatives that are not given are taken
+        from ``half_window`` (10) samples on each side.
+        """
+        return self._native.online(
+            rate_hz,
+            forgetting_s,
+            correlation_s,
+            collision_s,
+            payload_s,
+            contact_alarms_per_hour,
+            drift_alarms_per_hour,
+            half_window,
+        )
 
     def robot(self) -> Robot:
         """A robot with the identified bodies; raises ``ResultError`` where there is no description to write them into."""

@@ -18,6 +18,7 @@ __all__ = [
     "StopRun",
     "Study",
     "StudyError",
+    "Watch",
     "__version__",
     "_check",
     "_command",
@@ -160,6 +161,17 @@ class FittedModel:
     def predict(
         self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
     ) -> tuple[_Array, _Array]: ...
+    def online(
+        self,
+        rate_hz: float,
+        forgetting_s: float | None = None,
+        correlation_s: float | None = None,
+        collision_s: float | None = None,
+        payload_s: float | None = None,
+        contact_alarms_per_hour: float | None = None,
+        drift_alarms_per_hour: float | None = None,
+        half_window: int | None = None,
+    ) -> Watch: ...
     def export(self, target: str) -> tuple[str, list[str]]: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
@@ -180,6 +192,45 @@ class Run:
     @property
     def ddq(self) -> _Array: ...
     def torque(self, time_s: float, q: _Array, dq: _Array) -> _Array: ...
+
+@final
+class Watch:
+    def update(
+        self,
+        q: npt.ArrayLike,
+        tau: npt.ArrayLike,
+        dq: npt.ArrayLike | None = None,
+        ddq: npt.ArrayLike | None = None,
+    ) -> list[dict[str, Any]]: ...
+    def calibrate(
+        self,
+        q: npt.ArrayLike,
+        tau: npt.ArrayLike,
+        dq: npt.ArrayLike | None = None,
+        ddq: npt.ArrayLike | None = None,
+    ) -> None: ...
+    def restart(self) -> None: ...
+    def consistent(self) -> tuple[_Array, dict[str, float]]: ...
+    @property
+    def alarms(self) -> list[dict[str, Any]]: ...
+    @property
+    def contact(self) -> dict[str, Any] | None: ...
+    @property
+    def drift(self) -> dict[str, Any] | None: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def values(self) -> _Array | None: ...
+    @property
+    def covariance(self) -> _Array | None: ...
+    @property
+    def thresholds_nm(self) -> _Array: ...
+    @property
+    def residuals_nm(self) -> _Array: ...
+    @property
+    def samples(self) -> int: ...
+    @property
+    def delay_s(self) -> float: ...
 
 _Progress = Callable[[str, int, int | None], object]
 

@@ -81,7 +81,9 @@ pub use over_scalar::{inverse_dynamics_over, mass_matrix_over};
 pub use parametric_model::{ParametricModel, ParametricModelError};
 pub use regressor::torque_regressor;
 pub use regressor_adjoint::{MotionGradient, regressor_panels_adjoint};
-pub use regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following};
+pub use regressor_panels::{
+    Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following, regressor_panels_of_sample,
+};
 pub use term_history::TermHistory;
 pub use workspace::{BatchWorkspace, Workspace};
 

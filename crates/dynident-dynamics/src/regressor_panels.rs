@@ -3,10 +3,10 @@
 //! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its
 //! own narrow panel: columns after one another, each with one value per sample. The whole regressor is never stored.
 
-use crate::regressor::{BlockSink, Work, regressor_blocks};
+use crate::regressor::{BlockSink, Work, regressor_blocks, torque_regressor};
 use crate::term_history::TermHistory;
 use crate::tree_scratch::{TreeBatch, expanded};
-use crate::workspace::{AnyScratch, BatchWorkspace, parents, put_lanes, same_tree, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, Workspace, parents, put_lanes, same_tree, take_lanes};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
 use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, JointCoupling, Model};
@@ -345,6 +345,39 @@ pub fn regressor_panels_following(
     } else {
         dispatch(*level, Fill { model, scratch, layout, motion, panels });
     }
+    fill_terms(layout, motion, history, panels);
+}
+
+/// [`regressor_panels_following`] for one sample at a time: the same panels to rounding, in less than half the time
+/// that a block of one sample takes.
+///
+/// # Panics
+/// As [`regressor_panels_following`], or if the motion has more than one sample.
+pub fn regressor_panels_of_sample(
+    model: &Model,
+    workspace: &mut Workspace,
+    layout: &PanelLayout,
+    motion: &JointMotion<'_>,
+    history: &mut TermHistory,
+    panels: &mut Panels,
+) {
+    assert_eq!(motion.samples, 1, "one sample at a time");
+    layout.check_tree(model);
+    panels.resize(layout, 1);
+    let row_length = 10 * model.body_count();
+    let rows = torque_regressor(model, workspace, motion.q, motion.dq, motion.ddq);
+    for ((panel, values), row) in layout.joints.iter().zip(&mut panels.joints).zip(rows.chunks_exact(row_length)) {
+        for (value, &global) in values.as_mut_slice().iter_mut().zip(&panel.columns) {
+            if let Column::Body { body, parameter } = layout.columns[global] {
+                *value = row[10 * body + parameter];
+            }
+        }
+    }
+    fill_terms(layout, motion, history, panels);
+}
+
+/// Fills the columns of terms; those of bodies are there.
+fn fill_terms(layout: &PanelLayout, motion: &JointMotion<'_>, history: &mut TermHistory, panels: &mut Panels) {
     let samples = motion.samples;
     if history.temperature_c.len() != layout.dof() * samples {
         history.temperature_c.clear();

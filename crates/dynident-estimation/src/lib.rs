@@ -61,8 +61,8 @@ pub use diagnostics::{
 };
 pub use error::EstimationError;
 pub use factor::{
-    FactorShape, InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings, SegmentShape,
-    SegmentedFactor, TriangularFactor, Unexcited, unexcited_columns,
+    FactorShape, FactorWorkspace, InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, RecursiveFactor,
+    SegmentSettings, SegmentShape, SegmentedFactor, TriangularFactor, Unexcited, unexcited_columns,
 };
 pub use linear::{
     CrossProblem, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict,

@@ -14,7 +14,7 @@ use std::borrow::Cow;
 const WORTH_THREADS: usize = 50_000;
 
 /// Numbers of an array, row-major, and its axes before the last.
-struct Samples<'py> {
+pub(crate) struct Samples<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
     lead: Vec<usize>,
 }

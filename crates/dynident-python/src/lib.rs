@@ -14,6 +14,7 @@ mod model;
 mod pool;
 mod robot;
 mod study;
+mod watch;
 
 /// The extension module.
 #[pyo3::pymodule]
@@ -34,6 +35,8 @@ mod _native {
     use crate::robot::Robot;
     #[pymodule_export]
     use crate::study::Study;
+    #[pymodule_export]
+    use crate::watch::OnlineWatch;
 
     use pyo3::prelude::*;
 

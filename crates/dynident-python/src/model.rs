@@ -3,9 +3,11 @@
 use crate::arrays::{Motion, array, joint_major, sample_major};
 use crate::errors;
 use crate::study::Study;
+use crate::watch::OnlineWatch;
 use dynident::export::Target;
 use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
+use dynident::online::WatchSettings;
 use dynident::{IdentificationOutcome, ResultFile, TorquePredictor, export_result, identification_report};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -152,6 +154,35 @@ impl FittedModel {
         });
         let rows = |values: &[f64]| array(py, motion.lead(), &[dof], sample_major(values, samples, dof));
         Ok((rows(&found.tau)?, rows(&found.half_width_95)?))
+    }
+
+    /// A watch over the robot; what is not given is the default.
+    #[pyo3(signature = (rate_hz, forgetting_s=None, correlation_s=None, collision_s=None, payload_s=None, contact_alarms_per_hour=None, drift_alarms_per_hour=None, half_window=None))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+    fn online(
+        &self,
+        py: Python<'_>,
+        rate_hz: f64,
+        forgetting_s: Option<f64>,
+        correlation_s: Option<f64>,
+        collision_s: Option<f64>,
+        payload_s: Option<f64>,
+        contact_alarms_per_hour: Option<f64>,
+        drift_alarms_per_hour: Option<f64>,
+        half_window: Option<usize>,
+    ) -> PyResult<OnlineWatch> {
+        let mut settings = WatchSettings::new(rate_hz);
+        settings.half_life_s = forgetting_s;
+        let set = |value: &mut f64, given: Option<f64>| *value = given.unwrap_or(*value);
+        set(&mut settings.correlation_s, correlation_s);
+        set(&mut settings.contact.collision_s, collision_s);
+        set(&mut settings.contact.payload_s, payload_s);
+        set(&mut settings.contact.false_alarms_per_hour, contact_alarms_per_hour);
+        set(&mut settings.drift_alarms_per_hour, drift_alarms_per_hour);
+        settings.half_window = half_window.unwrap_or(settings.half_window);
+        let watch = self.predictor(py)?.watch(&settings);
+        let watch = watch.map_err(|error| errors::Error::new_err(error.to_string()))?;
+        Ok(OnlineWatch::new(watch, self.joint_names(), &settings))
     }
 
     /// The model in the form `target`: its text, and what has to be known of it.

@@ -63,6 +63,7 @@ pub use dynident_export as export;
 pub use dynident_identification as identification;
 pub use dynident_iteration as iteration;
 pub use dynident_model as model;
+pub use dynident_online as online;
 pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 

@@ -2,9 +2,10 @@
 //! physics.
 
 use dynident_dynamics::{
-    BatchWorkspace, PanelLayout, Panels, Workspace, all_columns, body_placements, forward_dynamics, gravity_torque,
-    inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, kinetic_energy, mass_matrix,
-    mass_matrix_and_bias, potential_energy, regressor_panels, torque_regressor,
+    BatchWorkspace, PanelLayout, Panels, TermHistory, Workspace, all_columns, body_placements, forward_dynamics,
+    gravity_torque, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, kinetic_energy,
+    mass_matrix, mass_matrix_and_bias, potential_energy, regressor_panels, regressor_panels_of_sample,
+    torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::{Random, random_tree};
@@ -270,6 +271,17 @@ fn every_processor_level_and_the_batch_agree() {
                         row[column] = panels.joint(joint)[place * samples + s];
                     }
                     assert_close(&row, &regressor[joint * count..(joint + 1) * count], ROUNDING, level.name());
+                }
+                // The same panels, one sample at a time.
+                let mut sample = Panels::default();
+                let (q, dq, ddq) = (at(&q), at(&dq), at(&ddq));
+                let motion = JointMotion { samples: 1, q: &q, dq: &dq, ddq: &ddq };
+                let history = &mut TermHistory::default();
+                regressor_panels_of_sample(&model, &mut single, &layout, &motion, history, &mut sample);
+                for joint in 0..dof {
+                    let count = layout.joint_columns(joint).len();
+                    let column: Vec<f64> = (0..count).map(|place| panels.joint(joint)[place * samples + s]).collect();
+                    assert_close(&sample.joint(joint)[..count], &column, ROUNDING, level.name());
                 }
             }
         }

@@ -5,12 +5,14 @@
 //! a covariance can later ask how the segments differ. The factors of all joints and logs over one list of named
 //! columns make a [`LinearProblem`] (an [`InstrumentedProblem`] where instruments stand beside the regressor), with a
 //! [`Prior`] where there is one. [`RankSettings`] say when a column counts as excited, a [`RankReport`] what was
-//! decided; [`unexcited_columns`] holds columns against the noise of the motion.
+//! decided; [`unexcited_columns`] holds columns against the noise of the motion. Where samples come one at a time, a
+//! [`RecursiveFactor`] takes them.
 
 mod excitation;
 mod instrumented;
 mod problem;
 mod rank;
+mod recursive;
 mod reflect;
 mod segmented;
 mod stored;
@@ -22,6 +24,7 @@ pub(crate) use problem::StackedProblem;
 pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
 pub(crate) use rank::{Solution, Split, report, solve, solved_values, split};
+pub use recursive::RecursiveFactor;
 pub(crate) use reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 pub use segmented::{SegmentSettings, SegmentedFactor};
 pub use stored::{FactorShape, SegmentShape};

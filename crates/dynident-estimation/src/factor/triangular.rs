@@ -102,6 +102,12 @@ impl TriangularFactor {
         &self.triangle
     }
 
+    /// The factor with these entries on and above the diagonal.
+    pub(crate) fn from_entries(columns: usize, rows: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        let triangle = (0..=columns).flat_map(|row| (row..=columns).map(move |column| (row, column)));
+        Self { columns, rows, triangle: triangle.map(|(row, column)| entry(row, column)).collect() }
+    }
+
     /// Regressor columns (without the torque).
     pub fn columns(&self) -> usize {
         self.columns

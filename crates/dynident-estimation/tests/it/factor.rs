@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use dynident_estimation::factor::FactorWorkspace;
-use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_estimation::{EstimationError, RecursiveFactor, SegmentSettings, SegmentedFactor, TriangularFactor};
 use dynident_lanes::Level;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -217,4 +217,92 @@ fn a_weight_scales_the_triangle() {
     let factor = TriangularFactor::from_rows(1, &[3.0, 4.0, 1.0, 1.0], 2).unwrap().scaled(2.0).unwrap();
     assert!((factor.entry(0, 0) - 10.0).abs() < 1e-14);
     assert!((factor.residual_sum_of_squares(&[0.0]).unwrap() - 8.0).abs() < 1e-13);
+}
+
+/// Samples of some rows each, of which row m begins at `begins[m]`, into both factors.
+fn recursive(
+    seed: u64,
+    columns: usize,
+    begins: &[usize],
+    samples: usize,
+    level: Level,
+) -> (RecursiveFactor, DMatrix<f64>) {
+    let mut random = Random::new(seed);
+    let mut all = rows(&mut random, samples * begins.len(), columns);
+    let mut factor = RecursiveFactor::with_level(columns, begins, level);
+    for sample in 0..samples {
+        for (row, &begin) in begins.iter().enumerate() {
+            for column in 0..=columns {
+                let value = &mut all[(sample * begins.len() + row, column)];
+                if column < begin {
+                    *value = 0.0;
+                } else {
+                    factor.set(row, column, *value);
+                }
+            }
+        }
+        factor.absorb().unwrap();
+    }
+    (factor, all)
+}
+
+#[test]
+fn sample_by_sample_is_the_same_triangle() {
+    // Columns of one line and of several, whole and not; more rows than are reflected together; rows in any order of
+    // their beginnings, and one that has the torque alone.
+    let shapes: [(usize, &[usize]); 6] = [
+        (1, &[0]),
+        (7, &[0, 3]),
+        (15, &[4, 0, 15]),
+        (22, &[0, 0, 9, 1, 17, 8, 3]),
+        (40, &[3; 8]),
+        (33, &[0, 30, 5, 7, 9, 2, 4, 8, 1, 6, 3]),
+    ];
+    for (columns, begins) in shapes {
+        for level in Level::available() {
+            for samples in [1, 3, 40] {
+                let (factor, all) = recursive(9, columns, begins, samples, level);
+                let expected = triangle(&TriangularFactor::from_rows(columns, all.as_slice(), all.nrows()).unwrap());
+                let found = factor.to_triangular();
+                assert_eq!((factor.samples(), found.rows()), (samples, all.nrows()));
+                let found = triangle(&found);
+                assert!(found.diagonal().iter().all(|&value| value >= 0.0));
+                assert!(gram_difference(&found, &all) < TOLERANCE, "{columns} columns, {samples}, {}", level.name());
+                // Unique where the rows determine all columns.
+                if samples == 40 && begins[0] == 0 {
+                    assert!(triangle_difference(&found, &expected) < 1e-10, "{columns} columns, {}", level.name());
+                    let mut values = vec![0.0; columns];
+                    assert!(factor.solve(&mut values));
+                    let (w, tau) = (all.columns(0, columns), all.column(columns));
+                    let gradient = w.tr_mul(&(tau - w * nalgebra::DVector::from_vec(values)));
+                    let size = w.norm() * tau.norm();
+                    assert!(gradient.amax() < TOLERANCE * size, "{} of {size}", gradient.amax());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sample_with_a_number_that_is_none_is_refused_whole() {
+    let (mut factor, _) = recursive(4, 12, &[5, 0, 2], 9, Level::detect());
+    let before = factor.to_triangular();
+    for bad in [f64::NAN, f64::INFINITY, -1e150] {
+        factor.set(1, 3, 1.0);
+        factor.set(0, 9, bad);
+        let refused = factor.absorb();
+        assert!(matches!(refused, Err(EstimationError::Unusable { row: 0, column: 9, .. })), "{refused:?}");
+        assert_eq!(factor.to_triangular(), before);
+    }
+    // And nothing of it is left for the next one, of zeros.
+    factor.absorb().unwrap();
+    assert_eq!(triangle(&factor.to_triangular()), triangle(&before));
+    factor.scale(2.0).unwrap();
+    assert_eq!(triangle(&factor.to_triangular()), 2.0 * triangle(&before));
+    assert!(factor.scale(-1.0).is_err());
+    let mut other = RecursiveFactor::new(12, &[0]);
+    other.start_from(&before).unwrap();
+    assert_eq!(triangle(&other.to_triangular()), triangle(&before));
+    assert!(RecursiveFactor::new(3, &[0]).start_from(&before).is_err());
+    assert!(!RecursiveFactor::new(3, &[0]).solve(&mut [0.0; 3]));
 }

@@ -1,12 +1,13 @@
 //! The torque that a finished model asks for along a motion.
 
 use crate::error::Error;
-use crate::result::ResultFile;
+use crate::result::{LogSummary, ResultFile};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::student_half_width;
 use dynident_identification::RegressorModel;
 use dynident_model::terms::JointMotion;
+use dynident_online::{OnlineError, StartingPoint, Watch, WatchSettings};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 
@@ -26,6 +27,8 @@ pub struct TorquePredictor {
     covariance: DMatrix<f64>,
     joint_sigma: Vec<f64>,
     width: f64,
+    /// The lowest cut-off of the filters behind which residuals were measured, Hz.
+    band_hz: Option<f64>,
 }
 
 /// Torques along a motion, joint-major as the motion is, Nm (N).
@@ -63,6 +66,8 @@ impl TorquePredictor {
         if joint_sigma.len() != model.dof() || joint_sigma.iter().any(|sigma| !sigma.is_finite()) {
             return Err(wrong("residual_std_nm is not one finite number for each joint"));
         }
+        let own = |log: &LogSummary| log.filter_cutoff_hz.unwrap_or(0.5 * log.filtered_rate_hz);
+        let band_hz = stored.logs.iter().map(own).filter(|hz| *hz > 0.0).reduce(f64::min);
         let equations = stored.training.samples * model.dof();
         Ok(Self {
             covariance: DMatrix::from_fn(n, n, |row, column| rows[row][column]),
@@ -70,6 +75,7 @@ impl TorquePredictor {
             model,
             theta,
             joint_sigma,
+            band_hz,
         })
     }
 
@@ -81,6 +87,17 @@ impl TorquePredictor {
     /// Names of the joints, in the order of the motion.
     pub fn joint_names(&self) -> Vec<String> {
         self.model.joint_names()
+    }
+
+    /// A watch over the robot by this model: its reference are the base parameters that predict, with the covariance of
+    /// the estimate; residuals were measured behind the filter of the fit (`band_hz`, unless the settings have one).
+    ///
+    /// # Errors
+    /// As [`Watch::new`].
+    pub fn watch(&self, settings: &WatchSettings) -> Result<Watch, OnlineError> {
+        let reference = StartingPoint { values: self.theta.clone(), covariance: self.covariance.clone() };
+        let settings = WatchSettings { band_hz: settings.band_hz.or(self.band_hz), ..settings.clone() };
+        Watch::new(self.model.clone(), reference, &self.joint_sigma, &settings)
     }
 
     /// The torque along `motion`, whose samples follow one another in time (friction with memory begins at rest).

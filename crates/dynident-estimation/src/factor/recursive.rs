@@ -1,0 +1,396 @@
+//! A triangle that takes the few rows of a sample at a time: what a recursive estimate stands on.
+//!
+//! A block of hundreds of rows is reflected down its columns (`reflect.rs`). A sample gives one row for each joint, and
+//! registers along seven rows are half empty: here they lie along the columns. Reflector k takes
+//! `v = (ν, a)`, `a` the entries of the rows in column k, to all columns from k on at once,
+//!
+//! ```text
+//!     t_j = β (ν R_kj + Σ_m a_m A_mj),   R_kj −= ν t_j,   A_mj −= a_m t_j,
+//! ```
+//!
+//! and rows that have not begun yet, because their joint moves none of the bodies so far, are left out.
+
+use super::reflect::{CHUNK_ROWS, Chunk};
+use super::triangular::TriangularFactor;
+use crate::error::{EstimationError, require};
+use dynident_lanes::{Kernel, Lane, Level, dispatch};
+
+/// Rows reflected together: what registers hold.
+const MOST_ROWS: usize = 8;
+
+/// Reflectors applied together.
+const REFLECTORS: usize = 2;
+
+/// As in `reflect.rs`: a column of rows whose squares sum to less counts as zero.
+const NEGLIGIBLE_SQUARE: f64 = 1.0e-290;
+
+/// The largest magnitude that can be squared and summed without overflow.
+const LARGEST: f64 = 1.0e140;
+
+/// The upper triangular R of all rows `[W | τ]` so far, of which every sample brings as many as there are joints.
+///
+/// The same factor as a [`TriangularFactor`] to rounding, in a form for which a sample is cheap: 2·rows·(columns + 1)²
+/// operations less what rows that begin late leave out, and no allocation.
+///
+/// ```
+/// use dynident_estimation::RecursiveFactor;
+/// // τ = 2 w on two joints; then an error of 3 where w = 0.
+/// let mut factor = RecursiveFactor::new(1, &[0, 0]);
+/// for [first, second] in [[1.0, 2.0], [2.0, 0.0]] {
+///     for (row, w) in [first, second].into_iter().enumerate() {
+///         factor.set(row, 0, w);
+///         factor.set(row, 1, 2.0 * w);
+///     }
+///     factor.absorb()?;
+/// }
+/// factor.set(0, 1, 3.0);
+/// factor.absorb()?;
+/// let factor = factor.to_triangular();
+/// assert_eq!(factor.rows(), 6);
+/// assert!((factor.residual_sum_of_squares(&[2.0])? - 9.0).abs() < 1e-12);
+/// # Ok::<(), dynident_estimation::EstimationError>(())
+/// ```
+#[derive(Clone, Debug)]
+#[doc(alias("recursive least squares", "square-root information", "srif"))]
+pub struct RecursiveFactor {
+    level: Level,
+    columns: usize,
+    samples: usize,
+    /// Row k from the line that holds its diagonal on. What stands before the diagonal means nothing.
+    triangle: Vec<Chunk>,
+    /// Rows of the sample at hand, in groups of those that are reflected together: the lines of a group one after
+    /// another, in each its rows, those first that begin first.
+    lines: Vec<Line>,
+    /// Where each row of a sample stands among all, and the column at which each of them begins, in that order.
+    places: Vec<usize>,
+    begins: Vec<usize>,
+}
+
+/// Eight columns of the rows that are reflected together.
+type Line = [Chunk; MOST_ROWS];
+
+impl RecursiveFactor {
+    /// The factor of no rows. Every sample has as many rows as `begins` has entries; row m has zeros in the columns
+    /// before `begins[m]`.
+    pub fn new(columns: usize, begins: &[usize]) -> Self {
+        Self::with_level(columns, begins, Level::detect())
+    }
+
+    /// [`new`](Self::new) at a chosen processor level.
+    pub fn with_level(columns: usize, begins: &[usize], level: Level) -> Self {
+        let mut order: Vec<usize> = (0..begins.len()).collect();
+        order.sort_by_key(|&row| begins[row]);
+        let mut places = vec![0; begins.len()];
+        for (place, &row) in order.iter().enumerate() {
+            places[row] = place;
+        }
+        let count = line_count(columns);
+        let begins: Vec<usize> = order.iter().map(|&row| begins[row]).collect();
+        Self {
+            level,
+            columns,
+            samples: 0,
+            // Whole steps of reflectors: a row of zeros may be the last.
+            triangle: vec![Chunk::ZERO; row_line((columns + 1).next_multiple_of(REFLECTORS), count)],
+            lines: vec![[Chunk::ZERO; MOST_ROWS]; begins.len().div_ceil(MOST_ROWS) * count],
+            places,
+            begins,
+        }
+    }
+
+    /// Regressor columns (without the torque).
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Samples absorbed so far.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Sets an entry of row `row` of the sample at hand; column [`columns()`](Self::columns) is the torque's. Entries
+    /// that are not set are zero. One before the row's beginning is not seen.
+    ///
+    /// # Panics
+    /// If there is no such row in a sample, or no such column.
+    #[inline]
+    pub fn set(&mut self, row: usize, column: usize, value: f64) {
+        assert!(column <= self.columns, "column {column} of {}", self.columns);
+        let place = self.places[row];
+        let line = place / MOST_ROWS * line_count(self.columns) + column / CHUNK_ROWS;
+        self.lines[line][place % MOST_ROWS].0[column % CHUNK_ROWS] = value;
+    }
+
+    /// Takes the rows of the sample at hand into the triangle, without allocation.
+    ///
+    /// # Errors
+    /// [`EstimationError::Unusable`] for a NaN, an infinity or a magnitude above 1e140: nothing of the sample is taken.
+    pub fn absorb(&mut self) -> Result<(), EstimationError> {
+        let count = line_count(self.columns);
+        if let Some(bad) = dispatch(self.level, FindUnusable(&self.lines)) {
+            let (group, line) = (bad / MOST_ROWS / count, bad / MOST_ROWS % count);
+            let place = group * MOST_ROWS + bad % MOST_ROWS;
+            let row = self.places.iter().position(|&at| at == place).unwrap_or(0);
+            let chunk = self.lines[bad / MOST_ROWS][bad % MOST_ROWS].0;
+            let within = chunk.iter().position(|value| value.is_nan() || value.abs() > LARGEST).unwrap_or(0);
+            self.lines.fill([Chunk::ZERO; MOST_ROWS]);
+            let column = line * CHUNK_ROWS + within;
+            return Err(EstimationError::Unusable { row, column, value: chunk[within], limit: LARGEST });
+        }
+        for (lines, begins) in self.lines.chunks_mut(count).zip(self.begins.chunks(MOST_ROWS)) {
+            dispatch(
+                self.level,
+                TriangleOnRows { triangle: &mut self.triangle, size: self.columns + 1, lines, begins },
+            );
+        }
+        self.samples += 1;
+        Ok(())
+    }
+
+    /// Entry (`row`, `column`) of R; column [`columns()`](Self::columns) is the torque's. Zero below the diagonal.
+    ///
+    /// # Panics
+    /// If either number is above [`columns()`](Self::columns).
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        assert!(row <= self.columns && column <= self.columns, "entry ({row}, {column}) of {} columns", self.columns);
+        if column < row { 0.0 } else { self.at(row, column) }
+    }
+
+    fn at(&self, row: usize, column: usize) -> f64 {
+        let line = row_line(row, line_count(self.columns)) + column / CHUNK_ROWS - row / CHUNK_ROWS;
+        self.triangle[line].0[column % CHUNK_ROWS]
+    }
+
+    /// All rows so far times `weight`: `weight · R`, in place.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
+    pub fn scale(&mut self, weight: f64) -> Result<(), EstimationError> {
+        require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")?;
+        for value in self.triangle.iter_mut().flat_map(|chunk| &mut chunk.0) {
+            *value *= weight;
+        }
+        Ok(())
+    }
+
+    /// The θ of `R_W θ = r`, in `out`; false where a diagonal of R is below 1e-12 of the largest, and rows do not
+    /// determine θ. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `out` has not one entry for each column.
+    pub fn solve(&self, out: &mut [f64]) -> bool {
+        assert_eq!(out.len(), self.columns, "one entry for each column");
+        let count = line_count(self.columns);
+        let largest = (0..self.columns).map(|k| self.at(k, k)).fold(0.0, f64::max);
+        for row in (0..self.columns).rev() {
+            let start = row_line(row, count);
+            let (mut known, first) = (0.0, row / CHUNK_ROWS);
+            for (line, chunk) in self.triangle[start..row_line(row + 1, count)].iter().enumerate() {
+                let columns = (first + line) * CHUNK_ROWS..((first + line + 1) * CHUNK_ROWS).min(self.columns);
+                for (column, entry) in columns.zip(&chunk.0) {
+                    known += if column > row { entry * out[column] } else { 0.0 };
+                }
+            }
+            let pivot = self.at(row, row);
+            if pivot.is_nan() || pivot <= 1e-12 * largest {
+                return false;
+            }
+            out[row] = (self.at(row, self.columns) - known) / pivot;
+        }
+        true
+    }
+
+    /// The same factor as a [`TriangularFactor`], which estimators and fits take. Allocates.
+    pub fn to_triangular(&self) -> TriangularFactor {
+        TriangularFactor::from_entries(self.columns, self.samples * self.begins.len(), |row, column| {
+            self.entry(row, column)
+        })
+    }
+
+    /// Starts from a factor of rows before the first sample.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] when the numbers of columns differ.
+    pub fn start_from(&mut self, factor: &TriangularFactor) -> Result<(), EstimationError> {
+        crate::error::expect("columns of the start", self.columns, factor.columns())?;
+        self.samples = 0;
+        for row in 0..=self.columns {
+            let start = row_line(row, line_count(self.columns)) - row / CHUNK_ROWS;
+            for column in row..=self.columns {
+                self.triangle[start + column / CHUNK_ROWS].0[column % CHUNK_ROWS] = factor.entry(row, column);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Lines of eight columns, the torque's among them.
+const fn line_count(columns: usize) -> usize {
+    (columns + 1).div_ceil(CHUNK_ROWS)
+}
+
+/// The line with which row `row` begins: eight rows have all `count` lines, the next eight one less.
+const fn row_line(row: usize, count: usize) -> usize {
+    let (whole, rest) = (row / CHUNK_ROWS, row % CHUNK_ROWS);
+    CHUNK_ROWS * whole * count - CHUNK_ROWS / 2 * whole * whole.saturating_sub(1) + rest * (count - whole)
+}
+
+/// The first chunk, counted through all lines, with a number that cannot be squared.
+struct FindUnusable<'a>(&'a [Line]);
+
+impl Kernel for FindUnusable<'_> {
+    type Output = Option<usize>;
+
+    #[inline(always)]
+    fn run<T: Lane>(self) -> Option<usize> {
+        // False for NaN; without an early exit it vectorises.
+        let mut usable = true;
+        for value in self.0.as_flattened().iter().flat_map(|chunk| &chunk.0) {
+            usable &= value.abs() <= LARGEST;
+        }
+        if usable {
+            return None;
+        }
+        let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
+        self.0.as_flattened().iter().position(|chunk| chunk.0.iter().any(bad))
+    }
+}
+
+/// Reflects up to eight rows into the triangle, and leaves zeros for the next sample.
+struct TriangleOnRows<'a> {
+    triangle: &'a mut [Chunk],
+    size: usize,
+    lines: &'a mut [Line],
+    begins: &'a [usize],
+}
+
+impl Kernel for TriangleOnRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Self { mut triangle, size, lines, begins } = self;
+        let mut active = 0;
+        for first in (0..size).step_by(REFLECTORS) {
+            while active < begins.len() && begins[active] < first + REFLECTORS {
+                active += 1;
+            }
+            let rest = &mut lines[first / CHUNK_ROWS..];
+            let (above, later) = triangle.split_at_mut(rest.len() * REFLECTORS);
+            triangle = later;
+            let within = first % CHUNK_ROWS;
+            match active {
+                0 => {}
+                1 => reflect::<T, 1>(above, rest, within),
+                2 => reflect::<T, 2>(above, rest, within),
+                3 => reflect::<T, 3>(above, rest, within),
+                4 => reflect::<T, 4>(above, rest, within),
+                5 => reflect::<T, 5>(above, rest, within),
+                6 => reflect::<T, 6>(above, rest, within),
+                7 => reflect::<T, 7>(above, rest, within),
+                _ => reflect::<T, 8>(above, rest, within),
+            }
+        }
+        lines.fill([Chunk::ZERO; MOST_ROWS]);
+    }
+}
+
+/// Two reflectors of two rows of the triangle and `M` rows: made of their own columns, number by number, then applied
+/// to eight columns after eight, which stay in registers for both. Columns before their own in the first line hold
+/// rounding of earlier reflectors: it is reflected too, which bounds it, and never read.
+#[inline(always)]
+fn reflect<T: Lane, const M: usize>(triangle: &mut [Chunk], lines: &mut [Line], within: usize) {
+    let count = lines.len();
+    let (upper, lower) = triangle.split_at_mut(count);
+    let (Some(first), Some(second), Some(line)) = (upper.first(), lower.first(), lines.first()) else { return };
+    let (i, j) = (within % CHUNK_ROWS, (within + 1) % CHUNK_ROWS);
+    let (mut a, mut b) = ([0.0; M], [0.0; M]);
+    for m in 0..M {
+        (a[m], b[m]) = (line[m].0[i], line[m].0[j]);
+    }
+    let (own, beside) = (Reflector::new(first.0[i], &a), first.0[j]);
+    let amount = (own.nu * beside + product(&a, &b)) * own.beta;
+    let beside = beside - own.nu * amount;
+    for m in 0..M {
+        b[m] -= a[m] * amount;
+    }
+    let other = Reflector::new(second.0[j], &b);
+    let (a, b): ([T; M], [T; M]) = (wide(&a), wide(&b));
+    let own_wide = [T::splat(own.nu), T::splat(own.beta)];
+    let other_wide = [T::splat(other.nu), T::splat(other.beta)];
+    for ((line, upper), lower) in lines.iter_mut().zip(upper.iter_mut()).zip(lower.iter_mut()) {
+        for part in 0..CHUNK_ROWS / T::LANES {
+            let at = part * T::LANES;
+            let mut x = [T::ZERO; M];
+            for m in 0..M {
+                x[m] = T::load(&line[m].0[at..]);
+            }
+            apply(own_wide, &a, &mut upper.0[at..], &mut x);
+            apply(other_wide, &b, &mut lower.0[at..], &mut x);
+            for m in 0..M {
+                x[m].store(&mut line[m].0[at..]);
+            }
+        }
+    }
+    upper[0].0[i] = own.norm;
+    upper[0].0[j] = beside;
+    lower[0].0[j] = other.norm;
+}
+
+/// `I - β v vᵀ` with `v = (ν, a)`, which makes of `(old, a)` `(norm, 0)`.
+struct Reflector {
+    nu: f64,
+    beta: f64,
+    norm: f64,
+}
+
+impl Reflector {
+    #[inline(always)]
+    fn new<const M: usize>(old: f64, a: &[f64; M]) -> Self {
+        let square = product(a, a);
+        if square < NEGLIGIBLE_SQUARE {
+            return Self { nu: 0.0, beta: 0.0, norm: old };
+        }
+        // Beside the root, which takes as long.
+        let inverse = 1.0 / square;
+        let norm = (old * old + square).sqrt();
+        let sum = old + norm;
+        // old - norm without cancellation, and β of at most 2/square: see `reflect.rs`.
+        Self { nu: -square / sum, beta: sum / norm * inverse, norm }
+    }
+}
+
+/// Applies a reflector to a row of the triangle and the rows in `x`.
+#[inline(always)]
+fn apply<T: Lane, const M: usize>([nu, beta]: [T; 2], a: &[T; M], above: &mut [f64], x: &mut [T; M]) {
+    let r = T::load(above);
+    // Two sums, which do not wait for each other.
+    let mut sums = [r * nu, T::ZERO];
+    for m in 0..M {
+        sums[m % 2] = x[m].mul_add(a[m], sums[m % 2]);
+    }
+    let amount = (sums[0] + sums[1]) * beta;
+    nu.neg_mul_add(amount, r).store(above);
+    for m in 0..M {
+        x[m] = a[m].neg_mul_add(amount, x[m]);
+    }
+}
+
+#[inline(always)]
+fn wide<T: Lane, const M: usize>(values: &[f64; M]) -> [T; M] {
+    let mut wide = [T::ZERO; M];
+    for m in 0..M {
+        wide[m] = T::splat(values[m]);
+    }
+    wide
+}
+
+/// `aᵀ b` in sums that do not wait for each other.
+#[inline(always)]
+fn product<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
+    let mut sums = [0.0; 4];
+    for m in 0..M {
+        sums[m % 4] += a[m] * b[m];
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
+}

@@ -1,0 +1,302 @@
+//! The estimate that a batch would give, after every sample.
+
+use crate::error::{OnlineError, check, check_positive};
+use dynident_dynamics::{Panels, TermHistory, Workspace, regressor_panels_of_sample};
+use dynident_estimation::consistent::PhysicalFit;
+use dynident_estimation::{LinearProblem, RecursiveFactor, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_identification::RegressorModel;
+use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
+use dynident_model::terms::JointMotion;
+use nalgebra::{Cholesky, DMatrix};
+
+/// A weight above which all rows are scaled back: far from what squares to infinity.
+const LARGEST_GROWTH: f64 = 1e30;
+
+/// How samples count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OnlineSettings {
+    /// Standard deviation of each joint's torque error, Nm (N): rows are divided by it.
+    pub torque_std_nm: Vec<f64>,
+    /// Samples after which a sample counts half; none forgets nothing.
+    pub half_life_samples: Option<f64>,
+    /// Samples that tell as much as one with an independent error: residuals that are correlated in time say less than
+    /// their number. 1 for independent ones.
+    pub samples_per_independent: f64,
+}
+
+impl OnlineSettings {
+    /// Independent errors of these sizes, nothing forgotten.
+    pub fn new(torque_std_nm: Vec<f64>) -> Self {
+        Self { torque_std_nm, half_life_samples: None, samples_per_independent: 1.0 }
+    }
+
+    /// That the settings can be met.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn validate(&self) -> Result<(), OnlineError> {
+        check_positive("torque_std_nm", &self.torque_std_nm)?;
+        check_positive("half_life_samples", self.half_life_samples.as_slice())?;
+        if !(self.samples_per_independent >= 1.0 && self.samples_per_independent.is_finite()) {
+            let fix = "give 1 or more";
+            return Err(OnlineError::Number {
+                what: "samples_per_independent",
+                value: self.samples_per_independent,
+                fix,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What is known before the first sample.
+#[derive(Clone, Debug)]
+pub struct StartingPoint {
+    /// Base parameters.
+    pub values: Vec<f64>,
+    /// Their covariance; zeros for what was held where it is.
+    pub covariance: DMatrix<f64>,
+}
+
+/// A recursive estimate of base parameters in square-root form.
+///
+/// Every sample gives one row `w_j/σ_j`, `τ_j/σ_j` for each joint, which goes into the triangle of all before
+/// (a [`RecursiveFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so that no number of samples makes
+/// the covariance indefinite, and without forgetting it is the batch estimate to rounding. Bierman, Factorization
+/// Methods for Discrete Sequential Estimation (1977), ch. IV.
+#[derive(Debug)]
+pub struct OnlineEstimator {
+    model: RegressorModel,
+    settings: OnlineSettings,
+    factor: RecursiveFactor,
+    /// What new rows are multiplied by: old ones weigh less because new ones weigh more.
+    growth: f64,
+    growth_per_sample: f64,
+    samples: u64,
+    workspace: Workspace,
+    history: TermHistory,
+    panels: Panels,
+}
+
+impl OnlineEstimator {
+    /// An estimator for a robot (a [`ParametricModel`](dynident_dynamics::ParametricModel), or one with what
+    /// identification has added to it), from what is known of it; without a start the first samples alone say what it
+    /// is, and [`values`](Self::values) are none until they do.
+    ///
+    /// # Errors
+    /// Settings or a start that do not belong to the robot, a covariance that is none; friction that follows a
+    /// temperature, which samples do not have.
+    pub fn new(
+        model: impl Into<RegressorModel>,
+        settings: OnlineSettings,
+        start: Option<&StartingPoint>,
+    ) -> Result<Self, OnlineError> {
+        settings.validate()?;
+        let model = model.into();
+        if let Some(joint) = model.joint_that_needs_temperature() {
+            return Err(OnlineError::Temperature { joint: model.joint_names().swap_remove(joint) });
+        }
+        let (dof, columns) = (model.dof(), model.layout().columns().len());
+        if settings.torque_std_nm.len() != dof {
+            let found = settings.torque_std_nm.len();
+            return Err(OnlineError::Length { what: "torque_std_nm", expected: dof, found });
+        }
+        let first = |joint| model.layout().joint_columns(joint).iter().copied().min().unwrap_or(columns);
+        let begins: Vec<usize> = (0..dof).map(first).collect();
+        let mut factor = RecursiveFactor::new(columns, &begins);
+        if let Some(start) = start {
+            // What is known counts as it says, however many samples tell as much as one.
+            let rows = TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?;
+            factor.start_from(&rows.scaled(settings.samples_per_independent.sqrt())?)?;
+        }
+        let growth_per_sample = settings.half_life_samples.map_or(1.0, |half| 0.5_f64.powf(-0.5 / half));
+        let mut made = Self {
+            workspace: Workspace::new(model.model()),
+            history: TermHistory::new(model.load_parameters.clone()),
+            panels: Panels::default(),
+            growth: 1.0,
+            growth_per_sample,
+            samples: 0,
+            factor,
+            settings,
+            model,
+        };
+        // What grows with the first sample has its size before it.
+        let rest = vec![0.0; dof];
+        made.see(&rest, &rest, &rest);
+        made.restart();
+        Ok(made)
+    }
+
+    /// The robot.
+    pub fn model(&self) -> &RegressorModel {
+        &self.model
+    }
+
+    /// Samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The triangle of all rows, the start among them. With forgetting it is multiplied by a growing number,
+    /// which [`information`](Self::information) takes out.
+    pub fn factor(&self) -> &RecursiveFactor {
+        &self.factor
+    }
+
+    /// How samples count.
+    pub fn settings(&self) -> &OnlineSettings {
+        &self.settings
+    }
+
+    /// The regressor of a motion's next sample.
+    fn see(&mut self, q: &[f64], dq: &[f64], ddq: &[f64]) {
+        let motion = JointMotion { samples: 1, q, dq, ddq };
+        let (model, layout) = (self.model.model(), self.model.layout());
+        regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
+    }
+
+    /// The next sample begins a motion: friction with memory starts at rest.
+    pub fn restart(&mut self) {
+        self.history.restart();
+    }
+
+    /// Torque of the last sample by base parameters `values`, for each joint in `out`, as the drive's log would have
+    /// it, Nm (N). Allocates nothing.
+    ///
+    /// # Panics
+    /// If `values` has not one entry for each base parameter, or `out` for each joint.
+    pub fn torque(&self, values: &[f64], out: &mut [f64]) {
+        let layout = self.model.layout();
+        assert_eq!((values.len(), out.len()), (layout.columns().len(), self.model.dof()), "parameters and joints");
+        for (joint, out) in out.iter_mut().enumerate() {
+            let columns = layout.joint_columns(joint).iter().zip(self.panels.joint(joint));
+            *out = columns.map(|(&column, entry)| values[column] * entry).sum::<f64>() / self.gain(joint);
+        }
+    }
+
+    /// What logged torque of a joint is multiplied by.
+    fn gain(&self, joint: usize) -> f64 {
+        self.model.torque_gains.get(joint).copied().unwrap_or(1.0)
+    }
+
+    /// Takes a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Allocates nothing.
+    ///
+    /// # Errors
+    /// A vector of another length or a number that is none: nothing has changed then.
+    pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<(), OnlineError> {
+        let dof = self.model.dof();
+        for (what, values) in [("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)] {
+            check(what, values, dof)?;
+        }
+        self.see(q, dq, ddq);
+        let layout = self.model.layout();
+        let columns = layout.columns().len();
+        for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
+            let weight = self.growth / std;
+            let gain = self.gain(joint);
+            for (&column, entry) in layout.joint_columns(joint).iter().zip(self.panels.joint(joint)) {
+                self.factor.set(joint, column, weight * entry);
+            }
+            self.factor.set(joint, columns, weight * gain * tau);
+        }
+        self.factor.absorb()?;
+        self.samples += 1;
+        self.growth *= self.growth_per_sample;
+        if self.growth > LARGEST_GROWTH {
+            self.factor.scale(1.0 / self.growth)?;
+            self.growth = 1.0;
+        }
+        Ok(())
+    }
+
+    /// The base parameters now, in `out`; false while the samples do not determine them.
+    ///
+    /// # Panics
+    /// If `out` has not one entry for each base parameter.
+    pub fn values(&self, out: &mut [f64]) -> bool {
+        self.factor.solve(out)
+    }
+
+    /// Their covariance, `κ (RᵀR)⁻¹` of rows with unit variance, κ the samples per independent one; none while the
+    /// samples do not determine them. Allocates.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let triangle = self.information().regressor_triangle();
+        let columns = triangle.ncols();
+        let inverse = triangle.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
+        let covariance = &inverse * inverse.transpose();
+        covariance.iter().all(|value| value.is_finite()).then_some(covariance)
+    }
+
+    /// `R/√κ` without what forgetting has multiplied it by: `(RᵀR)⁻¹` is the covariance. Allocates.
+    pub fn information(&self) -> TriangularFactor {
+        let scale = self.growth_per_sample / self.growth / self.settings.samples_per_independent.sqrt();
+        // Both are positive and finite: growth is kept below a bound.
+        self.factor.to_triangular().scaled(scale).unwrap_or_else(|_| self.factor.to_triangular())
+    }
+
+    /// The parameters of all bodies and terms that can be real and explain what was seen best, as
+    /// [`consistent_parameters`] finds them from the factors of logs; all joints' rows count as those of one, in units
+    /// of their noise. Takes milliseconds and allocates: not for the loop that controls.
+    ///
+    /// # Errors
+    /// As [`consistent_parameters`].
+    pub fn consistent(&self, settings: &ConsistencySettings) -> Result<PhysicalFit, OnlineError> {
+        let factor = self.information();
+        let size = factor.columns() + 1;
+        let panel: Vec<f64> =
+            (0..size).flat_map(|c| (0..size).map(move |r| (r, c))).map(|(r, c)| factor.entry(r, c)).collect();
+        let mut rows = SegmentedFactor::new(size - 1, SegmentSettings::for_rows(size))?;
+        rows.absorb(&panel, size)?;
+        let names = self.model.parametric.base().expressions();
+        let mut problem = LinearProblem::new(names, vec!["all joints".into()]);
+        problem.add("online", 0, (0..size - 1).collect(), rows)?;
+        Ok(consistent_parameters(&self.model.parametric, &problem, &[1.0], settings)?)
+    }
+}
+
+/// The rows that say what is known before: `L⁻¹ θ = L⁻¹ θ₀` with `V = L Lᵀ`.
+fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, OnlineError> {
+    check("values of the start", &start.values, columns)?;
+    if start.covariance.shape() != (columns, columns) {
+        let found = start.covariance.nrows();
+        return Err(OnlineError::Length { what: "covariance of the start", expected: columns, found });
+    }
+    // What an identification held where it was has no variance: it counts as known a thousand times better than the
+    // best of the others.
+    let mut covariance = start.covariance.clone();
+    let least = covariance.diagonal().iter().copied().filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
+    for held in 0..columns {
+        if least.is_finite() && covariance.column(held).iter().all(|entry| *entry == 0.0) {
+            covariance[(held, held)] = 1e-6 * least;
+        }
+    }
+    let root = match Cholesky::new(covariance.clone()) {
+        Some(own) => {
+            own.l().solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?
+        }
+        None => inverse_root(&covariance)?,
+    };
+    let right = &root * nalgebra::DVector::from_column_slice(&start.values);
+    Ok(root.iter().chain(right.iter()).copied().collect())
+}
+
+/// `V^(-1/2)` of a covariance without full rank, as one from fewer segments than parameters is: what it does not know
+/// of a direction is no knowledge, and no direction counts as known better than a hundredth of the worst, in units of
+/// the parameters' own deviations.
+fn inverse_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
+    const LEAST_SHARE: f64 = 1e-4;
+    let std = covariance.diagonal().map(f64::sqrt);
+    if !std.iter().all(|value| *value > 0.0 && value.is_finite()) {
+        return Err(OnlineError::Covariance);
+    }
+    let correlation = DMatrix::from_fn(std.len(), std.len(), |i, j| covariance[(i, j)] / (std[i] * std[j]));
+    let eigen = correlation.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    // Rounding of a rank that is not full, and no more.
+    if eigen.eigenvalues.min() < -1e-9 * largest {
+        return Err(OnlineError::Covariance);
+    }
+    let scale = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE * largest).sqrt());
+    Ok(DMatrix::from_fn(std.len(), std.len(), |i, j| eigen.eigenvectors[(j, i)] / (scale[i] * std[j])))
+}

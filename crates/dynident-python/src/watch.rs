@@ -1,0 +1,337 @@
+//! `Watch`: a robot under watch, sample by sample or array by array.
+
+use crate::arrays::{Samples, array};
+use crate::errors::Error;
+use dynident::identification::consistent::ConsistencySettings;
+use dynident::model::terms::TorqueTerm;
+use dynident::online::{Contact, DriftAlarm, Look, OnlineError, Residuals, Watch, WatchSettings};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+/// The exception of samples and settings.
+fn raised(error: OnlineError) -> PyErr {
+    Error::new_err(error.to_string())
+}
+
+/// A robot under watch: what ``Model.online`` gives.
+///
+/// ``update`` takes samples as they come, one or an array of them; what it finds is in ``alarms``. Velocities and
+/// accelerations are taken from positions where they are not given, and answers are then ``delay_s`` old.
+#[pyclass(frozen, module = "dynident", name = "Watch")]
+pub(crate) struct OnlineWatch {
+    own: Mutex<Watched>,
+    joints: Vec<String>,
+    parameters: Vec<String>,
+    rate_hz: f64,
+}
+
+struct Watched {
+    watch: Watch,
+    /// Whether derivatives come with the samples; none before the first.
+    with_derivatives: Option<bool>,
+    samples: u64,
+    now: Option<Contact>,
+    drift: Option<DriftAlarm>,
+    alarms: Vec<Alarm>,
+}
+
+/// Something that began.
+#[derive(Clone, Copy)]
+struct Alarm {
+    time_s: f64,
+    what: What,
+}
+
+#[derive(Clone, Copy)]
+enum What {
+    Contact(Contact),
+    Drift(DriftAlarm),
+}
+
+impl OnlineWatch {
+    /// A watch with the names that its alarms give.
+    pub(crate) fn new(watch: Watch, joints: Vec<String>, settings: &WatchSettings) -> Self {
+        let parameters = watch.estimator().model().base().expressions();
+        let rate_hz = settings.contact.rate_hz;
+        let own = Watched { watch, with_derivatives: None, samples: 0, now: None, drift: None, alarms: Vec::new() };
+        Self { own: Mutex::new(own), joints, parameters, rate_hz }
+    }
+
+    fn own(&self) -> MutexGuard<'_, Watched> {
+        self.own.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Runs all samples through the watch; gives `look`'s answer after each.
+    fn run(
+        &self,
+        py: Python<'_>,
+        arrays: [&Bound<'_, PyAny>; 2],
+        derivatives: Option<[&Bound<'_, PyAny>; 2]>,
+        mut look: impl FnMut(&mut Watched, Option<Contact>) -> Result<(), OnlineError> + Send,
+    ) -> PyResult<()> {
+        let dof = self.joints.len();
+        let q = Samples::of(arrays[0], "q", dof)?;
+        let tau = Samples::of(arrays[1], "tau", dof)?.like(&q, "tau")?;
+        let derivatives = match derivatives {
+            Some([dq, ddq]) => {
+                Some([Samples::of(dq, "dq", dof)?.like(&q, "dq")?, Samples::of(ddq, "ddq", dof)?.like(&q, "ddq")?])
+            }
+            None => None,
+        };
+        let (q, tau) = (q.numbers(), tau.numbers());
+        let derivatives = derivatives.as_ref().map(|both| both.each_ref().map(Samples::numbers));
+        let (q, tau): (&[f64], &[f64]) = (&q, &tau);
+        let derivatives = derivatives.as_ref().map(|[dq, ddq]| (&**dq, &**ddq));
+        py.detach(move || {
+            let mut own = self.own();
+            if *own.with_derivatives.get_or_insert(derivatives.is_some()) != derivatives.is_some() {
+                return Err(Mixed::Derivatives);
+            }
+            for at in (0..q.len()).step_by(dof.max(1)) {
+                let row = at..at + dof;
+                let (q, tau) = (&q[row.clone()], &tau[row.clone()]);
+                let contact = match derivatives {
+                    Some((dq, ddq)) => own.watch.add(q, &dq[row.clone()], &ddq[row], tau)?,
+                    None => own.watch.add_measured(q, tau)?,
+                };
+                own.samples += 1;
+                look(&mut own, contact)?;
+            }
+            Ok(())
+        })
+        .map_err(|error| match error {
+            Mixed::Derivatives => Error::new_err(
+                "velocities and accelerations came with earlier samples and not with these, or the other way: give \
+                 them always or never",
+            ),
+            Mixed::Online(error) => raised(error),
+        })
+    }
+
+    fn described<'py>(&self, py: Python<'py>, alarm: &Alarm) -> PyResult<Bound<'py, PyDict>> {
+        let found = PyDict::new(py);
+        found.set_item("time_s", alarm.time_s)?;
+        match alarm.what {
+            What::Contact(contact) => self.contact_into(&found, contact)?,
+            What::Drift(drift) => self.drift_into(&found, drift)?,
+        }
+        Ok(found)
+    }
+
+    fn contact_into(&self, found: &Bound<'_, PyDict>, contact: Contact) -> PyResult<()> {
+        let kind = match contact.look {
+            Look::Collision => "collision",
+            Look::Payload => "payload",
+        };
+        found.set_item("kind", kind)?;
+        found.set_item("joint", &self.joints[contact.joint])?;
+        found.set_item("residual_nm", contact.residual_nm)?;
+        found.set_item("threshold_nm", contact.threshold_nm)
+    }
+
+    fn drift_into(&self, found: &Bound<'_, PyDict>, drift: DriftAlarm) -> PyResult<()> {
+        found.set_item("kind", "drift")?;
+        found.set_item("parameter", &self.parameters[drift.parameter])?;
+        found.set_item("statistic", drift.statistic)?;
+        found.set_item("threshold", drift.threshold)
+    }
+}
+
+enum Mixed {
+    Derivatives,
+    Online(OnlineError),
+}
+
+impl From<OnlineError> for Mixed {
+    fn from(error: OnlineError) -> Self {
+        Self::Online(error)
+    }
+}
+
+#[pymethods]
+impl OnlineWatch {
+    /// Takes a sample, ``(n,)``, or samples in the order of time, ``(..., n)``; gives the alarms that began in them.
+    #[pyo3(signature = (q, tau, dq=None, ddq=None))]
+    fn update<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        tau: &Bound<'py, PyAny>,
+        dq: Option<&Bound<'py, PyAny>>,
+        ddq: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let derivatives = match (dq, ddq) {
+            (Some(dq), Some(ddq)) => Some([dq, ddq]),
+            (None, None) => None,
+            _ => return Err(Error::new_err("dq and ddq: give both or none")),
+        };
+        let before = self.own().alarms.len();
+        let rate_hz = self.rate_hz;
+        self.run(py, [q, tau], derivatives, |own, contact| {
+            let delay = if own.with_derivatives == Some(true) { 0 } else { own.watch.delay_samples() as u64 };
+            let time_s = (own.samples - 1).saturating_sub(delay) as f64 / rate_hz;
+            if let Some(contact) = contact
+                && own.now.is_none_or(|now| (now.look, now.joint) != (contact.look, contact.joint))
+            {
+                own.alarms.push(Alarm { time_s, what: What::Contact(contact) });
+            }
+            own.now = contact;
+            if own.watch.drift_is_due()
+                && let Some(drift) = own.watch.check_drift()?
+            {
+                if drift.is_raised() && !own.drift.is_some_and(|last| last.is_raised()) {
+                    own.alarms.push(Alarm { time_s, what: What::Drift(drift) });
+                }
+                own.drift = Some(drift);
+            }
+            Ok(())
+        })?;
+        self.own().alarms[before..].iter().map(|alarm| self.described(py, alarm)).collect()
+    }
+
+    /// Thresholds of contact by motion that nothing touched, ten times the longest time constant at least: shapes
+    /// ``(samples, n)``. The samples count for the estimate as well.
+    #[pyo3(signature = (q, tau, dq=None, ddq=None))]
+    fn calibrate(
+        &self,
+        py: Python<'_>,
+        q: &Bound<'_, PyAny>,
+        tau: &Bound<'_, PyAny>,
+        dq: Option<&Bound<'_, PyAny>>,
+        ddq: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let derivatives = match (dq, ddq) {
+            (Some(dq), Some(ddq)) => Some([dq, ddq]),
+            (None, None) => None,
+            _ => return Err(Error::new_err("dq and ddq: give both or none")),
+        };
+        let mut residuals = Residuals { joints: vec![Vec::new(); self.joints.len()] };
+        self.run(py, [q, tau], derivatives, |own, _| {
+            // Before the first window is full there is none.
+            if own.watch.estimator().samples() > 0 {
+                for (all, residual) in residuals.joints.iter_mut().zip(own.watch.residuals_nm()) {
+                    all.push(*residual);
+                }
+            }
+            Ok(())
+        })?;
+        let mut own = self.own();
+        own.watch.calibrate(&residuals).map_err(raised)?;
+        own.now = None;
+        Ok(())
+    }
+
+    /// The next sample begins a motion.
+    fn restart(&self) {
+        let mut own = self.own();
+        own.watch.restart();
+        own.now = None;
+    }
+
+    /// All alarms so far, each when it began: dictionaries with ``time_s`` and ``kind``.
+    #[getter]
+    fn alarms<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let alarms = self.own().alarms.clone();
+        alarms.iter().map(|alarm| self.described(py, alarm)).collect()
+    }
+
+    /// What touches the robot now, or None.
+    #[getter]
+    fn contact<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(contact) = self.own().now else { return Ok(None) };
+        let found = PyDict::new(py);
+        self.contact_into(&found, contact)?;
+        Ok(Some(found))
+    }
+
+    /// The last check of drift, or None before the first.
+    #[getter]
+    fn drift<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(drift) = self.own().drift else { return Ok(None) };
+        let found = PyDict::new(py);
+        self.drift_into(&found, drift)?;
+        Ok(Some(found))
+    }
+
+    /// Names of the base parameters.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.parameters.clone()
+    }
+
+    /// The base parameters now; None while the samples do not determine them.
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
+        let mut values = vec![0.0; self.parameters.len()];
+        let known = self.own().watch.estimator().values(&mut values);
+        known.then(|| array(py, &[values.len()], &[], values)).transpose()
+    }
+
+    /// Their covariance; None while the samples do not determine them.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py>>> {
+        let found = self.own().watch.estimator().covariance();
+        // Symmetric: by columns as by rows.
+        found.map(|matrix| array(py, &[matrix.nrows(), matrix.ncols()], &[], matrix.as_slice().to_vec())).transpose()
+    }
+
+    /// Parameters of all bodies and friction now that can be real: bodies ``(bodies, 10)``, and friction by symbol.
+    fn consistent<'py>(&self, py: Python<'py>) -> PyResult<(Array<'py>, Bound<'py, PyDict>)> {
+        // Whoever has the lock does not wait for the interpreter.
+        let found = py.detach(|| {
+            let own = self.own();
+            let estimator = own.watch.estimator();
+            let parameters = estimator.consistent(&ConsistencySettings::default())?.parameters;
+            let symbols: Vec<String> = estimator.model().terms().iter().map(TorqueTerm::symbol).collect();
+            Ok((parameters, symbols))
+        });
+        let (parameters, symbols) = found.map_err(raised)?;
+        let (bodies, terms) = parameters.split_at(parameters.len() - symbols.len());
+        let friction = PyDict::new(py);
+        for (symbol, value) in symbols.iter().zip(terms) {
+            friction.set_item(symbol, value)?;
+        }
+        Ok((array(py, &[bodies.len() / 10], &[10], bodies.to_vec())?, friction))
+    }
+
+    /// Thresholds of collision and payload, Nm (N), shape ``(n, 2)``.
+    #[getter]
+    fn thresholds_nm<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let thresholds = self.own().watch.contact().thresholds_nm().to_vec();
+        array(py, &[thresholds.len()], &[2], thresholds.concat())
+    }
+
+    /// Residuals of the last sample, Nm (N), shape ``(n,)``.
+    #[getter]
+    fn residuals_nm<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let residuals = self.own().watch.residuals_nm().to_vec();
+        array(py, &[residuals.len()], &[], residuals)
+    }
+
+    /// Samples so far.
+    #[getter]
+    fn samples(&self) -> u64 {
+        self.own().samples
+    }
+
+    /// By how much answers are behind where derivatives are taken from positions, s.
+    #[getter]
+    fn delay_s(&self) -> f64 {
+        self.own().watch.delay_samples() as f64 / self.rate_hz
+    }
+
+    fn __repr__(&self) -> String {
+        let own = self.own();
+        format!(
+            "Watch({} joints at {} Hz, {} samples, {} alarms)",
+            self.joints.len(),
+            self.rate_hz,
+            own.samples,
+            own.alarms.len()
+        )
+    }
+}
