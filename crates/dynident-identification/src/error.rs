@@ -5,7 +5,7 @@ use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
 use crate::recording::LogError;
-use crate::reduced::ReduceError;
+use crate::reducible::ReduceError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
 use thiserror::Error;
