@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import os
 import platform
-import resource
 import signal
 import statistics
 import subprocess
@@ -64,10 +63,6 @@ def reduced(path: Path) -> dynident.Factors:
     return fleet.reduce(robot, log, arm=f"arm {int(path.stem) % ARMS}", segments=4, **STATED)
 
 
-def with_pid(path: Path) -> tuple[int, dynident.Factors]:
-    return os.getpid(), reduced(path)
-
-
 class Killer(threading.Thread):
     """Kills one busy worker of Ray after another."""
 
@@ -77,7 +72,7 @@ class Killer(threading.Thread):
 
     def run(self) -> None:
         while self.killed < self.most and not self.over.wait(0.4):
-            found = subprocess.run(["pgrep", "-f", "ray::with_pid"], capture_output=True, text=True, check=False)
+            found = subprocess.run(["pgrep", "-f", "ray::run"], capture_output=True, text=True, check=False)
             for pid in found.stdout.split()[:1]:
                 try:
                     os.kill(int(pid), signal.SIGKILL)
@@ -91,29 +86,29 @@ def on_ray(paths: list[Path], workers: int, kill: int = 0) -> tuple[float, bytes
 
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     ray.init(num_cpus=workers, include_dashboard=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": path}})
-    fleet.each(with_pid, paths[: 2 * workers], on="ray")  # imports
+    fleet.each(reduced, paths[: 2 * workers], on="ray")  # imports
     killer = Killer(kill)
     killer.start()
     start = time.perf_counter()
-    found = fleet.each(with_pid, paths, on="ray")
+    found = fleet.merged(reduced, paths, on="ray", batch=8)
     seconds = time.perf_counter() - start
     killer.over.set()
     ray.shutdown()
-    return seconds, fleet.merge(factors for _, factors in found).to_bytes(), killer.killed
+    return seconds, found.to_bytes(), killer.killed
 
 
-PEAK = """
-import resource, sys
-import dynident
-from dynident import fleet
-sys.path.insert(0, sys.argv[3])
-from fleet import STATED, ROOT  # this file
-import importlib
-log = dynident.Log.read(sys.argv[1], position="q{1..6}", torque="tau{1..6}", time="t")
-fleet_module = importlib.import_module("dynident.fleet")
-factors = fleet_module.reduce(dynident.Robot.load(ROOT / "robots" / "ur10.urdf"), log, segments=4, **STATED)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, len(factors.to_bytes()))
-"""
+def high_water_mb() -> float:
+    """Most memory of this process since its program was loaded, megabytes (Linux)."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    return float(line.split()[1]) / 1024
+
+
+def reduce_file(path: Path) -> None:
+    """The work of one worker on one file, in a process of its own: its memory, and bytes of the factors."""
+    log = dynident.Log.read(path, position="q{1..6}", torque="tau{1..6}", time="t")
+    robot = dynident.Robot.load(ROOT / "robots" / "ur10.urdf")
+    factors = fleet.reduce(robot, log, segments=4, **STATED)
+    print(high_water_mb(), len(factors.to_bytes()))
 
 
 def peak(rows: int, folder: Path) -> tuple[float, int]:
@@ -126,9 +121,7 @@ def peak(rows: int, folder: Path) -> tuple[float, int]:
             # The same motion again and again: it need not join smoothly to show how memory grows.
             table = np.column_stack([t + begin / RATE_HZ, q, tau])[: rows - begin]
             np.savetxt(file, table, fmt="%.7g", delimiter=",")
-    done = subprocess.run(
-        [sys.executable, "-c", PEAK, str(path), "", str(Path(__file__).parent)], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, __file__, "--file", str(path)], capture_output=True, text=True, check=False)
     path.unlink()
     if done.returncode:
         raise SystemExit(done.stderr)
@@ -140,7 +133,11 @@ def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__)
     ask.add_argument("--logs", type=int, default=1000)
     ask.add_argument("--quick", action="store_true", help="a few logs: that it runs, not how fast")
+    ask.add_argument("--file", type=Path, help=argparse.SUPPRESS)
     asked = ask.parse_args()
+    if asked.file:
+        reduce_file(asked.file)
+        return
     count, kills, rows = (24, 2, [4_000, 16_000]) if asked.quick else (asked.logs, 50, [10_000, 100_000, 1_000_000])
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} processors, Python {platform.python_version()}, Dynident {dynident.__version__}")
     with tempfile.TemporaryDirectory() as name:
@@ -182,7 +179,7 @@ def main() -> None:
         for row in rows:
             megabytes, size = peak(row, folder)
             print(f"a process that reduces a CSV file of {row} rows: {megabytes:.0f} MB at most, {size} bytes of factors")
-    print(f"this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+    print(f"this process, with the factors of all logs: {high_water_mb():.0f} MB")
 
 
 if __name__ == "__main__":

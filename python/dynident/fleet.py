@@ -1,7 +1,7 @@
 """Many logs, many robots: reduce logs where they lie, put the factors together, see how a fleet differs.
 
 >>> from dynident import fleet                                                              # doctest: +SKIP
->>> factors = fleet.merge(fleet.each(reduce_one, paths, on="ray"))                          # doctest: +SKIP
+>>> factors = fleet.merged(reduce_one, paths, on="ray")                                     # doctest: +SKIP
 >>> models = fleet.identify_each(factors, on="ray")                                         # doctest: +SKIP
 >>> fleet.spread(models).unlike                                                             # doctest: +SKIP
 ['arm-17']
@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -44,6 +45,7 @@ __all__ = [
     "load",
     "logs",
     "merge",
+    "merged",
     "reduce",
     "save",
     "spread",
@@ -205,13 +207,34 @@ def each(function: Callable[[Item], Found], items: Iterable[Item], *, on: object
     return _on_dask(function, todo, None if on == "dask" else on)
 
 
+def merged(
+    function: Callable[[Item], Factors], items: Iterable[Item], *, on: object = None, batch: int = 16
+) -> Factors:
+    """``merge(each(function, items, on=on))``, where a worker takes ``batch`` items at a time and merges what they give:
+    fewer and larger messages, for logs whose reduction takes some milliseconds. Of a lost worker the whole batch is done
+    again.
+    """
+    if batch < 1:
+        raise ValueError(f"batch = {batch}: give at least 1")
+    todo = list(items)
+    parts = [todo[begin : begin + batch] for begin in range(0, len(todo), batch)]
+    return merge(each(partial(_merged_here, function), parts, on=on))
+
+
+def _merged_here(function: Callable[[Item], Factors], items: Sequence[Item]) -> Factors:
+    return merge([function(item) for item in items])
+
+
 def _on_ray(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
     import ray
 
     if not ray.is_initialized():
         ray.init(include_dashboard=False, log_to_driver=False)
+    def run(item: Item) -> Found:
+        return function(item)
+
     # Lost workers are no failure, however many; what the function raises is.
-    task = ray.remote(max_retries=-1, retry_exceptions=False)(function)
+    task = ray.remote(max_retries=-1, retry_exceptions=False)(run)
     most = max(2, 4 * int(ray.cluster_resources().get("CPU", 1)))
     found: list[Any] = [None] * len(items)
     running: dict[Any, int] = {}

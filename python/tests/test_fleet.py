@@ -173,6 +173,14 @@ def test_processes_give_the_same_bytes() -> None:
         assert fleet.each(reduced_quickly, range(4), on=pool) == here
 
 
+def test_batches_are_merged_alike(some: list[dynident.Factors]) -> None:
+    whole = fleet.merge(some).to_bytes()
+    for batch in (1, 4, 100):
+        assert fleet.merged(reduced, range(6), batch=batch).to_bytes() == whole
+    with pytest.raises(ValueError, match="at least 1"):
+        fleet.merged(reduced, range(6), batch=0)
+
+
 def test_ray_gives_the_same_bytes_though_workers_are_killed(tmp_path: Path) -> None:
     ray = pytest.importorskip("ray")
     here = [reduced_quickly(seed) for seed in range(9)]

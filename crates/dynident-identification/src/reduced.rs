@@ -1,8 +1,8 @@
 //! Logs reduced to their factors: a fit of many logs that need not lie in one place.
 //!
-//! [`reduce`] turns each log into its triangles, wherever it lies; [`identify_reduced`] makes the model of the triangles
-//! alone, as [`identify`](crate::identify()) would of the logs. For that, nothing may be left that is chosen by looking
-//! at the samples again: cut-off and friction are stated, the estimator is least squares.
+//! [`reduce`] turns each log into its triangles, wherever it lies; [`identify_reduced`] makes the model of the
+//! triangles alone, as [`identify`](crate::identify()) would of the logs. For that, nothing may be left that is chosen
+//! by looking at the samples again: cut-off and friction are stated, the estimator is least squares.
 
 use crate::between_logs::with_variation;
 use crate::error::IdentificationError;
@@ -77,10 +77,10 @@ pub fn reduce(
     })
 }
 
-/// The model that explains reduced logs: the estimate with what varies between logs in its bars, consistent
-/// parameters, signs of torque and friction. As [`identify`](crate::identify()), but for what only samples show: delays,
-/// torque over time, other readings of a doubtful log, tests on held-out motion. The result does not depend on where
-/// the logs were reduced; of their order it depends by rounding.
+/// The model that explains reduced logs: the estimate with what varies between logs in its bars, consistent parameters,
+/// signs of torque and friction. As [`identify`](crate::identify()), but for what only samples show: delays, torque
+/// over time, other readings of a doubtful log, tests on held-out motion. The result does not depend on where the logs
+/// were reduced; of their order it depends by rounding.
 ///
 /// # Errors
 /// [`ReduceError`] as [`reduce`]; factors of other columns; as [`identify`](crate::identify()).
