@@ -1,4 +1,4 @@
-//! Torque that stands still while its joint moves.
+//! Torque that stands still while its joint moves: repeated by a recorder, or cut off at what a channel can show.
 
 use super::outliers::middle;
 use crate::quantisation::{quantisation_step, usual_change};
@@ -16,16 +16,26 @@ const SHARE_OF_MOTION: f64 = 0.1;
 /// Least motion in steps of a quantised encoder, and least usual change of a quantised torque over as many samples.
 const QUANTA: f64 = 4.0;
 
-/// A run of one value; its first sample was measured, those from `from + 1` to `to` (exclusive) are repeated.
+/// A run of one value, from `from` to `to` (exclusive).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
     pub(super) from: usize,
     pub(super) to: usize,
+    /// At an extreme of the channel: there the first sample is no better than the others.
+    pub(super) saturated: bool,
+}
+
+impl Run {
+    /// The samples that were not measured: of a held torque the first one was.
+    pub(super) fn invented(&self) -> core::ops::Range<usize> {
+        self.from + usize::from(!self.saturated)..self.to
+    }
 }
 
 /// Runs of one and the same torque in `tau` while the position `q` moves on, longer than the quantisation explains: at
-/// least ten samples, six times the longest run nearby, where the torque takes several values. A torque at `extremes`
-/// of the channel is saturated, not held.
+/// least ten samples, six times the longest run nearby, where the torque takes several values. At `extremes` of the
+/// channel the torque is saturated, again and again: there runs at an extreme nearby do not count. The peak of a
+/// smooth torque in quantisation steps is at most `2 / (√2 − 1) = 4.8` times as long as the step beside it.
 pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> {
     let mut held = Vec::new();
     let n = tau.len();
@@ -37,8 +47,8 @@ pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> 
             continue;
         }
         let to = (from + SHORTEST..n).find(|k| tau[*k] != tau[from]).unwrap_or(n);
-        let run = Run { from, to };
-        if !extremes.contains(&tau[from]) && is_held(tau, q, run) {
+        let run = Run { from, to, saturated: extremes.contains(&tau[from]) };
+        if is_held(tau, q, run, extremes) {
             held.push(run);
         }
         from = to;
@@ -46,7 +56,7 @@ pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> 
     held
 }
 
-fn is_held(tau: &[f64], q: &[f64], run: Run) -> bool {
+fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2]) -> bool {
     let length = run.to - run.from;
     let around = length.clamp(5 * SHORTEST, AROUND);
     let sides = [run.from.saturating_sub(around)..run.from, run.to..(run.to + around).min(tau.len())];
@@ -61,7 +71,10 @@ fn is_held(tau: &[f64], q: &[f64], run: Run) -> bool {
         let mut current = 0;
         for k in 0..tau.len() {
             current = if k > 0 && tau[k] == tau[k - 1] { current + 1 } else { 1 };
-            longest = longest.max(current);
+            // Of a saturated torque the others of its kind tell nothing.
+            if !run.saturated || !extremes.contains(&tau[k]) {
+                longest = longest.max(current);
+            }
         }
     }
     let step = quantisation_step(&tau[run.from.saturating_sub(around)..(run.to + around).min(tau.len())]);
@@ -112,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn rest_coarse_steps_slow_updates_and_saturation_are_not_held() {
+    fn rest_coarse_steps_and_slow_updates_are_not_held() {
         let (tau, q) = signals(4000);
         let coarse: Vec<f64> = tau.iter().map(|tau| (tau / 4.0).round() * 4.0).collect();
         assert!(held_runs(&coarse, &q, [-20.0, 20.0]).is_empty());
@@ -125,7 +138,30 @@ mod tests {
         // A count of the encoder now and then is no motion.
         resting.1[1000..2000].iter_mut().enumerate().for_each(|(i, q)| *q += 2e-6 * (i / 60) as f64);
         assert!(held_runs(&resting.0[900..1100], &resting.1[900..1100], [-20.5, 20.5]).is_empty());
-        let clipped: Vec<f64> = tau.iter().map(|tau| tau.clamp(-12.0, 12.0)).collect();
-        assert!(held_runs(&clipped, &q, [-12.0, 12.0]).is_empty());
+        // The peaks of a torque without noise, in steps.
+        for step in [0.05, 0.1, 0.37, 1.0] {
+            let smooth = |i: usize| (20.0 * (1.5 * i as f64 * 0.001).sin() / step).round() * step;
+            let stepped: Vec<f64> = (0..20_000).map(smooth).collect();
+            let q: Vec<f64> = (0..20_000).map(|i| (1.5 * i as f64 * 0.001 + 0.7).cos()).collect();
+            let extremes = [-1.0, 1.0].map(|sign| sign * stepped.iter().copied().fold(0.0, f64::max));
+            assert!(held_runs(&stepped, &q, extremes).is_empty(), "{step}");
+        }
+    }
+
+    /// Also where they are cut off four times as often as they are told.
+    #[test]
+    fn what_is_cut_off_at_an_extreme_is_saturated() {
+        let noise = normal(12, 8000);
+        let tau: Vec<f64> = (0..8000).map(|i| 20.0 * (6.0 * i as f64 * 0.001).sin() + 0.05 * noise[i]).collect();
+        let q: Vec<f64> = (0..8000).map(|i| (6.0 * i as f64 * 0.001 + 0.7).cos()).collect();
+        for limit in [19.0, 12.0, 4.0] {
+            let clipped: Vec<f64> = tau.iter().map(|tau| tau.clamp(-limit, limit)).collect();
+            let found = held_runs(&clipped, &q, [-limit, limit]);
+            assert!(found.iter().all(|run| run.saturated), "{limit}: {found:?}");
+            let told: usize = found.iter().map(|run| run.invented().len()).sum();
+            let cut = tau.iter().filter(|tau| tau.abs() > limit).count();
+            // Runs of fewer than ten samples, where noise crosses the limit, are left.
+            assert!(told as f64 > 0.9 * cut as f64 && told <= cut, "{limit}: {told} of {cut}");
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! From rows as they were read to rows that a motion is made of.
 //!
 //! [`CleanRows`] reads two blocks ahead and, on the way: finds single torque samples far from those around them
-//! (`outliers`) and torque that stands still while its joint moves (`held`), both marked so that no row of a fit holds
-//! them; replaces lone spikes of a position (`spikes`); gives each row its place by the clock; and fills holes that are
+//! (`outliers`) and torque that stands still while its joint moves (`held`: repeated, or saturated), both marked so that
+//! no row of a fit holds them; replaces lone spikes of a position (`spikes`); gives each row its place by the clock; and fills holes that are
 //! short against the motion (`holes`), marked likewise. What it did is kept for the report.
 
 mod held;
@@ -170,7 +170,8 @@ impl CleanRows {
             let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint]);
             marked.extend(single.iter().map(|at| at - own.start));
             for run in &held_runs {
-                let repeated = (run.from + 1).max(own.start)..run.to.min(own.end);
+                let invented = run.invented();
+                let repeated = invented.start.max(own.start)..run.to.min(own.end);
                 marked.extend(repeated.clone().map(|at| at - own.start));
             }
             marked.sort_unstable();
@@ -191,12 +192,14 @@ impl CleanRows {
                 self.tally.add((joint, Reason::Outlier), &block, index, values, 1);
             }
             for run in &held_runs {
-                let repeated = (run.from + 1).max(own.start)..run.to.min(own.end);
+                let invented = run.invented();
+                let repeated = invented.start.max(own.start)..run.to.min(own.end);
                 if !repeated.is_empty() {
-                    let begins = u64::from(run.from + 1 >= own.start);
+                    let begins = u64::from(invented.start >= own.start);
                     let index = repeated.start - own.start;
                     let values = [tau[repeated.start]; 2];
-                    self.tally.add_run((joint, Reason::Held), &block, index, values, (repeated.len() as u64, begins));
+                    let reason = if run.saturated { Reason::Saturated } else { Reason::Held };
+                    self.tally.add_run((joint, reason), &block, index, values, (repeated.len() as u64, begins));
                 }
             }
         }

@@ -13,6 +13,9 @@ pub enum Reason {
     Outlier,
     /// A torque that is repeated while its joint moves: left out of torque and regressor alike.
     Held,
+    /// A torque that is cut off at an extreme of its channel while its joint moves: left out of torque and regressor
+    /// alike.
+    Saturated,
     /// A position that no motion makes: replaced by the cubic through its neighbours.
     Spike,
 }
@@ -21,7 +24,7 @@ impl Reason {
     /// What it is found in.
     pub fn channel(self) -> Quantity {
         match self {
-            Self::Outlier | Self::Held => Quantity::Torque,
+            Self::Outlier | Self::Held | Self::Saturated => Quantity::Torque,
             Self::Spike => Quantity::Position,
         }
     }
@@ -39,11 +42,11 @@ pub struct SetAside {
     pub reason: Reason,
     /// How many samples.
     pub samples: u64,
-    /// In how many places: runs of a held torque, else as many as samples.
+    /// In how many places: runs of a held or saturated torque, else as many as samples.
     pub places: u64,
     /// Their share of the rows used, 0 to 1.
     pub share: f64,
-    /// 0-based data row in the file of the one that stands off farthest; of a held torque, of the first.
+    /// 0-based data row in the file of the one that stands off farthest; of a held or saturated torque, of the first.
     pub row: u64,
     /// Its time, in seconds after the first data row of the file.
     pub time_s: f64,
@@ -66,6 +69,11 @@ impl SetAside {
             Reason::Held => format!(
                 "is repeated {places} times while the joint moves, {samples} samples ({share:.2} %) in all, e.g. {value:.4} \
                  from {time_s:.3} s (row {row}) on; they are left out of torque and regressor alike"
+            ),
+            Reason::Saturated => format!(
+                "saturated: stands {places} times at an extreme of the channel while the joint moves, {samples} samples \
+                 ({share:.2} %) in all, e.g. at {value:.4} from {time_s:.3} s (row {row}) on; they are left out of torque \
+                 and regressor alike"
             ),
             Reason::Spike => format!(
                 "{samples} samples ({share:.2} %) stand alone, e.g. {value:.6} for about {expected:.6} at {time_s:.3} s \

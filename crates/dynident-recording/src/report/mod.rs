@@ -192,7 +192,7 @@ impl ImportReport {
         }
         for found in &self.set_aside {
             let name = format!("{} {}", found.channel.key(), found.joint);
-            let few = found.share < FEW && found.reason != Reason::Held;
+            let few = found.share < FEW && matches!(found.reason, Reason::Outlier | Reason::Spike);
             add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
         }
         // Each channel by itself.
@@ -207,7 +207,11 @@ impl ImportReport {
                     format!("mostly dead: {:.1} % of the samples are exactly zero", 100.0 * channel.zero_share);
                 add(if measured { Level::Problem } else { Level::Warning }, &name, message);
             }
-            if channel.saturated() {
+            let of_channel = |found: &SetAside, reason: Reason| {
+                found.channel == channel.channel && found.joint == channel.joint && found.reason == reason
+            };
+            let is_left_out = self.set_aside.iter().any(|found| of_channel(found, Reason::Saturated));
+            if channel.saturated() && !is_left_out {
                 let message = format!(
                     "saturated? {} samples in a row at an extreme of [{}, {}]",
                     channel.longest_run_at_extreme, channel.min, channel.max
@@ -222,9 +226,8 @@ impl ImportReport {
                 );
                 add(Level::Problem, &name, message);
             }
-            let is_set_aside = |found: &SetAside| {
-                found.channel == channel.channel && found.joint == channel.joint && found.reason != Reason::Held
-            };
+            let is_set_aside =
+                |found: &SetAside| of_channel(found, Reason::Outlier) || of_channel(found, Reason::Spike);
             if let Some(worst) = &channel.worst_lone_sample
                 && !self.set_aside.iter().any(is_set_aside)
             {

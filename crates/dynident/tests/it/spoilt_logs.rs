@@ -156,3 +156,32 @@ fn outliers_and_held_torque_do_not_reach_the_model() {
         }
     }
 }
+
+/// A channel that ends at 80 % of what the shoulder's torque is: what is cut off is left out, and said, and the model is
+/// that of the rest. It was a warning alone.
+#[test]
+fn saturated_torque_does_not_reach_the_model() {
+    const LIFT: usize = 1;
+    let folder = tempfile::tempdir().unwrap();
+    let clean = rows(folder.path(), 21);
+    let reference = fitted(folder.path(), &clean);
+    let column = 1 + JOINTS + LIFT;
+    let limit = 0.8 * clean.iter().map(|row| row[column].abs()).fold(0.0, f64::max);
+    let cut = clean.iter().filter(|row| row[column].abs() > limit).count();
+    let mut bad = clean.clone();
+    bad.iter_mut().for_each(|row| row[column] = row[column].clamp(-limit, limit));
+    let found = fitted(folder.path(), &bad);
+    let import = serde_json::to_value(&found.result.logs[0].import).unwrap();
+    let told = set_aside(&import, NAMES[LIFT], "saturated").unwrap();
+    let samples = told["samples"].as_f64().unwrap();
+    // Where noise crosses the limit runs are shorter than ten samples and stay.
+    assert!((0.75 * cut as f64..=cut as f64).contains(&samples), "{cut} {told}");
+    let findings = import["findings"].as_array().unwrap();
+    let names = |finding: &&Value| finding["channel"] == format!("torque {}", NAMES[LIFT]);
+    let own: Vec<&Value> = findings.iter().filter(names).collect();
+    assert!(own.len() == 1 && own[0]["level"] == "warning", "{own:?}");
+    for (found, reference) in model_errors(&found).into_iter().zip(model_errors(&reference)) {
+        // What is cut off is more than a few outliers: a tenth to a third of a joint's rows.
+        assert!(found < 1.5 * reference, "{found} for {reference}, {cut} samples cut off");
+    }
+}
