@@ -80,7 +80,7 @@ pub use nonlinear::{
     maximum_likelihood, simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
     spline_motion_least_squares,
 };
-pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, correlation, student_half_width};
+pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, HALF_WIDTH_95, correlation, student_half_width};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -2,16 +2,13 @@
 
 use crate::consistent::{ConsistencySettings, nominal_covariance};
 use crate::training::Training;
-use dynident_estimation::Estimate;
+use dynident_estimation::{Estimate, HALF_WIDTH_95};
 use serde::{Deserialize, Serialize};
 
 /// An estimate is conditional where the nominal values may move it by this share of its own error bar.
 const MATTERS: f64 = 0.1;
 /// A held parameter is named where it may move the estimate by this share of what all of them may.
 const NAMED: f64 = 0.1;
-/// Half the width of a 95 % interval in standard deviations.
-const HALF_WIDTH_95: f64 = 1.959_963_984_540_054;
-
 /// A parameter at nominal that an estimate hangs on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -4,7 +4,7 @@ use crate::bandwidth::CutoffByError;
 use crate::between_logs::BetweenLogs;
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
-    inertials, nearest_to_nominal,
+    inertials, nearest_to_nominal, parameter_std,
 };
 use crate::diagnosis::{Diagnosis, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
@@ -41,6 +41,9 @@ pub struct ConsistentParameters {
     /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
     /// nominal one that has the estimated base parameters.
     pub parameters: Vec<f64>,
+    /// Standard deviation of each of `parameters` ([`parameter_std`]); none where there is no consistent set, and for bodies
+    /// that are not described.
+    pub parameter_std: Vec<Option<f64>>,
     /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
     pub intervals: Option<Vec<ParameterInterval>>,
     /// Bodies whose nominal parameters are no body's, with the least eigenvalue of their pseudo-inertia.
@@ -305,6 +308,7 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
         fit: None,
         failure: Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()),
         parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
+        parameter_std: vec![None; robot.nominal().len()],
         intervals: None,
         inconsistent_nominal: settings.map_or_else(Vec::new, |settings| inconsistent_nominal_bodies(robot, settings)),
     }
@@ -343,8 +347,16 @@ pub fn consistent_stage(
     };
     let parameters = fit.as_ref().map(|fit| fit.parameters.clone());
     let knowledge = settings.consistency.as_ref();
+    // A fit that succeeded has a problem that is one.
+    let parameter_std = match knowledge.filter(|_| fit.is_some()) {
+        Some(knowledge) => {
+            parameter_std(robot, (problem, &arm), knowledge).map_err(IdentificationError::Consistency)?
+        }
+        None => vec![None; robot.nominal().len()],
+    };
     Ok(ConsistentParameters {
         parameters: parameters.unwrap_or_else(|| nearest_to_nominal(robot, &arm.values)),
+        parameter_std,
         inconsistent_nominal: knowledge
             .map_or_else(Vec::new, |knowledge| inconsistent_nominal_bodies(robot, knowledge)),
         fit,

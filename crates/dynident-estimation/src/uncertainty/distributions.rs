@@ -7,6 +7,9 @@
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
 
+/// Half the width of the 95 % interval of a normal variable, in standard deviations.
+pub const HALF_WIDTH_95: f64 = 1.959_963_984_540_054;
+
 /// Probability that a chi-squared variable with `degrees_of_freedom` degrees of freedom exceeds `value`; NaN
 /// for a NaN or for none of them.
 pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {

@@ -16,6 +16,7 @@ mod joint_gains;
 mod known_columns;
 mod maximum_likelihood;
 mod noise_levels;
+mod physical_errors;
 mod physical_golden;
 mod physical_problems;
 mod physical_routes;

@@ -9,6 +9,7 @@ mod intervals;
 mod nearest_to_nominal;
 mod nominal_spread;
 mod of_estimate;
+mod parameter_std;
 mod problem;
 mod settings;
 
@@ -17,6 +18,7 @@ pub use intervals::{ParameterInterval, consistent_intervals};
 pub use nearest_to_nominal::{inertials, nearest_to_nominal};
 pub use nominal_spread::nominal_covariance;
 pub use of_estimate::consistent_with_estimate;
+pub use parameter_std::parameter_std;
 pub use problem::{
     consistency_problem, consistent_parameters, inconsistent_nominal_bodies, nearest_consistent_parameters,
     typical_length_m,

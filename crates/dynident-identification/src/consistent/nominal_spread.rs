@@ -42,14 +42,18 @@ pub fn nominal_covariance(
             directions.push((0..base.count()).map(sum).collect());
         }
     }
-    let values = &robot.nominal()[bodies..];
-    let sizes = term_sizes(robot, problem, 1.0);
-    for (place, (value, size)) in values.iter().zip(sizes).enumerate() {
-        let spread: f64 = (MASS_SHARE * value).hypot(TERM_SHARE * size);
+    for (place, spread) in term_spreads(robot, problem).into_iter().enumerate() {
         directions.push(map(bodies + place).iter().map(|x| x * spread).collect());
     }
     let spread = DMatrix::from_fn(base.count(), directions.len(), |row, column| directions[column][row]);
     &spread * spread.transpose()
+}
+
+/// How far the nominal value of each torque term may be wrong: 30 % of it, and half of what its joint's torque allows.
+pub(super) fn term_spreads(robot: &ParametricModel, problem: &LinearProblem) -> Vec<f64> {
+    let values = &robot.nominal()[robot.model().inertial_count()..];
+    let sizes = term_sizes(robot, problem, 1.0);
+    values.iter().zip(sizes).map(|(value, size)| (MASS_SHARE * value).hypot(TERM_SHARE * size)).collect()
 }
 
 /// ρ J^½ S J^½ as ten parameters, for the ten symmetric S of unit norm.

@@ -37,8 +37,18 @@ pub fn consistent_parameters(
     joint_sigma: &[f64],
     settings: &ConsistencySettings,
 ) -> Result<PhysicalFit, ConsistencyError> {
+    Ok(physical_fit(&described_problem(robot, problem, joint_sigma, settings)?, &settings.fit())?)
+}
+
+/// [`consistency_problem`] with what the description says of the masses.
+pub(super) fn described_problem(
+    robot: &ParametricModel,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+    settings: &ConsistencySettings,
+) -> Result<PhysicalProblem, ConsistencyError> {
     let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
-    Ok(physical_fit(&problem.with_mass_beliefs(mass_beliefs(robot, settings))?, &settings.fit())?)
+    Ok(problem.with_mass_beliefs(mass_beliefs(robot, settings))?)
 }
 
 /// The consistent set of parameters whose base parameters are nearest to `theta` in the data's own metric: for
@@ -53,8 +63,7 @@ pub fn nearest_consistent_parameters(
     settings: &ConsistencySettings,
     theta: &[f64],
 ) -> Result<PhysicalFit, ConsistencyError> {
-    let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
-    let around = problem.around(theta)?.with_mass_beliefs(mass_beliefs(robot, settings))?;
+    let around = described_problem(robot, problem, joint_sigma, settings)?.around(theta)?;
     Ok(physical_fit(&around, &settings.fit())?)
 }
 
@@ -86,7 +95,7 @@ pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &Consisten
 
 /// Whether ten parameters are those of a consistent body, or of one that is as thin as a plate; and the least
 /// eigenvalue of their pseudo-inertia.
-fn consistent_body(own: &[f64]) -> (bool, f64) {
+pub(super) fn consistent_body(own: &[f64]) -> (bool, f64) {
     let stated = InertialParameters(core::array::from_fn(|k| own[k]));
     let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
     // Rounding of the moments, and of the mass beside them.

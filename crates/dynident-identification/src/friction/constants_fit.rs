@@ -14,7 +14,7 @@ use super::constants::{at, coordinates, step_of, value_at};
 use super::weak_terms::without_weakest;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
-use dynident_estimation::{Estimate, EstimationError, LinearProblem};
+use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, LinearProblem};
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
@@ -27,9 +27,6 @@ const FURTHEST: f64 = 0.7;
 const KNOWN_BEFOREHAND: f64 = 1.2;
 /// Steps have ended once every one is below this share of its standard deviation, or of the constant.
 const SETTLED: (f64, f64) = (0.1, 2.0e-3);
-/// Half the width of a 95 % interval in standard deviations.
-const HALF_WIDTH_95: f64 = 1.959_963_984_540_054;
-
 /// Chosen friction and those of its constants that can be moved.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionConstants {

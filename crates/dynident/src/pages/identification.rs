@@ -4,8 +4,8 @@ use crate::error::Error;
 use crate::result::{
     BaseParameterResult, BodyResult, JointFrictionResult, LogSummary, ResultFile, TermResult, ValueSource,
 };
-use dynident_estimation::ValidationReport;
 use dynident_estimation::consistent::IntervalEnd;
+use dynident_estimation::{HALF_WIDTH_95, ValidationReport};
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::examination::{LogTrace, LogValidation};
@@ -410,14 +410,17 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     let rows = r.bodies.iter().map(|body| {
         let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));
         let marked = |text: String, k: usize| Cell::from(text + mark(body, k));
-        let mut row = vec![Cell::from(&body.name), marked(short(body.mass_kg, 4), 0), prior.into()];
+        let bar = body.std.map_or_else(String::new, |std| short(HALF_WIDTH_95 * std[0], 3));
+        let mut row = vec![Cell::from(&body.name), marked(short(body.mass_kg, 4), 0), bar.into(), prior.into()];
         row.extend((0..3).map(|k| body.com_m.map_or_else(|| Cell::from(""), |com| marked(short(com[k], 4), k + 1))));
         let least = body.pseudo_inertia_min_eigenvalue;
         row.push(Cell::judged(short(least, 3), if least > 0.0 { Tone::Plain } else { Tone::Bad }));
         row
     });
-    let note = format!("centre of mass in the body's own frame; least eigenvalue of the pseudo-inertia; {MARKS}");
-    let columns = ["body", "mass, kg", "description, kg", "x, m", "y, m", "z, m", "least eigenvalue"];
+    let note = format!(
+        "± if the description is right within 30 %; centre of mass in the body's own frame; least eigenvalue of the pseudo-inertia; {MARKS}"
+    );
+    let columns = ["body", "mass, kg", "± (95 %), kg", "description, kg", "x, m", "y, m", "z, m", "least eigenvalue"];
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
     let rows = r.bodies.iter().map(|body| {
         let inertia = body.inertia_at_origin_kgm2.iter().enumerate();

@@ -290,6 +290,11 @@ pub struct BodyResult {
     /// For each of the ten whether torque told it; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sources: Option<[ValueSource; 10]>,
+    /// Standard deviation of each of the ten, by the logs and the description together, if the description is right
+    /// within 30 %: of a value that torque tells by itself that of the logs, of one that is in no torque that of the
+    /// description. None for a body that is not described, and where bodies are not the physically consistent set's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<[f64; 10]>,
 }
 
 /// Where a body's value comes from.

@@ -266,7 +266,7 @@ fn exported_model(
     }
     let sources = sources(found.model(), found.estimate());
     let values = (&found.inertials()[..], &found.consistent.parameters[..]);
-    model_files(robot, &found.model().parametric, values, &sources)
+    model_files(robot, &found.model().parametric, values, (&sources, &found.consistent.parameter_std))
 }
 
 /// What the result has beside the identification itself.
@@ -328,7 +328,7 @@ fn result_file(
         simulated,
         base_parameters: base_parameters(model, estimate, found.consistent_base_values(), &conditionals),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        bodies: bodies(model, parts.inertials, &sources(model, estimate)),
+        bodies: bodies(model, parts.inertials, &sources(model, estimate), &found.consistent.parameter_std),
         possible_intervals: found.consistent.intervals.clone(),
         essential: found.essential.clone(),
         correlations: strongest_correlations(estimate, CORRELATIONS),

@@ -5,6 +5,7 @@ use crate::result::{InputFile, Provenance, ValueSource};
 use crate::study::StudyRobot;
 use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
+use dynident_estimation::HALF_WIDTH_95;
 use dynident_model::mjcf::{Loss, included_from};
 use dynident_model::terms::JointProperty;
 use dynident_model::{
@@ -32,10 +33,11 @@ pub(super) fn model_files(
     robot: &StudyRobot,
     model: &ParametricModel,
     (inertials, parameters): (&[InertialParameters], &[f64]),
-    sources: &[[ValueSource; 10]],
+    (sources, std): (&[[ValueSource; 10]], &[Option<f64>]),
 ) -> Result<ModelFiles, String> {
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
+    let sources = (sources, std);
     note_sources(model, parameters, sources, lost_in_urdf, &mut links);
     let joints = joint_changes(model, parameters);
     let Robot { model: whole, format, text, .. } = &robot.robot;
@@ -148,11 +150,11 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
     Ok(links)
 }
 
-/// Says in a body's comment which of its values torque told, and what of its joint's drive the file does not hold.
+/// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's drive the file does not hold.
 fn note_sources(
     model: &ParametricModel,
     parameters: &[f64],
-    sources: &[[ValueSource; 10]],
+    (sources, std): (&[[ValueSource; 10]], &[Option<f64>]),
     lost: fn(Option<JointProperty>) -> bool,
     changes: &mut [LinkChange],
 ) {
@@ -168,6 +170,9 @@ fn note_sources(
             of(ValueSource::Partly),
             of(ValueSource::Nominal)
         );
+        if let Some(std) = std[10 * index] {
+            let _ = write!(text, "; mass {:.4} kg ± {:.2e} kg (95 %)", parameters[10 * index], HALF_WIDTH_95 * std);
+        }
         let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
         let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && lost(term.property()));
         let lost: Vec<String> =

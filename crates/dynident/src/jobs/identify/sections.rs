@@ -122,6 +122,7 @@ pub(super) fn bodies(
     model: &RegressorModel,
     inertials: &[InertialParameters],
     sources: &[[ValueSource; 10]],
+    std: &[Option<f64>],
 ) -> Vec<BodyResult> {
     model
         .model()
@@ -129,7 +130,8 @@ pub(super) fn bodies(
         .iter()
         .zip(inertials)
         .zip(sources)
-        .map(|((body, inertial), sources)| BodyResult {
+        .zip(std.chunks(10))
+        .map(|(((body, inertial), sources), std)| BodyResult {
             name: body.name().to_owned(),
             links: body.links.iter().map(|link| link.name.clone()).collect(),
             mass_kg: inertial.mass_kg(),
@@ -139,6 +141,7 @@ pub(super) fn bodies(
             prior: body.prior().map(|prior| prior.0),
             pseudo_inertia_min_eigenvalue: inertial.pseudo_inertia().symmetric_eigenvalues().min(),
             sources: Some(*sources),
+            std: std.iter().copied().collect::<Option<Vec<f64>>>().and_then(|std| std.try_into().ok()),
         })
         .collect()
 }

@@ -1,0 +1,39 @@
+//! Error bars of all parameters of the consistent set, by data and description together.
+
+use super::error::ConsistencyError;
+use super::nominal_spread::term_spreads;
+use super::problem::{MASS_SHARE, consistent_body, described_problem};
+use super::settings::ConsistencySettings;
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::consistent::{Belief, expected_error};
+use dynident_estimation::{Estimate, LinearProblem};
+use dynident_model::Body;
+
+/// Standard deviation of every parameter of the consistent set, ten for each body and one for each term: how far it is
+/// to be expected from the truth if the description is right within 30 % ([`nominal_covariance`](super::nominal_covariance)) and
+/// the estimate as its covariance says ([`expected_error`]). What torque tells by itself has the bar of the data, a mass
+/// that is in no torque 30 % of itself. None for the values of a body of which the description says nothing, or
+/// something impossible: there a rough body stands for it, and only the base parameters mean anything.
+///
+/// # Errors
+/// As [`consistent_parameters`](super::consistent_parameters).
+pub fn parameter_std(
+    robot: &ParametricModel,
+    (problem, estimate): (&LinearProblem, &Estimate),
+    settings: &ConsistencySettings,
+) -> Result<Vec<Option<f64>>, ConsistencyError> {
+    let physical = described_problem(robot, problem, &estimate.joint_sigma, settings)?;
+    let belief = Belief { body_share: MASS_SHARE, scalar_std: term_spreads(robot, problem) };
+    let count = robot.base().count();
+    let covariance = estimate.covariance.view((0, 0), (count, count)).into_owned();
+    let std = expected_error(&physical, &settings.fit(), &covariance, &belief)?;
+    let is_described = |(index, body): (usize, &Body)| {
+        let own = settings.bodies.get(body.name());
+        let is_stated = own.is_some_and(|own| own.prior.is_some() || own.known.is_some());
+        let nominal = &robot.nominal()[10 * index..10 * index + 10];
+        is_stated || (body.prior().is_some() && consistent_body(nominal).0)
+    };
+    let described: Vec<bool> = robot.model().bodies().iter().enumerate().map(is_described).collect();
+    let of = |(index, std): (usize, f64)| described.get(index / 10).is_none_or(|&described| described).then_some(std);
+    Ok(std.into_iter().enumerate().map(of).collect())
+}
