@@ -41,8 +41,8 @@ pub struct ConsistentParameters {
     /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
     /// nominal one that has the estimated base parameters.
     pub parameters: Vec<f64>,
-    /// Standard deviation of each of `parameters` ([`parameter_std`]); none where there is no consistent set, and for bodies
-    /// that are not described.
+    /// Standard deviation of each of `parameters` ([`parameter_std`]); none where there is no consistent set, and for
+    /// bodies that are not described.
     pub parameter_std: Vec<Option<f64>>,
     /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
     pub intervals: Option<Vec<ParameterInterval>>,

@@ -17,15 +17,15 @@ pub struct Belief {
 }
 
 /// Standard deviation of the error of every parameter of a [`physical_fit`](super::physical_fit), bodies' ten each and
-/// then scalars, for a truth that is drawn by `belief`; zero for bodies that are known. `covariance` (base, base) is that
-/// of the base parameters which the fit follows, whatever widened it.
+/// then scalars, for a truth that is drawn by `belief`; zero for bodies that are known. `covariance` (base, base) is
+/// that of the base parameters which the fit follows, whatever widened it.
 ///
-/// The fit, linear about its reference, is `x̂ = A GᵀR₁ θ̂ + ..` with `A = (GᵀG + W)⁻¹`: G are the weighted rows over the
-/// unknowns x, which are one standard deviation of the belief long, and W is what the fit's own prior adds. It errs by
-/// `A GᵀR₁ (θ̂ − θ) − A W x`, two independent parts with the covariances `U V Uᵀ`, `U = A GᵀR₁`, and `(A W)(A W)ᵀ`. So a
-/// value that the data tell has the bar of the data, one that they do not tell that of the description, and the bar
-/// counts what a prior leaves open that weighs less than the belief. Limits, which only make errors smaller, are left
-/// out.
+/// The fit, linear about its reference, is `x̂ = A GᵀR₁ θ̂ + ..` with `A = (GᵀG + W)⁻¹`: G are the weighted rows over
+/// the unknowns x, which are one standard deviation of the belief long, and W is what the fit's own prior adds. It errs
+/// by `A GᵀR₁ (θ̂ − θ) − A W x`, two independent parts with the covariances `U V Uᵀ`, `U = A GᵀR₁`, and `(A W)(A W)ᵀ`.
+/// So a value that the data tell has the bar of the data, one that they do not tell that of the description, and the
+/// bar counts what a prior leaves open that weighs less than the belief. Limits, which only make errors smaller, are
+/// left out.
 ///
 /// # Errors
 /// [`PhysicalError::Mismatch`] for shapes that do not fit, [`PhysicalError::NotFinite`] for numbers that are none, and

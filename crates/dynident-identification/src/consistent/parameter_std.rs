@@ -10,10 +10,11 @@ use dynident_estimation::{Estimate, LinearProblem};
 use dynident_model::Body;
 
 /// Standard deviation of every parameter of the consistent set, ten for each body and one for each term: how far it is
-/// to be expected from the truth if the description is right within 30 % ([`nominal_covariance`](super::nominal_covariance)) and
-/// the estimate as its covariance says ([`expected_error`]). What torque tells by itself has the bar of the data, a mass
-/// that is in no torque 30 % of itself. None for the values of a body of which the description says nothing, or
-/// something impossible: there a rough body stands for it, and only the base parameters mean anything.
+/// to be expected from the truth if the description is right within 30 %
+/// ([`nominal_covariance`](super::nominal_covariance)) and the estimate as its covariance says ([`expected_error`]).
+/// What torque tells by itself has the bar of the data, a mass that is in no torque 30 % of itself. None for the values
+/// of a body of which the description says nothing, or something impossible: there a rough body stands for it, and only
+/// the base parameters mean anything.
 ///
 /// # Errors
 /// As [`consistent_parameters`](super::consistent_parameters).

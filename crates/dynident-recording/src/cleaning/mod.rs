@@ -1,9 +1,10 @@
 //! From rows as they were read to rows that a motion is made of.
 //!
 //! [`CleanRows`] reads two blocks ahead and, on the way: finds single torque samples far from those around them
-//! (`outliers`) and torque that stands still while its joint moves (`held`: repeated, or saturated), both marked so that
-//! no row of a fit holds them; replaces lone spikes of a position (`spikes`); gives each row its place by the clock; and fills holes that are
-//! short against the motion (`holes`), marked likewise. What it did is kept for the report.
+//! (`outliers`) and torque that stands still while its joint moves (`held`: repeated, or saturated), both marked so
+//! that no row of a fit holds them; replaces lone spikes of a position (`spikes`); gives each row its place by the
+//! clock; and fills holes that are short against the motion (`holes`), marked likewise. What it did is kept for the
+//! report.
 
 mod held;
 mod holes;

@@ -4,9 +4,9 @@ use super::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident::estimation::HALF_WIDTH_95;
 use dynident::result::ValueSource;
 
-/// Arms whose masses are up to 30 % from their descriptions, with friction; twenty seconds at 200 Hz with noise of
-/// 0.2 Nm and 1e-5 rad. The median mass is nearer to the truth than the description's, none is further than 1.2 times
-/// the description's error and three of its own bars, which hold, and the first one, of which only the inertia about its
+/// Arms whose masses are up to 30 % from their descriptions, with friction; twenty seconds at 200 Hz with noise of 0.2
+/// Nm and 1e-5 rad. The median mass is nearer to the truth than the description's, none is further than 1.2 times the
+/// description's error and three of its own bars, which hold, and the first one, of which only the inertia about its
 /// axis is in any torque, is the description's with the bar of the description.
 #[test]
 fn masses_come_nearer_to_the_truth() {

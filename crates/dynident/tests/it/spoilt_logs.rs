@@ -157,8 +157,8 @@ fn outliers_and_held_torque_do_not_reach_the_model() {
     }
 }
 
-/// A channel that ends at 80 % of what the shoulder's torque is: what is cut off is left out, and said, and the model is
-/// that of the rest. It was a warning alone.
+/// A channel that ends at 80 % of what the shoulder's torque is: what is cut off is left out, and said, and the model
+/// is that of the rest. It was a warning alone.
 #[test]
 fn saturated_torque_does_not_reach_the_model() {
     const LIFT: usize = 1;

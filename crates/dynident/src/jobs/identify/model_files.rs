@@ -150,7 +150,8 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
     Ok(links)
 }
 
-/// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's drive the file does not hold.
+/// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's drive
+/// the file does not hold.
 fn note_sources(
     model: &ParametricModel,
     parameters: &[f64],
