@@ -17,7 +17,7 @@ import dynident
 from dynident import fleet
 
 STATED = {
-    "drive": {"viscous": True, "coulomb": "none", "offset": False},
+    "drive": {"drive_inertia": False, "viscous": True, "coulomb": "none", "offset": False},
     "friction": "stated",
     "estimator": "weighted",
     "motion": {"differentiator": {"method": "butterworth", "order": 4, "cutoff_hz": 10.0}, "torque_lag_s": 0.0},

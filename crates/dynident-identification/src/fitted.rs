@@ -1,8 +1,9 @@
-//! From recordings to an estimate: cut-off, friction, factors, parameters, with the torque's lag among the unknowns.
+//! From recordings to an estimate: drives, cut-off, friction, factors, parameters, with the torque's lag among the unknowns.
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
 use crate::chosen_friction::{ChosenFriction, choose_friction};
+use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
@@ -16,6 +17,7 @@ use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
+use dynident_dynamics::ParametricModel;
 use dynident_estimation::Estimate;
 use dynident_recording::MotionSettings;
 use dynident_recording::log::OneOrMany;
@@ -71,6 +73,10 @@ pub(crate) struct Fitted<'a> {
     /// The task's, with the estimator that `auto` took and the lag that was taken off.
     pub(crate) settings: IdentificationSettings,
     pub(crate) cutoff: Option<CutoffByError>,
+    /// The task's robot, with the drive inertia that was seen and friction as stated.
+    pub(crate) robot: ParametricModel,
+    /// Whether drive inertia was seen; none where terms state it.
+    pub(crate) drive_inertia: Option<DriveInertiaChoice>,
     /// Rows and fit with friction as stated, where it was chosen.
     pub(crate) stated_friction: Option<(Training, Estimate)>,
     /// What the constants of chosen friction add to the bars.
@@ -216,7 +222,11 @@ fn fitted_once<'a>(
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
     let logs = Logs::new(robot.model(), recordings, filters, chosen, cutoff_hz, execution)?;
 
-    // Filters and friction, by the logs where they are left to them.
+    // Drives, filters and friction, by the logs where they are left to them.
+    let (robot, drive_inertia) = match job.arm() {
+        Some(_) => (robot.clone(), None),
+        None => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
+    };
     let first = RegressorModel::from(robot.clone());
     let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
     let started = Instant::now();
@@ -225,7 +235,7 @@ fn fitted_once<'a>(
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
         let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let friction = choose_friction((&logs, settings), robot, (chosen, payloads))?;
+        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
         let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
@@ -249,7 +259,7 @@ fn fitted_once<'a>(
         },
     };
     let found = Estimated { logs, training, estimation, settings: settings.clone() };
-    let Estimated { logs, training, estimation, settings } = with_less_noise(task, chosen, found)?;
+    let Estimated { logs, training, estimation, settings } = with_less_noise(task, &robot, chosen, found)?;
     let estimation_s = before_s + started.elapsed().as_secs_f64();
     Ok(Fitted {
         logs,
@@ -257,6 +267,8 @@ fn fitted_once<'a>(
         estimation,
         settings,
         cutoff,
+        robot,
+        drive_inertia,
         stated_friction: friction.stated,
         constants_error: friction.constants_error,
         lag: LagChoice::default(),

@@ -8,6 +8,7 @@ use crate::consistent::{
 };
 use crate::diagnosis::{Diagnosis, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
+use crate::drive_inertia::DriveInertiaChoice;
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSource};
 use crate::examination::{
@@ -75,6 +76,8 @@ pub struct Identification {
     pub cutoff: Option<CutoffByError>,
     /// The cut-off whose band held-out figures are for, where the fit has another.
     pub motion_hz: Option<f64>,
+    /// Whether drives were seen to have inertia; none where terms state it.
+    pub drive_inertia: Option<DriveInertiaChoice>,
     /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
     pub training: Training,
     /// The estimator that made the estimate: of `auto` the one that it took.
@@ -172,6 +175,9 @@ pub fn identify_payload(
     if !task.settings.friction.is_empty() {
         return Err(PayloadError::FrictionOfKnownArm.into());
     }
+    if !task.settings.drive_inertia.is_empty() {
+        return Err(PayloadError::DrivesOfKnownArm.into());
+    }
     execution.install(|| identified(task, execution, &mut Job::Payload(arm)))
 }
 
@@ -194,6 +200,8 @@ fn identified(
         mut estimation,
         settings,
         cutoff,
+        robot,
+        drive_inertia,
         stated_friction,
         lag,
         between_logs,
@@ -258,7 +266,7 @@ fn identified(
         DiagnosisChoice::WhenDoubtful if !is_doubted() => None,
         DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
             let of_task = plain.filter(|_| own_terms);
-            Some(diagnose((&logs, settings), robot, &chosen, of_task)?)
+            Some(diagnose((&logs, settings), &robot, &chosen, of_task)?)
         }
     };
     times.estimation_s += estimation_s;
@@ -272,6 +280,7 @@ fn identified(
         motion: logs.motion.clone(),
         cutoff,
         motion_hz: logs.motion_hz(),
+        drive_inertia,
         training,
         estimator: settings.estimation.estimator.clone(),
         estimation,

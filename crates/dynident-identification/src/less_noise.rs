@@ -7,6 +7,7 @@ use crate::logs::Logs;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
+use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimateStatus;
 
 /// Rows, estimate and the settings that made them.
@@ -25,12 +26,13 @@ const NOISY: &str = "noise of the positions biases the least squares by which it
 /// A cut-off that would be lowered by less is kept.
 const WORTH_LOWERING: f64 = 0.8;
 
-/// The settings with the estimator that `auto` took. Where it took instruments and the cut-off was left to the data,
+/// The settings with the estimator that `auto` took; `robot` is the task's with the drive inertia that was seen. Where it took instruments and the cut-off was left to the data,
 /// rows and estimate are made again with a cut-off that lets less noise into the regressor, and with friction as stated
 /// in any case: what least squares,
 /// held-out errors and delays are made from then shows the robot and not the noise.
 pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
+    robot: &ParametricModel,
     chosen: &[usize],
     mut found: Estimated<'a>,
 ) -> Result<Estimated<'a>, IdentificationError> {
@@ -43,7 +45,7 @@ pub(crate) fn with_less_noise<'a>(
     };
     let own = InstrumentSettings { cutoff_hz: Some(cutoff_hz), ..own };
     found.settings.estimation.estimator = Estimator::Instrumental(own);
-    let IdentificationTask { robot, recordings, payloads, .. } = task;
+    let IdentificationTask { recordings, payloads, .. } = task;
     let filters = (&found.settings.motion, &task.settings.parallel_filter);
     let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
     let before_hz = found.logs.motion.differentiator.cutoff_hz();

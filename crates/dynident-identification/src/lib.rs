@@ -99,6 +99,7 @@
 //! | a log file, a stream, arrays | [`Recording`] over a [`Log`](dynident_recording::Log); a motion made elsewhere: [`Recording::of_motion`] |
 //! | another estimator | [`Estimator`](estimators::Estimator) in [`EstimationSettings`]; what it alone finds: [`Findings`](estimators::Findings) |
 //! | instruments from a simulated loop or a second run | [`identify_with_instruments`] |
+//! | drive inertia where the training logs show it | [`IdentificationSettings::drive_inertia`] |
 //! | friction chosen by the training logs | [`IdentificationSettings::friction`] |
 //! | what is known of the bodies | [`ConsistencySettings`](consistent::ConsistencySettings) |
 //! | how far a mass could be off | [`IdentificationSettings::intervals`] |
@@ -123,6 +124,7 @@ mod conditional;
 pub mod consistent;
 pub mod diagnosis;
 mod doubt;
+mod drive_inertia;
 mod error;
 pub mod estimators;
 pub mod examination;
@@ -151,6 +153,7 @@ pub use between_logs::BetweenLogs;
 pub use check::{StudyExamination, examine_study};
 pub use chosen_friction::{ChosenFriction, choose_friction};
 pub use conditional::{Condition, Conditional, conditionals, resting_joints};
+pub use drive_inertia::{DriveInertiaChoice, DriveInertiaEstimate, choose_drive_inertia};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;

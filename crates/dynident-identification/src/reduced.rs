@@ -2,7 +2,7 @@
 //!
 //! [`reduce`] turns each log into its triangles, wherever it lies; [`identify_reduced`] makes the model of the
 //! triangles alone, as [`identify`](crate::identify()) would of the logs. For that, nothing may be left that is chosen
-//! by looking at the samples again: cut-off and friction are stated, the estimator is least squares.
+//! by looking at the samples again: cut-off, drives and friction are stated, the estimator is least squares.
 
 use crate::between_logs::with_variation;
 use crate::error::IdentificationError;
@@ -135,6 +135,7 @@ fn identified(
         motion: logs.motion.clone(),
         cutoff: None,
         motion_hz: None,
+        drive_inertia: None,
         estimator: settings.estimation.estimator.clone(),
         estimation: Estimation::plain(estimate),
         essential: None,

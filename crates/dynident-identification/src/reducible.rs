@@ -13,6 +13,14 @@ pub enum ReduceError {
         "the cut-off is left to the logs, and each would have its own: state motion.differentiator.cutoff_hz, or reduce like a model that was identified from some of them"
     )]
     Cutoff,
+    /// Whether drives have inertia is left to the logs.
+    #[error(
+        "whether the torque of joint {joint} holds its drive's inertia is left to the logs: state it (drive.drive_inertia = true or false), or reduce like a model that was identified from some of them"
+    )]
+    DriveInertia {
+        /// The first such joint.
+        joint: String,
+    },
     /// Friction is left to the logs.
     #[error(
         "the friction of joint {joint} is left to the logs: state it (drive.friction = \"stated\" and its terms), or reduce like a model that was identified from some of them"
@@ -45,6 +53,9 @@ pub(crate) fn is_reducible(model: &RegressorModel, settings: &IdentificationSett
     }
     if settings.motion.differentiator.wants_cutoff() {
         return Err(ReduceError::Cutoff);
+    }
+    if let Some(joint) = settings.drive_inertia.first() {
+        return Err(ReduceError::DriveInertia { joint: joint.clone() });
     }
     if model.needs_load() {
         return Err(ReduceError::Load);

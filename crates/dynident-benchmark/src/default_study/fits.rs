@@ -27,6 +27,7 @@ pub fn default_settings(joints: &[String]) -> IdentificationSettings {
     settings.estimation.estimator = Estimator::Auto(InstrumentSettings::default());
     let search = |name: &String| FrictionSearch { coulomb: Some(USUAL_STEP), ..FrictionSearch::of(name) };
     settings.friction = joints.iter().map(search).collect();
+    settings.drive_inertia = joints.to_vec();
     settings
 }
 

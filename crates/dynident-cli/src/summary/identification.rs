@@ -52,6 +52,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     text += &lags(r);
     text += &between_logs(r);
     text += &super::load::loads(r);
+    text += &drives(r);
     text.push('\n');
     if !r.friction_choice.is_empty() {
         text += &friction(r);
@@ -237,6 +238,12 @@ fn lags(r: &ResultFile) -> String {
         vec![name(joint), value, half]
     });
     format!("{text}\n{}", table(&header, 1..3, rows.collect()))
+}
+
+/// Whether the training logs show the inertia of the drives.
+fn drives(r: &ResultFile) -> String {
+    let said = r.drive_inertia_choice.as_ref();
+    said.map_or_else(String::new, |choice| wrapped(&format!("drive inertia: {}", choice.sentence()), 2))
 }
 
 /// What friction the training logs chose, against the plain one; and whose they did not, with the reason.

@@ -52,6 +52,9 @@ pub enum PayloadError {
         "[arm] and friction = \"auto\": a known arm has the friction of its result; leave friction out, with refit = \"friction\" to find its parameters again"
     )]
     FrictionOfKnownArm,
+    /// Drive inertia that is to be tested of an arm that is known.
+    #[error("[arm]: a known arm has the drive inertia of its result; test none")]
+    DrivesOfKnownArm,
     /// Friction that depends on the bare arm's load.
     #[error(
         "load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`"

@@ -6,10 +6,10 @@ use crate::result::{
 };
 use dynident_estimation::consistent::IntervalEnd;
 use dynident_estimation::{HALF_WIDTH_95, ValidationReport};
-use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::examination::{LogTrace, LogValidation};
 use dynident_identification::friction::FrictionConstant;
+use dynident_identification::{DriveInertiaEstimate, Role};
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 
@@ -340,6 +340,7 @@ fn friction(page: &mut Report, r: &ResultFile) {
     }
     page.add(table);
     lags(page, r);
+    drives(page, r);
     if !r.friction_choice.is_empty() {
         let row = |joint: &JointFrictionResult| {
             let constants: Vec<String> = joint.constants.iter().map(constant).collect();
@@ -348,6 +349,22 @@ fn friction(page: &mut Report, r: &ResultFile) {
         let header = ["joint", "friction", "constants with their 95 % intervals (rad/s or m/s, and their powers)"];
         page.add(Table::new("Friction that the logs chose", header).rows(r.friction_choice.iter().map(row)));
     }
+}
+
+/// Whether the logs show the inertia of the drives, with what the test found of each.
+fn drives(page: &mut Report, r: &ResultFile) {
+    let Some(choice) = &r.drive_inertia_choice else { return };
+    let row = |drive: &DriveInertiaEstimate| {
+        let figures = [short(drive.inertia, 3), short(drive.half_width_95, 3)].map(Cell::from);
+        core::iter::once(Cell::from(&drive.joint)).chain(figures).collect::<Vec<_>>()
+    };
+    if !choice.drives.is_empty() {
+        let header = ["joint", "inertia of its drive, kg m² (kg)", "± (95 %)"];
+        let table = Table::new("Do the logs show the inertia of the drives?", header)
+            .note("by least squares with friction as stated, before anything else is chosen");
+        page.add(table.rows(choice.drives.iter().map(row)));
+    }
+    page.add(Text::new(format!("Drive inertia: {}.", choice.sentence())));
 }
 
 /// A constant of chosen friction, in words.

@@ -16,7 +16,7 @@ use dynident_identification::examination::{
 use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
-use dynident_identification::{BetweenLogs, Condition, CutoffByError, Role};
+use dynident_identification::{BetweenLogs, Condition, CutoffByError, DriveInertiaChoice, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -82,6 +82,10 @@ pub struct ResultFile {
     pub correlations: Vec<CorrelatedPair>,
     /// Friction and drives.
     pub joints: Vec<JointResult>,
+    /// Whether the logs show the inertia of the drives, for the joints where no key states it; none where keys state it
+    /// for all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive_inertia_choice: Option<DriveInertiaChoice>,
     /// How friction was chosen, for the joints where the study asks for it.
     #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,

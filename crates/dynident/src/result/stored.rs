@@ -64,7 +64,8 @@ impl ResultFile {
         Ok(stored)
     }
 
-    /// The study with the friction that was chosen and the lag that was taken off when the model was made.
+    /// The study with the drive inertia that was seen, the friction that was chosen and the lag that was taken off when
+    /// the model was made.
     pub(crate) fn as_fitted(&self, study: &Study) -> Study {
         let mut study = study.clone();
         if study.motion.torque_lag_s.is_none() {
@@ -74,6 +75,11 @@ impl ResultFile {
             if let Some(drive) = &joint.drive {
                 let own = study.drive.joints.entry(joint.joint.clone()).or_default();
                 *own = JointDrive { drive_inertia: own.drive_inertia, offset: own.offset, ..drive.clone() };
+            }
+        }
+        if let Some(choice) = &self.drive_inertia_choice {
+            for joint in &choice.joints {
+                study.drive.joints.entry(joint.clone()).or_default().drive_inertia = Some(choice.seen);
             }
         }
         study

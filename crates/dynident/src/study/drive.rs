@@ -26,9 +26,9 @@ pub enum CoulombChoice {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {
-    /// Inertia of rotor and gear as seen from the joint. Off by default: where torque is measured at the link it does
-    /// not show.
-    pub drive_inertia: bool,
+    /// Inertia of rotor and gear as seen from the joint: where torque is measured at the link it does not show. By
+    /// default `identify` lets the logs say whether it does, and the other commands have none.
+    pub drive_inertia: Option<bool>,
     /// Viscous friction. On by default.
     pub viscous: bool,
     /// Coulomb friction. `"smooth"` by default.
@@ -59,7 +59,7 @@ pub struct DriveSection {
 impl Default for DriveSection {
     fn default() -> Self {
         Self {
-            drive_inertia: false,
+            drive_inertia: None,
             viscous: true,
             coulomb: CoulombChoice::Smooth,
             coulomb_width: 0.02,
@@ -124,6 +124,11 @@ pub struct CouplingSection {
 }
 
 impl DriveSection {
+    /// Whether this joint's drive has inertia, where a key says so.
+    pub(crate) fn drive_inertia_of(&self, joint: &str) -> Option<bool> {
+        self.joints.get(joint).and_then(|own| own.drive_inertia).or(self.drive_inertia)
+    }
+
     /// Who says which friction this joint has, where a key does; `None` where all keys of friction, the joint's and
     /// those of all joints, are as they are by default.
     pub(crate) fn friction_of(&self, joint: &str) -> Option<FrictionChoice> {

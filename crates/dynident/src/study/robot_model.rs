@@ -172,7 +172,7 @@ pub(crate) fn drive_choice(drive: &DriveSection, joint: &str) -> DriveChoice {
     let default = JointDrive::default();
     let own = drive.joints.get(joint).unwrap_or(&default);
     DriveChoice {
-        drive_inertia: own.drive_inertia.unwrap_or(drive.drive_inertia),
+        drive_inertia: drive.drive_inertia_of(joint).unwrap_or(false),
         viscous: own.viscous.unwrap_or(drive.viscous),
         coulomb: shape(own.coulomb.unwrap_or(drive.coulomb), drive, own),
         offset: own.offset.unwrap_or(drive.offset),

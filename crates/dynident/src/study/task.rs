@@ -9,7 +9,7 @@ use crate::error::{Error, StudyError};
 use dynident_identification::estimators::SimulatedLoopSettings;
 use dynident_identification::friction::{FrictionSearch, JointFriction};
 use dynident_identification::payload::Payload;
-use dynident_identification::{IdentificationSettings, IdentificationTask, Recording};
+use dynident_identification::{DriveInertiaChoice, IdentificationSettings, IdentificationTask, Recording};
 use dynident_recording::{FilterError, RecordingError, Reference};
 use std::path::Path;
 use std::sync::Arc;
@@ -124,6 +124,9 @@ impl Study {
         settings.consistency = self.estimator.physical.settings();
         settings.intervals = self.estimator.intervals;
         settings.friction = self.friction_searches(robot);
+        if self.why_drives_are_untested().is_none() {
+            settings.drive_inertia = self.unstated_drives(robot);
+        }
         (settings.offsets, settings.gains) = (self.drive.offsets, self.drive.gains);
         settings.gain_std = 0.01 * self.drive.gain_std_percent.unwrap_or(0.0);
         Ok(settings)
@@ -157,6 +160,30 @@ impl Study {
             max_iterations: section.max_iterations,
             difference: section.difference,
         })
+    }
+
+    /// Joints whose drive inertia no key states.
+    fn unstated_drives(&self, robot: &StudyRobot) -> Vec<String> {
+        let names = robot.model().joints().iter().map(|joint| &joint.name);
+        names.filter(|name| self.drive.drive_inertia_of(name).is_none()).cloned().collect()
+    }
+
+    /// Joints without drive inertia although no key states that they have none, with the reason.
+    pub(crate) fn drive_inertia_untested(&self, robot: &StudyRobot) -> Option<DriveInertiaChoice> {
+        let (reason, joints) = (self.why_drives_are_untested()?, self.unstated_drives(robot));
+        (!joints.is_empty()).then(|| DriveInertiaChoice::untested(joints, reason))
+    }
+
+    /// Why the logs are not asked for drive inertia that no key states; `None` where they are.
+    fn why_drives_are_untested(&self) -> Option<&'static str> {
+        let method = self.estimator.method;
+        if self.arm.is_some() {
+            Some("a known arm has the drives of its result")
+        } else if method.is_least_squares() || method == EstimatorMethod::Instrumental {
+            None
+        } else {
+            Some("with this estimator [drive] drive_inertia says it")
+        }
     }
 
     /// The joints whose friction the training logs choose: those of which a key says so, and by default all others

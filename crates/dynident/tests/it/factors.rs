@@ -19,6 +19,7 @@ fn study() -> (Study, PathBuf) {
     let stated = r#"{"differentiator": {"method": "butterworth", "order": 4, "cutoff_hz": 8.0}, "torque_lag_s": 0.0}"#;
     study.motion = serde_json::from_str(stated).unwrap();
     study.drive.friction = Some(dynident::study::FrictionChoice::Stated);
+    study.drive.drive_inertia = Some(true);
     study.estimator.method = dynident::study::EstimatorMethod::Weighted;
     (study, path)
 }
@@ -106,6 +107,7 @@ fn what_is_left_to_the_logs_is_refused_with_the_key() {
             .contains("motion.differentiator.cutoff_hz")
     );
     assert!(said(&|study| study.drive.friction = None).contains("drive.friction = \"stated\""));
+    assert!(said(&|study| study.drive.drive_inertia = None).contains("drive.drive_inertia = true or false"));
     let huber = dynident::study::EstimatorMethod::Huber;
     assert!(said(&|study| study.estimator.method = huber).contains("estimator.method = \"huber\""));
 }

@@ -14,6 +14,7 @@ mod design_messages;
 mod design_tasks;
 mod differentiators;
 mod drive_gains;
+mod drive_inertia;
 mod estimators;
 mod excitation;
 mod exogeneity;

@@ -116,6 +116,7 @@ fn identified(
     if source.is_some() {
         // What makes the instruments has the study's own terms.
         settings.friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
+        settings.drive_inertia.clear();
     }
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
@@ -333,6 +334,7 @@ fn result_file(
         essential: found.essential.clone(),
         correlations: strongest_correlations(estimate, CORRELATIONS),
         joints: joint_results(model, estimate, parameters, &found.examination.pooled_delays),
+        drive_inertia_choice: found.drive_inertia.clone().or_else(|| study.drive_inertia_untested(robot)),
         friction_choice: [&found.training.friction_choice[..], &study.friction_as_stated(robot)]
             .into_iter()
             .flat_map(friction_results)

@@ -46,7 +46,7 @@ pub struct NewStudy {
 
 /// Writes a study: which joints the columns are by their names and their number, units by names, limits and spread,
 /// which part tests the model; then examines it as [`check`] does and writes what that names without an alternative,
-/// and fits once to see whether drives have inertia.
+/// and fits once to see whether drives have inertia, which `design` and `iterate` cannot see.
 /// Every line has its reason beside it; what is not sure is marked. Nothing is written to a file.
 ///
 /// # Errors

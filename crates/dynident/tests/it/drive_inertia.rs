@@ -1,0 +1,140 @@
+//! Whether the torque holds the inertia of the drives is the logs' to say: simulated arms with and without it.
+use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
+use dynident::result::ResultFile;
+use dynident::{RunOptions, Silent, Study, identify, validate};
+use dynident_identification::{Execution, Logs, choose_drive_inertia};
+use std::path::Path;
+
+/// Standard deviation of the torque's noise, Nm, and of the positions', rad.
+const NOISE: (f64, f64) = (0.2, 1.0e-5);
+/// Logs of each kind.
+const SEEDS: u64 = 20;
+
+/// A log of 10 s at 100 Hz with noise.
+fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
+    let (mut random, dof) = (Random(1000 + seed), truth.drive.len());
+    let noisy = |q: &[f64], tau: &[f64]| {
+        let q = q.iter().map(|q| q + NOISE.1 * random.normal()).collect::<Vec<_>>();
+        [q, tau.iter().map(|tau| tau + NOISE.0 * random.normal()).collect()].concat()
+    };
+    write_log(path, truth, &Motion::new(dof, seed), (100.0, 10.0), &header(dof), noisy);
+}
+
+/// A study that names files and columns, and what `drive` states.
+fn job(folder: &Path, description: &Path, dof: usize, drive: &str) -> Job {
+    let columns = format(dof).split("[format]").nth(1).map(|columns| format!("[format]{columns}")).unwrap();
+    let text = format!("robot.file = {description:?}\nlog = [{{ file = \"log.csv\" }}]\n{drive}\n{columns}");
+    Job::new(folder, &text)
+}
+
+/// The test's figure for a study, and the drives that it is about.
+fn tested(job: &Job) -> (f64, usize) {
+    let robot = job.robot();
+    let folders = dynident::Folders::new(&job.study, &job.path, None);
+    let task = job.study.task(&job.path, &robot, &folders).unwrap();
+    let (filters, alone) = (task.settings.filters(), Execution::default());
+    let logs = Logs::new(robot.model(), &task.recordings, filters, &[0], None, alone).unwrap();
+    let (found, choice) = choose_drive_inertia((&logs, &task.settings), &task.robot, (&[0], &[])).unwrap();
+    let choice = choice.unwrap();
+    assert_eq!(found.terms().iter().any(|term| term.is_drive_inertia()), choice.seen);
+    assert_eq!(choice.seen, choice.standard_deviations.unwrap() >= choice.needed);
+    (choice.standard_deviations.unwrap(), choice.drives.len())
+}
+
+/// What is there is found, and what is not there is a standard normal figure: the chance of four of them is 3e-5.
+#[test]
+fn drives_are_found_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut figures = Vec::new();
+    for seed in 0..dynident_testing::count(SEEDS as usize, 400) as u64 {
+        for (robot, apart) in [("robots/ur10.urdf", 4), ("robots/planar2r.urdf", 1)] {
+            let description = repository(robot);
+            for has_drives in [true, false] {
+                let truth = Truth::near(&description, 0.1, has_drives);
+                write_noisy(&folder.path().join("log.csv"), &truth, 1 + seed);
+                let job = job(folder.path(), &description, truth.drive.len(), "");
+                let (figure, drives) = tested(&job);
+                // The inertia of the first axes' drives joins with that of their links.
+                assert_eq!(drives, apart, "{robot}");
+                assert_eq!(figure >= 4.0, has_drives, "{robot}, seed {seed}: {figure}");
+                if !has_drives {
+                    figures.push(figure);
+                }
+            }
+        }
+    }
+    // Mean and mean square of standard normal figures: within four of their own deviations. Bars are on the safe side
+    // and residuals of a smooth step that is nearly right are small, so the square may be less.
+    let count = figures.len() as f64;
+    let mean = figures.iter().sum::<f64>() / count;
+    let square = figures.iter().map(|figure| figure * figure).sum::<f64>() / count;
+    assert!(mean.abs() < 4.0 / count.sqrt(), "{mean}: {figures:?}");
+    assert!(square < 1.0 + 4.0 * (2.0 / count).sqrt(), "{square}: {figures:?}");
+}
+
+/// Files and columns are enough: the same model as where the key states it, which a test and an export read back.
+#[test]
+fn what_the_logs_say_is_what_a_key_would() {
+    let folder = tempfile::tempdir().unwrap();
+    let description = repository("robots/planar2r.urdf");
+    for has_drives in [true, false] {
+        let truth = Truth::near(&description, 0.1, has_drives);
+        write_noisy(&folder.path().join("log.csv"), &truth, 3);
+        let own = |drive: &str| job(folder.path(), &description, truth.drive.len(), &format!("drive = {{ {drive} }}"));
+        let found = own("friction = \"stated\"").identify();
+        let choice = found.result.drive_inertia_choice.clone().unwrap();
+        assert_eq!(choice.seen, has_drives, "{choice:?}");
+        let key = format!("friction = \"stated\", drive_inertia = {has_drives}");
+        let stated = own(&key).identify();
+        assert!(stated.result.drive_inertia_choice.is_none());
+        let values = |result: &ResultFile| serde_json::to_value(&result.base_parameters).unwrap();
+        assert_eq!(values(&found.result), values(&stated.result));
+        // A key against the logs is obeyed.
+        let against = own(&format!("friction = \"stated\", drive_inertia = {}", !has_drives)).identify();
+        assert_ne!(against.result.base_parameters.len(), found.result.base_parameters.len());
+
+        // The finished model is tested by the study that says nothing.
+        let result = folder.path().join("result.json");
+        std::fs::write(&result, serde_json::to_string(&found.result).unwrap()).unwrap();
+        let job = own("friction = \"stated\"");
+        let tested = validate(&result, &job.study, &job.path, &Job::options(1)).unwrap();
+        let error = tested.validation[0].in_fit_band.as_ref().unwrap_or(&tested.validation[0].model);
+        let own = found.result.training.relative_error_percent.unwrap();
+        assert!((error.relative_error_percent.unwrap() - own).abs() < 1e-6 * own, "{error:?} {own}");
+        assert!(found.report().unwrap().contains("Drive inertia: "));
+    }
+}
+
+/// One joint cannot tell its drive from its link; an estimator that is not least squares makes no test.
+#[test]
+fn what_cannot_be_tested_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(repository("robots/planar2r.urdf")).unwrap();
+    let path = folder.path().join("arm.urdf");
+    std::fs::write(&path, text).unwrap();
+    let truth = Truth::near(&path, 0.1, false);
+    write_noisy(&folder.path().join("log.csv"), &truth, 3);
+    let lock = &truth.model.joints()[1].name;
+    let one = format!("robot.lock = {{ {lock} = 0.0 }}\ndrive.friction = \"stated\"");
+    let study = job(folder.path(), &path, 1, &one).identify().result;
+    let choice = study.drive_inertia_choice.unwrap();
+    assert!(!choice.seen && choice.untested.as_ref().unwrap().contains("cannot tell"), "{choice:?}");
+    assert!(choice.sentence().starts_with("not tested"));
+
+    let robust = job(folder.path(), &path, 2, "estimator.method = \"maximum-likelihood\"").identify().result;
+    assert!(robust.drive_inertia_choice.is_some_and(|choice| choice.untested.is_some()));
+}
+
+/// The simulated arm of README has drives, and its study is files and columns.
+#[test]
+fn the_example_states_nothing() {
+    let path = repository("examples/ur10_simulated.toml");
+    let study = Study::load(&path).unwrap();
+    assert_eq!(study.drive, dynident::study::DriveSection::default());
+    let options = RunOptions { data: None, threads: 2, progress: &Silent };
+    let found = identify(&study, &path, &options).unwrap().result;
+    assert!(found.drive_inertia_choice.unwrap().seen);
+    // Some 1 % of the torque is noise; without the drives' inertia 4 % is left.
+    let error = found.validation[0].physical.as_ref().unwrap().relative_error_percent.unwrap();
+    assert!(error < 1.2, "{error} %");
+}
