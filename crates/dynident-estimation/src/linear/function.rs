@@ -9,8 +9,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// What an estimator of a caller gets: the rows of every joint, reduced to as many as there are columns and one more.
 ///
-/// They are the triangular factors of the rows: for each joint and every θ, `‖τ - W θ‖²` and `Wᵀ(τ - W θ)` over them are
-/// those over all samples. Columns that the data do not excite are not among them; what they give at their fallback
+/// They are the triangular factors of the rows: for each joint and every θ, `‖τ - W θ‖²` and `Wᵀ(τ - W θ)` over them
+/// are those over all samples. Columns that the data do not excite are not among them; what they give at their fallback
 /// values is taken from τ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatorRows {

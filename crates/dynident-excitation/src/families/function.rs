@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 const NAME: &str = "function";
 
-/// Step of a parameter, as a share of `1 + |p|`, by which a motion that is not linear is differentiated: the cube root of
-/// the rounding.
+/// Step of a parameter, as a share of `1 + |p|`, by which a motion that is not linear is differentiated: the cube root
+/// of the rounding.
 const STEP: f64 = 6e-6;
 /// The largest deviation from linearity, as a share of the motion, that is rounding.
 const LINEAR: f64 = 1e-9;
@@ -40,17 +40,17 @@ pub struct FunctionFamilySettings {
     pub function: String,
     /// Free parameters of each joint, 1 to 1000.
     pub parameters: usize,
-    /// Whether the motion is linear in the parameters, zero at zero: gradients are then exact, and the function is called
-    /// once for each parameter and grid of times; otherwise it is differentiated, twice for each parameter and step of
-    /// the search. Default false.
+    /// Whether the motion is linear in the parameters, zero at zero: gradients are then exact, and the function is
+    /// called once for each parameter and grid of times; otherwise it is differentiated, with two calls for each
+    /// parameter and step of the search. Default false.
     pub linear: bool,
 }
 
 /// A family that is a caller's [`MotionFunction`].
 ///
 /// A random start draws every parameter from the standard normal distribution. Where the family is linear, it is then
-/// scaled to a part of each joint's range and velocity and shifted inside it, if a motion that stands still is among the
-/// family's; where it is not, the function itself has to make sensible motions of such parameters.
+/// scaled to a part of each joint's range and velocity and shifted inside it, if a motion that stands still is among
+/// the family's; where it is not, the function itself has to make sensible motions of such parameters.
 #[derive(Debug)]
 pub struct FunctionFamily {
     function: Arc<dyn MotionFunction>,
