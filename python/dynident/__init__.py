@@ -8,12 +8,15 @@
 """
 
 from . import fleet
+from ._describe import Inspection, NewStudy, inspect, new
+from ._functions import FunctionWarning
 from ._iterate import Iteration, iterate
 from ._jobs import Check, Design, ProblemWarning, Simulation, check, design, identify, log_contents, simulate, validate
 from ._log import Log
 from ._model import Model
 from ._native import (
     Error,
+    EstimatorRows,
     Factors,
     LogError,
     ResultError,
@@ -32,11 +35,15 @@ __all__ = [
     "Check",
     "Design",
     "Error",
+    "EstimatorRows",
     "Factors",
+    "FunctionWarning",
+    "Inspection",
     "Iteration",
     "Log",
     "LogError",
     "Model",
+    "NewStudy",
     "ProblemWarning",
     "ResultError",
     "Robot",
@@ -52,8 +59,10 @@ __all__ = [
     "design",
     "fleet",
     "identify",
+    "inspect",
     "iterate",
     "log_contents",
+    "new",
     "simulate",
     "study",
     "validate",

@@ -194,6 +194,29 @@ class Model:
         """A C99 header: inverse dynamics, gravity, mass matrix, friction, forward dynamics."""
         return self.export("c")
 
+    def to_simulator(self) -> dict[str, Any]:
+        """Armature, damping, frictionloss, delay and actuator gain of every joint with error bars, as MuJoCo and its kin
+        mean them: ``dynident export --to simulator`` as a dictionary.
+        """
+        found: dict[str, Any] = json.loads(self._native.simulator()[0])
+        return found
+
+    def to_simulator_table(self) -> str:
+        """The same as a table of Markdown."""
+        return self._native.simulator()[1]
+
+    def to_payload(self, controller: str, name: str | None = None) -> str:
+        """A payload that was estimated, in the form that the controller of ``"ur"`` (a line of URScript), ``"franka"``
+        (JSON), ``"kuka"`` (LOAD_DATA) or ``"abb"`` (loaddata) takes; ``name`` says which where there are several.
+        """
+        return self._native.payload(controller, name)[0]
+
+    @property
+    def functions(self) -> list[str]:
+        """Parts of its study that were code of Python, each with the name of its function."""
+        found: list[str] = self.result["method"].get("functions", [])
+        return found
+
     def to_pandas(self) -> pd.DataFrame:
         """The base parameters as a table."""
         import pandas as pd

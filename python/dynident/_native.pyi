@@ -8,6 +8,7 @@ from typing_extensions import Unpack
 
 __all__ = [
     "Error",
+    "EstimatorRows",
     "Factors",
     "FittedModel",
     "LogError",
@@ -27,8 +28,10 @@ __all__ = [
     "_factors_errors",
     "_identify",
     "_identify_factors",
+    "_inspect",
     "_iterate",
     "_log_contents",
+    "_new",
     "_reduce",
     "_simulate",
     "_spread",
@@ -125,6 +128,7 @@ class Study:
         path: str | PathLike[str],
         robot: Robot | None,
         samples: Sequence[tuple[str, _Samples] | None],
+        functions: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> Study: ...
     @staticmethod
     def _restore(
@@ -132,6 +136,7 @@ class Study:
         path: str | PathLike[str],
         description: tuple[str, str | PathLike[str]] | None,
         samples: Sequence[tuple[str, _Samples] | None],
+        functions: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> Study: ...
     def _with_sections(self, sections: str, samples: Sequence[tuple[str, _Samples] | None]) -> Study: ...
     @property
@@ -140,6 +145,8 @@ class Study:
     def name(self) -> str | None: ...
     @property
     def log_names(self) -> list[str]: ...
+    @property
+    def functions(self) -> list[str]: ...
     def to_json(self) -> str: ...
     def to_toml(self) -> str: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
@@ -173,7 +180,26 @@ class FittedModel:
         half_window: int | None = None,
     ) -> Watch: ...
     def export(self, target: str) -> tuple[str, list[str]]: ...
+    def simulator(self) -> tuple[str, str]: ...
+    def payload(self, reader: str, name: str | None = None) -> tuple[str, list[str]]: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class EstimatorRows:
+    @property
+    def W(self) -> _Array: ...
+    @property
+    def tau(self) -> _Array: ...
+    @property
+    def joint(self) -> list[int]: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def joint_names(self) -> list[str]: ...
+    @property
+    def samples(self) -> list[int]: ...
+    @property
+    def sigma(self) -> _Array: ...
 
 @final
 class Run:
@@ -250,6 +276,16 @@ def _iterate(
     resume: bool = False,
     threads: int | None = None,
     heard: Callable[[int, float], object] | None = None,
+) -> str: ...
+def _inspect(robot: Robot, total_mass_kg: float | None = None) -> tuple[str, str | None]: ...
+def _new(
+    robot: str | PathLike[str],
+    logs: Sequence[str | PathLike[str]],
+    out: str | PathLike[str],
+    rate_hz: float | None = None,
+    stated: str | None = None,
+    threads: int | None = None,
+    progress: _Progress | None = None,
 ) -> str: ...
 def _log_contents(path: str | PathLike[str]) -> str: ...
 def _write_files(folder: str | PathLike[str], texts: Mapping[str, str | None]) -> None: ...

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
 
+from ._functions import Functions, FunctionWarning
 from ._log import Log
 from ._native import Robot, Study
 
@@ -19,7 +21,7 @@ def study(
     *,
     name: str | None = None,
     friction: str | None = None,
-    estimator: str | Mapping[str, Any] | None = None,
+    estimator: str | Mapping[str, Any] | Callable[..., object] | None = None,
     **sections: Any,
 ) -> Study:
     """A study of a robot and its logs.
@@ -29,6 +31,21 @@ def study(
     by their names, each a mapping of its keys (a list of mappings where the study has ``[[...]]``): ``drive``,
     ``coupling``, ``torque``, ``payload``, ``arm``, ``motion``, ``parallel_filter``, ``design``, ``controller``,
     ``simulation``, ``iteration``. Unknown keys raise ``StudyError``.
+
+    Where a torque, a differentiator, the estimator or the family of a design is code of your own, it stands under the
+    key ``function`` (of estimator and differentiator also in the place of the whole section):
+
+    - ``torque=[{"name": "k", "joint": "joint1", "function": f}]``: ``f(q, dq)``, both of shape ``(samples, n)``, gives
+      the torque per unit of the coefficient, ``(samples,)``;
+    - ``motion={"differentiator": f}``: ``f(q, rate_hz)`` with the positions of one joint, ``(samples,)``, gives
+      ``q, dq, ddq``, each ``(samples,)``; a mapping may also hold ``context_samples`` (how far a sample is felt; by
+      default over the whole log), ``minimum_samples`` (5) and ``smooth(signal, rate_hz)`` for the torque;
+    - ``estimator=f``: ``f(rows)`` with ``EstimatorRows`` gives values, ``(columns,)``, or a pair of values and
+      covariance;
+    - ``design={"family": {"function": f, "parameters": k, "linear": True}}``: ``f(parameters, time_s)`` with ``(n, k)``
+      and ``(samples,)`` gives ``q, dq, ddq, dddq``, each ``(samples, n)``; without ``linear`` it is differentiated.
+
+    Such a study is no text (``to_toml`` raises), and slow: ``FunctionWarning`` says so.
 
     >>> import dynident
     >>> own = dynident.study("robots/planar2r.urdf", drive={"drive_inertia": True})
@@ -49,8 +66,14 @@ def study(
         **sections,
     }
     if estimator is not None:
-        content["estimator"] = {"method": estimator} if isinstance(estimator, str) else dict(estimator)
-    return Study._assemble(_json(content), "<study>", robot, [log._samples() for log in logs])
+        content["estimator"] = {"method": estimator} if isinstance(estimator, str) else estimator
+    functions = Functions()
+    content = functions.taken_from(content)
+    samples = [log._samples() for log in logs]
+    made = Study._assemble(_json(content), "<study>", robot, samples, functions.named or None)
+    for part in made.functions:
+        warnings.warn(f"{part} is a function of Python: for trying an idea, and slow", FunctionWarning, stacklevel=3)
+    return made
 
 
 def with_logs(own: Study, logs: Log | Iterable[Log]) -> Study:

@@ -8,8 +8,9 @@ use dynident::export::{MODEL_SCHEMA, ModelFile, SIMULATOR_SCHEMA, SimulatorFile}
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
-    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, NEW_STUDY_SCHEMA,
-    NewStudyFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile, VALIDATION_SCHEMA, ValidationFile,
+    FACTORS_SCHEMA, FactorsFile, INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA,
+    LogContents, NEW_STUDY_SCHEMA, NewStudyFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile,
+    VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
@@ -29,6 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (DESIGN_SCHEMA, written::<DesignFile>()),
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
         (EXPORT_SCHEMA, written::<ExportFile>()),
+        (FACTORS_SCHEMA, written::<FactorsFile>()),
         (INSPECTION_SCHEMA, written::<Inspection>()),
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
         (LOG_SCHEMA, written::<LogContents>()),

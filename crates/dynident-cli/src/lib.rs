@@ -68,6 +68,10 @@ enum Command {
     Check(commands::check::Options),
     /// Fit a study's model to its logs and test it on the held-out ones.
     Identify(commands::identify::Options),
+    /// Reduce logs to their factors: small files from which a model is identified without the logs.
+    Reduce(commands::reduce::Options),
+    /// Put factors of many logs into one file, in any order.
+    Merge(commands::merge::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
     /// Write a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters or JSON, or a payload.
@@ -126,6 +130,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Design(options) => commands::design::run(&options, &context),
         Command::Check(options) => commands::check::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
+        Command::Reduce(options) => commands::reduce::run(&options, &context),
+        Command::Merge(options) => commands::merge::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
         Command::Export(options) => commands::export::run(&options, &context),
         Command::Simulate(options) => commands::simulate::run(&options, &context),

@@ -102,6 +102,14 @@ pub enum EstimationError {
         /// The column.
         name: String,
     },
+    /// What a caller's own estimator gave is no estimate.
+    #[error("the estimator `{name}`: {problem}")]
+    Own {
+        /// Its name.
+        name: String,
+        /// What is wrong, and what to give.
+        problem: String,
+    },
     /// The parameters that an iteration begins with cannot be simulated.
     #[error(
         "the simulation does not get through with the starting values; start from a description or an estimate that is a physically consistent set"

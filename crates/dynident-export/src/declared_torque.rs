@@ -1,5 +1,6 @@
 //! Declared torques as symbols: expressions operation by operation, tables piece by piece.
 
+use crate::error::ExportError;
 use crate::graph::{Function, Function2};
 use crate::robot_model::RobotModel;
 use crate::symbol::Symbol;
@@ -9,19 +10,31 @@ use dynident_model::terms::{
 };
 
 /// Torque of every joint by what the user declared; none if nothing was.
-pub(crate) fn declared_torque(robot: &RobotModel, q: &[Symbol], dq: &[Symbol]) -> Option<Vec<Symbol>> {
+///
+/// # Errors
+/// [`ExportError::Term`] for a caller's own code.
+pub(crate) fn declared_torque(
+    robot: &RobotModel,
+    q: &[Symbol],
+    dq: &[Symbol],
+) -> Result<Option<Vec<Symbol>>, ExportError> {
     let mut torque = vec![Symbol::ZERO; robot.model().dof()];
     let mut is_declared = false;
     for (term, value) in robot.terms() {
+        let symbol = term.symbol();
         let TorqueTerm::Declared(term) = term else { continue };
         is_declared = true;
         let unit = match &term.law {
             DeclaredLaw::Expression(expression) => of_expression(expression, q, dq),
             DeclaredLaw::Table(table) => of_table(table, q[term.joint]),
+            DeclaredLaw::Function(_) => {
+                let needs = "the code of a function that was given to this program";
+                return Err(ExportError::Term { symbol, kind: "declared", needs });
+            }
         };
         torque[term.joint] += Symbol::splat(value) * unit;
     }
-    is_declared.then_some(torque)
+    Ok(is_declared.then_some(torque))
 }
 
 fn of_expression(expression: &Expression, q: &[Symbol], dq: &[Symbol]) -> Symbol {

@@ -51,7 +51,7 @@ impl Equations {
             let rest = vec![Symbol::ZERO; dof];
             let rotors = drive_inertia(robot);
             let friction = friction(robot, &dq)?;
-            let declared = declared_torque(robot, &q, &dq);
+            let declared = declared_torque(robot, &q, &dq)?;
             // Other than rigid bodies and inertia of drives.
             let beside: Vec<Symbol> = match &declared {
                 Some(declared) => {

@@ -17,8 +17,9 @@ pub enum LogNoise {
     #[default]
     Shared,
     /// Each log has its own: `σ_jℓ = √(‖τ_jℓ - W_jℓ θ‖² / rows)` and θ by weighted least squares in turn, until they
-    /// settle. Residuals are then those of the last log. Not for ordinary least squares, which knows no weights, and
-    /// for estimators that go back to the logs it shapes the consistent set alone.
+    /// settle. Residuals are then those of the last log. Not for ordinary least squares, which knows no weights, nor
+    /// for a caller's own rule, which sees the rows as they are; for estimators that go back to the logs it shapes the
+    /// consistent set alone.
     Own,
 }
 
@@ -31,7 +32,7 @@ pub(crate) fn weighted_by_log(
     problem: LinearProblem,
 ) -> Result<LinearProblem, EstimationError> {
     let (logs, joints) = (problem.logs().len(), problem.joints().len());
-    if logs < 2 || matches!(settings.estimator, Estimator::Ordinary) {
+    if logs < 2 || matches!(settings.estimator, Estimator::Ordinary | Estimator::Function(_)) {
         return Ok(problem);
     }
     // No error bars are wanted on the way.

@@ -124,14 +124,37 @@ impl<'py> Motion<'py> {
         own: &[usize],
         work: impl FnOnce([&[f64]; 3], &mut [f64]) + Send,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let shape: Vec<usize> = self.lead().iter().chain(own).copied().collect();
-        let array = PyArrayDyn::<f64>::zeros(py, shape, false);
-        {
-            let mut lent = array.readwrite();
-            let out = lent.as_slice_mut().map_err(|error| PyValueError::new_err(error.to_string()))?;
-            self.compute(py, out.len(), |motion| work(motion, out));
-        }
+        let array = PyArrayDyn::<f64>::zeros(py, self.shape(own), false);
+        self.fill_into(py, &array, work)?;
         Ok(array)
+    }
+
+    /// Shape of an array with the samples' axes and `own` ones.
+    pub(crate) fn shape(&self, own: &[usize]) -> Vec<usize> {
+        self.lead().iter().chain(own).copied().collect()
+    }
+
+    /// As [`fill`](Self::fill), into an array that is there and holds whatever it holds.
+    pub(crate) fn fill_into(
+        &self,
+        py: Python<'py>,
+        array: &Bound<'py, PyArrayDyn<f64>>,
+        work: impl FnOnce([&[f64]; 3], &mut [f64]) + Send,
+    ) -> PyResult<()> {
+        let wrong = |error: String| PyValueError::new_err(format!("out: {error}"));
+        let mut lent = array.try_readwrite().map_err(|error| wrong(error.to_string()))?;
+        let out = lent.as_slice_mut().map_err(|error| wrong(error.to_string()))?;
+        self.compute(py, out.len(), |motion| work(motion, out));
+        Ok(())
+    }
+
+    /// The array that a caller wants filled: of doubles, of this shape, row by row.
+    pub(crate) fn given(&self, out: &Bound<'py, PyAny>, own: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let shape = self.shape(own);
+        match out.cast::<PyArrayDyn<f64>>() {
+            Ok(array) if array.shape() == shape && array.is_c_contiguous() => Ok(array.clone()),
+            _ => Err(PyValueError::new_err(format!("out: give an array of float64, row by row, of shape {shape:?}"))),
+        }
     }
 
     /// Runs `work`, which makes so many numbers, on the numbers, without the interpreter's lock; on several threads

@@ -1,5 +1,6 @@
 //! Studies of sections and of what lies in memory.
 
+use crate::callables::Callables;
 use crate::errors;
 use dynident::Study;
 use dynident::model::Robot;
@@ -8,19 +9,22 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 
-/// The study of sections in JSON, of a robot and of samples in memory: one entry for each log, None for one in a file.
+/// The study of sections in JSON, of a robot, of samples in memory (one entry for each log, None for one in a file) and
+/// of code.
 pub(crate) fn assembled(
     py: Python<'_>,
     sections: &str,
     path: &Path,
     robot: Option<Robot>,
     samples: Vec<Option<MemoryLog>>,
+    callables: &Callables,
 ) -> PyResult<Study> {
     let mut study = Study::from_json(sections, path).map_err(|error| errors::job(py, &error))?;
     study.robot.description = robot.map(Box::new);
     for (log, samples) in study.log.iter_mut().zip(samples) {
         log.samples = samples;
     }
+    callables.into_study(py, &mut study)?;
     Ok(study)
 }
 

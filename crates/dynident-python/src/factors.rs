@@ -1,5 +1,6 @@
 //! `Factors`: logs reduced to what a fit needs of them, and what a fleet of robots says.
 
+use crate::callables::Callables;
 use crate::errors;
 use crate::functions::of_study;
 use crate::jobs::{run, threads as threads_or_all};
@@ -69,7 +70,8 @@ impl Factors {
     /// Robot, drives, filters and estimator; a study without a log.
     #[getter]
     fn study(&self) -> Study {
-        Study { study: self.0.study().clone(), path: self.0.study_path().to_owned() }
+        let (study, path) = (self.0.study().clone(), self.0.study_path().to_owned());
+        Study { study, path, callables: Callables::default() }
     }
 
     fn __len__(&self) -> usize {
@@ -107,7 +109,7 @@ pub(crate) fn _identify_factors(
     let (own, threads) = (factors.get().0.clone(), threads_or_all(threads));
     run(factors.py(), threads, progress, move |watch| {
         let outcome = identify_factors(&own, &RunOptions { data: None, threads, progress: watch })?;
-        Ok(FittedModel::found(own.study().clone(), own.study_path().to_owned(), outcome))
+        Ok(FittedModel::found(own.study().clone(), own.study_path().to_owned(), Callables::default(), outcome))
     })
 }
 

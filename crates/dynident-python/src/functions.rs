@@ -5,14 +5,17 @@ use crate::errors;
 use crate::function_robot::{Raised, robot_of};
 use crate::jobs::{Watch, run, run_to_its_stop, threads as threads_or_all};
 use crate::model::{FittedModel, RESULT};
+use crate::robot::Robot;
 use crate::study::Study;
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
 use dynident::iteration::{RobotRun, RunRecord, StopSignal};
+use dynident::result::StudyChange;
 use dynident::{
-    Error, IterationWatch, OutputSet, RunOptions, check, design_study, identify, iterate_study, iterate_with_robot,
-    log_contents, simulate_study, validate_result,
+    Error, InspectSettings, IterationWatch, MendedDescription, NewStudy, OutputSet, RunOptions, check, design_study,
+    identify, inspect_robot, iterate_study, iterate_with_robot, log_contents, mended_robot, new_study, simulate_study,
+    validate_result,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -56,9 +59,10 @@ pub(crate) fn _identify(
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<FittedModel> {
+    let callables = study.get().callables.clone();
     of_study(study, threads, progress, |study, path, options, _| {
         let outcome = identify(&study, &path, options)?;
-        Ok(FittedModel::found(study, path, outcome))
+        Ok(FittedModel::found(study, path, callables, outcome))
     })
 }
 
@@ -169,6 +173,51 @@ pub(crate) fn _iterate(
         Some(error) => Err(error),
         None => found,
     }
+}
+
+/// Reads and audits a robot's description as it was read: JSON, and the text with its slips corrected where it has some
+/// whose numbers can be known.
+#[pyfunction]
+#[pyo3(signature = (robot, total_mass_kg=None))]
+pub(crate) fn _inspect(
+    py: Python<'_>,
+    robot: &Bound<'_, Robot>,
+    total_mass_kg: Option<f64>,
+) -> PyResult<(String, Option<String>)> {
+    let (description, settings) = (robot.get().description(), InspectSettings { total_mass_kg });
+    let found = py.detach(|| {
+        let text = match mended_robot(description, &settings)? {
+            MendedDescription::Urdf(text) => Some(text),
+            MendedDescription::NothingToMend | MendedDescription::NoUrdf => None,
+        };
+        Ok((json(&inspect_robot(description, &settings)?)?, text))
+    });
+    found.map_err(|error: Error| errors::job(py, &error))
+}
+
+/// Writes the text of a study from a robot's file and recordings, as seen from `out`: JSON. `stated` are lines that a
+/// person states: JSON.
+#[pyfunction]
+#[pyo3(signature = (robot, logs, out, rate_hz=None, stated=None, threads=None, progress=None))]
+#[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+pub(crate) fn _new(
+    py: Python<'_>,
+    robot: PathBuf,
+    logs: Vec<PathBuf>,
+    out: PathBuf,
+    rate_hz: Option<f64>,
+    stated: Option<&str>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let stated: Option<Vec<StudyChange>> = stated.map(serde_json::from_str).transpose().map_err(|error| {
+        errors::StudyError::new_err(format!("stated: {error}; give lines as `proposed` of `unsure` has them"))
+    })?;
+    let request = NewStudy { robot, logs, out, rate_hz, stated: stated.unwrap_or_default() };
+    let threads = threads_or_all(threads);
+    run(py, threads, progress, move |watch| {
+        json(&new_study(&request, &RunOptions { data: None, threads, progress: watch })?)
+    })
 }
 
 /// What a recording holds: JSON.

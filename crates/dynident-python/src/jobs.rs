@@ -1,5 +1,6 @@
 //! A job beside the interpreter: other threads of Python run on, Ctrl-C ends it, progress is heard.
 
+use crate::callables::Thrown;
 use crate::errors;
 use dynident::iteration::StopSignal;
 use dynident::{Error, Progress};
@@ -123,7 +124,11 @@ fn waited_for<T: Send + 'static>(
                 return interrupted.map_or_else(|| outcome.map_err(|error| errors::job(py, &error)), Err);
             }
             Ok(Err(panic)) if panic.is::<Cancelled>() => return Err(PyKeyboardInterrupt::new_err(())),
-            Ok(Err(panic)) => resume_unwind(panic),
+            // What code of Python raised; Ctrl-C before it counts more.
+            Ok(Err(panic)) => match panic.downcast::<Thrown>() {
+                Ok(thrown) => return Err(interrupted.unwrap_or(thrown.0)),
+                Err(panic) => resume_unwind(panic),
+            },
             // It ended without a word, which a thread does not do.
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(errors::Error::new_err("the job ended without a result"));

@@ -5,6 +5,7 @@
 
 mod arrays;
 mod assembled;
+mod callables;
 mod errors;
 mod factors;
 mod function_robot;
@@ -20,6 +21,8 @@ mod watch;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
+    use crate::callables::EstimatorRows;
+    #[pymodule_export]
     use crate::errors::{Error, LogError, ResultError, RobotError, StopRun, StudyError};
     #[pymodule_export]
     use crate::factors::{_drift, _factors_errors, _identify_factors, _reduce, _spread, Factors};
@@ -27,7 +30,8 @@ mod _native {
     use crate::function_robot::Run;
     #[pymodule_export]
     use crate::functions::{
-        _check, _command, _design, _identify, _iterate, _log_contents, _simulate, _validate, _write_files,
+        _check, _command, _design, _identify, _inspect, _iterate, _log_contents, _new, _simulate, _validate,
+        _write_files,
     };
     #[pymodule_export]
     use crate::model::FittedModel;

@@ -1,14 +1,18 @@
 //! `FittedModel`: what an identification found, with its study.
 
 use crate::arrays::{Motion, array, joint_major, sample_major};
+use crate::callables::{Callables, guarded};
 use crate::errors;
 use crate::study::Study;
 use crate::watch::OnlineWatch;
-use dynident::export::Target;
+use dynident::export::{PayloadReader, Target};
 use dynident::identification::examination::LogTrace;
 use dynident::model::terms::JointMotion;
 use dynident::online::WatchSettings;
-use dynident::{IdentificationOutcome, ResultFile, TorquePredictor, export_result, identification_report};
+use dynident::{
+    IdentificationOutcome, ResultFile, TorquePredictor, export_payload_of, export_result, export_simulator_of,
+    identification_report,
+};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use std::borrow::Cow;
@@ -32,6 +36,7 @@ type Reduced<'py> = (Bound<'py, PyAny>, (String, Study, Descriptions, String));
 pub(crate) struct FittedModel {
     study: dynident::Study,
     path: PathBuf,
+    callables: Callables,
     result: ResultFile,
     descriptions: Descriptions,
     page: Page,
@@ -48,10 +53,15 @@ enum Page {
 
 impl FittedModel {
     /// What an identification of this study has found.
-    pub(crate) fn found(study: dynident::Study, path: PathBuf, outcome: IdentificationOutcome) -> Self {
+    pub(crate) fn found(
+        study: dynident::Study,
+        path: PathBuf,
+        callables: Callables,
+        outcome: IdentificationOutcome,
+    ) -> Self {
         let IdentificationOutcome { result, urdf, table, mjcf, sdf, traces, .. } = outcome;
         let descriptions = [urdf, table, mjcf, sdf];
-        Self { study, path, result, descriptions, page: Page::Of(traces), predictor: OnceLock::new() }
+        Self { study, path, callables, result, descriptions, page: Page::Of(traces), predictor: OnceLock::new() }
     }
 
     pub(crate) fn result(&self) -> &ResultFile {
@@ -60,7 +70,10 @@ impl FittedModel {
 
     fn predictor(&self, py: Python<'_>) -> PyResult<&TorquePredictor> {
         if self.predictor.get().is_none() {
-            let made = TorquePredictor::new(&self.result, Path::new(RESULT), (&self.study, &self.path), None);
+            // Code of Python is called on the way: nobody waits for it with the interpreter's lock.
+            let made = py.detach(|| {
+                guarded(|| TorquePredictor::new(&self.result, Path::new(RESULT), (&self.study, &self.path), None))
+            })?;
             // Another thread may have been faster with the same.
             let _ = self.predictor.set(made.map_err(|error| errors::job(py, &error))?);
         }
@@ -80,11 +93,12 @@ impl FittedModel {
         descriptions: Descriptions,
         report: String,
     ) -> PyResult<Self> {
+        let callables = study.get().callables.clone();
         let (study, path) = study.get().owned();
         let result = ResultFile::parse(json.as_bytes(), Path::new(RESULT));
         let result = result.map_err(|error| errors::job(py, &error))?;
         let page = Page::Written(report);
-        let made = Self { study, path, result, descriptions, page, predictor: OnceLock::new() };
+        let made = Self { study, path, callables, result, descriptions, page, predictor: OnceLock::new() };
         // That study and result belong together.
         made.predictor(py)?;
         Ok(made)
@@ -120,7 +134,8 @@ impl FittedModel {
     /// The study that it was made with.
     #[getter]
     fn study(&self) -> Study {
-        Study { study: self.study.clone(), path: self.path.clone() }
+        let (study, path, callables) = (self.study.clone(), self.path.clone(), self.callables.clone());
+        Study { study, path, callables }
     }
 
     /// The description with the new values, URDF, D-H table, MJCF and SDF; None for what the result does not have.
@@ -150,8 +165,8 @@ impl FittedModel {
         let samples = motion.count();
         let found = motion.compute(py, 0, |numbers| {
             let [q, dq, ddq] = numbers.map(|rows| joint_major(rows, samples, dof));
-            predictor.predict(&JointMotion { samples, q: &q, dq: &dq, ddq: &ddq })
-        });
+            guarded(|| predictor.predict(&JointMotion { samples, q: &q, dq: &dq, ddq: &ddq }))
+        })?;
         let rows = |values: &[f64]| array(py, motion.lead(), &[dof], sample_major(values, samples, dof));
         Ok((rows(&found.tau)?, rows(&found.half_width_95)?))
     }
@@ -191,8 +206,36 @@ impl FittedModel {
             let known: Vec<&str> = Target::ALL.iter().map(|form| form.name()).collect();
             errors::ResultError::new_err(format!("no form `{target}`: give one of {}", known.join(", ")))
         })?;
-        let exported = export_result(&self.result, Path::new(RESULT), (&self.study, &self.path), (None, wanted))
-            .map_err(|error| errors::job(py, &error))?;
+        let of = (&self.study, &*self.path);
+        let made = || guarded(|| export_result(&self.result, Path::new(RESULT), of, (None, wanted)));
+        let exported = py.detach(made)?.map_err(|error| errors::job(py, &error))?;
         Ok((exported.text, exported.notes))
+    }
+
+    /// Drives as simulators mean them: JSON and a table of Markdown.
+    fn simulator(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        let of = (&self.study, &*self.path);
+        let made = py.detach(|| guarded(|| export_simulator_of(&self.result, Path::new(RESULT), of, None)))?;
+        let made = made.map_err(|error| errors::job(py, &error))?;
+        let json = made.json().map_err(|error| errors::ResultError::new_err(error.to_string()))?;
+        Ok((json.text, made.table().text))
+    }
+
+    /// A payload as the controller `reader` takes it: its text, and what has to be known of it.
+    #[pyo3(signature = (reader, name=None))]
+    fn payload(&self, py: Python<'_>, reader: &str, name: Option<&str>) -> PyResult<(String, Vec<String>)> {
+        const KNOWN: [(&str, PayloadReader); 4] = [
+            ("ur", PayloadReader::UniversalRobots),
+            ("franka", PayloadReader::Franka),
+            ("kuka", PayloadReader::Kuka),
+            ("abb", PayloadReader::Abb),
+        ];
+        let wanted = KNOWN.into_iter().find(|(known, _)| *known == reader).ok_or_else(|| {
+            let known = KNOWN.map(|(known, _)| known).join(", ");
+            errors::ResultError::new_err(format!("no controller `{reader}`: give one of {known}"))
+        })?;
+        let made = export_payload_of(&self.result, Path::new(RESULT), name, wanted.1);
+        let made = made.map_err(|error| errors::job(py, &error))?;
+        Ok((made.text, made.notes))
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::arrays::{Motion, array, joint_major};
 use crate::assembled::{assembled, json_of};
+use crate::callables::Callables;
 use crate::errors;
 use dynident::dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
@@ -20,8 +21,6 @@ use std::sync::{Mutex, OnceLock};
 
 /// Samples of one block of a batch: enough for full lanes, little enough for the cache.
 const BLOCK: usize = 128;
-/// Rows of a regressor that are written at once: their pages fit into the first level of the address cache.
-const ROWS_AT_ONCE: usize = 16;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
@@ -46,6 +45,9 @@ pub(crate) struct Robot {
     /// Scratch memory of threads that have called.
     singles: Mutex<Vec<Workspace>>,
     batches: Mutex<Vec<BatchWorkspace>>,
+    panels: Mutex<Vec<Panels>>,
+    /// Of the regressor with all columns, and with those of the base parameters.
+    layouts: [OnceLock<PanelLayout>; 2],
 }
 
 impl Robot {
@@ -61,12 +63,20 @@ impl Robot {
 
     fn with_settings(py: Python<'_>, description: Description, settings: String) -> PyResult<Self> {
         let path = description.path.clone();
-        let study = assembled(py, &study_of(&path, &settings)?, &path, Some(description.clone()), Vec::new())?;
+        let study = assembled(
+            py,
+            &study_of(&path, &settings)?,
+            &path,
+            Some(description.clone()),
+            Vec::new(),
+            &Callables::default(),
+        )?;
         let folders = Folders::new(&study, &path, None);
         let made = StudyRobot::new(&study, &path, &folders).map_err(|error| errors::job(py, &error))?;
         let model = made.model().clone();
-        let (base, singles, batches) = (OnceLock::new(), Mutex::default(), Mutex::default());
-        Ok(Self { description, settings, model, base, singles, batches })
+        let (base, layouts) = (OnceLock::new(), Default::default());
+        let (singles, batches, panels) = (Mutex::default(), Mutex::default(), Mutex::default());
+        Ok(Self { description, settings, model, base, singles, batches, panels, layouts })
     }
 
     /// What was read, before any key is in force.
@@ -376,36 +386,52 @@ impl Robot {
         Ok((part(0)?, part(1)?, part(2)?))
     }
 
-    /// The regressor ``Y(q, dq, ddq)`` with ``Y @ inertial_parameters.ravel() == tau``, shape ``(..., n, 10 bodies)``.
-    #[pyo3(signature = (q, dq=None, ddq=None))]
+    /// The regressor ``Y(q, dq, ddq)`` with ``Y @ inertial_parameters.ravel() == tau``, shape ``(..., n, 10 bodies)``;
+    /// with ``base`` its columns that stand for the base parameters alone, shape ``(..., n, base parameters)``, for
+    /// which ``Y @ (base_projection @ inertial_parameters.ravel()) == tau``. ``out`` is an array of this shape to write
+    /// into, as of an earlier call: it saves the system making memory, which takes longer than the numbers.
+    #[pyo3(signature = (q, dq=None, ddq=None, *, base=false, out=None))]
     fn regressor<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'py, PyAny>,
         dq: Option<&Bound<'py, PyAny>>,
         ddq: Option<&Bound<'py, PyAny>>,
+        base: bool,
+        out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Array<'py>> {
-        let (dof, columns) = (self.model.dof(), self.model.inertial_count());
+        let dof = self.model.dof();
+        let layout = self.layouts[usize::from(base)].get_or_init(|| {
+            let columns = if base { self.base().base_columns() } else { all_columns(&self.model, &[]) };
+            PanelLayout::new(&self.model, columns)
+        });
+        let columns = layout.columns().len();
         let motion = Motion::of(dof, q, dq, ddq)?;
-        let layout = PanelLayout::new(&self.model, all_columns(&self.model, &[]));
-        motion.fill(py, &[dof, columns], |numbers, out| {
+        // Memory that nobody has written to is zero, and nothing but zeros stands in the other columns.
+        let is_zero = out.is_none();
+        let array = match out {
+            Some(out) => motion.given(out, &[dof, columns])?,
+            None => PyArrayDyn::<f64>::zeros(py, motion.shape(&[dof, columns]), false),
+        };
+        motion.fill_into(py, &array, |numbers, out| {
             self.for_blocks(numbers, (out, dof * columns), |workspace, motion, out| {
-                let mut panels = Panels::default();
-                regressor_panels(&self.model, workspace, &layout, motion, &mut panels);
-                for joint in 0..dof {
-                    // A few rows at a time, or every number written is a page of its own.
-                    for (part, rows) in out.chunks_mut(ROWS_AT_ONCE * dof * columns).enumerate() {
-                        let from = part * ROWS_AT_ONCE;
-                        for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
-                            let entries = &panels.joint(joint)[place * motion.samples + from..];
-                            for (row, entry) in rows.chunks_exact_mut(dof * columns).zip(entries) {
-                                row[joint * columns + column] = *entry;
+                lend(&self.panels, Panels::default, |panels| {
+                    regressor_panels(&self.model, workspace, layout, motion, panels);
+                    if !is_zero {
+                        out.fill(0.0);
+                    }
+                    for joint in 0..dof {
+                        let (panel, places) = (panels.joint(joint), layout.joint_columns(joint));
+                        for (row, to) in out.chunks_exact_mut(columns.max(1)).skip(joint).step_by(dof).enumerate() {
+                            for (entry, &column) in panel[row..].iter().step_by(motion.samples).zip(places) {
+                                to[column] = *entry;
                             }
                         }
                     }
-                }
+                });
             });
-        })
+        })?;
+        Ok(array)
     }
 
     /// The base parameters of the bodies: what torque can tell, as sums of inertial parameters.

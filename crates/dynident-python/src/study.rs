@@ -2,13 +2,14 @@
 
 use crate::arrays::array;
 use crate::assembled::assembled;
+use crate::callables::Callables;
 use crate::errors;
 use crate::robot::Robot;
 use dynident::model::read_robot;
 use dynident::recording::{LogSource, MemoryLog};
 use numpy::{PyArrayDyn, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 use std::path::{Path, PathBuf};
 
 /// Samples of one log: names of the columns, and the columns.
@@ -24,6 +25,8 @@ type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 pub(crate) struct Study {
     pub(crate) study: dynident::Study,
     pub(crate) path: PathBuf,
+    /// Code that its sections name.
+    pub(crate) callables: Callables,
 }
 
 impl Study {
@@ -39,7 +42,7 @@ impl Study {
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let study = dynident::Study::load(&path).map_err(|error| errors::job(py, &error))?;
-        Ok(Self { study, path })
+        Ok(Self { study, path, callables: Callables::default() })
     }
 
     /// Reads the text of a study; files that it names are looked for beside ``path``, which need not exist.
@@ -47,34 +50,40 @@ impl Study {
     #[pyo3(signature = (text, path=PathBuf::from("<study>")))]
     fn parse(py: Python<'_>, text: &str, path: PathBuf) -> PyResult<Self> {
         let study = dynident::Study::parse(text, &path).map_err(|error| errors::job(py, &error))?;
-        Ok(Self { study, path })
+        Ok(Self { study, path, callables: Callables::default() })
     }
 
     /// Sections as JSON, with a robot and with samples in memory: one entry for each log, None for one in a file.
     #[staticmethod]
-    #[pyo3(signature = (sections, path, robot, samples))]
+    #[pyo3(signature = (sections, path, robot, samples, functions=None))]
     fn _assemble(
         py: Python<'_>,
         sections: &str,
         path: PathBuf,
         robot: Option<&Bound<'_, Robot>>,
         samples: Vec<Option<(String, Samples<'_>)>>,
+        functions: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let description = robot.map(|robot| robot.get().description().clone());
-        Ok(Self { study: assembled(py, sections, &path, description, tables(samples)?)?, path })
+        let callables = Callables::of(functions);
+        let study = assembled(py, sections, &path, description, tables(samples)?, &callables)?;
+        Ok(Self { study, path, callables })
     }
 
     /// The inverse of ``__reduce__``.
     #[staticmethod]
+    #[pyo3(signature = (sections, path, description, samples, functions=None))]
     fn _restore(
         py: Python<'_>,
         sections: &str,
         path: PathBuf,
         description: Option<(String, PathBuf)>,
         samples: Vec<Option<(String, Samples<'_>)>>,
+        functions: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let robot = description.map(|(text, path)| read_robot(text, &path)).transpose().map_err(errors::robot)?;
-        Ok(Self { study: assembled(py, sections, &path, robot, tables(samples)?)?, path })
+        let callables = Callables::of(functions);
+        Ok(Self { study: assembled(py, sections, &path, robot, tables(samples)?, &callables)?, path, callables })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
@@ -84,7 +93,8 @@ impl Study {
         for log in &own.study.log {
             samples.push(log.samples.as_ref().map(|table| columns(py, table)).transpose()?);
         }
-        let state = (own.to_json()?, own.path.clone(), description, samples);
+        // Functions are pickled as Python pickles them: by where they stand.
+        let state = (own.to_json()?, own.path.clone(), description, samples, own.callables.dictionary(py));
         Ok((slf.get_type().getattr("_restore")?, state.into_pyobject(py)?))
     }
 
@@ -114,8 +124,8 @@ impl Study {
         samples: Vec<Option<(String, Samples<'_>)>>,
     ) -> PyResult<Self> {
         let robot = self.study.robot.description.as_deref().cloned();
-        let study = assembled(py, sections, &self.path, robot, tables(samples)?)?;
-        Ok(Self { study, path: self.path.clone() })
+        let study = assembled(py, sections, &self.path, robot, tables(samples)?, &self.callables)?;
+        Ok(Self { study, path: self.path.clone(), callables: self.callables.clone() })
     }
 
     /// All sections as JSON.
@@ -123,8 +133,20 @@ impl Study {
         serde_json::to_string(&self.study).map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
-    /// The study as TOML. Samples and descriptions in memory are only named in it.
+    /// The parts that are code of Python, each with the name of its function: ``estimator: ridge``.
+    #[getter]
+    fn functions(&self) -> Vec<String> {
+        self.study.functions()
+    }
+
+    /// The study as TOML. Samples and descriptions in memory are only named in it; a study with functions is no text,
+    /// and raises ``StudyError``.
     fn to_toml(&self) -> PyResult<String> {
+        if let [first, ..] = &self.study.functions()[..] {
+            let message =
+                format!("{first} is a function of Python, which no file holds: pickle the study, or leave it out");
+            return Err(errors::StudyError::new_err(message));
+        }
         self.study.to_toml().map_err(|error| errors::StudyError::new_err(error.to_string()))
     }
 

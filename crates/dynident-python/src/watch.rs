@@ -1,6 +1,7 @@
 //! `Watch`: a robot under watch, sample by sample or array by array.
 
 use crate::arrays::{Samples, array};
+use crate::callables::guarded;
 use crate::errors::Error;
 use dynident::identification::consistent::ConsistencySettings;
 use dynident::model::terms::TorqueTerm;
@@ -86,7 +87,7 @@ impl OnlineWatch {
         let derivatives = derivatives.as_ref().map(|both| both.each_ref().map(Samples::numbers));
         let (q, tau): (&[f64], &[f64]) = (&q, &tau);
         let derivatives = derivatives.as_ref().map(|[dq, ddq]| (&**dq, &**ddq));
-        py.detach(move || {
+        let work = move || {
             let mut own = self.own();
             if *own.with_derivatives.get_or_insert(derivatives.is_some()) != derivatives.is_some() {
                 return Err(Mixed::Derivatives);
@@ -102,8 +103,8 @@ impl OnlineWatch {
                 look(&mut own, contact)?;
             }
             Ok(())
-        })
-        .map_err(|error| match error {
+        };
+        py.detach(|| guarded(work))?.map_err(|error| match error {
             Mixed::Derivatives => Error::new_err(
                 "velocities and accelerations came with earlier samples and not with these, or the other way: give \
                  them always or never",

@@ -289,6 +289,14 @@ pub enum FilterError {
         /// What is wrong, and the fix.
         problem: String,
     },
+    /// A caller's own differentiator whose code is not at hand.
+    #[error(
+        "the differentiator is the function `{name}`, and no file holds code: give it from the program that has it (from Python as motion = {{\"differentiator\": {{\"function\": ..}}}})"
+    )]
+    NoFunction {
+        /// Its name.
+        name: String,
+    },
     /// A differentiator that needs the commanded motion, without one.
     #[error(
         "{method} needs the motion that was commanded: name its table, reference = \"trajectory.csv\", in the differentiator or in the log"

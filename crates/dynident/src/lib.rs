@@ -69,14 +69,18 @@ pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
 pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError};
-pub use factors::{FactorLog, Factors};
+pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
-pub use jobs::export::{export_model, export_payload, export_result, export_simulator};
+pub use jobs::export::{
+    export_model, export_payload, export_payload_of, export_result, export_simulator, export_simulator_of,
+};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
-pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
+pub use jobs::inspect::{
+    InspectSettings, MendedDescription, inspect, inspect_robot, inspect_with, mended, mended_robot,
+};
 pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
 pub use jobs::new_study::{NewStudy, new_study};

@@ -1,9 +1,11 @@
-//! `dynident identify STUDY.toml --out DIR`.
+//! `dynident identify STUDY.toml --out DIR`, or of factors in place of a study and its logs.
 
-use super::{Context, json, judged, known_in, message_of, pretty_json, refuse_overwriting};
+use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
-use dynident::{OutputSet, RunOptions, Study, check_writable, identify};
-use std::path::PathBuf;
+use dynident::{
+    Factors, IdentificationOutcome, OutputSet, RunOptions, Study, check_writable, identify, identify_factors,
+};
+use std::path::{Path, PathBuf};
 
 /// The user's description with the new values.
 const URDF: &str = "identified.urdf";
@@ -20,7 +22,14 @@ const PROBLEMS_SHOWN: usize = 8;
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
-    study: PathBuf,
+    #[arg(required_unless_present = "factors")]
+    study: Option<PathBuf>,
+    /// Files of factors that `reduce` or `merge` wrote, in place of a study and its logs.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["study", "data"])]
+    factors: Vec<PathBuf>,
+    /// Of factors, the logs of this robot alone.
+    #[arg(long, value_name = "NAME", requires = "factors")]
+    arm: Option<String>,
     /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well, of an MJCF
     /// identified.xml, of an SDF identified.sdf).
     #[arg(long, value_name = "DIR")]
@@ -33,15 +42,16 @@ pub(crate) struct Options {
     max_validation_error: Option<f64>,
 }
 
+/// What is written.
+const FILES: [&str; 6] = [URDF, TABLE, MJCF, SDF, "report.html", "result.json"];
+
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let study = Study::load(&options.study).map_err(message_of)?;
-    let out = (&*options.out, &[URDF, TABLE, MJCF, SDF, "report.html", "result.json"][..]);
-    let of_study = (&study, &*options.study, options.data.as_deref());
-    refuse_overwriting(out, of_study, &["robot", "torque", "log", "arm", "format", "motion", "estimator"], &[])?;
-    check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let mut identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
+    let mut identification = match &options.study {
+        Some(study) => of_study(study, options, &run)?,
+        None => of_factors(options, &run)?,
+    };
     if let Some(provenance) = &mut identification.result.provenance {
         provenance.command = Some(command(options));
     }
@@ -80,10 +90,47 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if problems.is_empty() { within } else { Verdict::Negative })
 }
 
+/// The model of a study and its logs.
+fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
+    let study = Study::load(path).map_err(message_of)?;
+    let named = (&study, path, options.data.as_deref());
+    let sections = ["robot", "torque", "log", "arm", "format", "motion", "estimator"];
+    refuse_overwriting((&options.out, &FILES), named, &sections, &[])?;
+    check_writable(&options.out).map_err(message_of)?;
+    identify(&study, path, run).map_err(known_in(path))
+}
+
+/// The model of factors.
+fn of_factors(options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
+    let outputs = FILES.map(|name| options.out.join(name));
+    dynident::refuse_overwriting(&outputs, &options.factors).map_err(message_of)?;
+    let mut all = factors::read_all(&options.factors)?;
+    if let Some(arm) = &options.arm {
+        all = of_arm(&all, arm)?;
+    }
+    check_writable(&options.out).map_err(message_of)?;
+    identify_factors(&all, run).map_err(message_of)
+}
+
+/// The logs of one robot.
+fn of_arm(all: &Factors, arm: &str) -> Result<Factors, String> {
+    let own = all.only(|log| log.arm.as_deref() == Some(arm));
+    if own.logs().is_empty() {
+        let known: Vec<&str> = all.arms().into_iter().flatten().collect();
+        return Err(format!("--arm {arm}: no log of it; the factors have logs of {}", known.join(", ")));
+    }
+    Ok(own)
+}
+
 /// What was asked for, without what does not change the result. Folders are left to the list of files: their names say
 /// more of a computer than of a result.
 fn command(options: &Options) -> String {
-    let study = options.study.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let limit = options.max_validation_error.map(|limit| format!(" --max-validation-error {limit}"));
-    format!("dynident identify {study}{}", limit.unwrap_or_default())
+    let arm = options.arm.as_ref().map(|arm| format!(" --arm {arm}"));
+    let of = match &options.study {
+        Some(study) => name(study),
+        None => format!("--factors {}", options.factors.iter().map(|path| name(path)).collect::<Vec<_>>().join(" ")),
+    };
+    format!("dynident identify {of}{}{}", arm.unwrap_or_default(), limit.unwrap_or_default())
 }

@@ -3,6 +3,7 @@
 mod benchmark;
 mod check;
 mod design;
+mod factors;
 mod findings;
 mod identification;
 mod inspection;
@@ -17,6 +18,7 @@ mod validation;
 pub(crate) use benchmark::benchmark;
 pub(crate) use check::check;
 pub(crate) use design::design;
+pub(crate) use factors::factors;
 pub(crate) use identification::identification;
 pub(crate) use inspection::{inspection, mended};
 pub(crate) use iteration::{iteration, simulation};

@@ -33,14 +33,13 @@ pub(crate) fn fault(model: &Model, term: &TorqueTerm) -> Option<DeclaredFault> {
     let function = term.state_function()?;
     let states = States::inside_limits(model, TRIALS);
     let motion = states.motion();
-    let mut largest = 0.0_f64;
-    for sample in 0..states.samples {
-        let Some(value) = function.value(&motion, sample) else {
-            let at = |joint: usize| (joint, motion.q_of(joint)[sample], motion.dq_of(joint)[sample]);
-            return Some(DeclaredFault::Undefined(function.follows().into_iter().map(at).collect()));
-        };
-        largest = largest.max(value.abs());
+    let mut values = vec![0.0; states.samples];
+    function.fill(&motion, &mut values);
+    if let Some(sample) = values.iter().position(|value| value.is_nan()) {
+        let at = |joint: usize| (joint, motion.q_of(joint)[sample], motion.dq_of(joint)[sample]);
+        return Some(DeclaredFault::Undefined(function.follows().into_iter().map(at).collect()));
     }
+    let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     (largest < NOTHING).then_some(DeclaredFault::Nothing)
 }
 

@@ -9,12 +9,14 @@
 //! | correlated between joints | [`generalized_least_squares`] |
 //! | a level that depends on the velocity | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
+//! | what a caller says of it | [`estimate_by`] |
 //! | in the columns too | [`instrumental_variables`]; [`hausman_test`] and [`fast_motion`] say whether it matters |
 //!
 //! A function takes a problem, its settings and, where rows are needed again, a source of rows at last: a pass over the
 //! log as often as it is called. [`joint_gains`] estimates the torque constants of the drives from the same rows.
 
 mod fast_motion;
+mod function;
 mod generalized;
 mod hausman;
 mod instrumental;
@@ -27,6 +29,7 @@ mod robust;
 mod weighted;
 
 pub use fast_motion::{FastMotion, fast_motion};
+pub use function::{EstimatorRows, OwnEstimate, estimate_by};
 pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};

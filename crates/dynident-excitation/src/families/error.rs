@@ -17,6 +17,14 @@ pub enum FamilyError {
         /// What would do.
         fix: &'static str,
     },
+    /// A caller's own family that is not what it says it is.
+    #[error("family function `{name}`: {problem}")]
+    Function {
+        /// Its name.
+        name: String,
+        /// What is wrong, and what to do.
+        problem: &'static str,
+    },
     /// A list has the wrong number of entries.
     #[error("family {family}, {what}: expected {expected} entries, found {found}")]
     Length {

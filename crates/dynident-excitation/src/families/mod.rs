@@ -14,6 +14,7 @@
 //! | [`JoinedFamily`]: families one after another | sum | as its members |
 //! | [`StartingAt`]: a family moved to a start posture | as the family | as the family |
 //! | [`Given`]: a motion that is known already | none | as it is |
+//! | [`FunctionFamily`]: a caller's own code | as it says | as it is |
 
 mod b_spline;
 #[cfg(test)]
@@ -21,6 +22,7 @@ mod check;
 mod error;
 mod fourier;
 mod friction_ladder;
+mod function;
 mod given;
 mod joined;
 mod linear;
@@ -40,6 +42,7 @@ pub use b_spline::{BSpline, BSplineSettings};
 pub use error::FamilyError;
 pub use fourier::{Fourier, FourierSettings};
 pub use friction_ladder::{FrictionLadder, FrictionLadderSettings, LadderPace};
+pub use function::{FunctionFamily, FunctionFamilySettings, MotionFunction};
 pub use given::Given;
 pub use joined::{JoinedFamily, JoinedSettings};
 pub use linear::{Basis, LinearFamily};

@@ -10,6 +10,7 @@ mod band_motion;
 mod error;
 mod exogeneity;
 mod filtered_period;
+mod function;
 mod generalized;
 mod instrument_rows;
 mod instrumental;
@@ -28,6 +29,7 @@ mod spline_torque;
 
 pub use error::EstimatorError;
 pub use exogeneity::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
+pub use function::{EstimatorFunction, EstimatorRule};
 pub use instrumental::InstrumentSettings;
 pub use instruments::{InstrumentSource, SmoothedMotion};
 pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
@@ -70,6 +72,8 @@ pub enum Estimator {
     Auto(InstrumentSettings),
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental(InstrumentSettings),
+    /// A caller's own rule on the rows as factors.
+    Function(EstimatorFunction),
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood(PeriodSettings),
     /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed
@@ -97,6 +101,7 @@ impl Estimator {
             Self::NoiseWeighted(_) => "noise-weighted",
             Self::Auto(_) => "auto",
             Self::Instrumental(_) => "instrumental",
+            Self::Function(_) => "function",
             Self::MaximumLikelihood(_) => "maximum-likelihood",
             Self::Simultaneous(_) | Self::SplineMotion(_) => "simultaneous",
             Self::Didim(_) => "didim",
@@ -115,6 +120,7 @@ impl Estimator {
             | Self::Tukey
             | Self::NoiseWeighted(_)
             | Self::Instrumental(_)
+            | Self::Function(_)
             | Self::MaximumLikelihood(_)
             | Self::Simultaneous(_)
             | Self::SplineMotion(_)
@@ -136,6 +142,7 @@ impl Estimator {
             | Self::Generalized
             | Self::Huber
             | Self::Tukey
+            | Self::Function(_)
             | Self::NoiseWeighted(_) => true,
             Self::Instrumental(_)
             | Self::MaximumLikelihood(_)
@@ -277,6 +284,7 @@ fn without_instruments(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), 
         Estimator::Weighted | Estimator::Auto(_) | Estimator::Instrumental(_) => {
             (weighted_least_squares(rows.problem, &settings.weighted())?, Findings::None)
         }
+        Estimator::Function(own) => (own.estimate(rows)?, Findings::None),
         Estimator::Huber => robust::robust(rows, RowWeight::huber())?,
         Estimator::Tukey => robust::robust(rows, RowWeight::tukey())?,
         Estimator::Generalized => generalized::generalized(rows)?,

@@ -1,12 +1,12 @@
 //! A torque that a user declares: `τ = k f(q, q̇)` with a coefficient `k` to be found. Springs, counterbalances,
 //! cables, gas struts, magnets: all that holds a joint by where it stands.
 //!
-//! `f` is an [`Expression`] of positions and velocities, or a [`TorqueTable`] of the joint's own position. As for every
-//! term, the torque is what the drive has to give: a spring that pulls the joint back to `q₀` with the stiffness `c` is
-//! `c (q - q₀)`, and one that helps the drive has the other sign.
+//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] of the joint's own position, or a caller's own
+//! code ([`TorqueFunction`]). As for every term, the torque is what the drive has to give: a spring that pulls the joint
+//! back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
 
 use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
-use super::{Expression, JointMotion, JointNames, TermInput, TorqueTable};
+use super::{Expression, JointMotion, JointNames, TermInput, TorqueFunction, TorqueTable};
 use crate::joint::{Joint, JointSpring};
 use crate::tree::Model;
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,8 @@ pub enum DeclaredLaw {
     Expression(Expression),
     /// A curve over the position of its own joint.
     Table(TorqueTable),
+    /// A caller's own code.
+    Function(TorqueFunction),
 }
 
 impl Declared {
@@ -84,6 +86,8 @@ impl Declared {
                 expression.slopes(|joint| motion.q_of(joint)[sample], |joint| motion.dq_of(joint)[sample], take);
             }
             DeclaredLaw::Table(table) => take(self.joint, false, table.slope(motion.q_of(self.joint)[sample])),
+            // Differentiated block by block, not here.
+            DeclaredLaw::Function(_) => {}
         }
     }
 }
@@ -95,12 +99,31 @@ impl StateFunction for Declared {
                 expression.value(|joint| motion.q_of(joint)[sample], |joint| motion.dq_of(joint)[sample])
             }
             DeclaredLaw::Table(table) => Some(table.value(motion.q_of(self.joint)[sample])).filter(|x| x.is_finite()),
+            DeclaredLaw::Function(function) => function.value(motion, sample),
         }
+    }
+
+    fn fill(&self, motion: &JointMotion<'_>, out: &mut [f64]) {
+        if let DeclaredLaw::Function(function) = &self.law {
+            return function.fill(motion, out);
+        }
+        for (sample, to) in out.iter_mut().enumerate() {
+            *to = self.value(motion, sample).unwrap_or(f64::NAN);
+        }
+    }
+
+    fn first_outside(&self, motion: &JointMotion<'_>) -> Option<usize> {
+        if let DeclaredLaw::Function(function) = &self.law {
+            let mut values = vec![0.0; motion.samples];
+            function.fill(motion, &mut values);
+            return values.iter().position(|value| value.is_nan());
+        }
+        (0..motion.samples).find(|&sample| !self.is_inside(motion, sample))
     }
 
     fn is_inside(&self, motion: &JointMotion<'_>, sample: usize) -> bool {
         match &self.law {
-            DeclaredLaw::Expression(_) => self.value(motion, sample).is_some(),
+            DeclaredLaw::Expression(_) | DeclaredLaw::Function(_) => self.value(motion, sample).is_some(),
             DeclaredLaw::Table(table) => {
                 let [first, last] = table.range();
                 (first..=last).contains(&motion.q_of(self.joint)[sample])
@@ -112,6 +135,7 @@ impl StateFunction for Declared {
         match &self.law {
             DeclaredLaw::Expression(expression) => expression.joints(),
             DeclaredLaw::Table(_) => vec![self.joint],
+            DeclaredLaw::Function(function) => function.follows.clone(),
         }
     }
 
@@ -124,6 +148,7 @@ impl StateFunction for Declared {
                 let (joint, count) = (self.joint + 1, points.len());
                 format!("table of q{joint}, {count} points from ({first}, {begin}) to ({last}, {end})")
             }
+            DeclaredLaw::Function(function) => format!("function {}", function.name),
         }
     }
 }
@@ -153,16 +178,19 @@ impl TermKind for Declared {
         match &self.law {
             DeclaredLaw::Expression(expression) => vec![("expression", TermConstant::Text(expression.to_string()))],
             DeclaredLaw::Table(table) => vec![("table", TermConstant::Points(table.points().to_vec()))],
+            DeclaredLaw::Function(function) => vec![("function", TermConstant::Text(function.name.clone()))],
         }
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        for (sample, to) in out.iter_mut().enumerate() {
-            *to = self.value(motion, sample).unwrap_or(0.0);
-        }
+        self.fill(motion, out);
+        out.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = 0.0);
     }
 
     fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], [by_q, by_dq, _]: [&mut [f64]; 3]) {
+        if let DeclaredLaw::Function(function) = &self.law {
+            return function.apply_adjoint(motion, weights, [by_q, by_dq]);
+        }
         for (sample, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
             self.slopes(motion, sample, |joint, is_velocity, slope| {
                 let to = if is_velocity { &mut *by_dq } else { &mut *by_q };

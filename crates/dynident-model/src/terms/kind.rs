@@ -41,12 +41,24 @@ pub enum TermAction<'a> {
 
 /// A function of positions and velocities that a user declares.
 pub trait StateFunction: Debug {
-    /// Its value at sample `sample` of a motion; `None` where it has none. Allocates nothing.
+    /// Its value at sample `sample` of a motion; `None` where it has none. Allocates nothing, but for code of a caller.
     fn value(&self, motion: &JointMotion<'_>, sample: usize) -> Option<f64>;
+
+    /// Its values at all samples of a motion, NaN where it has none.
+    fn fill(&self, motion: &JointMotion<'_>, out: &mut [f64]) {
+        for (sample, to) in out.iter_mut().enumerate() {
+            *to = self.value(motion, sample).unwrap_or(f64::NAN);
+        }
+    }
 
     /// Whether it says something of the state at sample `sample`: an expression with a value, a table that reaches so
     /// far.
     fn is_inside(&self, motion: &JointMotion<'_>, sample: usize) -> bool;
+
+    /// The first sample of a motion that is not [inside](Self::is_inside).
+    fn first_outside(&self, motion: &JointMotion<'_>) -> Option<usize> {
+        (0..motion.samples).find(|&sample| !self.is_inside(motion, sample))
+    }
 
     /// The joints whose motion it follows, ascending.
     fn follows(&self) -> Vec<usize>;

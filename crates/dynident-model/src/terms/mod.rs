@@ -8,6 +8,7 @@ mod declared;
 mod directional;
 mod drive_inertia;
 mod expression;
+mod function;
 mod kind;
 mod load;
 mod offset;
@@ -28,6 +29,7 @@ pub use drive_inertia::DriveInertia;
 pub use expression::{
     Expression, ExpressionError, ExpressionFunction, ExpressionFunction2, ExpressionNode, ExpressionProblem, JointNames,
 };
+pub use function::{TorqueFunction, TorqueLaw};
 pub use kind::{
     JointProperty, MotionFunction, StateFunction, TermAction, TermConstant, TermJoints, VelocityCurve,
     VelocityFriction, VelocityFunction,
@@ -309,8 +311,7 @@ impl TorqueTerm {
     /// The first sample of a motion of which a declared torque says nothing: its expression has no value there, or its
     /// table does not reach so far. Its column is zero there, or what the table's end says.
     pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
-        let function = self.state_function()?;
-        (0..motion.samples).find(|&sample| !function.is_inside(motion, sample))
+        self.state_function()?.first_outside(motion)
     }
 
     /// True when the column depends on earlier samples.

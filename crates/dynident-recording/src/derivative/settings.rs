@@ -7,6 +7,7 @@ use super::differentiator::Differentiator;
 use super::five_point_cubic::FivePointCubic;
 use super::fourier_fit::FourierFit;
 use super::frequency_domain::{Ends, FrequencyDomain};
+use super::function::DifferentiatorCode;
 use super::position_map::PositionMap;
 use super::reference_lag::check_max_lag;
 use super::savitzky_golay::SavitzkyGolay;
@@ -128,6 +129,14 @@ pub enum DifferentiatorSettings {
         #[serde(default = "half")]
         max_lag_s: f64,
     },
+    /// A caller's own [`Differentiator`]: no file holds its code.
+    Function {
+        /// What it is called in results.
+        function: String,
+        /// The code.
+        #[serde(skip)]
+        code: DifferentiatorCode,
+    },
     /// [`Deviation`]: the reference's own derivatives, and those of the smoothed deviation from it.
     Deviation {
         /// The commanded motion; a log may have its own.
@@ -174,6 +183,9 @@ impl DifferentiatorSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
+        if let Self::Function { .. } = self {
+            return Ok(());
+        }
         let Some(reference) = self.reference() else { return self.build(1.0).map(drop) };
         reference.validate()?;
         if let Self::PositionMap { max_lag_s, .. } | Self::TimeWarp { max_lag_s, .. } = self {
@@ -204,7 +216,8 @@ impl DifferentiatorSettings {
             | Self::FrequencyDomain { .. }
             | Self::SmoothedDifferences { .. }
             | Self::FivePointCubic { .. }
-            | Self::VelocitySeries { .. } => None,
+            | Self::VelocitySeries { .. }
+            | Self::Function { .. } => None,
         }
     }
 
@@ -221,7 +234,8 @@ impl DifferentiatorSettings {
             | Self::FourierFit { .. }
             | Self::SmoothedDifferences { .. }
             | Self::PositionMap { .. }
-            | Self::TimeWarp { .. } => None,
+            | Self::TimeWarp { .. }
+            | Self::Function { .. } => None,
         }
     }
 
@@ -287,6 +301,10 @@ impl DifferentiatorSettings {
             Self::TimeWarp { reference, max_lag_s } => {
                 Box::new(TimeWarp::new(motion(reference, "time-warp")?, *max_lag_s)?)
             }
+            Self::Function { function, code } => match code.build() {
+                Some(own) => own,
+                None => return Err(FilterError::NoFunction { name: function.clone() }),
+            },
             Self::Deviation { reference, smoother, max_lag_s } => {
                 self.validate()?;
                 let reference = motion(reference, "deviation")?;

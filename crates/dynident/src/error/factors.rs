@@ -50,6 +50,12 @@ pub enum FactorsError {
         /// The sections that differ.
         sections: Vec<String>,
     },
+    /// A study with code in it.
+    #[error("{part} is a function of a caller, and factors hold no code: identify from the logs themselves")]
+    Function {
+        /// Which part, and what its function is called.
+        part: String,
+    },
     /// A study that needs a file beside it.
     #[error("the torque table {file} lies beside the study, and factors hold no files: leave this torque out")]
     Table {

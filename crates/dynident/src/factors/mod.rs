@@ -5,11 +5,16 @@ mod file;
 
 use crate::digest::hexadecimal;
 use crate::error::FactorsError;
+use crate::result::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
 use crate::study::Study;
 use dynident_identification::ReducedLog;
 use sha2::{Digest, Sha256};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Seconds from 1970 to the year 10000, which times in text do not reach.
+const LAST_SECOND: f64 = 253_402_300_800.0;
 
 /// One log of [`Factors`].
 #[derive(Clone, Debug)]
@@ -95,6 +100,31 @@ impl Factors {
         arms
     }
 
+    /// What there is to say of them as a file of so many bytes at `path`.
+    pub fn file(&self, path: &Path, bytes: u64) -> FactorsFile {
+        let time = |seconds: f64| {
+            // What the calendar does not have is not written.
+            let since = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds < LAST_SECOND)?;
+            let at: SystemTime = UNIX_EPOCH.checked_add(since)?;
+            Some(humantime::format_rfc3339_seconds(at).to_string())
+        };
+        let log = |log: &FactorLog| FactorsLog {
+            name: log.log.name.clone(),
+            arm: log.arm.clone(),
+            recorded_at: log.recorded_at_s.and_then(time),
+            sha256: log.sha256.clone(),
+            rows: log.log.statistics.filtered_rows,
+        };
+        let robot = self.study.robot.description.as_ref().map(|robot| robot.model.name().to_owned());
+        FactorsFile {
+            schema: FACTORS_SCHEMA.to_owned(),
+            file: path.display().to_string(),
+            bytes,
+            robot: robot.unwrap_or_default(),
+            logs: self.logs.iter().map(log).collect(),
+        }
+    }
+
     /// Those logs alone that `is_wanted` says yes to.
     #[must_use]
     pub fn only(&self, is_wanted: impl Fn(&FactorLog) -> bool) -> Self {
@@ -147,6 +177,18 @@ fn in_order(mut logs: Vec<FactorLog>) -> Vec<FactorLog> {
     let mut seen = HashSet::new();
     logs.retain(|log| seen.insert(log.sha256.clone()));
     logs
+}
+
+/// Seconds since 1970 began of a time in UTC: `2026-01-05T08:00:00Z`, `2026-01-05 08:00:00`, `2026-01-05`, or the
+/// seconds themselves; none for what is no such time.
+pub fn seconds_of(text: &str) -> Option<f64> {
+    let text = text.trim();
+    if let Ok(seconds) = text.parse::<f64>() {
+        return (0.0..LAST_SECOND).contains(&seconds).then_some(seconds);
+    }
+    let whole = if text.len() == "2026-01-05".len() { format!("{text}T00:00:00Z") } else { text.to_owned() };
+    let at = humantime::parse_rfc3339_weak(&whole).ok()?;
+    Some(at.duration_since(UNIX_EPOCH).ok()?.as_secs_f64())
 }
 
 /// The name alone: a file that many machines write says nothing of where it was written.

@@ -42,14 +42,21 @@ pub enum MendedDescription {
 /// # Errors
 /// If the description cannot be read.
 pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescription, Error> {
-    let robot = load_robot(path)?;
-    let Some(slips) = slips_of(&robot, settings)? else { return Ok(MendedDescription::NoUrdf) };
+    mended_robot(&load_robot(path)?, settings)
+}
+
+/// As [`mended`] of a description that is in memory.
+///
+/// # Errors
+/// A URDF whose numbers cannot be told apart.
+pub fn mended_robot(robot: &Robot, settings: &InspectSettings) -> Result<MendedDescription, Error> {
+    let Some(slips) = slips_of(robot, settings)? else { return Ok(MendedDescription::NoUrdf) };
     if slips.stated == slips.corrected {
         return Ok(MendedDescription::NothingToMend);
     }
     rewrite_inertials(&robot.text, &slips.stated, &slips.corrected)
         .map(MendedDescription::Urdf)
-        .map_err(|error| Error::Result { path: path.to_owned(), message: error.to_string() })
+        .map_err(|error| Error::Result { path: robot.path.clone(), message: error.to_string() })
 }
 
 /// The slips of a URDF; none for another description.
@@ -67,8 +74,15 @@ fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, 
 /// # Errors
 /// If the description cannot be read.
 pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspection, Error> {
-    let robot = load_robot(path)?;
-    let slips = slips_of(&robot, settings)?.map_or_else(Vec::new, |slips| slips.found);
+    inspect_robot(&load_robot(path)?, settings)
+}
+
+/// As [`inspect_with`] of a description that is in memory.
+///
+/// # Errors
+/// A URDF whose numbers cannot be told apart.
+pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspection, Error> {
+    let slips = slips_of(robot, settings)?.map_or_else(Vec::new, |slips| slips.found);
     let model = &robot.model;
     let base_settings = BaseParameterSettings::default();
     let base = BaseParameters::new(model, &[], &base_settings);
@@ -126,7 +140,7 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
     Ok(Inspection {
         schema: INSPECTION_SCHEMA.to_owned(),
         name: model.name().to_owned(),
-        file: path.display().to_string(),
+        file: robot.path.display().to_string(),
         dof: model.dof(),
         moving_mass_kg: model.inertials().iter().map(InertialParameters::mass_kg).sum(),
         gravity_m_s2: model.gravity().0,

@@ -51,6 +51,11 @@ pub fn reduce(
     if let Some(file) = study.torque.iter().find_map(|torque| torque.table_file.as_ref()) {
         return Err(factors(FactorsError::Table { file: file.display().to_string() }));
     }
+    // A design makes no factors.
+    let undesigned = Study { design: None, ..study.clone() };
+    if let Some(part) = undesigned.functions().into_iter().next() {
+        return Err(factors(FactorsError::Function { part }));
+    }
     let mut study = like.map_or_else(|| study.clone(), |model| model.as_fitted(study));
     if let Some(cutoff_hz) = like.and_then(ResultFile::cutoff_hz) {
         study.motion.differentiator = study.motion.differentiator.with_cutoff(cutoff_hz);

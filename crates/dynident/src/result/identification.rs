@@ -155,6 +155,10 @@ pub struct MethodSummary {
     pub status: String,
     /// Solutions made.
     pub iterations: usize,
+    /// Parts of the study that were a caller's own code, each with the name of its function: the result can be made
+    /// again, and used where it needs them, only with that code.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub functions: Vec<String>,
     /// What the error bars account for.
     pub covariance: String,
     /// Time segments behind the covariance.

@@ -5,6 +5,7 @@ mod check;
 mod design;
 mod evaluation;
 mod export;
+mod factors;
 mod identification;
 mod inspection;
 mod iterations;
@@ -23,6 +24,7 @@ pub use design::{
 };
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
+pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,

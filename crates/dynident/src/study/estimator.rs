@@ -1,12 +1,13 @@
 //! `[estimator]`: how the parameters are estimated, and how far they are trusted.
 
+use super::Code;
 use super::physical::PhysicalChoice;
 use super::simulated::SimulatedSection;
 use crate::error::{Error, Expected, StudyError};
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings, SplineMotionSettings};
 use dynident_identification::EstimationSettings;
 use dynident_identification::estimators::{
-    Estimator, InstrumentSettings, NoiseLevels, PeriodSettings, SimulatedLoopSettings,
+    Estimator, EstimatorFunction, EstimatorRule, InstrumentSettings, NoiseLevels, PeriodSettings, SimulatedLoopSettings,
 };
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,8 @@ pub enum EstimatorMethod {
     NoiseWeighted,
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental,
+    /// A caller's own function of the rows: no file holds its code.
+    Function,
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood,
     /// Motion and parameters together: noise of positions and torques weighed against each other. The motion is a
@@ -56,6 +59,7 @@ impl EstimatorMethod {
             | Self::Generalized
             | Self::Huber
             | Self::Tukey
+            | Self::Function
             | Self::NoiseWeighted => true,
             Self::Instrumental
             | Self::MaximumLikelihood
@@ -77,6 +81,7 @@ impl EstimatorMethod {
             Self::Tukey => "tukey",
             Self::NoiseWeighted => "noise-weighted",
             Self::Instrumental => "instrumental",
+            Self::Function => "function",
             Self::MaximumLikelihood => "maximum-likelihood",
             Self::Simultaneous => "simultaneous",
             Self::Didim => "didim",
@@ -93,6 +98,12 @@ impl EstimatorMethod {
 pub struct EstimatorSection {
     /// The method; `"auto"` by default.
     pub method: EstimatorMethod,
+    /// What the function of `method = "function"` is called; its code is given by the program that has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub function: Option<String>,
+    /// The code of `function`.
+    #[serde(skip)]
+    pub code: Code<dyn EstimatorRule>,
     /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each
     /// time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
@@ -150,6 +161,10 @@ impl EstimatorSection {
             EstimatorMethod::Huber => Estimator::Huber,
             EstimatorMethod::Tukey => Estimator::Tukey,
             EstimatorMethod::NoiseWeighted => Estimator::NoiseWeighted(self.noise_levels.clone()),
+            EstimatorMethod::Function => Estimator::Function(EstimatorFunction {
+                name: self.function.clone().unwrap_or_default(),
+                rule: self.code.0.clone(),
+            }),
             EstimatorMethod::Instrumental => Estimator::Instrumental(self.instruments.clone().unwrap_or_default()),
             EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(self.periods.clone()),
             EstimatorMethod::Simultaneous if self.has_series() => Estimator::Simultaneous(self.periods.clone()),
@@ -178,11 +193,16 @@ impl EstimatorSection {
             | EstimatorMethod::Huber
             | EstimatorMethod::Tukey
             | EstimatorMethod::NoiseWeighted
+            | EstimatorMethod::Function
             | EstimatorMethod::Instrumental => false,
         }
     }
 
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
+        if self.function.is_some() != (self.method == EstimatorMethod::Function) {
+            let fix = "give estimator.method = \"function\" and estimator.function together, or neither";
+            return Err(StudyError::conflict("estimator.function", fix));
+        }
         self.rank.validate().map_err(StudyError::at("[estimator.rank]"))?;
         let instruments = self.instruments.clone().unwrap_or_default();
         let estimation = self.common();

@@ -1,6 +1,7 @@
 //! **The study file**: a robot, its drives, its logs and how to fit them, without code.
 
 mod arrays;
+mod code;
 mod design;
 mod drive;
 mod estimator;
@@ -21,6 +22,7 @@ mod simulation;
 mod task;
 mod torque;
 
+pub use code::{Code, FunctionChoice};
 pub use design::{
     CriterionChoice, DesignSection, FamilyChoice, GivenStroke, JoinedChoice, OptimiserChoice, PriorSection,
     StartPosture, TorqueNoise, WindowedCondition, WindowedProblem,
@@ -47,7 +49,7 @@ use crate::error::{Error, StudyError};
 use dynident_identification::Role;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_model::line_and_column;
-use dynident_recording::{LogFormat, MotionSettings};
+use dynident_recording::{DifferentiatorSettings, LogFormat, MotionSettings};
 use dynident_simulation::ControllerSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -236,6 +238,25 @@ impl Study {
     /// Places of the logs with this role.
     pub(crate) fn logs_of_role(&self, role: Role) -> Vec<usize> {
         (0..self.log.len()).filter(|&index| self.log[index].role == role).collect()
+    }
+
+    /// The parts that are a caller's own code, each with the name of its function: a study with such is no file's.
+    pub fn functions(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        for torque in &self.torque {
+            found.extend(torque.function.as_ref().map(|name| format!("torque `{}`: {name}", torque.name)));
+        }
+        if let DifferentiatorSettings::Function { function, .. } = &self.motion.differentiator {
+            found.push(format!("motion.differentiator: {function}"));
+        }
+        if self.estimator.method == EstimatorMethod::Function {
+            let name = self.estimator.function.as_deref().unwrap_or_default();
+            found.push(format!("estimator: {name}"));
+        }
+        if let Some(design) = &self.design {
+            found.extend(design.family.functions().into_iter().map(|name| format!("design.family: {name}")));
+        }
+        found
     }
 
     fn check(&self) -> Result<(), StudyError> {

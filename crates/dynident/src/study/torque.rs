@@ -1,11 +1,14 @@
 //! `[[torque]]`: torques of positions and velocities that the study declares: springs, counterbalances, cables.
 
-use super::{Folders, Study};
+use super::{Code, Folders, Study};
 use crate::error::{Error, StudyError};
-use dynident_model::terms::{Declared, DeclaredLaw, Expression, JointNames, TorqueTable, TorqueTerm};
+use dynident_model::terms::{
+    Declared, DeclaredLaw, Expression, JointNames, TorqueFunction, TorqueLaw, TorqueTable, TorqueTerm,
+};
 use dynident_model::{Model, ModelError};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Largest file of a table, bytes: 200 points are far less.
 const MOST_TABLE_BYTES: u64 = 1 << 20;
@@ -30,6 +33,12 @@ pub struct TorqueSection {
     /// The same points in a file: CSV with a column of positions and one of torques.
     #[serde(default)]
     pub table_file: Option<PathBuf>,
+    /// The name of a caller's own function of positions and velocities; its code is given by the program that has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub function: Option<String>,
+    /// The code of `function`.
+    #[serde(skip)]
+    pub code: Code<dyn TorqueLaw>,
     /// What the coefficient is thought to be: the prior's, and that of the robot which `simulate` simulates.
     #[serde(default)]
     pub nominal: Option<f64>,
@@ -48,6 +57,7 @@ impl TorqueSection {
             self.expression.is_some().then_some("expression"),
             self.table.is_some().then_some("table"),
             self.table_file.is_some().then_some("table_file"),
+            self.function.is_some().then_some("function"),
         ]
         .into_iter()
         .flatten()
@@ -64,6 +74,15 @@ impl TorqueSection {
             return Err(StudyError::conflict("unit", "give at most 40 characters on one line"));
         }
         Ok(())
+    }
+
+    /// The law that is a caller's own code; it may follow all joints.
+    fn own_law(&self, name: &str, joints: usize) -> Result<DeclaredLaw, StudyError> {
+        let code = self.code.0.as_ref().ok_or_else(|| {
+            let fix = "no file holds code: give it from the program that has it, or an expression";
+            StudyError::conflict(format!("function = \"{name}\""), fix)
+        })?;
+        Ok(DeclaredLaw::Function(TorqueFunction::new(name, (0..joints).collect(), Arc::clone(code))))
     }
 
     fn term(
@@ -85,12 +104,16 @@ impl TorqueSection {
                 DeclaredLaw::Table(TorqueTable::new(points.clone()).map_err(|error| wrong(error.into()))?)
             }
             (None, None, Some(file)) => DeclaredLaw::Table(read_table(file)?),
-            (None, None, None) => {
-                return Err(wrong(StudyError::missing("no expression", "give expression, table or table_file")));
-            }
+            (None, None, None) => match &self.function {
+                Some(name) => self.own_law(name, names.len()).map_err(wrong)?,
+                None => {
+                    let fix = "give expression, table or table_file";
+                    return Err(wrong(StudyError::missing("no expression", fix)));
+                }
+            },
         };
         let usual = match law {
-            DeclaredLaw::Expression(_) => "Nm",
+            DeclaredLaw::Expression(_) | DeclaredLaw::Function(_) => "Nm",
             DeclaredLaw::Table(_) => "1",
         };
         let unit = self.unit.clone().unwrap_or_else(|| usual.to_owned());

@@ -2,7 +2,7 @@
 
 mod simulator;
 
-pub use simulator::export_simulator;
+pub use simulator::{export_simulator, export_simulator_of};
 
 use crate::error::Error;
 use crate::result::ResultFile;
@@ -111,13 +111,25 @@ fn recorded_velocities(stored: &ResultFile, dof: usize) -> Vec<Vec<RecordedVeloc
 /// # Errors
 /// A result without payloads or without this one, a payload without a body that can be real.
 pub fn export_payload(result_path: &Path, name: Option<&str>, reader: PayloadReader) -> Result<Exported, Error> {
-    let stored = ResultFile::read(result_path)?;
+    export_payload_of(&ResultFile::read(result_path)?, result_path, name, reader)
+}
+
+/// As [`export_payload()`] with a result that is in memory; messages call it `result_path`.
+///
+/// # Errors
+/// As [`export_payload()`].
+pub fn export_payload_of(
+    stored: &ResultFile,
+    result_path: &Path,
+    name: Option<&str>,
+    reader: PayloadReader,
+) -> Result<Exported, Error> {
     let wrong = |message: String| Error::Result { path: result_path.to_owned(), message };
     let names = stored.payloads.iter().map(|payload| format!("`{}`", payload.name)).collect::<Vec<_>>().join(", ");
     let found = match (name, &stored.payloads[..]) {
         (_, []) => return Err(wrong("no payload was estimated: add [[payload]] to the study".to_owned())),
         (None, [only]) => only,
-        (None, _) => return Err(wrong(format!("has the payloads {names}: name one with --payload"))),
+        (None, _) => return Err(wrong(format!("has the payloads {names}: name one (--payload)"))),
         (Some(name), all) => (all.iter().find(|payload| payload.name == name))
             .ok_or_else(|| wrong(format!("no payload `{name}`; it has {names}")))?,
     };

@@ -19,10 +19,22 @@ pub fn export_simulator(
     (study, study_path): (&Study, &Path),
     data: Option<&Path>,
 ) -> Result<SimulatorFile, Error> {
-    let stored = ResultFile::read(result_path)?;
-    let robot = robot_model(&stored, result_path, (study, study_path), data)?;
+    export_simulator_of(&ResultFile::read(result_path)?, result_path, (study, study_path), data)
+}
+
+/// As [`export_simulator()`] with a result that is in memory; messages call it `result_path`.
+///
+/// # Errors
+/// As [`export_simulator()`].
+pub fn export_simulator_of(
+    stored: &ResultFile,
+    result_path: &Path,
+    (study, study_path): (&Study, &Path),
+    data: Option<&Path>,
+) -> Result<SimulatorFile, Error> {
+    let robot = robot_model(stored, result_path, (study, study_path), data)?;
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
-    SimulatorFile::of(&robot, &drive_knowledge(&stored, &robot), &reservations(&stored)).map_err(cannot)
+    SimulatorFile::of(&robot, &drive_knowledge(stored, &robot), &reservations(stored)).map_err(cannot)
 }
 
 /// Covariance, delays and gains that a result holds, in the order of the robot's terms and joints.

@@ -8,9 +8,7 @@ use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::jobs::provenance::{beside, now, provenance, seen_from};
-use crate::result::{
-    LogSummary, MethodSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult,
-};
+use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
@@ -315,10 +313,7 @@ fn result_file(
         problems: Vec::new(),
         provenance: Some(parts.provenance),
         robot: robot_summary(robot),
-        method: MethodSummary {
-            gain_std_percent: study.drive.gain_std_percent,
-            ..method_summary(found, found.estimator.name())
-        },
+        method: method_summary(study, found),
         noise_in_regressor: found.estimation.noise_in_regressor.clone(),
         gross_errors,
         noise_correlation,

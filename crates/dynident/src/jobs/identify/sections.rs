@@ -5,11 +5,12 @@ use crate::result::{
     PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingErrors, TrainingJoint, TrainingResult,
     ValueSource,
 };
-use crate::study::{JointDrive, StudyRobot};
+use crate::study::{JointDrive, Study, StudyRobot};
 use dynident_dynamics::Determination;
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, EstimateStatus};
 use dynident_identification::consistent::typical_length_m;
+use dynident_identification::estimators::Estimator;
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{Conditional, Identification, Recording, RegressorModel, resting_joints};
@@ -27,11 +28,11 @@ pub(super) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
     }
 }
 
-pub(super) fn method_summary(identification: &Identification, estimator: &str) -> MethodSummary {
+pub(super) fn method_summary(study: &Study, identification: &Identification) -> MethodSummary {
     let (model, estimate, motion) = (identification.model(), identification.estimate(), &identification.motion);
     let (weakest, strongest) = model.base().gap();
     MethodSummary {
-        estimator: estimator.to_owned(),
+        estimator: identification.estimator.name().to_owned(),
         status: match estimate.status {
             EstimateStatus::Complete => "complete",
             EstimateStatus::NotAllExcited => "not-all-excited",
@@ -39,11 +40,15 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         }
         .to_owned(),
         iterations: estimate.iterations,
-        covariance: if estimate.clusters > 0 {
-            "time segments: accounts for residuals correlated in time".to_owned()
-        } else {
-            "white residuals".to_owned()
-        },
+        functions: study.functions(),
+        covariance: match &identification.estimator {
+            _ if estimate.clusters > 0 => "time segments: accounts for residuals correlated in time",
+            Estimator::Function(_) if estimate.covariance_method != study.estimator.covariance => {
+                "as the function gave it"
+            }
+            _ => "white residuals",
+        }
+        .to_owned(),
         clusters: estimate.clusters,
         motion: motion.clone(),
         cutoff: identification.cutoff.clone(),
@@ -58,7 +63,7 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
         coincident: coincident(model),
         resting_joints: resting_joints(&identification.training).into_iter().map(|joint| model.joint_names()[joint].clone()).collect(),
-        gain_std_percent: None,
+        gain_std_percent: study.drive.gain_std_percent,
         load_parameters: model.load_parameters.clone(),
     }
 }

@@ -13,6 +13,7 @@ pub use prior::PriorSection;
 pub use start_posture::StartPosture;
 pub use windows::{GivenStroke, WindowedCondition, WindowedProblem};
 
+use super::FunctionChoice;
 use crate::error::{Expected, StudyError};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::families::{
@@ -127,6 +128,8 @@ pub enum FamilyChoice {
     FrictionLadder(FrictionLadderSettings),
     /// Postures held one after another, for gravity.
     StaticPostures(StaticPosturesSettings),
+    /// A caller's own code.
+    Function(FunctionChoice),
     /// Families one after another.
     Joined(JoinedChoice),
 }
@@ -143,7 +146,24 @@ impl FamilyChoice {
             Self::SplicedLogistic(_) => "spliced-logistic",
             Self::FrictionLadder(_) => "friction-ladder",
             Self::StaticPostures(_) => "static-postures",
+            Self::Function(_) => "function",
             Self::Joined(_) => "joined",
+        }
+    }
+
+    /// Names of the functions of a caller that it or its parts are.
+    pub fn functions(&self) -> Vec<String> {
+        match self {
+            Self::Function(own) => vec![own.function.clone()],
+            Self::Joined(joined) => joined.parts.iter().flat_map(Self::functions).collect(),
+            Self::Fourier(_)
+            | Self::BSpline(_)
+            | Self::Quintic(_)
+            | Self::Multisine(_)
+            | Self::LogisticStrokes(_)
+            | Self::SplicedLogistic(_)
+            | Self::FrictionLadder(_)
+            | Self::StaticPostures(_) => Vec::new(),
         }
     }
 
@@ -161,6 +181,7 @@ impl FamilyChoice {
             Self::SplicedLogistic(settings) => Box::new(SplicedLogistic::new(joints, duration_s, settings)?),
             Self::FrictionLadder(settings) => Box::new(FrictionLadder::new(joints, duration_s, settings)?),
             Self::StaticPostures(settings) => Box::new(StaticPostures::new(joints, duration_s, settings)?),
+            Self::Function(settings) => Box::new(settings.family(joints, duration_s)?),
             Self::Joined(settings) => Box::new(settings.family(joints, duration_s)?),
         })
     }

@@ -1,0 +1,32 @@
+//! Files of factors: what `reduce`, `merge` and `identify --factors` share.
+
+use super::{Context, json};
+use crate::{summary, terminal};
+use dynident::{Factors, write_whole};
+use std::path::{Path, PathBuf};
+
+/// Reads factors; the message of what is wrong names the file.
+pub(super) fn read(path: &Path) -> Result<Factors, String> {
+    let bytes = std::fs::read(path).map_err(|error| format!("{}: cannot be read ({error})", path.display()))?;
+    Factors::from_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// All logs of several files.
+pub(super) fn read_all(paths: &[PathBuf]) -> Result<Factors, String> {
+    let parts: Vec<Factors> = paths.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
+    Factors::merged(parts).map_err(|error| error.to_string())
+}
+
+/// Writes factors, whole or not at all, and says what they hold.
+pub(super) fn write(factors: &Factors, out: &Path, context: &Context) -> Result<(), String> {
+    let bytes = factors.to_bytes().map_err(|error| format!("{}: {error}", out.display()))?;
+    write_whole(out, &bytes).map_err(super::message_of)?;
+    let file = factors.file(out, bytes.len() as u64);
+    if context.json {
+        terminal::print(&json(&file)?)
+    } else if context.quiet {
+        Ok(())
+    } else {
+        terminal::print(summary::factors(&file).trim_end())
+    }
+}

@@ -1,0 +1,80 @@
+//! `dynident reduce STUDY.toml --out FILE`.
+
+use super::{Context, factors, known_in, message_of, refuse_overwriting};
+use crate::Verdict;
+use dynident::{ReduceSettings, ResultFile, Role, RunOptions, Study, reduce, seconds_of};
+use std::path::{Path, PathBuf};
+
+/// Options of `reduce`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The study file; cut-off and friction are stated in it, or taken from --like.
+    study: PathBuf,
+    /// The file of factors to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Reduce this log of the study alone, whatever its role; may be given several times. By default all that are
+    /// fitted to.
+    #[arg(long = "log", value_name = "NAME")]
+    logs: Vec<String>,
+    /// Read logs as this model was identified: with the cut-off, friction and lag of its result.json.
+    #[arg(long, value_name = "RESULT.json")]
+    like: Option<PathBuf>,
+    /// The robot that the logs were recorded on, where there are several of one kind.
+    #[arg(long, value_name = "NAME")]
+    arm: Option<String>,
+    /// When they were recorded: 2026-01-05T08:00:00Z, 2026-01-05 (UTC), or seconds since 1970.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    recorded_at: Option<f64>,
+    /// Time segments kept of each log: error bars of few logs need many, of hundreds one will do.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    segments: u16,
+    /// Folder of the recordings, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    seconds_of(text).ok_or_else(|| "give 2026-01-05T08:00:00Z, 2026-01-05, or seconds since 1970".to_owned())
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let mut study = Study::load(&options.study).map_err(message_of)?;
+    let (folder, name) = place(&options.out)?;
+    let further: Vec<PathBuf> = options.like.iter().cloned().collect();
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    refuse_overwriting((folder, &[name]), of_study, &["robot", "torque", "log", "format", "motion"], &further)?;
+    if !options.logs.is_empty() {
+        choose(&mut study, &options.logs).map_err(|why| format!("{}: {why}", options.study.display()))?;
+    }
+    let like = options.like.as_deref().map(ResultFile::read).transpose().map_err(message_of)?;
+    let settings = ReduceSettings {
+        arm: options.arm.clone(),
+        recorded_at_s: options.recorded_at,
+        segments: usize::from(options.segments),
+    };
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let found = reduce(&study, &options.study, like.as_ref(), &settings, &run).map_err(known_in(&options.study))?;
+    factors::write(&found, &options.out, context)?;
+    Ok(Verdict::Good)
+}
+
+/// Folder and name of a file.
+fn place(out: &Path) -> Result<(&Path, &str), String> {
+    let name = out.file_name().and_then(|name| name.to_str());
+    let name = name.ok_or_else(|| format!("{}: give the name of a file", out.display()))?;
+    Ok((out.parent().unwrap_or_else(|| Path::new("")), name))
+}
+
+/// The named logs alone, to be fitted to.
+fn choose(study: &mut Study, wanted: &[String]) -> Result<(), String> {
+    let names: Vec<String> = (0..study.log.len()).map(|index| study.log_name(index)).collect();
+    if let Some(unknown) = wanted.iter().find(|name| !names.contains(name)) {
+        return Err(format!("no log `{unknown}`; its logs are {}", names.join(", ")));
+    }
+    let mut own = names.iter();
+    study.log.retain(|_| own.next().is_some_and(|name| wanted.contains(name)));
+    study.log.iter_mut().for_each(|log| log.role = Role::Identify);
+    Ok(())
+}

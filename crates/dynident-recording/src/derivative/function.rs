@@ -1,0 +1,60 @@
+//! A caller's own differentiator among the settings: shared code, which no file holds.
+
+use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
+use crate::error::FilterError;
+use std::sync::Arc;
+
+/// The code of a [`Differentiator`] that this crate does not know, or none where settings were read from a file. Equal
+/// to itself and its clones alone.
+#[derive(Clone, Debug, Default)]
+pub struct DifferentiatorCode(Option<Arc<dyn Differentiator>>);
+
+impl From<Arc<dyn Differentiator>> for DifferentiatorCode {
+    fn from(code: Arc<dyn Differentiator>) -> Self {
+        Self(Some(code))
+    }
+}
+
+impl PartialEq for DifferentiatorCode {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+impl DifferentiatorCode {
+    /// The differentiator, where there is code.
+    pub(super) fn build(&self) -> Option<Box<dyn Differentiator>> {
+        let code = self.0.clone()?;
+        Some(Box::new(Shared(code)))
+    }
+}
+
+/// A differentiator that others hold as well.
+#[derive(Debug)]
+struct Shared(Arc<dyn Differentiator>);
+
+impl Differentiator for Shared {
+    fn name(&self) -> &'static str {
+        self.0.name()
+    }
+
+    fn minimum_samples(&self) -> usize {
+        self.0.minimum_samples()
+    }
+
+    fn context_samples(&self, rate_hz: f64) -> Option<usize> {
+        self.0.context_samples(rate_hz)
+    }
+
+    fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
+        self.0.differentiate_at(place, q, out)
+    }
+
+    fn smooth(&self, rate_hz: f64, signal: &[f64], out: &mut [f64]) -> Result<(), FilterError> {
+        self.0.smooth(rate_hz, signal, out)
+    }
+}
