@@ -10,7 +10,7 @@ import pytest
 import dynident
 
 
-@pytest.mark.parametrize("module", ["dynident", "dynident._log", "dynident._study", "dynident._jobs", "dynident._model"])
+@pytest.mark.parametrize("module", ["dynident", "dynident._log", "dynident._study", "dynident._jobs", "dynident._model", "dynident._describe"])
 def test_examples_run(module: str, root, monkeypatch: pytest.MonkeyPatch) -> None:
     # Their files are the repository's.
     monkeypatch.chdir(root)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +128,50 @@ def test_mujoco_is_a_robot(planar: dynident.Robot, root: Path, tmp_path: Path) -
     friction = found.model().friction
     assert friction["joint1"]["fv1"] == pytest.approx(0.8, rel=0.05)
     assert found.runs[-1]["max_tracking_error_rad"]
+
+
+INTERRUPTED = """
+import json, sys, time
+sys.path.insert(0, {tests!r})
+import numpy as np
+import dynident
+from test_motion import SECTIONS
+
+stopped = []
+
+def robot(run):
+    period, q = 1.0 / run.rate_hz, run.q[0]
+    try:
+        for sample in range(run.samples):
+            run.torque(sample * period, run.q[sample], run.dq[sample])
+            if sample == 20:
+                print("moving", flush=True)
+            time.sleep(0.01)
+    except dynident.StopRun:
+        stopped.append(True)
+        raise
+
+try:
+    dynident.iterate(dynident.Robot.load({urdf!r}), {out!r}, robot=robot, **SECTIONS)
+except KeyboardInterrupt:
+    print(json.dumps({{"interrupted": True, "stopped": stopped}}), flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a signal that one process sends another")
+def test_ctrl_c_stops_a_robot_that_is_a_function(root: Path, tmp_path: Path) -> None:
+    names = {"tests": str(root / "python" / "tests"), "urdf": str(root / "robots" / "planar2r.urdf"), "out": str(tmp_path)}
+    child = subprocess.Popen([sys.executable, "-c", INTERRUPTED.format(**names)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "moving\n"
+        child.send_signal(signal.SIGINT)
+        # 1500 samples of 10 ms are left of the run, had it gone on.
+        said, _ = child.communicate(timeout=60)
+        begin = json.loads(said.splitlines()[-1])
+    finally:
+        child.kill()
+    assert begin == {"interrupted": True, "stopped": [True]}
+    assert child.returncode == 0
+    # What was recorded is kept, and says why it ends.
+    assert json.loads((tmp_path / "iterations.json").read_text())["status"] == "interrupted"

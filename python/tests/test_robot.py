@@ -122,3 +122,26 @@ def test_threads_and_forked_processes(ur10: dynident.Robot) -> None:
     context = multiprocessing.get_context("fork")
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
         assert set(processes.map(_regressor_sum, [ur10] * 4, timeout=120)) == {expected}
+
+
+def test_a_regressor_is_written_where_it_is_wanted(ur10: dynident.Robot) -> None:
+    # More than a block, and no whole number of them.
+    _, q, dq, ddq = motion(6, seconds=3.0, rate_hz=100.0)
+    whole = ur10.regressor(q, dq, ddq)
+    out = np.full_like(whole, np.nan)
+    assert ur10.regressor(q, dq, ddq, out=out) is out
+    np.testing.assert_array_equal(out, whole)
+    base = ur10.regressor(q, dq, ddq, base=True)
+    np.testing.assert_array_equal(base, whole[..., ur10.base_columns])
+    theta = ur10.base_projection @ ur10.inertial_parameters.ravel()
+    np.testing.assert_allclose(base @ theta, ur10.inverse_dynamics(q, dq, ddq), atol=1e-6)
+    own = np.full_like(base, np.nan)
+    np.testing.assert_array_equal(ur10.regressor(q, dq, ddq, base=True, out=own), base)
+    one = np.full((6, 60), np.nan)
+    np.testing.assert_array_equal(ur10.regressor(q[0], dq[0], ddq[0], out=one), whole[0])
+    for wrong in (out[:-1], np.asfortranarray(out), out.astype("f4"), out[..., ::-1], "text"):
+        with pytest.raises(ValueError, match="out: give an array of float64"):
+            ur10.regressor(q, dq, ddq, out=wrong)
+    out.flags.writeable = False
+    with pytest.raises(ValueError, match="out"):
+        ur10.regressor(q, dq, ddq, out=out)

@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::Path;
 use std::process::Stdio;
 
-fn json(text: &str) -> Value {
+pub(crate) fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
@@ -18,7 +18,7 @@ fn has(value: &Value, keys: &[&str]) {
 
 /// A log that a robot could have made, 1,500 rows at 100 Hz: torques of the fixture's arm by the command itself,
 /// friction that opposes the motion, and a noise of a few mNm.
-fn honest_log(folder: &Path) {
+pub(crate) fn honest_log(folder: &Path) {
     let mut states = "q1,q2,dq1,dq2,ddq1,ddq2\n".to_owned();
     let motion = |t: f64| {
         let mut moved = [[0.0; 3]; 2];

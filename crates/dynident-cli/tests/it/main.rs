@@ -9,6 +9,7 @@ mod design_check;
 mod design_paper;
 mod evaluation;
 mod export;
+mod factors;
 mod files;
 mod iterate;
 mod packing;

@@ -1,9 +1,9 @@
 //! A torque that a user declares: `τ = k f(q, q̇)` with a coefficient `k` to be found. Springs, counterbalances,
 //! cables, gas struts, magnets: all that holds a joint by where it stands.
 //!
-//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] of the joint's own position, or a caller's own
-//! code ([`TorqueFunction`]). As for every term, the torque is what the drive has to give: a spring that pulls the joint
-//! back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
+//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] of the joint's own position, or a caller's
+//! own code ([`TorqueFunction`]). As for every term, the torque is what the drive has to give: a spring that pulls the
+//! joint back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
 
 use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::{Expression, JointMotion, JointNames, TermInput, TorqueFunction, TorqueTable};
