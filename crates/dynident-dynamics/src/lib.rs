@@ -50,6 +50,7 @@ mod derivatives;
 mod energy;
 mod forward_dynamics;
 mod gravity;
+mod ground;
 mod independent_columns;
 mod inverse_dynamics;
 mod kinematics;

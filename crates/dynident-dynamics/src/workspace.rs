@@ -1,7 +1,7 @@
 //! Scratch memory of the algorithms: one per thread, allocated once.
 
 use crate::composite::Composite;
-use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyDerivative, BodyState};
+use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, VariedBody};
 use crate::tree_scratch::{TreeBatch, TreeScratch};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
@@ -29,7 +29,7 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) bodies: Vec<BodyState<T>>,
     pub(crate) composites: Vec<Composite<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia<T>>,
-    pub(crate) derivative: Vec<BodyDerivative<T>>,
+    pub(crate) varied: Vec<VariedBody<T>>,
     /// Square matrices over the joints of the tree, row-major.
     pub(crate) matrices: [Vec<T>; 3],
 }
@@ -47,7 +47,7 @@ impl<T: Scalar> CoreScratch<T> {
             bodies: vec![BodyState::REST; dof],
             composites: vec![Composite::ZERO; dof],
             articulated: vec![ArticulatedInertia::ZERO; dof],
-            derivative: vec![BodyDerivative::ZERO; dof],
+            varied: vec![VariedBody::REST; dof],
             matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
         }
     }
