@@ -7,8 +7,9 @@
 //! Wensing, Kim and Slotine, *Linear matrix inequalities for physically consistent inertial parameter identification*,
 //! RA-L 2018, section III).
 
+use crate::hinge::symmetric;
 use dynident_lanes::Scalar;
-use dynident_model::{InertialParameters, Mat3, Transform, Vec3};
+use dynident_model::{JointStep, Mat3, Transform, Vec3};
 
 /// A twist (angular, linear) or a wrench (moment, force) at the base's origin.
 #[derive(Clone, Copy, Debug)]
@@ -97,24 +98,20 @@ pub(crate) struct MassMoments<T> {
 impl<T: Scalar> MassMoments<T> {
     pub(crate) const ZERO: Self = Self { mass: T::ZERO, first: Vec3::ZERO, second: [T::ZERO; 6] };
 
-    /// Of a body whose frame stands at `placement`.
+    /// Of a body whose inner frame stands at `placement`.
     #[inline(always)]
-    pub(crate) fn of(inertial: &InertialParameters, placement: &Transform<T>) -> Self {
-        let [mass, hx, hy, hz, xx, xy, xz, yy, yz, zz] = inertial.0;
-        let half = 0.5 * (xx + yy + zz);
-        let own = [half - xx, -xy, -xz, half - yy, -yz, half - zz].map(T::splat);
+    pub(crate) fn of(step: &JointStep, placement: &Transform<T>) -> Self {
         let Transform { rotation, translation: t } = placement;
-        let rows = rotation.mul_mat(&symmetric(&own)).0;
+        let rows = rotation.mul_mat(&symmetric(&step.second.map(T::splat))).0;
         let r = &rotation.0;
-        let (mass, first) = (T::splat(mass), rotation.mul_vec(Vec3([hx, hy, hz]).splat()));
-        // R Σ Rᵀ + t hᵀ + h tᵀ + m t tᵀ, with g = h + m t/2.
-        let g = t.scale_add(mass * T::splat(0.5), first);
-        let entry = |a: usize, b: usize| {
-            let shift = t[a].mul_add(g[b], g[a] * t[b]);
-            rows[a][2].mul_add(r[b][2], rows[a][1].mul_add(r[b][1], rows[a][0].mul_add(r[b][0], shift)))
-        };
-        let second = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
-        Self { mass, first: t.scale_add(mass, first), second }
+        let first = rotation.mul_vec(step.first.splat());
+        if step.mass == 0.0 {
+            Self { mass: T::ZERO, first, second: carried(&rows, r, *t, first) }
+        } else {
+            let mass = T::splat(step.mass);
+            let g = t.scale_add(mass * T::splat(0.5), first);
+            Self { mass, first: t.scale_add(mass, first), second: carried(&rows, r, *t, g) }
+        }
     }
 
     /// The wrench `I w` of a twist: `n = (tr(Σ) 1 - Σ) w₁ + h × w₂`, `f = m w₂ + w₁ × h`.
@@ -168,8 +165,9 @@ impl<T: Scalar> MomentRates<T> {
     pub(crate) fn of(moments: &MassMoments<T>, velocity: &Spatial<T>) -> Self {
         let Spatial { angular: w, linear: u } = *velocity;
         let (h, s) = (moments.first, symmetric(&moments.second).0);
-        let column = |k: usize| w.cross_add(Vec3(s[k]), u.scale(h[k]));
-        let (a, b, c) = (column(0), column(1), column(2));
+        let a = w.cross_add(Vec3(s[0]), u.scale(h[0]));
+        let b = w.cross_add(Vec3(s[1]), u.scale(h[1]));
+        let c = w.cross_add(Vec3(s[2]), u.scale(h[2]));
         Self {
             momentum: w.cross_add(h, u.scale(moments.mass)),
             second: Mat3([[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]]),
@@ -180,10 +178,7 @@ impl<T: Scalar> MomentRates<T> {
     #[inline(always)]
     pub(crate) fn spatial_momentum(&self) -> Spatial<T> {
         let g = &self.second.0;
-        Spatial {
-            angular: Vec3([g[2][1] - g[1][2], g[0][2] - g[2][0], g[1][0] - g[0][1]]),
-            linear: self.momentum,
-        }
+        Spatial { angular: Vec3([g[2][1] - g[1][2], g[0][2] - g[2][0], g[1][0] - g[0][1]]), linear: self.momentum }
     }
 
     /// `B w + addend` with `B = ½ ((v ×*) I - I (v ×) + (I v) ×̄*) = [tr(G) 1 - G, 0; -[p]×, 0]` of the twist's angular
@@ -196,10 +191,7 @@ impl<T: Scalar> MomentRates<T> {
             let diagonal = angular[k].mul_add(trace, addend.angular[k]);
             g[k][2].neg_mul_add(angular[2], g[k][1].neg_mul_add(angular[1], g[k][0].neg_mul_add(angular[0], diagonal)))
         };
-        Spatial {
-            angular: Vec3([row(0), row(1), row(2)]),
-            linear: angular.cross_add(self.momentum, addend.linear),
-        }
+        Spatial { angular: Vec3([row(0), row(1), row(2)]), linear: angular.cross_add(self.momentum, addend.linear) }
     }
 
     /// Angular part of `Bᵀ y`, the other part is zero: `(tr(G) 1 - Gᵀ) y₁ + p × y₂`.
@@ -222,7 +214,16 @@ impl<T: Scalar> core::ops::AddAssign for MomentRates<T> {
     }
 }
 
+/// `R Σ Rᵀ + t gᵀ + g tᵀ`, upper triangle, from the rows of `R Σ`: with `g = h + m t/2` the second moment about another
+/// point. A function of its own: a closure called six times would not be compiled for the processor level.
 #[inline(always)]
-fn symmetric<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
-    Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
+fn carried<T: Scalar>(rows: &[[T; 3]; 3], r: &[[T; 3]; 3], t: Vec3<T>, g: Vec3<T>) -> [T; 6] {
+    macro_rules! entry {
+        ($a:literal, $b:literal) => {{
+            let shift = t[$a].mul_add(g[$b], g[$a] * t[$b]);
+            let (row, column) = (&rows[$a], &r[$b]);
+            row[2].mul_add(column[2], row[1].mul_add(column[1], row[0].mul_add(column[0], shift)))
+        }};
+    }
+    [entry!(0, 0), entry!(0, 1), entry!(0, 2), entry!(1, 1), entry!(1, 2), entry!(2, 2)]
 }

@@ -33,6 +33,32 @@ impl<T: Scalar> BodyState<T> {
     };
 }
 
+/// A body in its inner frame ([`dynident_model::JointStep`]) while the inverse dynamics run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinkState<T> {
+    pub(crate) omega: Vec3<T>,
+    pub(crate) alpha: Vec3<T>,
+    /// Of the frame's origin, minus gravity.
+    pub(crate) acceleration: Vec3<T>,
+    /// `[α]× + [ω]× [ω]×`.
+    pub(crate) spin: Mat3<T>,
+    /// Force on the body (with everything that hangs on it).
+    pub(crate) force: Vec3<T>,
+    /// Moment about the frame's origin.
+    pub(crate) moment: Vec3<T>,
+}
+
+impl<T: Scalar> LinkState<T> {
+    pub(crate) const REST: Self = Self {
+        omega: Vec3::ZERO,
+        alpha: Vec3::ZERO,
+        acceleration: Vec3::ZERO,
+        spin: Mat3::ZERO,
+        force: Vec3::ZERO,
+        moment: Vec3::ZERO,
+    };
+}
+
 /// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ
 /// α + mass a`; and what its joint needs of it.
 #[derive(Clone, Copy, Debug)]
