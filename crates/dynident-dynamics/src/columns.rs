@@ -1,8 +1,8 @@
 //! Where the composite-rigid-body algorithm keeps its columns: one wrench for each joint, several to a bundle.
 //!
-//! The columns of a run of joints without branches stand side by side in the order of the joints, and every run begins a
-//! bundle of its own; behind a run stand the runs that hang on it. So the columns of a joint's subtree fill whole bundles,
-//! one after the other, but for lanes of joints further in, whose columns do not exist yet and are zero.
+//! The columns of a run of joints without branches stand side by side in the order of the joints, and every run begins
+//! a bundle of its own; behind a run stand the runs that hang on it. So the columns of a joint's subtree fill whole
+//! bundles, one after the other, but for lanes of joints further in, whose columns do not exist yet and are zero.
 
 use dynident_lanes::Lane;
 use dynident_model::{Model, Vec3};

@@ -1,9 +1,9 @@
-//! Bodies in one frame, the base's: axes, velocities and accelerations as twists at the base's origin, and inertias that
-//! simply add up over a subtree.
+//! Bodies in one frame, the base's: axes, velocities and accelerations as twists at the base's origin, and inertias
+//! that simply add up over a subtree.
 //!
-//! Twists and wrenches are spatial vectors at one point in one frame, angular part first (Featherstone 2008, chapter 2),
-//! so that nothing has to be carried from frame to frame. Inertia is kept as the moments of the mass in place of the
-//! inertia tensor: mass `m`, first moment `h = ∫ x dm`, second moment `Σ = ∫ x xᵀ dm` (the tensor is `tr(Σ) 1 - Σ`;
+//! Twists and wrenches are spatial vectors at one point in one frame, angular part first (Featherstone 2008, chapter
+//! 2), so that nothing has to be carried from frame to frame. Inertia is kept as the moments of the mass in place of
+//! the inertia tensor: mass `m`, first moment `h = ∫ x dm`, second moment `Σ = ∫ x xᵀ dm` (the tensor is `tr(Σ) 1 - Σ`;
 //! Wensing, Kim and Slotine, *Linear matrix inequalities for physically consistent inertial parameter identification*,
 //! RA-L 2018, section III).
 

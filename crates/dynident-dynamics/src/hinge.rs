@@ -1,5 +1,5 @@
-//! From frame to frame over one joint, by the steps of the model ([`JointStep`]): axes are z, and most constant rotations
-//! are none or a quarter turn about x, so that turning a vector takes four products in place of nine.
+//! From frame to frame over one joint, by the steps of the model ([`JointStep`]): axes are z, and most constant
+//! rotations are none or a quarter turn about x, so that turning a vector takes four products in place of nine.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{JointStep, Mat3, Vec3};

@@ -12,7 +12,8 @@ use dynident_model::{JointStep, Mat3, Model, Vec3};
 /// friction and drives. One entry per joint: Nm for revolute joints, N for prismatic ones.
 ///
 /// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section
-/// 5.3; over the model's inner frames ([`JointStep`]). Allocation-free. Bodies without a prior count as massless: see [`Model::bodies_without_prior`].
+/// 5.3; over the model's inner frames ([`JointStep`]). Allocation-free. Bodies without a prior count as massless: see
+/// [`Model::bodies_without_prior`].
 ///
 /// ```
 /// # use dynident_model::{Body, Joint, JointKind, JointLimits, InertialParameters, Link, Mat3, Model, Transform, Vec3};

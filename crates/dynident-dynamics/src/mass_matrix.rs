@@ -9,8 +9,8 @@ use dynident_model::{JointStep, Model, Vec3};
 
 /// The mass matrix `M(q)`, row-major, symmetric, dof × dof: `∂τ/∂q̈` of the inverse dynamics.
 ///
-/// Composite-rigid-body algorithm: Walker and Orin (1982); Featherstone (2008), section 6.2; over the model's inner frames
-/// ([`JointStep`](dynident_model::JointStep)). Allocation-free.
+/// Composite-rigid-body algorithm: Walker and Orin (1982); Featherstone (2008), section 6.2; over the model's inner
+/// frames ([`JointStep`](dynident_model::JointStep)). Allocation-free.
 ///
 /// # Panics
 /// If `q` has not one entry per joint, or the workspace was made for another tree.
@@ -35,9 +35,8 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
 ///
 /// Allocation-free, but for robots whose joints follow others at the first block of a size.
 ///
-/// # Panics
-/// If `q` has not joints × samples or `out` not joints × joints × samples numbers, or the workspace was made for another
-/// tree.
+/// # Panics If `q` has not joints × samples or `out` not joints × joints × samples numbers, or the workspace was made
+/// for another tree.
 #[doc(alias("crba"))]
 pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64], samples: usize, out: &mut [f64]) {
     workspace.check(model, samples, &[q]);
@@ -118,32 +117,19 @@ pub(crate) fn put_matrix<T: Lane>(columns: &ColumnScratch<T>, out: &mut [f64]) {
     if !columns.is_one_run() {
         out.fill(0.0);
     }
-    let joints = columns.place.len();
-    if T::PER_BUNDLE == 1 || !columns.is_one_run() {
-        for entry in &columns.entries {
-            let work = columns.rows[entry.work];
-            out[entry.upper] = work;
-            out[entry.lower] = work;
-        }
-        return;
-    }
-    // A serial arm: the joints' columns stand in their order.
-    let width = columns.rows.len() / joints.max(1);
-    for row in 0..joints {
-        let works = &columns.rows[row * width..][..joints];
-        for (column, &work) in works.iter().enumerate().skip(row) {
-            out[row * joints + column] = work;
-            out[column * joints + row] = work;
-        }
+    for entry in &columns.entries {
+        let work = columns.rows[entry.work];
+        out[entry.upper] = work;
+        out[entry.lower] = work;
     }
 }
 
 /// From placed hinges to the rows of `columns`.
 ///
-/// What hangs on a joint is one rigid body: first moment `h`, second moment Σ about the origin of the joint's frame. Along
-/// (about) z it needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`, the joint's column; carried inward, its part along
-/// (about) the axis of every joint on the way is an entry of the matrix. Columns of one sample travel together, several in
-/// a bundle.
+/// What hangs on a joint is one rigid body: first moment `h`, second moment Σ about the origin of the joint's frame.
+/// Along (about) z it needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`, the joint's column; carried inward, its part
+/// along (about) the axis of every joint on the way is an entry of the matrix. Columns of one sample travel together,
+/// several in a bundle.
 #[inline(always)]
 pub(crate) fn composite_rigid_bodies<T: Lane>(
     model: &Model,
@@ -164,17 +150,19 @@ pub(crate) fn composite_rigid_bodies<T: Lane>(
     for index in (0..joints).rev() {
         let step = &steps[index];
         let (inner, outer) = moments.split_at_mut(index);
-        let (h, s) = if step.is_tip { own_moments(step) } else { outer[0] };
-        let about = s[0] + s[3];
-        let (f, n) = if step.turns {
-            (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], about]))
-        } else {
-            (Vec3([T::ZERO, T::ZERO, T::splat(step.subtree_mass)]), Vec3([h[1], -h[0], T::ZERO]))
-        };
+        if step.is_tip {
+            outer[0] = own_moments(step);
+        }
+        let (h, s) = &outer[0];
         let (own, lane) = place[index];
         if T::PER_BUNDLE == 1 {
             // Lanes are samples: a column goes all the way to the base in registers.
-            let (mut at, mut f, mut n) = (index, f, n);
+            let (mut f, mut n) = if step.turns {
+                (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], s[0] + s[3]]))
+            } else {
+                (Vec3([T::ZERO, T::ZERO, T::splat(step.subtree_mass)]), Vec3([h[1], -h[0], T::ZERO]))
+            };
+            let mut at = index;
             loop {
                 let work = if steps[at].turns { n[2] } else { f[2] };
                 work.store(&mut rows[(at * bundles + own) * lanes..]);
@@ -184,15 +172,18 @@ pub(crate) fn composite_rigid_bodies<T: Lane>(
                 at = parent;
             }
         } else {
+            let (f, n) = (&mut force[own].0, &mut moment[own].0);
             if step.turns {
-                f[0].add_at(&mut force[own].0[0], lane);
-                f[1].add_at(&mut force[own].0[1], lane);
-                n[2].add_at(&mut moment[own].0[2], lane);
+                (-h[1]).add_at(&mut f[0], lane);
+                h[0].add_at(&mut f[1], lane);
+                (-s[2]).add_at(&mut n[0], lane);
+                (-s[4]).add_at(&mut n[1], lane);
+                (s[0] + s[3]).add_at(&mut n[2], lane);
             } else {
-                f[2].add_at(&mut force[own].0[2], lane);
+                T::splat(step.subtree_mass).add_at(&mut f[2], lane);
+                h[1].add_at(&mut n[0], lane);
+                (-h[0]).add_at(&mut n[1], lane);
             }
-            n[0].add_at(&mut moment[own].0[0], lane);
-            n[1].add_at(&mut moment[own].0[1], lane);
             let (force, moment) = (&mut force[own..end[index]], &mut moment[own..end[index]]);
             let row = rows[(index * bundles + own) * lanes..].chunks_exact_mut(lanes);
             for (column, to) in (if step.turns { &*moment } else { &*force }).iter().zip(row) {
@@ -210,15 +201,20 @@ pub(crate) fn composite_rigid_bodies<T: Lane>(
             }
         }
         let Some(parent) = step.parent else { continue };
-        let (h, s) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(h), hinge.up_symmetric(&s)));
+        let (h, s) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(*h), hinge.up_symmetric(s)));
         let t = hinges.translation(step, index);
-        let sum = if step.is_last_child { own_moments(&steps[parent]) } else { inner[parent] };
-        inner[parent] = if step.subtree_mass == 0.0 {
-            moved_sum(sum, h, h, &s, t)
+        // A body takes its own moments when the first of its children comes.
+        if T::PER_BUNDLE == 1 {
+            // Stores of wide lanes are dear: one for each number.
+            let mut sum = if step.is_last_child { own_moments(&steps[parent]) } else { inner[parent] };
+            add(&mut sum, h, &s, step.subtree_mass, t);
+            inner[parent] = sum;
         } else {
-            let mass = T::splat(step.subtree_mass);
-            moved_sum(sum, t.scale_add(mass, h), t.scale_add(mass * T::splat(0.5), h), &s, t)
-        };
+            if step.is_last_child {
+                inner[parent] = own_moments(&steps[parent]);
+            }
+            add(&mut inner[parent], h, &s, step.subtree_mass, t);
+        }
     }
 }
 
@@ -227,21 +223,26 @@ fn own_moments<T: Lane>(step: &JointStep) -> (Vec3<T>, [T; 6]) {
     (step.first.splat(), step.second.map(T::splat))
 }
 
-/// The sum of moments `(h, Σ)` about the origin and of others `(m, h, Σ)` about the point `t`: those are `h + m t` and, with
-/// `g = h + m t/2`, `Σ + t gᵀ + g tᵀ`.
+/// Adds moments `(m, h, Σ)` about the point `t` to moments `(h, Σ)` about the origin: `h + m t` and, with `g = h + m
+/// t/2`, `Σ + t gᵀ + g tᵀ`.
 #[inline(always)]
-fn moved_sum<T: Lane>(
-    (first, second): (Vec3<T>, [T; 6]),
-    h: Vec3<T>,
-    g: Vec3<T>,
-    s: &[T; 6],
-    t: Vec3<T>,
-) -> (Vec3<T>, [T; 6]) {
+fn add<T: Lane>(sum: &mut (Vec3<T>, [T; 6]), h: Vec3<T>, s: &[T; 6], mass: f64, t: Vec3<T>) {
+    let (first, second) = sum;
+    let mut g = h;
+    *first += h;
+    if mass != 0.0 {
+        *first += t.scale(T::splat(mass));
+        g = t.scale_add(T::splat(0.5 * mass), h);
+    }
     macro_rules! entry {
         ($k:literal, $a:literal, $b:literal) => {
-            second[$k] + t[$a].mul_add(g[$b], t[$b].mul_add(g[$a], s[$k]))
+            second[$k] += t[$a].mul_add(g[$b], t[$b].mul_add(g[$a], s[$k]));
         };
     }
-    let second = [entry!(0, 0, 0), entry!(1, 0, 1), entry!(2, 0, 2), entry!(3, 1, 1), entry!(4, 1, 2), entry!(5, 2, 2)];
-    (first + h, second)
+    entry!(0, 0, 0);
+    entry!(1, 0, 1);
+    entry!(2, 0, 2);
+    entry!(3, 1, 1);
+    entry!(4, 1, 2);
+    entry!(5, 2, 2);
 }

@@ -1,16 +1,16 @@
 //! The tree in the form that costs the recursions of the dynamics least: made once for a model.
 //!
-//! Joint torques do not depend on how a body's frame is turned about its joint's axis, nor on what of a turning body lies
-//! on that axis without moving. Both freedoms are used up here:
+//! Joint torques do not depend on how a body's frame is turned about its joint's axis, nor on what of a turning body
+//! lies on that axis without moving. Both freedoms are used up here:
 //!
-//! - **Frames.** Every body has an inner frame at the origin of its own, with z along the joint's axis. Its x is chosen so
-//!   that a child's axis, where it stands at a right angle, comes out of a quarter turn about x (the modified Denavit-
-//!   Hartenberg convention: Khalil and Kleinfinger, *A new geometric notation for open and closed-loop robots*, ICRA 1986).
-//!   On most arms every constant rotation is then the identity or that quarter turn, and to turn a vector from frame to
-//!   frame takes four products.
+//! - **Frames.** Every body has an inner frame at the origin of its own, with z along the joint's axis. Its x is chosen
+//!   so that a child's axis, where it stands at a right angle, comes out of a quarter turn about x (the modified
+//!   Denavit-Hartenberg convention: Khalil and Kleinfinger, *A new geometric notation for open and closed-loop
+//!   robots*, ICRA 1986). On most arms every constant rotation is then the identity or that quarter turn, and to turn a
+//!   vector from frame to frame takes four products.
 //! - **Inertia.** Mass, first moment along the axis and second moment along the axis of a turning body act as a part of
-//!   its parent: they are moved there, and three of ten numbers are zero (the regrouping of base parameters: Gautier and
-//!   Khalil, *Direct calculation of minimum set of inertial parameters of serial robots*, IEEE T-RA 1990).
+//!   its parent: they are moved there, and three of ten numbers are zero (the regrouping of base parameters: Gautier
+//!   and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots*, IEEE T-RA 1990).
 
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
@@ -27,8 +27,8 @@ pub enum StepRotation {
     General(Mat3),
 }
 
-/// One joint and its body in inner frames. Its torque is the same as that of the [`Joint`] and body which it stands for;
-/// its body's inertial parameters alone are not.
+/// One joint and its body in inner frames. Its torque is the same as that of the [`Joint`] and body which it stands
+/// for; its body's inertial parameters alone are not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointStep {
     /// Index of the parent body, or `None` for the base.
@@ -53,8 +53,8 @@ pub struct JointStep {
     pub subtree_mass: f64,
     /// True when nothing hangs on the body.
     pub is_tip: bool,
-    /// True when no body with a higher index hangs on the same parent: from the tips to the base it is the first that gives
-    /// its parent something.
+    /// True when no body with a higher index hangs on the same parent: from the tips to the base it is the first that
+    /// gives its parent something.
     pub is_last_child: bool,
 }
 
@@ -210,8 +210,8 @@ mod tests {
         placements
     }
 
-    /// Origins and axes of all bodies are where the joints put them. Rotations and lengths are of the size of one, ten of
-    /// them follow one another: 1e-13.
+    /// Origins and axes of all bodies are where the joints put them. Rotations and lengths are of the size of one, ten
+    /// of them follow one another: 1e-13.
     fn assert_same_axes(model: &Model, random: &mut Random) {
         let q: Vec<f64> = (0..model.body_count()).map(|_| random.uniform(-3.0, 3.0)).collect();
         let mut bodies: Vec<Transform> = Vec::new();
@@ -247,7 +247,7 @@ mod tests {
                 joint.parent = index.checked_sub(1);
                 let turn = core::f64::consts::FRAC_PI_2 * f64::from(random.bits() as u8 % 4);
                 joint.placement.rotation = Mat3::from_axis_angle(unit(random.bits() as usize % 3, 1.0), turn);
-                joint.axis = unit(random.bits() as usize % 3, if random.bits() % 2 == 0 { 1.0 } else { -1.0 });
+                joint.axis = unit(random.bits() as usize % 3, if random.bits().is_multiple_of(2) { 1.0 } else { -1.0 });
             }
             let model = Model::new("right angles", plain.base().clone(), joints, plain.bodies().to_vec()).unwrap();
             assert_same_axes(&model, &mut random);
