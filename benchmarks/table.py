@@ -23,7 +23,8 @@ NAMES = {
     ("mujoco", "wheel"): "MuJoCo",
 }
 # Dynident's batched kernels have no counterpart in Pinocchio: the same quantity one call at a time stands beside them.
-SAME_QUANTITY = {"regressor_batch": "joint_torque_regressor", "rnea_batch": "rnea", "crba_batch": "crba", "aba_batch": "aba"}
+SAME_QUANTITY = {"regressor_batch": "joint_torque_regressor", "rnea_batch": "rnea", "crba_batch": "crba",
+                 "rnea_derivatives_batch": "rnea_derivatives", "aba_batch": "aba"}
 VARIANT = re.compile(r"_(world|local)$")
 
 

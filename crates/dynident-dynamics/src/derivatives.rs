@@ -1,11 +1,13 @@
 //! Analytic derivatives of the inverse dynamics.
 
-use crate::composite::Composite;
-use crate::states::{BodyDerivative, BodyState};
-use crate::tree_scratch::TreeScratch;
-use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
-use dynident_lanes::{Scalar, dispatch_single};
-use dynident_model::{InertialParameters, Model, Transform, Vec3};
+use crate::ground::{MassMoments, MomentRates, Spatial};
+use crate::hinge::{Hinge, with_hinge};
+use crate::states::VariedBody;
+use crate::tree_scratch::{TreeBatch, TreeScratch, expanded, project_matrices};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
+use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
+use dynident_model::terms::JointMotion;
+use dynident_model::{Model, Transform, Vec3};
 
 /// Derivatives of the joint torques, row-major, dof × dof: row = torque, column = what it is derived by.
 #[derive(Clone, Copy, Debug)]
@@ -21,10 +23,17 @@ pub struct InverseDynamicsDerivatives<'w> {
 /// Derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) by position, velocity and acceleration, without
 /// differences.
 ///
-/// Tangent recursion: for every joint the variation of the Newton-Euler recursion runs over the joint's own subtree
-/// outward and over the path to the base inward (Carpentier and Mansard, *Analytical derivatives of rigid body dynamics
-/// algorithms*, RSS 2018, in body frames). A variation of `q_j` turns or slides frame `j` against its parent; its whole
-/// effect on the subtree is the change of the motion that arrives there. Allocation-free.
+/// With axes `S`, their rates `Ψ̇ = v × S`, `Ψ̈ = a × S + v × Ψ̇` and inertias all in the base's frame, inertia `I`,
+/// Coriolis matrix `B` and wrench `f` of what hangs on a joint are sums, and for a joint `i` on the way to `j`
+///
+/// ```text
+/// ∂τ_i/∂q_j = S_i · (2 B_j Ψ̇_j + I_j Ψ̈_j + S_j ×* f_j)      ∂τ_j/∂q_i = 2 Ψ̇_i · (B_jᵀ S_j) + Ψ̈_i · (I_j S_j)
+/// ∂τ_i/∂q̇_j = S_i · (2 B_j S_j + 2 I_j Ψ̇_j)                 ∂τ_j/∂q̇_i = 2 S_i · (B_jᵀ S_j) + 2 Ψ̇_i · (I_j S_j)
+/// ```
+///
+/// with `a` against gravity: Singh, Russell and Wensing, *Efficient analytical derivatives of rigid-body dynamics using
+/// spatial vector algebra*, RA-L 2022. Every pair costs these products alone: O(n · depth).
+/// Allocation-free.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.
@@ -53,188 +62,177 @@ pub fn inverse_dynamics_derivatives<'w>(
     InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration }
 }
 
-one_sample_kernel!((q, dq, ddq), newton_euler_derivatives, by_position: matrices[0], by_velocity: matrices[1], by_acceleration: matrices[2]);
-
-#[derive(Clone, Copy, PartialEq)]
-enum DerivativeBy {
-    Position,
-    Velocity,
+/// The same derivatives of many samples: entry `(i, k)` of sample `s` stands at `[(i * dof + k) * samples + s]`.
+#[derive(Debug)]
+pub struct DerivativeArrays<'a> {
+    /// `∂τ/∂q`.
+    pub by_position: &'a mut [f64],
+    /// `∂τ/∂q̇`.
+    pub by_velocity: &'a mut [f64],
+    /// `∂τ/∂q̈`, the mass matrix.
+    pub by_acceleration: &'a mut [f64],
 }
+
+/// [`inverse_dynamics_derivatives`] of every sample of a motion.
+///
+/// Allocation-free, but for robots whose joints follow others at the first block of a size.
+///
+/// # Panics
+/// If an array of the motion has not joints × samples or one of the derivatives not joints × joints × samples numbers,
+/// or the workspace was made for another size.
+#[doc(alias("rnea derivatives"))]
+pub fn inverse_dynamics_derivatives_batch(
+    model: &Model,
+    workspace: &mut BatchWorkspace,
+    motion: &JointMotion<'_>,
+    derivatives: DerivativeArrays<'_>,
+) {
+    workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
+    let DerivativeArrays { by_position, by_velocity, by_acceleration } = derivatives;
+    let mut out = [by_position, by_velocity, by_acceleration];
+    for array in &out {
+        let entries = model.dof() * model.dof() * motion.samples;
+        assert_eq!(array.len(), entries, "a derivative has one entry for two joints and sample");
+    }
+    let BatchWorkspace { level, scratch, tree, .. } = workspace;
+    let Some(coupling) = model.coupling() else {
+        dispatch(*level, Batch { model, scratch, motion, out });
+        return;
+    };
+    let TreeBatch { motion: tree_motion, matrices, .. } = tree;
+    let motion = &expanded(coupling, motion, tree_motion);
+    for matrix in matrices.iter_mut() {
+        matrix.resize(coupling.joints() * motion.q.len(), 0.0);
+    }
+    let tree_out = matrices.each_mut().map(Vec::as_mut_slice);
+    dispatch(*level, Batch { model, scratch, motion, out: tree_out });
+    for (to, from) in out.iter_mut().zip(matrices) {
+        project_matrices(coupling, from, motion.samples, to);
+    }
+}
+
+struct Batch<'a> {
+    model: &'a Model,
+    scratch: &'a mut AnyScratch,
+    motion: &'a JointMotion<'a>,
+    out: [&'a mut [f64]; 3],
+}
+
+impl Kernel for Batch<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Self { model, scratch, motion, mut out } = self;
+        let core = &mut scratch.of::<T>().core;
+        let samples = motion.samples;
+        for at in (0..samples).step_by(T::LANES) {
+            take_lanes(&mut core.q, motion.q, samples, at);
+            take_lanes(&mut core.dq, motion.dq, samples, at);
+            take_lanes(&mut core.ddq, motion.ddq, samples, at);
+            newton_euler_derivatives(model, core);
+            for (out, matrix) in out.iter_mut().zip(&core.matrices) {
+                for (row, value) in out.chunks_exact_mut(samples).zip(matrix) {
+                    put_lanes(*value, row, at);
+                }
+            }
+        }
+    }
+}
+
+one_sample_kernel!((q, dq, ddq), newton_euler_derivatives, by_position: matrices[0], by_velocity: matrices[1], by_acceleration: matrices[2]);
 
 /// From `q`, `dq`, `ddq` of the scratch to its three matrices.
 #[inline(always)]
 pub(crate) fn newton_euler_derivatives<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    crate::mass_matrix::composite_rigid_bodies(model, scratch);
-    scratch.matrices.swap(0, 2);
-    crate::inverse_dynamics::newton_euler(model, scratch);
-    for (slot, by) in [DerivativeBy::Position, DerivativeBy::Velocity].into_iter().enumerate() {
-        scratch.matrices[slot].fill(T::ZERO);
-        for joint in 0..model.body_count() {
-            vary(model, scratch, joint, by, slot);
-        }
+    scratch.hinges.place(model.steps(), &scratch.q);
+    outward(model, scratch);
+    inward(model, scratch);
+}
+
+/// Axes, their rates, and what every body alone contributes.
+#[inline(always)]
+fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+    let steps = model.steps();
+    let joints = steps.len();
+    let hinges = scratch.hinges.placed(joints);
+    let varied = &mut scratch.varied[..joints];
+    let (dq, ddq) = (&scratch.dq[..joints], &scratch.ddq[..joints]);
+    let gravity = Spatial { angular: Vec3::ZERO, linear: (-model.gravity()).splat() };
+    let base = VariedBody { acceleration: gravity, ..VariedBody::REST };
+    for index in 0..joints {
+        let step = &steps[index];
+        let (inner, outer) = varied.split_at_mut(index);
+        let parent = step.parent.map_or(&base, |parent| &inner[parent]);
+        let body = &mut outer[0];
+        let (above, dq, ddq) = (&parent.placement, dq[index], ddq[index]);
+        body.placement.translation = above.point(hinges.translation(step, index));
+        body.placement.rotation = with_hinge!(hinges, *step, index, |hinge| hinge.after(&above.rotation));
+        let Transform { rotation, translation } = &body.placement;
+
+        let direction = Vec3([rotation.0[0][2], rotation.0[1][2], rotation.0[2][2]]);
+        let axis = Spatial::axis(step.turns, direction, *translation);
+        // The parent's velocity and the body's own move the axis alike: S × S = 0.
+        let rate = parent.velocity.cross(&axis);
+        body.velocity = axis.scale_add(dq, &parent.velocity);
+        body.acceleration = axis.scale_add(ddq, &rate.scale_add(dq, &parent.acceleration));
+        body.second_rate = parent.acceleration.cross_add(&axis, &parent.velocity.cross(&rate));
+        body.axis = axis;
+        body.twice_rate = Spatial { angular: rate.angular + rate.angular, linear: rate.linear + rate.linear };
+
+        body.moments = MassMoments::of(step, &body.placement);
+        body.rates = MomentRates::of(&body.moments, &body.velocity);
+        let inertial = body.moments.times(&body.acceleration);
+        body.wrench = body.velocity.cross_dual_add(&body.rates.spatial_momentum(), &inertial);
     }
 }
 
-/// One column of one derivative matrix.
+/// From the tips to the base: what hangs on a joint against all axes on the way to it.
 #[inline(always)]
-fn vary<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>, joint: usize, by: DerivativeBy, slot: usize) {
-    let (maps, dof) = (model.maps(), model.body_count());
-    let CoreScratch { bodies, derivative, matrices, dq, .. } = scratch;
-    // Outward: children of a varied body stand after it, so one sweep from `joint` reaches the subtree.
-    for index in joint..dof {
-        let map = &maps[index];
-        let varied_parent = map.parent.is_some_and(|parent| parent >= joint && is_below(model, joint, parent));
-        if index != joint && !varied_parent {
-            derivative[index] = BodyDerivative::ZERO;
-            continue;
-        }
-        let body = &bodies[index];
-        let Transform { rotation, translation } = &body.parent_from_body;
-        let axis = map.axis.splat::<T>();
-        let own = axis.scale(dq[index]);
-        let mut d = if index == joint {
-            own_variation(model, bodies, index, axis, own, by)
-        } else {
-            let parent = map.parent.unwrap_or(0);
-            let (base, moved) = (&bodies[parent], &derivative[parent]);
-            let swing = moved.alpha.cross_add(
-                *translation,
-                moved.omega.cross_add(
-                    base.omega.cross(*translation),
-                    base.omega.cross_add(moved.omega.cross(*translation), moved.acceleration),
-                ),
-            );
-            let omega = rotation.transpose_mul_vec(moved.omega);
-            let alpha = rotation.transpose_mul_vec(moved.alpha);
-            let acceleration = rotation.transpose_mul_vec(swing);
-            if map.turns {
-                BodyDerivative { omega, alpha: omega.cross_add(own, alpha), acceleration, ..BodyDerivative::ZERO }
-            } else {
-                let coriolis = omega.cross(own);
-                BodyDerivative {
-                    omega,
-                    alpha,
-                    acceleration: acceleration + coriolis + coriolis,
-                    ..BodyDerivative::ZERO
-                }
-            }
-        };
-        (d.force, d.moment) = wrench_variation(&model.inertials()[index], body.omega, &d);
-        derivative[index] = d;
+fn inward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+    let steps = model.steps();
+    let dof = steps.len();
+    let CoreScratch { varied, matrices: [by_position, by_velocity, by_acceleration], .. } = scratch;
+    let varied = &mut varied[..dof];
+    let [by_position, by_velocity, by_acceleration] =
+        [by_position, by_velocity, by_acceleration].map(|matrix| &mut matrix[..dof * dof]);
+    // Joints on different branches do not meet; every entry along a path is written below.
+    for matrix in [&mut *by_position, &mut *by_velocity, &mut *by_acceleration] {
+        matrix.fill(T::ZERO);
     }
-    // Inward over the subtree, then on along the path to the base.
-    for index in (joint..dof).rev() {
-        if index != joint && !is_below(model, joint, index) {
-            continue;
-        }
-        let d = derivative[index];
-        let map = &maps[index];
-        matrices[slot][index * dof + joint] = map.axis.splat::<T>().dot(if map.turns { d.moment } else { d.force });
-        if index == joint {
-            break;
-        }
-        if let Some(parent) = map.parent {
-            let Transform { rotation, translation } = bodies[index].parent_from_body;
-            let force = rotation.mul_vec(d.force);
-            derivative[parent].force += force;
-            derivative[parent].moment =
-                rotation.mul_vec_add(d.moment, translation.cross_add(force, derivative[parent].moment));
-        }
-    }
-    let (mut force, mut moment) = (derivative[joint].force, derivative[joint].moment);
-    let map = &maps[joint];
-    let axis = map.axis.splat::<T>();
-    let mut slide = Vec3::ZERO;
-    if by == DerivativeBy::Position {
-        // The parent sees the child's wrench turned (or carried) by the joint as well.
-        let body = &bodies[joint];
-        if map.turns {
-            force += axis.cross(body.force);
-            moment += axis.cross(body.moment);
-        } else {
-            slide = map.slide.splat::<T>().cross(body.parent_from_body.rotation.mul_vec(body.force));
-        }
-    }
-    let mut at = joint;
-    while let Some(parent) = maps[at].parent {
-        let Transform { rotation, translation } = bodies[at].parent_from_body;
-        force = rotation.mul_vec(force);
-        moment = rotation.mul_vec_add(moment, translation.cross_add(force, slide));
-        slide = Vec3::ZERO;
-        let along: Vec3<T> = maps[parent].axis.splat();
-        matrices[slot][parent * dof + joint] = along.dot(if maps[parent].turns { moment } else { force });
-        at = parent;
-    }
-}
+    for index in (0..dof).rev() {
+        let (inner, outer) = varied.split_at_mut(index);
+        let body = &outer[0];
+        let VariedBody { axis, twice_rate, second_rate, moments, rates, wrench, .. } = body;
+        let held = axis.cross_dual_add(wrench, &Spatial::ZERO);
+        let column_by_position = rates.coriolis_add(twice_rate.angular, &moments.times_add(second_rate, &held));
+        let column_by_velocity = rates.coriolis_add(axis.angular + axis.angular, &moments.times(twice_rate));
+        let column_by_acceleration = moments.times(axis);
+        let row = rates.coriolis_transposed(axis);
+        let twice_row = row + row;
 
-/// True when body `index` moves with `joint` (indices ascend from parent to child).
-#[inline(always)]
-fn is_below(model: &Model, joint: usize, index: usize) -> bool {
-    let mut at = index;
-    while at > joint {
-        match model.maps()[at].parent {
-            Some(parent) => at = parent,
-            None => return false,
+        by_position[index * dof + index] = axis.dot(&column_by_position);
+        by_velocity[index * dof + index] = axis.dot(&column_by_velocity);
+        by_acceleration[index * dof + index] = axis.dot(&column_by_acceleration);
+        let mut link = steps[index].parent;
+        while let Some(at) = link {
+            let above = &inner[at];
+            let (lower, upper) = (index * dof + at, at * dof + index);
+            by_position[upper] = above.axis.dot(&column_by_position);
+            by_velocity[upper] = above.axis.dot(&column_by_velocity);
+            let inertia = above.axis.dot(&column_by_acceleration);
+            by_acceleration[upper] = inertia;
+            by_acceleration[lower] = inertia;
+            by_position[lower] = above.twice_rate.angular.dot(row) + above.second_rate.dot(&column_by_acceleration);
+            by_velocity[lower] = above.axis.angular.dot(twice_row) + above.twice_rate.dot(&column_by_acceleration);
+            link = steps[at].parent;
+        }
+        if let Some(parent) = steps[index].parent {
+            let parent = &mut inner[parent];
+            parent.moments += body.moments;
+            parent.rates += body.rates;
+            parent.wrench += body.wrench;
         }
     }
-    at == joint
-}
-
-/// Variation of body `index`'s motion by its own joint's variable.
-#[inline(always)]
-fn own_variation<T: Scalar>(
-    model: &Model,
-    bodies: &[BodyState<T>],
-    index: usize,
-    axis: Vec3<T>,
-    own: Vec3<T>,
-    by: DerivativeBy,
-) -> BodyDerivative<T> {
-    let map = &model.maps()[index];
-    let body = &bodies[index];
-    let zero = BodyDerivative::ZERO;
-    // Angular velocity that arrives from the parent, in this body's frame.
-    let arriving = if map.turns { body.omega - own } else { body.omega };
-    match (by, map.turns) {
-        (DerivativeBy::Velocity, true) => BodyDerivative { omega: axis, alpha: arriving.cross(axis), ..zero },
-        (DerivativeBy::Velocity, false) => {
-            let coriolis = arriving.cross(axis);
-            BodyDerivative { acceleration: coriolis + coriolis, ..zero }
-        }
-        // Turning the frame by δq turns what arrives by -δq: δ(Rᵀ x) = -axis × Rᵀ x = Rᵀ x × axis.
-        (DerivativeBy::Position, true) => {
-            let omega = arriving.cross(axis);
-            let arriving_alpha = body.alpha - arriving.cross(own);
-            // alpha also holds axis · q̈, which axis × removes.
-            let alpha = omega.cross_add(own, arriving_alpha.cross(axis));
-            BodyDerivative { omega, alpha, acceleration: body.acceleration.cross(axis), ..zero }
-        }
-        // Sliding by δq moves the origin along the axis: δa = α × axis + ω × (ω × axis).
-        (DerivativeBy::Position, false) => {
-            let acceleration = body.omega.cross_add(body.omega.cross(axis), body.alpha.cross(axis));
-            BodyDerivative { acceleration, ..zero }
-        }
-    }
-}
-
-/// Variation of the wrench `f = m a + α × h + ω × (ω × h)`, `n = I α + ω × I ω + h × a` by a variation of the motion.
-#[inline(always)]
-fn wrench_variation<T: Scalar>(
-    inertial: &InertialParameters,
-    omega: Vec3<T>,
-    d: &BodyDerivative<T>,
-) -> (Vec3<T>, Vec3<T>) {
-    let body = Composite::of(inertial);
-    let (h, inertia) = (body.first_moment, body.inertia_matrix());
-    let force = d.omega.cross_add(
-        omega.cross(h),
-        omega.cross_add(d.omega.cross(h), d.alpha.cross_add(h, d.acceleration.scale(body.mass))),
-    );
-    let moment = d.omega.cross_add(
-        inertia.mul_vec(omega),
-        omega.cross_add(inertia.mul_vec(d.omega), inertia.mul_vec_add(d.alpha, h.cross(d.acceleration))),
-    );
-    (force, moment)
 }
 
 #[cfg(test)]
@@ -256,7 +254,7 @@ mod tests {
                 *to = if k == which && index == joint { Dual::variable(value) } else { Dual::constant(value) };
             }
         }
-        crate::inverse_dynamics::newton_euler(model, &mut scratch);
+        crate::body_frames::newton_euler(model, &mut scratch);
         scratch.tau.iter().map(|tau| tau.derivative).collect()
     }
 

@@ -1,15 +1,17 @@
 //! Forward dynamics: the articulated-body algorithm.
 
-use crate::inverse_dynamics::{inertial_wrench, outward};
+use crate::hinge::{Hinge, symmetric, with_hinge};
+use crate::inverse_dynamics::outward;
 use crate::motion_equation::mass_matrix_and_bias;
 use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
-use dynident_model::{Mat3, Model, Transform, Vec3};
+use dynident_model::{Mat3, Model, Vec3};
 
 /// Joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
 ///
-/// Articulated-body algorithm: Featherstone (2008), section 7.3, with the velocity terms taken from the outward
-/// recursion of the inverse dynamics. Allocation-free. Where a joint moves no inertia at all (massless tip), its
+/// Articulated-body algorithm: Featherstone (2008), section 7.3, over the model's inner frames
+/// ([`JointStep`](dynident_model::JointStep)), with the velocity terms taken from the outward recursion of the inverse
+/// dynamics. Allocation-free. Where a joint moves no inertia at all (massless tip), its
 /// acceleration is undefined and comes out infinite or not a number: check [`Model::bodies_without_prior`] first.
 ///
 /// # Panics
@@ -57,11 +59,6 @@ fn of_coupled_joints<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64],
     vector
 }
 
-#[inline(always)]
-fn full<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
-    Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
-}
-
 /// Takes `v wᵀ` (symmetric: w is v times a factor) off a symmetric matrix.
 #[inline(always)]
 fn subtract_outer<T: Scalar>(m: &mut [T; 6], v: Vec3<T>, w: Vec3<T>) {
@@ -83,64 +80,60 @@ fn cross_columns<T: Scalar>(t: Vec3<T>, m: &Mat3<T>) -> Mat3<T> {
     Mat3([[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]])
 }
 
-/// Upper triangle of `R S Rᵀ`, S symmetric.
-#[inline(always)]
-fn rotated<T: Scalar>(r: &Mat3<T>, s: &[T; 6]) -> [T; 6] {
-    let rows = r.mul_mat(&full(s)).0;
-    let entry =
-        |a: usize, b: usize| rows[a][2].mul_add(r.0[b][2], rows[a][1].mul_add(r.0[b][1], rows[a][0] * r.0[b][0]));
-    [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
-}
-
 /// From `q`, `dq`, `tau` of the scratch to its `ddq`.
 #[inline(always)]
 pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let maps = model.maps();
-    scratch.place(maps);
+    let steps = model.steps();
+    let joints = steps.len();
+    scratch.hinges.place(steps, &scratch.q);
+    let hinges = scratch.hinges.placed(joints);
+    let (links, articulated) = (&mut scratch.links[..joints], &mut scratch.articulated[..joints]);
+    let (tau, ddq) = (&scratch.tau[..joints], &mut scratch.ddq[..joints]);
     // With q̈ = 0 the outward recursion gives every body's velocity-dependent and gravity acceleration; the wrench that
     // goes with it is the bias. What is left is linear in the joint accelerations alone.
-    scratch.ddq.fill(T::ZERO);
-    outward(model, scratch);
-    for ((body, articulated), inertial) in
-        scratch.bodies.iter_mut().zip(&mut scratch.articulated).zip(model.inertials())
-    {
-        (body.force, body.moment) = inertial_wrench(inertial, body.omega, body.alpha, body.acceleration);
-        let p = inertial.0.map(T::splat);
-        articulated.rotation = [p[4], p[5], p[6], p[7], p[8], p[9]];
-        articulated.coupling = Mat3::skew(Vec3([p[1], p[2], p[3]]));
-        articulated.mass = [p[0], T::ZERO, T::ZERO, p[0], T::ZERO, p[0]];
+    ddq.fill(T::ZERO);
+    outward(model, hinges, links, &scratch.dq[..joints], ddq);
+    for (own, step) in articulated.iter_mut().zip(steps) {
+        let [xx, xy, xz, yy, yz, zz] = step.second;
+        own.rotation = [yy + zz, -xy, -xz, xx + zz, -yz, xx + yy].map(T::splat);
+        own.coupling = Mat3::skew(step.first.splat());
+        let mass = T::splat(step.mass);
+        own.mass = [mass, T::ZERO, T::ZERO, mass, T::ZERO, mass];
     }
-    for index in (0..maps.len()).rev() {
-        let map = &maps[index];
-        let axis = map.axis.splat::<T>();
-        let (inner, outer) = scratch.bodies.split_at_mut(index);
-        let body = &outer[0];
-        let (inner_inertias, outer_inertias) = scratch.articulated.split_at_mut(index);
+    for index in (0..joints).rev() {
+        let step = &steps[index];
+        let (inner, outer) = links.split_at_mut(index);
+        let link = &outer[0];
+        let (inner_inertias, outer_inertias) = articulated.split_at_mut(index);
         let own = &mut outer_inertias[0];
-        let column = if map.turns {
-            (full(&own.rotation).mul_vec(axis), own.coupling.transpose_mul_vec(axis))
+        let ([j, m], h) = ([own.rotation, own.mass], own.coupling);
+        // Column of the inertia along (about) the joint's axis z: moment, force.
+        let column = if step.turns {
+            (Vec3([j[2], j[4], j[5]]), Vec3(h.0[2]))
         } else {
-            (own.coupling.mul_vec(axis), full(&own.mass).mul_vec(axis))
+            (Vec3([h.0[0][2], h.0[1][2], h.0[2][2]]), Vec3([m[2], m[4], m[5]]))
         };
-        let along = |moment: Vec3<T>, force: Vec3<T>| axis.dot(if map.turns { moment } else { force });
+        let along = |moment: Vec3<T>, force: Vec3<T>| if step.turns { moment[2] } else { force[2] };
         own.inverse_inertia = along(column.0, column.1).recip();
-        own.rest_torque = scratch.tau[index] - along(body.moment, body.force);
-        let Some(parent) = map.parent else { continue };
+        own.rest_torque = tau[index] - along(link.moment, link.force);
+        let Some(parent) = step.parent else { continue };
         // The parent feels the whole inertia and bias, less what the joint gives way. Both are moved to the parent's
         // frame before the one is taken from the other, so that the division above has time: one body's chain of
         // dependent steps is what limits this algorithm.
-        let Transform { rotation: r, translation: t } = &body.parent_from_body;
-        let t = *t;
-        let column_force = r.mul_vec(column.1);
-        let column_moment = t.cross_add(column_force, r.mul_vec(column.0));
-        let force = r.mul_vec(body.force);
-        let moment = t.cross_add(force, r.mul_vec(body.moment));
-        // To the parent's axes, then to its origin: with T = [t]× the blocks become
+        let t = hinges.translation(step, index);
+        let ([column_moment, column_force, moment, force], j, m, h) = with_hinge!(hinges, *step, index, |hinge| {
+            (
+                [column.0, column.1, link.moment, link.force].map(|v| hinge.up(v)),
+                hinge.up_symmetric(&j),
+                hinge.up_symmetric(&m),
+                hinge.up_matrix(&h),
+            )
+        });
+        let column_moment = t.cross_add(column_force, column_moment);
+        let moment = t.cross_add(force, moment);
+        // To the parent's origin: with T = [t]× the blocks become
         // M' = M, H' = H + T M, J' = J + T Hᵀ + H Tᵀ + T M Tᵀ = J + T Hᵀ - H' T (T is skew).
-        let j = rotated(r, &own.rotation);
-        let m = rotated(r, &own.mass);
-        let h = r.mul_mat(&own.coupling).mul_mat(&r.transpose());
-        let h_new = h + cross_columns(t, &full(&m));
+        let h_new = h + cross_columns(t, &symmetric(&m));
         let left = cross_columns(t, &h.transpose());
         // H' T row by row: (row)ᵀ T = -(t × row)ᵀ, so - H' T has rows t × row.
         let right = [t.cross(Vec3(h_new.0[0])), t.cross(Vec3(h_new.0[1])), t.cross(Vec3(h_new.0[2]))];
@@ -149,9 +142,9 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
 
         own.column = (column_moment, column_force);
         let share = own.rest_torque * own.inverse_inertia;
-        let parent_body = &mut inner[parent];
-        parent_body.force += column_force.scale_add(share, force);
-        parent_body.moment += column_moment.scale_add(share, moment);
+        let parent_link = &mut inner[parent];
+        parent_link.force += column_force.scale_add(share, force);
+        parent_link.moment += column_moment.scale_add(share, moment);
         let (moment, force) = (column_moment.scale(own.inverse_inertia), column_force.scale(own.inverse_inertia));
         let parent = &mut inner_inertias[parent];
         for k in 0..6 {
@@ -168,32 +161,24 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         }
     }
     // Outward again, with what the joint accelerations add to each body's acceleration.
-    for index in 0..maps.len() {
-        let map = &maps[index];
-        let axis = map.axis.splat::<T>();
-        let own = &scratch.articulated[index];
-        let (inner, outer) = scratch.bodies.split_at_mut(index);
-        let body = &mut outer[0];
-        let Transform { rotation, translation } = &body.parent_from_body;
-        let (alpha, acceleration, pull) = if let Some(parent) = map.parent {
+    for index in 0..joints {
+        let step = &steps[index];
+        let own = &articulated[index];
+        let (inner, outer) = links.split_at_mut(index);
+        let link = &mut outer[0];
+        let (mut alpha, mut acceleration, pull) = if let Some(parent) = step.parent {
             let parent = &inner[parent];
-            (
-                rotation.transpose_mul_vec(parent.alpha),
-                rotation.transpose_mul_vec(parent.alpha.cross_add(*translation, parent.acceleration)),
-                own.column.0.dot(parent.alpha) + own.column.1.dot(parent.acceleration),
-            )
+            let origin = parent.alpha.cross_add(hinges.translation(step, index), parent.acceleration);
+            let (alpha, acceleration) =
+                with_hinge!(hinges, *step, index, |hinge| (hinge.down(parent.alpha), hinge.down(origin)));
+            (alpha, acceleration, own.column.0.dot(parent.alpha) + own.column.1.dot(parent.acceleration))
         } else {
             (Vec3::ZERO, Vec3::ZERO, T::ZERO)
         };
-        let ddq = (own.rest_torque - pull) * own.inverse_inertia;
-        scratch.ddq[index] = ddq;
+        ddq[index] = (own.rest_torque - pull) * own.inverse_inertia;
         // From here on alpha and acceleration of the bodies hold only what the joint accelerations cause.
-        if map.turns {
-            body.alpha = axis.scale_add(ddq, alpha);
-            body.acceleration = acceleration;
-        } else {
-            body.alpha = alpha;
-            body.acceleration = axis.scale_add(ddq, acceleration);
-        }
+        let along = if step.turns { &mut alpha } else { &mut acceleration };
+        along.0[2] += ddq[index];
+        (link.alpha, link.acceleration) = (alpha, acceleration);
     }
 }

@@ -1,17 +1,19 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
-use crate::states::BodyState;
+use crate::hinge::{Hinge, PlacedHinges, with_hinge};
+use crate::states::LinkState;
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
-use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3};
+use dynident_model::{JointStep, Mat3, Model, Vec3};
 
 /// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without
 /// friction and drives. One entry per joint: Nm for revolute joints, N for prismatic ones.
 ///
 /// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section
-/// 5.3. Allocation-free. Bodies without a prior count as massless: see [`Model::bodies_without_prior`].
+/// 5.3; over the model's inner frames ([`JointStep`]). Allocation-free. Bodies without a prior count as massless: see
+/// [`Model::bodies_without_prior`].
 ///
 /// ```
 /// # use dynident_model::{Body, Joint, JointKind, JointLimits, InertialParameters, Link, Mat3, Model, Transform, Vec3};
@@ -106,103 +108,114 @@ impl Kernel for Batch<'_> {
     }
 }
 
-/// The recursion over any scalar: from `q`, `dq`, `ddq` of the scratch to its `tau`.
+/// From `q`, `dq`, `ddq` of the scratch to its `tau`.
 #[inline(always)]
 pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    scratch.place(model.maps());
+    scratch.hinges.place(model.steps(), &scratch.q);
     newton_euler_placed(model, scratch);
 }
 
-/// The recursion with the transforms in place.
+/// The same with the hinges in place.
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let maps = model.maps();
-    outward(model, scratch);
-    let inertials = model.inertials();
-    for (body, inertial) in scratch.bodies.iter_mut().zip(inertials) {
-        let wrench = inertial_wrench(inertial, body.omega, body.alpha, body.acceleration);
-        body.force = wrench.0;
-        body.moment = wrench.1;
-    }
-    for index in (0..maps.len()).rev() {
-        let (inner, outer) = scratch.bodies.split_at_mut(index);
-        let body = &outer[0];
-        let map = &maps[index];
-        scratch.tau[index] = map.axis.splat().dot(if map.turns { body.moment } else { body.force });
-        if let Some(parent) = map.parent {
-            let Transform { rotation, translation } = &body.parent_from_body;
+    let steps = model.steps();
+    let joints = steps.len();
+    let hinges = scratch.hinges.placed(joints);
+    let links = &mut scratch.links[..joints];
+    outward(model, hinges, links, &scratch.dq[..joints], &scratch.ddq[..joints]);
+    let tau = &mut scratch.tau[..joints];
+    for index in (0..joints).rev() {
+        let step = &steps[index];
+        let (inner, outer) = links.split_at_mut(index);
+        let link = &outer[0];
+        tau[index] = if step.turns { link.moment[2] } else { link.force[2] };
+        if let Some(parent) = step.parent {
             let parent = &mut inner[parent];
-            let force = rotation.mul_vec(body.force);
+            let (force, moment) =
+                with_hinge!(hinges, *step, index, |hinge| (hinge.up(link.force), hinge.up(link.moment)));
             parent.force += force;
-            parent.moment = translation.cross_add(force, rotation.mul_vec_add(body.moment, parent.moment));
+            parent.moment = hinges.translation(step, index).cross_add(force, parent.moment) + moment;
         }
     }
 }
 
-/// Outward recursion: angular velocity, angular acceleration and acceleration minus gravity of every body from `dq`,
-/// `ddq` and the transforms.
+/// Outward: motion of every body, and the wrench that it needs by itself.
 #[inline(always)]
-pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let gravity = -model.gravity();
-    for (index, map) in model.maps().iter().enumerate() {
-        let (inner, outer) = scratch.bodies.split_at_mut(index);
-        let parent = map.parent.map(|parent| &inner[parent]);
-        moved(map, parent, gravity, scratch.dq[index], scratch.ddq[index], &mut outer[0]);
-    }
-}
-
-/// One step outward: the motion of a body from its parent's, at the transform that stands in `body`. `gravity` is the
-/// base's acceleration against gravity.
-#[inline(always)]
-pub(crate) fn moved<T: Scalar>(
-    map: &JointMap,
-    parent: Option<&BodyState<T>>,
-    gravity: Vec3,
-    dq: T,
-    ddq: T,
-    body: &mut BodyState<T>,
+pub(crate) fn outward<T: Scalar>(
+    model: &Model,
+    hinges: PlacedHinges<'_, T>,
+    links: &mut [LinkState<T>],
+    dq: &[T],
+    ddq: &[T],
 ) {
-    let Transform { rotation, translation } = &body.parent_from_body;
-    let translation = *translation;
-    let axis = map.axis.splat::<T>();
-    let (omega, alpha, acceleration) = if let Some(parent) = parent {
-        let swing = parent
-            .omega
-            .cross_add(parent.omega.cross(translation), parent.alpha.cross_add(translation, parent.acceleration));
-        (
-            rotation.transpose_mul_vec(parent.omega),
-            rotation.transpose_mul_vec(parent.alpha),
-            rotation.transpose_mul_vec(swing),
-        )
-    } else {
-        (Vec3::ZERO, Vec3::ZERO, rotation.transpose_mul_vec(gravity.splat()))
-    };
-    let own = axis.scale(dq);
-    if map.turns {
-        body.omega = omega + own;
-        body.alpha = axis.scale_add(ddq, omega.cross_add(own, alpha));
-        body.acceleration = acceleration;
-    } else {
-        body.omega = omega;
-        body.alpha = alpha;
-        let coriolis = omega.cross(own);
-        body.acceleration = axis.scale_add(ddq, acceleration + coriolis + coriolis);
+    let steps = model.steps();
+    let joints = links.len();
+    let (steps, dq, ddq) = (&steps[..joints], &dq[..joints], &ddq[..joints]);
+    let base = LinkState { acceleration: (-model.gravity()).splat(), ..LinkState::REST };
+    for index in 0..joints {
+        let step = &steps[index];
+        let (inner, outer) = links.split_at_mut(index);
+        let parent = step.parent.map_or(&base, |parent| &inner[parent]);
+        let translation = hinges.translation(step, index);
+        // The parent's acceleration comes last: it is what takes longest to arrive.
+        let origin = parent.spin.mul_vec(translation) + parent.acceleration;
+        let arriving = with_hinge!(hinges, *step, index, |hinge| {
+            [hinge.down(parent.omega), hinge.down(parent.alpha), hinge.down(origin)]
+        });
+        let link = &mut outer[0];
+        moved(step, arriving, dq[index], ddq[index], link);
+        (link.force, link.moment) = wrench(step, link);
     }
 }
 
-/// Force and moment (about the frame origin) that move a body: `f = m a + α × h + ω × (ω × h)` and
-/// `n = I α + ω × I ω + h × a` with `h = m r`, `a` the acceleration of the origin.
+/// One step outward, from angular velocity, angular acceleration and acceleration that arrive from the parent. A point
+/// `x` of a body has the acceleration `a + Γ x` with the spin `Γ = [α]× + [ω]× [ω]×`.
 #[inline(always)]
-pub(crate) fn inertial_wrench<T: Scalar>(
-    inertial: &InertialParameters,
-    omega: Vec3<T>,
-    alpha: Vec3<T>,
-    acceleration: Vec3<T>,
-) -> (Vec3<T>, Vec3<T>) {
-    let p = inertial.0.map(T::splat);
-    let first_moment = Vec3([p[1], p[2], p[3]]);
-    let inertia = Mat3([[p[4], p[5], p[6]], [p[5], p[7], p[8]], [p[6], p[8], p[9]]]);
-    let force = omega.cross_add(omega.cross(first_moment), alpha.cross_add(first_moment, acceleration.scale(p[0])));
-    let moment = omega.cross_add(inertia.mul_vec(omega), inertia.mul_vec_add(alpha, first_moment.cross(acceleration)));
-    (force, moment)
+fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T, link: &mut LinkState<T>) {
+    let [mut omega, mut alpha, mut acceleration] = arriving;
+    let [wx, wy, _] = omega.0;
+    if step.turns {
+        // ω × z q̇
+        alpha = Vec3([wy.mul_add(dq, alpha[0]), wx.neg_mul_add(dq, alpha[1]), alpha[2] + ddq]);
+        omega.0[2] += dq;
+    } else {
+        let twice = dq + dq;
+        let [x, y, z] = acceleration.0;
+        acceleration = Vec3([wy.mul_add(twice, x), wx.neg_mul_add(twice, y), z + ddq]);
+    }
+    let ([wx, wy, wz], [ax, ay, az]) = (omega.0, alpha.0);
+    let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
+    let spin = Mat3([
+        [-(yy + zz), wx.mul_add(wy, -az), wx.mul_add(wz, ay)],
+        [wx.mul_add(wy, az), -(xx + zz), wy.mul_add(wz, -ax)],
+        [wx.mul_add(wz, -ay), wy.mul_add(wz, ax), -(xx + yy)],
+    ]);
+    (link.omega, link.alpha, link.acceleration, link.spin) = (omega, alpha, acceleration, spin);
+}
+
+/// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x is `Γ_z Σ_y - Γ_y Σ_z` and so on
+/// with the rows of Γ and of the second moment Σ.
+#[inline(always)]
+fn wrench<T: Scalar>(step: &JointStep, link: &LinkState<T>) -> (Vec3<T>, Vec3<T>) {
+    let g = &link.spin.0;
+    let [ax, ay, az] = link.acceleration.0;
+    let [hx, hy, hz] = step.first.splat::<T>().0;
+    let [xx, xy, xz, yy, yz, zz] = step.second.map(T::splat);
+    // Turning bodies have neither mass nor first and second moment along the axis: see JointStep.
+    let force = |k: usize| g[k][1].mul_add(hy, g[k][0] * hx);
+    let mut f = Vec3([force(0), force(1), force(2)]);
+    let mut n = Vec3([hy * az, -(hx * az), hx.mul_add(ay, -(hy * ax))]);
+    n.0[0] = g[1][1].neg_mul_add(yz, g[1][0].neg_mul_add(xz, n[0]));
+    n.0[0] = g[2][2].mul_add(yz, g[2][1].mul_add(yy, g[2][0].mul_add(xy, n[0])));
+    n.0[1] = g[2][2].neg_mul_add(xz, g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, n[1])));
+    n.0[1] = g[0][1].mul_add(yz, g[0][0].mul_add(xz, n[1]));
+    n.0[2] = g[1][2].mul_add(xz, g[1][1].mul_add(xy, g[1][0].mul_add(xx, n[2])));
+    n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, g[0][0].neg_mul_add(xy, n[2])));
+    if !step.turns {
+        let along = Vec3([g[0][2], g[1][2], g[2][2]]);
+        f = link.acceleration.scale_add(T::splat(step.mass), along.scale_add(hz, f));
+        n.0[0] = g[1][2].neg_mul_add(zz, hz.neg_mul_add(ay, n[0]));
+        n.0[1] = g[0][2].mul_add(zz, hz.mul_add(ax, n[1]));
+    }
+    (f, n)
 }

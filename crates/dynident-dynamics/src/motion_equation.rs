@@ -1,10 +1,10 @@
 //! Both sides of the equation of motion at once, for simulation.
 
 use crate::inverse_dynamics::newton_euler_placed;
-use crate::mass_matrix::composite_rigid_bodies_placed;
+use crate::mass_matrix::{composite_rigid_bodies, put_matrix};
 use crate::tree_scratch::TreeScratch;
-use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
-use dynident_lanes::{Scalar, dispatch_single};
+use crate::workspace::{AnyScratch, Scratch, Workspace, take};
+use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::Model;
 
 /// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias =
@@ -14,7 +14,7 @@ use dynident_model::Model;
 /// without acceleration, with the transforms of the joints made once. Allocation-free.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another size.
+/// If a vector's length is not the number of joints, or the workspace was made for another tree.
 #[doc(alias("nonlinear effects", "coriolis", "nle"))]
 pub fn mass_matrix_and_bias<'w>(
     model: &Model,
@@ -23,6 +23,7 @@ pub fn mass_matrix_and_bias<'w>(
     dq: &[f64],
 ) -> (&'w [f64], &'w [f64]) {
     workspace.check(model, &[q, dq]);
+    workspace.check_tree(model);
     let Workspace { level, scratch, vector, matrices, tree, .. } = workspace;
     let matrix = &mut matrices[0];
     if let Some(coupling) = model.coupling() {
@@ -39,13 +40,29 @@ pub fn mass_matrix_and_bias<'w>(
     (&matrices[0], vector)
 }
 
-one_sample_kernel!((q, dq), bias_and_mass, bias: tau, matrix: matrices[0]);
+struct Single<'a> {
+    model: &'a Model,
+    scratch: &'a mut AnyScratch,
+    q: &'a [f64],
+    dq: &'a [f64],
+    matrix: &'a mut [f64],
+    bias: &'a mut [f64],
+}
 
-/// From `q` and `dq` of the scratch to its `tau` and its first matrix.
-#[inline(always)]
-fn bias_and_mass<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    scratch.ddq.fill(T::ZERO);
-    scratch.place(model.maps());
-    newton_euler_placed(model, scratch);
-    composite_rigid_bodies_placed(model, scratch);
+impl Kernel for Single<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Scratch { core, columns, .. } = self.scratch.of::<T>();
+        take(&mut core.q, self.q);
+        take(&mut core.dq, self.dq);
+        core.ddq.fill(T::ZERO);
+        core.hinges.place(self.model.steps(), &core.q);
+        newton_euler_placed(self.model, core);
+        for (to, from) in self.bias.iter_mut().zip(&core.tau) {
+            *to = from.lane(0);
+        }
+        composite_rigid_bodies(self.model, core, columns);
+        put_matrix(columns, self.matrix);
+    }
 }

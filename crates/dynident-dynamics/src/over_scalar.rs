@@ -1,7 +1,6 @@
 //! The algorithms over a scalar of the caller's own: dual numbers, intervals, symbols of a program to be written.
 
-use crate::inverse_dynamics::newton_euler;
-use crate::mass_matrix::composite_rigid_bodies;
+use crate::body_frames::{composite_rigid_bodies, newton_euler};
 use crate::workspace::CoreScratch;
 use dynident_lanes::Scalar;
 use dynident_model::Model;

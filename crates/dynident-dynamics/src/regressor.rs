@@ -6,7 +6,7 @@
 //! with the bodies (Atkeson, An and Hollerbach 1986 in the form of Featherstone's spatial vectors), so a serial arm
 //! costs one small rotation and one 6 × 10 product per pair.
 
-use crate::inverse_dynamics::outward;
+use crate::body_frames::outward;
 use crate::states::AxisScratch;
 use crate::tree_scratch::TreeScratch;
 use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};

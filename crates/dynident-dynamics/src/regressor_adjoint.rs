@@ -7,7 +7,7 @@
 //! frame to frame, and what each joint's turning or sliding changes on the way is the derivative by its position.
 //! One sweep gives all derivatives, at about twice the cost of the regressor.
 
-use crate::inverse_dynamics::outward;
+use crate::body_frames::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
 use crate::states::{AdjointScratch, BodyAdjoint};
 use crate::tree_scratch::{TreeBatch, expanded};
@@ -51,7 +51,7 @@ pub fn regressor_panels_adjoint(
     assert_eq!(adjoint.samples(), motion.samples, "one row of derivatives per sample");
     let BatchWorkspace { level, scratch, tree, .. } = workspace;
     let samples = motion.samples;
-    let TreeBatch { motion: tree_motion, results, panels: buffers } = tree;
+    let TreeBatch { motion: tree_motion, results, panels: buffers, .. } = tree;
     let mut tree_adjoint = Panels::in_buffers(core::mem::take(buffers));
     if let (Some(coupling), Some(layout)) = (model.coupling(), layout.scattered(adjoint, &mut tree_adjoint)) {
         let motion = &expanded(coupling, motion, tree_motion);
@@ -326,7 +326,7 @@ mod tests {
                     *to = if varied { Dual::variable(value) } else { Dual::constant(value) };
                 }
             }
-            crate::inverse_dynamics::newton_euler(&model, &mut scratch);
+            crate::body_frames::newton_euler(&model, &mut scratch);
             sum += scratch.tau[row].derivative;
         }
         sum

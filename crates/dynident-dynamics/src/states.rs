@@ -1,6 +1,7 @@
 //! What each algorithm keeps for each body while it runs: plain numbers, no rules. The rules are in the algorithms' own
 //! files.
 
+use crate::ground::{MassMoments, MomentRates, Spatial};
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
@@ -32,6 +33,32 @@ impl<T: Scalar> BodyState<T> {
     };
 }
 
+/// A body in its inner frame ([`dynident_model::JointStep`]) while the inverse dynamics run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinkState<T> {
+    pub(crate) omega: Vec3<T>,
+    pub(crate) alpha: Vec3<T>,
+    /// Of the frame's origin, minus gravity.
+    pub(crate) acceleration: Vec3<T>,
+    /// `[α]× + [ω]× [ω]×`.
+    pub(crate) spin: Mat3<T>,
+    /// Force on the body (with everything that hangs on it).
+    pub(crate) force: Vec3<T>,
+    /// Moment about the frame's origin.
+    pub(crate) moment: Vec3<T>,
+}
+
+impl<T: Scalar> LinkState<T> {
+    pub(crate) const REST: Self = Self {
+        omega: Vec3::ZERO,
+        alpha: Vec3::ZERO,
+        acceleration: Vec3::ZERO,
+        spin: Mat3::ZERO,
+        force: Vec3::ZERO,
+        moment: Vec3::ZERO,
+    };
+}
+
 /// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ
 /// α + mass a`; and what its joint needs of it.
 #[derive(Clone, Copy, Debug)]
@@ -58,19 +85,38 @@ impl<T: Scalar> ArticulatedInertia<T> {
     };
 }
 
-/// Variation of a body's motion and wrench by one joint variable.
+/// What the derivatives of the inverse dynamics need of a body, all in the base's frame. Inertia and wrench are the
+/// body's own at first, then those of everything that moves with it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BodyDerivative<T> {
-    pub(crate) omega: Vec3<T>,
-    pub(crate) alpha: Vec3<T>,
-    pub(crate) acceleration: Vec3<T>,
-    pub(crate) force: Vec3<T>,
-    pub(crate) moment: Vec3<T>,
+pub(crate) struct VariedBody<T> {
+    /// `base_from_body`.
+    pub(crate) placement: Transform<T>,
+    pub(crate) velocity: Spatial<T>,
+    /// Minus gravity.
+    pub(crate) acceleration: Spatial<T>,
+    /// The joint's axis `S` as a twist.
+    pub(crate) axis: Spatial<T>,
+    /// `2 Ψ̇ = 2 v × S`: how the axis moves.
+    pub(crate) twice_rate: Spatial<T>,
+    /// `Ψ̈ = a × S + v × Ψ̇`, with velocity and acceleration of the parent.
+    pub(crate) second_rate: Spatial<T>,
+    pub(crate) moments: MassMoments<T>,
+    pub(crate) rates: MomentRates<T>,
+    pub(crate) wrench: Spatial<T>,
 }
 
-impl<T: Scalar> BodyDerivative<T> {
-    pub(crate) const ZERO: Self =
-        Self { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO, force: Vec3::ZERO, moment: Vec3::ZERO };
+impl<T: Scalar> VariedBody<T> {
+    pub(crate) const REST: Self = Self {
+        placement: Transform::IDENTITY,
+        velocity: Spatial::ZERO,
+        acceleration: Spatial::ZERO,
+        axis: Spatial::ZERO,
+        twice_rate: Spatial::ZERO,
+        second_rate: Spatial::ZERO,
+        moments: MassMoments::ZERO,
+        rates: MomentRates::ZERO,
+        wrench: Spatial::ZERO,
+    };
 }
 
 /// The axes of all joints on the way to each body, as twists at the body's frame, several to a bundle.

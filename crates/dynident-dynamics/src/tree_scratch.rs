@@ -54,6 +54,8 @@ pub(crate) struct TreeBatch {
     pub(crate) motion: [Vec<f64>; 3],
     /// Torques; or derivatives by the motion.
     pub(crate) results: [Vec<f64>; 3],
+    /// Square matrices over the joints of the tree, entry by entry.
+    pub(crate) matrices: [Vec<f64>; 3],
     /// One panel of the regressor for each joint of the tree.
     pub(crate) panels: Vec<AlignedBuffer>,
 }
@@ -76,4 +78,23 @@ pub(crate) fn expanded<'r>(
     }
     let [q, dq, ddq] = room;
     JointMotion { samples, q, dq, ddq }
+}
+
+/// `Gᵀ A G` of the matrices of `samples` samples, entry by entry as [`crate::mass_matrix_batch`] has them.
+pub(crate) fn project_matrices(coupling: &JointCoupling, tree: &[f64], samples: usize, out: &mut [f64]) {
+    let (joints, dof) = (coupling.joints(), coupling.dof());
+    out.fill(0.0);
+    for row in 0..joints {
+        for column in 0..joints {
+            let from = &tree[(row * joints + column) * samples..][..samples];
+            for &(a, share_a) in coupling.row(row) {
+                for &(b, share_b) in coupling.row(column) {
+                    let to = &mut out[(a * dof + b) * samples..][..samples];
+                    for (to, from) in to.iter_mut().zip(from) {
+                        *to += share_a * share_b * from;
+                    }
+                }
+            }
+        }
+    }
 }

@@ -1,7 +1,9 @@
 //! Scratch memory of the algorithms: one per thread, allocated once.
 
+use crate::columns::ColumnScratch;
 use crate::composite::Composite;
-use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyDerivative, BodyState};
+use crate::hinge::Hinges;
+use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkState, VariedBody};
 use crate::tree_scratch::{TreeBatch, TreeScratch};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
@@ -11,6 +13,8 @@ use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 #[derive(Debug)]
 pub(crate) struct Scratch<T: Lane> {
     pub(crate) core: CoreScratch<T>,
+    /// Columns of the mass matrix, in bundles.
+    pub(crate) columns: ColumnScratch<T>,
     /// Ancestor axes of the torque regressor, in bundles.
     pub(crate) axes: AxisScratch<T>,
     /// Of the regressor's reverse sweep.
@@ -29,7 +33,11 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) bodies: Vec<BodyState<T>>,
     pub(crate) composites: Vec<Composite<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia<T>>,
-    pub(crate) derivative: Vec<BodyDerivative<T>>,
+    pub(crate) hinges: Hinges<T>,
+    pub(crate) links: Vec<LinkState<T>>,
+    /// First and second moments of composite bodies.
+    pub(crate) moments: Vec<(Vec3<T>, [T; 6])>,
+    pub(crate) varied: Vec<VariedBody<T>>,
     /// Square matrices over the joints of the tree, row-major.
     pub(crate) matrices: [Vec<T>; 3],
 }
@@ -47,7 +55,10 @@ impl<T: Scalar> CoreScratch<T> {
             bodies: vec![BodyState::REST; dof],
             composites: vec![Composite::ZERO; dof],
             articulated: vec![ArticulatedInertia::ZERO; dof],
-            derivative: vec![BodyDerivative::ZERO; dof],
+            hinges: Hinges::new(dof),
+            links: vec![LinkState::REST; dof],
+            moments: vec![(Vec3::ZERO, [T::ZERO; 6]); dof],
+            varied: vec![VariedBody::REST; dof],
             matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
         }
     }
@@ -128,6 +139,7 @@ impl Kernel for MakeScratch<'_> {
     fn run<T: Lane>(self) -> AnyScratch {
         AnyScratch(Box::new(Scratch::<T> {
             core: CoreScratch::new(self.0.body_count()),
+            columns: ColumnScratch::new(self.0),
             axes: AxisScratch::new(self.0),
             adjoint: AdjointScratch::new(self.0),
         }))

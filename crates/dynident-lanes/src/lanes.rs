@@ -128,6 +128,7 @@ impl<R: Register, B> SubAssign for Wide<R, B> {
 impl<R: Register, B: Register> Scalar for Wide<R, B> {
     const ZERO: Self = Self::of(R::ZERO);
     const ONE: Self = Self::of(R::ONE);
+    const ANGLES_AT_ONCE: usize = Self::PER_BUNDLE;
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -154,28 +155,44 @@ impl<R: Register, B: Register> Scalar for Wide<R, B> {
     fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {
         // A bundle takes several angles at once; where it holds one, this is the plain loop.
         let count = angles.len().min(sines.len()).min(cosines.len());
+        let (angles, sines, cosines) = (&angles[..count], &mut sines[..count], &mut cosines[..count]);
+        let whole = count - count % Self::PER_BUNDLE;
         let mut start = 0;
-        while start < count {
-            let end = (start + Self::PER_BUNDLE).min(count);
-            let mut packed = [0.0; 8];
-            for (k, angle) in angles[start..end].iter().enumerate() {
-                angle.store(&mut packed[k * R::LANES..]);
-            }
-            let (mut sine, mut cosine) = ([0.0; 8], [0.0; 8]);
-            let (s, c) = sin_cos(B::load(&packed));
-            s.store(&mut sine);
-            c.store(&mut cosine);
-            for k in 0..end - start {
-                sines[start + k] = Self::load(&sine[k * R::LANES..]);
-                cosines[start + k] = Self::load(&cosine[k * R::LANES..]);
-            }
+        while start < whole {
+            // As many as a constant says: no inner loop is left.
+            let end = start + Self::PER_BUNDLE;
+            sin_cos_bundle(&angles[start..end], &mut sines[start..end], &mut cosines[start..end]);
             start = end;
+        }
+        if whole < count {
+            sin_cos_bundle(&angles[whole..], &mut sines[whole..], &mut cosines[whole..]);
         }
     }
 
     #[inline(always)]
     fn recip(self) -> Self {
         Self::of(R::ONE.div(self.0))
+    }
+}
+
+/// Sines and cosines of as many angles as one bundle holds, or fewer.
+#[inline(always)]
+fn sin_cos_bundle<R: Register, B: Register>(
+    angles: &[Wide<R, B>],
+    sines: &mut [Wide<R, B>],
+    cosines: &mut [Wide<R, B>],
+) {
+    let mut packed = [0.0; 8];
+    for (k, angle) in angles.iter().enumerate() {
+        angle.store(&mut packed[k * R::LANES..]);
+    }
+    let (mut sine, mut cosine) = ([0.0; 8], [0.0; 8]);
+    let (s, c) = sin_cos(B::load(&packed));
+    s.store(&mut sine);
+    c.store(&mut cosine);
+    for (k, (sin, cos)) in sines.iter_mut().zip(cosines).enumerate() {
+        *sin = Wide::load(&sine[k * R::LANES..]);
+        *cos = Wide::load(&cosine[k * R::LANES..]);
     }
 }
 

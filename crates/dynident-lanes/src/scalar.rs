@@ -39,6 +39,9 @@ pub trait Scalar:
     /// `1 / self`.
     fn recip(self) -> Self;
 
+    /// How many angles [`sin_cos_all`](Scalar::sin_cos_all) takes in one step: whole multiples cost least.
+    const ANGLES_AT_ONCE: usize = 1;
+
     /// [`sin_cos`](Scalar::sin_cos) of every angle; the shorter of the three slices ends it.
     #[inline(always)]
     fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {

@@ -6,6 +6,7 @@ use crate::error::ModelError;
 use crate::inertial::InertialParameters;
 use crate::joint::{Joint, JointMap, Mimic};
 use crate::spatial::{Mat3, Transform, Vec3};
+use crate::steps::{JointStep, steps};
 
 /// Standard gravity of the tools of this field (Pinocchio, MuJoCo, URDF simulators), m/s², along -z of the base.
 pub const STANDARD_GRAVITY: Vec3 = Vec3([0.0, 0.0, -9.81]);
@@ -65,6 +66,7 @@ pub struct Model {
     base: Body,
     maps: Vec<JointMap>,
     inertials: Vec<InertialParameters>,
+    steps: Vec<JointStep>,
 }
 
 impl Model {
@@ -104,7 +106,8 @@ impl Model {
                 }
             }
         }
-        let inertials = bodies.iter().map(|body| body.prior().unwrap_or(InertialParameters::ZERO)).collect();
+        let inertials: Vec<_> = bodies.iter().map(|body| body.prior().unwrap_or(InertialParameters::ZERO)).collect();
+        let steps = steps(&joints, &inertials);
         let maps = joints.iter().map(Joint::map).collect();
         let tree = joints;
         let coupling = JointCoupling::of(&tree)?;
@@ -113,7 +116,7 @@ impl Model {
             |coupling| coupling.driving().iter().map(|&joint| tree[joint].clone()).collect(),
         );
         let gravity = STANDARD_GRAVITY;
-        Ok(Self { name: name.to_owned(), gravity, tree, joints, coupling, bodies, base, maps, inertials })
+        Ok(Self { name: name.to_owned(), gravity, tree, joints, coupling, bodies, base, maps, inertials, steps })
     }
 
     /// The robot's name.
@@ -181,6 +184,11 @@ impl Model {
     /// The joints' numbers, prepared for the algorithms; same order as [`tree_joints`](Model::tree_joints).
     pub fn maps(&self) -> &[JointMap] {
         &self.maps
+    }
+
+    /// Joints and bodies in the form that costs the dynamics least; same order as [`tree_joints`](Model::tree_joints).
+    pub fn steps(&self) -> &[JointStep] {
+        &self.steps
     }
 
     /// The moving bodies; body `i` hangs on joint `i` of the tree.
@@ -282,6 +290,7 @@ impl Model {
             body.links[0].inertial = Some(*inertial);
         }
         model.inertials = inertials.to_vec();
+        model.steps = steps(&model.tree, inertials);
         Ok(model)
     }
 

@@ -2,11 +2,15 @@
 
 use super::clock::Report;
 use super::motion::{Motion, STATES};
-use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, all_columns, inverse_dynamics_batch, regressor_panels};
+use dynident_dynamics::{
+    BatchWorkspace, DerivativeArrays, PanelLayout, Panels, all_columns, inverse_dynamics_batch,
+    inverse_dynamics_derivatives_batch, mass_matrix_batch, regressor_panels,
+};
 use dynident_model::Model;
 use std::hint::black_box;
 
-/// Times inverse dynamics and the whole regressor (ten columns for every body of every joint) in batches.
+/// Times inverse dynamics, mass matrix, derivatives and the whole regressor (ten columns for every body of every joint)
+/// in batches.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>, block: usize) {
     let blocks = Motion::random(model, STATES / block * block).blocks(block);
     let samples = blocks.len() * block;
@@ -16,6 +20,21 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>, block: usize) {
         for block in &blocks {
             inverse_dynamics_batch(model, &mut workspace, &block.view(), &mut tau);
             black_box(&tau);
+        }
+    });
+    let mut matrices = [(); 3].map(|()| vec![0.0; model.dof() * tau.len()]);
+    report.time("crba_batch", samples, || {
+        for motion in &blocks {
+            mass_matrix_batch(model, &mut workspace, &motion.q, block, &mut matrices[0]);
+            black_box(&matrices);
+        }
+    });
+    report.time("rnea_derivatives_batch", samples, || {
+        for motion in &blocks {
+            let [by_position, by_velocity, by_acceleration] = &mut matrices;
+            let out = DerivativeArrays { by_position, by_velocity, by_acceleration };
+            inverse_dynamics_derivatives_batch(model, &mut workspace, &motion.view(), out);
+            black_box(&matrices);
         }
     });
     let layout = PanelLayout::new(model, all_columns(model, &[]));

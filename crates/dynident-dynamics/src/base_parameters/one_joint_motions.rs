@@ -7,8 +7,8 @@
 //! fourth power for [`numerical_rank`](super::numerical_rank)).
 
 use super::{NumericalRank, numerical_rank};
+use crate::body_frames::{inertial_wrench, moved};
 use crate::independent_columns::independent_regressor_columns;
-use crate::inverse_dynamics::{inertial_wrench, moved};
 use crate::states::BodyState;
 use crate::workspace::joint_transform;
 use dynident_model::sample::Random;

@@ -18,8 +18,8 @@
 //! inertias, couplings and offsets join as constants in single entries.
 
 use super::own_units::OwnUnits;
+use crate::body_frames::inertial_wrench;
 use crate::independent_columns::{Columns, IndependentColumns, split_columns};
-use crate::inverse_dynamics::inertial_wrench;
 use dynident_model::terms::{MotionFunction, TorqueTerm};
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
 use nalgebra::{DVector, Matrix6, SMatrix, SVector};

@@ -15,15 +15,15 @@ use dynident_model::{Mimic, MimicSource, Model};
 /// Two ways of summing the same products over some ten bodies, in double precision.
 const ROUNDING: f64 = 1e-11;
 
-struct Case {
-    model: Model,
-    q: Vec<f64>,
-    dq: Vec<f64>,
-    ddq: Vec<f64>,
+pub(crate) struct Case {
+    pub(crate) model: Model,
+    pub(crate) q: Vec<f64>,
+    pub(crate) dq: Vec<f64>,
+    pub(crate) ddq: Vec<f64>,
 }
 
 /// Random trees, and as many some of whose joints follow others.
-fn cases() -> impl Iterator<Item = Case> {
+pub(crate) fn cases() -> impl Iterator<Item = Case> {
     (0..120).map(|case| {
         let seed = case / 2;
         let mut random = Random::new(1000 + seed);

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod base_parameters;
+mod batches;
 mod coupled_joints;
 mod golden;
 mod golden_base_parameters;

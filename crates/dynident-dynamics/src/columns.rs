@@ -1,0 +1,88 @@
+//! Where the composite-rigid-body algorithm keeps its columns: one wrench for each joint, several to a bundle.
+//!
+//! The columns of a run of joints without branches stand side by side in the order of the joints, and every run begins
+//! a bundle of its own; behind a run stand the runs that hang on it. So the columns of a joint's subtree fill whole
+//! bundles, one after the other, but for lanes of joints further in, whose columns do not exist yet and are zero.
+
+use dynident_lanes::Lane;
+use dynident_model::{Model, Vec3};
+
+/// Columns of all joints, and what they give.
+#[derive(Debug)]
+pub(crate) struct ColumnScratch<T: Lane> {
+    /// Bundle and place in it of each joint's column.
+    pub(crate) place: Vec<(usize, usize)>,
+    /// One past the last bundle of each joint's subtree; the first is the joint's own.
+    pub(crate) end: Vec<usize>,
+    pub(crate) force: Vec<Vec3<T::Bundle>>,
+    pub(crate) moment: Vec<Vec3<T::Bundle>>,
+    /// A row of bundles for each joint: work of the columns of its subtree on its axis.
+    pub(crate) rows: Vec<f64>,
+    /// Of all joints and those on the way to them: where the work stands in `rows`, and the two entries of the matrix.
+    pub(crate) entries: Vec<Entry>,
+    is_one_run: bool,
+}
+
+/// One entry of the mass matrix and its mirror image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    pub(crate) work: usize,
+    pub(crate) upper: usize,
+    pub(crate) lower: usize,
+}
+
+impl<T: Lane> ColumnScratch<T> {
+    pub(crate) fn new(model: &Model) -> Self {
+        let joints = model.body_count();
+        let parents: Vec<Option<usize>> = model.maps().iter().map(|map| map.parent).collect();
+        let children = |of: Option<usize>| (0..joints).filter(|&joint| parents[joint] == of).collect::<Vec<_>>();
+        let (mut place, mut bundles) = (vec![(0, 0); joints], 0);
+        let mut runs = children(None);
+        runs.reverse();
+        while let Some(start) = runs.pop() {
+            let (mut joint, mut count) = (start, 0);
+            loop {
+                place[joint] = (bundles + count / T::PER_BUNDLE, count % T::PER_BUNDLE);
+                count += 1;
+                let next = children(Some(joint));
+                if let [only] = next[..] {
+                    joint = only;
+                } else {
+                    runs.extend(next.into_iter().rev());
+                    break;
+                }
+            }
+            bundles += count.div_ceil(T::PER_BUNDLE);
+        }
+        let mut end: Vec<usize> = place.iter().map(|place| place.0 + 1).collect();
+        for joint in (0..joints).rev() {
+            if let Some(parent) = parents[joint] {
+                end[parent] = end[parent].max(end[joint]);
+            }
+        }
+        let lanes = <T::Bundle as Lane>::LANES;
+        let mut entries = Vec::new();
+        for joint in 0..joints {
+            let (bundle, at) = place[joint];
+            entries.extend(model.path(joint).into_iter().map(|row| Entry {
+                work: (row * bundles + bundle) * lanes + at * T::LANES,
+                upper: row * joints + joint,
+                lower: joint * joints + row,
+            }));
+        }
+        Self {
+            place,
+            end,
+            force: vec![Vec3::ZERO; bundles],
+            moment: vec![Vec3::ZERO; bundles],
+            rows: vec![0.0; joints * bundles * lanes],
+            entries,
+            is_one_run: (1..joints).all(|joint| parents[joint] == Some(joint - 1)),
+        }
+    }
+
+    /// True on a serial arm: every joint hangs on the one before.
+    pub(crate) fn is_one_run(&self) -> bool {
+        self.is_one_run
+    }
+}

@@ -1,0 +1,240 @@
+//! From frame to frame over one joint, by the steps of the model ([`JointStep`]): axes are z, and most constant
+//! rotations are none or a quarter turn about x, so that turning a vector takes four products in place of nine.
+
+use dynident_lanes::{Lane, Scalar};
+use dynident_model::{JointStep, Mat3, Vec3};
+
+/// The rotation `parent_from_body` of one joint at its position.
+pub(crate) trait Hinge<T: Scalar>: Copy {
+    /// `R v`.
+    fn up(self, v: Vec3<T>) -> Vec3<T>;
+    /// `Rᵀ v`.
+    fn down(self, v: Vec3<T>) -> Vec3<T>;
+    /// `R S Rᵀ` of a symmetric matrix, upper triangles by rows.
+    fn up_symmetric(self, s: &[T; 6]) -> [T; 6];
+    /// `R M Rᵀ`.
+    fn up_matrix(self, m: &Mat3<T>) -> Mat3<T>;
+    /// `M R`.
+    fn after(self, m: &Mat3<T>) -> Mat3<T>;
+}
+
+/// `Rz(q)`.
+#[derive(Clone, Copy)]
+pub(crate) struct AboutZ<T> {
+    pub(crate) cosine: T,
+    pub(crate) sine: T,
+}
+
+impl<T: Scalar> Hinge<T> for AboutZ<T> {
+    #[inline(always)]
+    fn up(self, v: Vec3<T>) -> Vec3<T> {
+        let Self { cosine: c, sine: s } = self;
+        Vec3([s.neg_mul_add(v[1], c * v[0]), s.mul_add(v[0], c * v[1]), v[2]])
+    }
+    #[inline(always)]
+    fn down(self, v: Vec3<T>) -> Vec3<T> {
+        let Self { cosine: c, sine: s } = self;
+        Vec3([c.mul_add(v[0], s * v[1]), s.neg_mul_add(v[0], c * v[1]), v[2]])
+    }
+    #[inline(always)]
+    fn up_symmetric(self, m: &[T; 6]) -> [T; 6] {
+        let Self { cosine: c, sine: s } = self;
+        let [xx, xy, xz, yy, yz, zz] = *m;
+        // First row of Rz M; the trace of the upper block stays.
+        let (a, b) = (s.neg_mul_add(xy, c * xx), s.neg_mul_add(yy, c * xy));
+        let first = s.neg_mul_add(b, c * a);
+        [first, s.mul_add(a, c * b), s.neg_mul_add(yz, c * xz), (xx + yy) - first, s.mul_add(xz, c * yz), zz]
+    }
+    #[inline(always)]
+    fn up_matrix(self, m: &Mat3<T>) -> Mat3<T> {
+        let Self { cosine: c, sine: s } = self;
+        let [x, y, z] = m.0;
+        let row = |k: usize| (s.neg_mul_add(y[k], c * x[k]), s.mul_add(x[k], c * y[k]));
+        let (a, b, d) = (row(0), row(1), row(2));
+        let columns = |p: T, q: T, r: T| [s.neg_mul_add(q, c * p), s.mul_add(p, c * q), r];
+        Mat3([columns(a.0, b.0, d.0), columns(a.1, b.1, d.1), columns(z[0], z[1], z[2])])
+    }
+    #[inline(always)]
+    fn after(self, m: &Mat3<T>) -> Mat3<T> {
+        let Self { cosine: c, sine: s } = self;
+        let row = |r: [T; 3]| [c.mul_add(r[0], s * r[1]), s.neg_mul_add(r[0], c * r[1]), r[2]];
+        Mat3([row(m.0[0]), row(m.0[1]), row(m.0[2])])
+    }
+}
+
+/// `Rx(90°) Rz(q)`.
+#[derive(Clone, Copy)]
+pub(crate) struct AfterQuarter<T>(pub(crate) AboutZ<T>);
+
+impl<T: Scalar> Hinge<T> for AfterQuarter<T> {
+    #[inline(always)]
+    fn up(self, v: Vec3<T>) -> Vec3<T> {
+        let [x, y, z] = self.0.up(v).0;
+        Vec3([x, -z, y])
+    }
+    #[inline(always)]
+    fn down(self, v: Vec3<T>) -> Vec3<T> {
+        self.0.down(Vec3([v[0], v[2], -v[1]]))
+    }
+    #[inline(always)]
+    fn up_symmetric(self, m: &[T; 6]) -> [T; 6] {
+        let [xx, xy, xz, yy, yz, zz] = self.0.up_symmetric(m);
+        [xx, -xz, xy, zz, -yz, yy]
+    }
+    #[inline(always)]
+    fn up_matrix(self, m: &Mat3<T>) -> Mat3<T> {
+        let [x, y, z] = self.0.up_matrix(m).0;
+        Mat3([[x[0], -x[2], x[1]], [-z[0], z[2], -z[1]], [y[0], -y[2], y[1]]])
+    }
+    #[inline(always)]
+    fn after(self, m: &Mat3<T>) -> Mat3<T> {
+        let row = |r: [T; 3]| [r[0], r[2], -r[1]];
+        self.0.after(&Mat3([row(m.0[0]), row(m.0[1]), row(m.0[2])]))
+    }
+}
+
+/// Any rotation.
+#[derive(Clone, Copy)]
+pub(crate) struct Turned<T>(pub(crate) Mat3<T>);
+
+impl<T: Scalar> Hinge<T> for Turned<T> {
+    #[inline(always)]
+    fn up(self, v: Vec3<T>) -> Vec3<T> {
+        self.0.mul_vec(v)
+    }
+    #[inline(always)]
+    fn down(self, v: Vec3<T>) -> Vec3<T> {
+        self.0.transpose_mul_vec(v)
+    }
+    #[inline(always)]
+    fn up_symmetric(self, m: &[T; 6]) -> [T; 6] {
+        let rows = self.0.mul_mat(&symmetric(m)).0;
+        let r = &self.0.0;
+        let entry = |a: usize, b: usize| rows[a][2].mul_add(r[b][2], rows[a][1].mul_add(r[b][1], rows[a][0] * r[b][0]));
+        [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+    }
+    #[inline(always)]
+    fn up_matrix(self, m: &Mat3<T>) -> Mat3<T> {
+        self.0.mul_mat(m).mul_mat(&self.0.transpose())
+    }
+    #[inline(always)]
+    fn after(self, m: &Mat3<T>) -> Mat3<T> {
+        m.mul_mat(&self.0)
+    }
+}
+
+/// The full symmetric matrix of an upper triangle by rows.
+#[inline(always)]
+pub(crate) fn symmetric<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
+    Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
+}
+
+/// Where the joints stand: what hinges are made of.
+#[derive(Debug)]
+pub(crate) struct Hinges<T> {
+    cosine: Vec<T>,
+    sine: Vec<T>,
+    /// Positions of sliding joints, with offsets those of turning ones.
+    position: Vec<T>,
+}
+
+impl<T: Scalar> Hinges<T> {
+    pub(crate) fn new(joints: usize) -> Self {
+        // Whole bundles: sines and cosines of several joints are taken at once.
+        let zeros = || vec![T::ZERO; joints.next_multiple_of(T::ANGLES_AT_ONCE)];
+        Self { cosine: zeros(), sine: zeros(), position: zeros() }
+    }
+
+    /// Places all joints at the positions `q`.
+    #[inline(always)]
+    pub(crate) fn place(&mut self, steps: &[JointStep], q: &[T]) {
+        for ((to, step), q) in self.position.iter_mut().zip(steps).zip(q) {
+            *to = *q + T::splat(step.offset);
+        }
+        T::sin_cos_all(&self.position, &mut self.sine, &mut self.cosine);
+    }
+
+    /// What was placed, with lengths that the compiler knows to be equal: loops over `joints` joints check no bounds.
+    #[inline(always)]
+    pub(crate) fn placed(&self, joints: usize) -> PlacedHinges<'_, T> {
+        PlacedHinges { cosine: &self.cosine[..joints], sine: &self.sine[..joints], position: &self.position[..joints] }
+    }
+}
+
+/// The hinges at one position of the robot.
+#[derive(Clone, Copy)]
+pub(crate) struct PlacedHinges<'a, T> {
+    cosine: &'a [T],
+    sine: &'a [T],
+    position: &'a [T],
+}
+
+impl<T: Scalar> PlacedHinges<'_, T> {
+    #[inline(always)]
+    pub(crate) fn about_z(&self, index: usize) -> AboutZ<T> {
+        AboutZ { cosine: self.cosine[index], sine: self.sine[index] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn turned(&self, constant: &Mat3, step: &JointStep, index: usize) -> Turned<T> {
+        let splat = |row: [f64; 3]| [T::splat(row[0]), T::splat(row[1]), T::splat(row[2])];
+        let constant = Mat3([splat(constant.0[0]), splat(constant.0[1]), splat(constant.0[2])]);
+        Turned(if step.turns { self.about_z(index).after(&constant) } else { constant })
+    }
+
+    /// Origin of body `index` in its parent's frame.
+    #[inline(always)]
+    pub(crate) fn translation(&self, step: &JointStep, index: usize) -> Vec3<T> {
+        let translation = step.translation.splat();
+        if step.turns { translation } else { step.slide.splat().scale_add(self.position[index], translation) }
+    }
+}
+
+/// The same hinges for bundles: what they turn stands in several lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct BundledHinges<'a, T>(pub(crate) PlacedHinges<'a, T>);
+
+impl<T: Lane> BundledHinges<'_, T> {
+    #[inline(always)]
+    pub(crate) fn about_z(&self, index: usize) -> AboutZ<T::Bundle> {
+        let AboutZ { cosine, sine } = self.0.about_z(index);
+        AboutZ { cosine: cosine.bundle(), sine: sine.bundle() }
+    }
+
+    #[inline(always)]
+    pub(crate) fn turned(&self, constant: &Mat3, step: &JointStep, index: usize) -> Turned<T::Bundle> {
+        let [a, b, c] = self.0.turned(constant, step, index).0.0;
+        Turned(Mat3([bundles(a), bundles(b), bundles(c)]))
+    }
+
+    #[inline(always)]
+    pub(crate) fn translation(&self, step: &JointStep, index: usize) -> Vec3<T::Bundle> {
+        Vec3(bundles(self.0.translation(step, index).0))
+    }
+}
+
+#[inline(always)]
+fn bundles<T: Lane>(values: [T; 3]) -> [T::Bundle; 3] {
+    [values[0].bundle(), values[1].bundle(), values[2].bundle()]
+}
+
+/// Runs `$body` with the hinge of one joint as `$hinge`: compiled once for each kind of rotation.
+macro_rules! with_hinge {
+    ($hinges:expr, $step:expr, $index:expr, |$hinge:ident| $body:expr) => {
+        match $step.rotation {
+            dynident_model::StepRotation::Aligned => {
+                let $hinge = $hinges.about_z($index);
+                $body
+            }
+            dynident_model::StepRotation::Quarter => {
+                let $hinge = $crate::hinge::AfterQuarter($hinges.about_z($index));
+                $body
+            }
+            dynident_model::StepRotation::General(constant) => {
+                let $hinge = $hinges.turned(&constant, &$step, $index);
+                $body
+            }
+        }
+    };
+}
+pub(crate) use with_hinge;

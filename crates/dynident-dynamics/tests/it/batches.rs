@@ -1,0 +1,59 @@
+//! Many samples at once give what one at a time gives, at every processor level.
+
+use crate::invariants::cases;
+use dynident_dynamics::{
+    BatchWorkspace, DerivativeArrays, Workspace, inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch,
+    mass_matrix, mass_matrix_batch,
+};
+use dynident_lanes::Level;
+use dynident_model::terms::JointMotion;
+
+/// The same recursion in another order of roundings, over some ten bodies.
+const ROUNDING: f64 = 1e-12;
+
+/// No multiple of any number of lanes, and fewer than any.
+const SAMPLES: [usize; 2] = [21, 3];
+
+#[test]
+fn matrices_in_batches_are_those_of_single_samples() {
+    for case in cases().step_by(3) {
+        let (model, dof) = (&case.model, case.model.dof());
+        for (level, samples) in Level::available().into_iter().flat_map(|level| SAMPLES.map(|samples| (level, samples)))
+        {
+            let mut workspace = Workspace::with_level(model, level);
+            let mut batch = BatchWorkspace::with_level(model, level);
+            // Every sample another state: entries are told apart.
+            let spread = |vector: &[f64]| -> Vec<f64> {
+                vector.iter().flat_map(|x| (0..samples).map(move |s| x + 0.1 * s as f64)).collect()
+            };
+            let [q, dq, ddq] = [&case.q, &case.dq, &case.ddq].map(|vector| spread(vector));
+            let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
+            // What was there does not stay.
+            let [mut matrix, mut by_q, mut by_dq, mut by_ddq] = [(); 4].map(|()| vec![f64::NAN; dof * dof * samples]);
+            mass_matrix_batch(model, &mut batch, &q, samples, &mut matrix);
+            let derivatives =
+                DerivativeArrays { by_position: &mut by_q, by_velocity: &mut by_dq, by_acceleration: &mut by_ddq };
+            inverse_dynamics_derivatives_batch(model, &mut batch, &motion, derivatives);
+            for sample in 0..samples {
+                let at = |array: &[f64]| (0..dof).map(|joint| array[joint * samples + sample]).collect::<Vec<f64>>();
+                let (q, dq, ddq) = (at(&q), at(&dq), at(&ddq));
+                let single = mass_matrix(model, &mut workspace, &q).to_vec();
+                let varied = inverse_dynamics_derivatives(model, &mut workspace, &q, &dq, &ddq);
+                let expected = [&single[..], varied.by_position, varied.by_velocity, varied.by_acceleration];
+                for (name, (found, expected)) in
+                    ["M", "dq", "ddq", "dddq"].iter().zip([&matrix, &by_q, &by_dq, &by_ddq].into_iter().zip(expected))
+                {
+                    let scale = expected.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
+                    for (entry, expected) in expected.iter().enumerate() {
+                        let found = found[entry * samples + sample];
+                        assert!(
+                            (found - expected).abs() <= ROUNDING * scale,
+                            "{name}, {}, sample {sample} of {samples}, entry {entry}: {found} against {expected}",
+                            level.name()
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
