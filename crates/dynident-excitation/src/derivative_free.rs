@@ -58,7 +58,7 @@ pub fn design_without_gradients(
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let criterion = task.criteria[task.criteria.len() - 1];
-    let times = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
+    let times = grid(task.family.duration_s(), settings.search_grid(task));
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let fine = grid(task.family.duration_s(), 2 * times.len() - 1);
     let weight = logged.len() as f64 / times.len() as f64;

@@ -8,6 +8,8 @@
 pub(crate) mod assess;
 mod clear_starts;
 mod column_units;
+mod effort;
+mod envelope;
 mod metric;
 mod problem;
 mod restoration;
@@ -24,6 +26,7 @@ use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
+use effort::{Effort, most_of_polishes};
 use nalgebra::DMatrix;
 use restoration::restored;
 use rounds::{Candidate, Rounds};
@@ -36,17 +39,21 @@ use std::time::Instant;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 8, for condition numbers 12.
+    /// Random starts of the first round. Default 8, for condition numbers 3, with 24 or more numbers a joint 2; fewer
+    /// for a robot so large that the search would else take more than about a minute of a core: unless one of this,
+    /// `rounds`, `evaluations_per_start` and `time_limit_s` is given, it gets less of everything.
     pub starts: Option<usize>,
-    /// Rounds of restarts around the best, of half as many starts. Default 1, for condition numbers 12.
+    /// Rounds of restarts around the best, of half as many starts and two at least. Default 1, for condition numbers
+    /// 24, with 24 or more numbers a joint 8.
     pub rounds: Option<usize>,
-    /// Evaluations of one start at most. Default 1,000, for condition numbers 300.
+    /// Evaluations of one start or restart at most. Default 1,000, for condition numbers 1,000 and 500, with 24 or more
+    /// numbers a joint 2,000.
     pub evaluations_per_start: Option<usize>,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast,
-    /// and 12.5 a second where places are limited, so that the ways between samples, on which columns are looked for,
-    /// are nearly straight.
+    /// Samples of the search grid. Default 96 (for condition numbers and families that are linear in their numbers 64),
+    /// at least five per free number of a joint, for families that move fast, and 12.5 a second where places are
+    /// limited, so that the ways between samples, on which columns are looked for, are nearly straight.
     pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
@@ -72,40 +79,22 @@ impl Default for DesignSettings {
 }
 
 impl DesignSettings {
-    /// How the search's evaluations are shared out: as the study says, or as suits the criterion.
-    fn effort(&self, criterion: &dyn Criterion) -> Effort {
-        let usual = if criterion.has_many_optima() { Effort::MANY_SHORT } else { Effort::FEW_LONG };
-        Effort {
-            starts: self.starts.unwrap_or(usual.starts).max(1),
-            rounds: self.rounds.unwrap_or(usual.rounds),
-            evaluations_per_start: self.evaluations_per_start.unwrap_or(usual.evaluations_per_start),
-        }
-    }
-
     /// Samples of the search grid.
-    pub(crate) fn search_grid(&self, family: &dyn Family, limits: &LimitSet) -> usize {
+    pub(crate) fn search_grid(&self, task: &DesignTask<'_>) -> usize {
+        let (family, limits) = (task.family, task.limits);
+        let many_optima = task.criteria.last().is_some_and(|criterion| criterion.has_many_optima());
+        let least = if many_optima && family.is_linear() { LEAST_SAMPLES_OF_MANY } else { LEAST_SAMPLES };
         let each = family.parameters() / family.joints().max(1);
         let of_place = if limits.has_places() { (PLACE_RATE_HZ * family.duration_s()) as usize } else { 0 };
         // Whole registers.
-        self.search_samples.unwrap_or_else(|| 96.max((5 * each).max(of_place).next_multiple_of(16))).max(8)
+        self.search_samples.unwrap_or_else(|| least.max((5 * each).max(of_place).next_multiple_of(16))).max(8)
     }
 }
 
-/// How many searches, and how long each.
-struct Effort {
-    starts: usize,
-    rounds: usize,
-    evaluations_per_start: usize,
-}
-
-impl Effort {
-    /// For criteria whose starts end near each other if each goes to its end. UR10, Panda and iiwa14, five harmonics,
-    /// three seeds: log det higher than by many short ones in eight of nine cases, in half the time.
-    const FEW_LONG: Self = Self { starts: 8, rounds: 1, evaluations_per_start: 1_000 };
-    /// For criteria with many local optima: on the same arms the condition number ends lower in five of nine cases in
-    /// ten seconds, and more evenly from seed to seed where there is more time.
-    const MANY_SHORT: Self = Self { starts: 12, rounds: 12, evaluations_per_start: 300 };
-}
+/// Samples of the search grid at least; where many descents are needed and each joint is a sum of few functions, whose
+/// extremes are then seen to some hundredths, fewer.
+const LEAST_SAMPLES: usize = 96;
+const LEAST_SAMPLES_OF_MANY: usize = 64;
 
 /// Rate of the search grid where places are limited, Hz.
 const PLACE_RATE_HZ: f64 = 12.5;
@@ -170,7 +159,6 @@ pub fn design(
 ) -> Result<Design, OptimiserError> {
     let begun = Instant::now();
     let last = *task.criteria.last().ok_or(OptimiserError::Start)?;
-    let effort = settings.effort(last);
     // Searches end early enough that what was found can be polished and taken back inside the limits in time: what
     // keeps them already needs little of it.
     let later = |share: f64| settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > share * limit);
@@ -178,7 +166,8 @@ pub fn design(
     let late = || later(if inside.load(Ordering::Relaxed) { SEARCH_SHARE_INSIDE } else { SEARCH_SHARE });
     let evaluations = AtomicU64::new(0);
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
-    let coarse = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
+    let coarse = grid(task.family.duration_s(), settings.search_grid(task));
+    let effort = Effort::of(task, settings, coarse.len());
     let rounds = Rounds::new(task, &coarse, logged.len(), true);
     let watch_all = watch;
     let stopped = AtomicBool::new(false);
@@ -204,7 +193,8 @@ pub fn design(
         let name = if round == 0 { "search" } else { "restart" };
         let watch = watch(name);
         let stop = |value, violation| watch(value, violation) || late();
-        let found = rounds.run(criterion, &margins, &starts, effort.evaluations_per_start, stop)?;
+        let each = if round == 0 { effort.evaluations_per_start } else { effort.evaluations_per_restart };
+        let found = rounds.run(criterion, &margins, &starts, each, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         if best.as_ref().is_none_or(|best| found.best.score < best.score) || round < task.criteria.len() {
             inside.store(found.best.violation <= INSIDE, Ordering::Relaxed);
@@ -232,7 +222,7 @@ pub fn design(
             });
             noise.collect::<Vec<f64>>().into()
         };
-        starts = core::iter::once(best.state.clone()).chain((0..(effort.starts / 2).max(2)).map(moved)).collect();
+        starts = core::iter::once(best.state.clone()).chain((0..effort.restarts()).map(moved)).collect();
     }
     // The polish on a finer grid, again with tighter limits while something is broken between its samples. What is kept
     // is the best trajectory whose limits were found kept everywhere, the search's own best included; only if there is
@@ -242,14 +232,17 @@ pub fn design(
     let rounds = Rounds::new(task, &fine, logged.len(), true);
     let mut state = best.ok_or(OptimiserError::Start)?.state.on_twice_the_samples(coarse.len());
     let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
+    let mut left = most_of_polishes(task, settings, fine.len());
     for _ in 0..POLISHES {
         // A search that was ended still comes back inside the limits: some tenths of a second.
         let ended = over();
-        let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations };
+        // Half of what is left, so that something is left for what is broken between samples.
+        let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations }.min(left.div_ceil(2).max(1));
         let report = watch("polish");
         let stop = |value, violation| (report(value, violation) && !ended) || later(POLISH_SHARE);
         let found = rounds.polish(criterion, &margins, state, budget, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
+        left = left.saturating_sub(found.evaluations);
         state = found.best.state;
         // The last iterate, and the best that kept the limits on the samples.
         let (ended, worst) = assess(task, criterion, state.x.clone(), &fine, &logged);

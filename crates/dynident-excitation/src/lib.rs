@@ -94,6 +94,7 @@ mod motion;
 pub mod optimisers;
 mod predicted_covariance;
 pub mod step_wise;
+mod symmetric_eigen;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};
 pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid, single_changes};

@@ -1,7 +1,8 @@
 //! The condition number of the stacked regressor, `√(λ_max / λ_min)` of its information.
 
 use super::{Criterion, ValueAndGradient};
-use nalgebra::{DMatrix, SymmetricEigen};
+use crate::symmetric_eigen::SymmetricEigen;
+use nalgebra::DMatrix;
 
 /// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`, smooth where eigenvalues meet (and at an
 /// optimum the lowest three or four do meet). The larger `p`, the nearer to the condition number itself.
@@ -47,27 +48,20 @@ impl Criterion for ConditionNumber {
 
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let (matrix, scale) = self.scaling(information)?;
-        let eigen = SymmetricEigen::new(matrix);
-        let (largest, smallest) = (eigen.eigenvalues.max(), eigen.eigenvalues.min());
+        let eigen = SymmetricEigen::new(&matrix)?;
+        let (smallest, largest) = eigen.extremes();
         if !(smallest > 0.0 && largest.is_finite()) {
             return None;
         }
         let p = self.order;
         // Shares of the two norms, relative to their largest terms so that no power overflows.
-        let high: Vec<f64> = eigen.eigenvalues.iter().map(|l| (l / largest).powf(p)).collect();
-        let low: Vec<f64> = eigen.eigenvalues.iter().map(|l| (smallest / l).powf(p)).collect();
+        let high: Vec<f64> = eigen.values.iter().map(|l| (l / largest).powf(p)).collect();
+        let low: Vec<f64> = eigen.values.iter().map(|l| (smallest / l).powf(p)).collect();
         let (high_sum, low_sum) = (high.iter().sum::<f64>(), low.iter().sum::<f64>());
         let value = 0.5 * (largest.ln() - smallest.ln() + (high_sum.ln() + low_sum.ln()) / p);
-        let slopes =
-            eigen.eigenvalues.iter().enumerate().map(|(k, l)| 0.5 * (high[k] / high_sum - low[k] / low_sum) / l);
-        let scaled_vectors = {
-            let mut vectors = eigen.eigenvectors.clone();
-            for (mut column, slope) in vectors.column_iter_mut().zip(slopes) {
-                column *= slope;
-            }
-            vectors
-        };
-        let mut derivative = scaled_vectors * eigen.eigenvectors.transpose();
+        let slopes: Vec<f64> =
+            eigen.values.iter().enumerate().map(|(k, l)| 0.5 * (high[k] / high_sum - low[k] / low_sum) / l).collect();
+        let mut derivative = eigen.weighted(&slopes);
         if self.scaled {
             // f(S D S): through the outer factors, and through S = diag(D)^-1/2.
             let (d, inner) = (information, derivative);
@@ -82,8 +76,7 @@ impl Criterion for ConditionNumber {
 
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
         let (matrix, _) = self.scaling(information)?;
-        let eigenvalues = SymmetricEigen::new(matrix).eigenvalues;
-        let smallest = eigenvalues.min();
-        (smallest > 0.0).then(|| (eigenvalues.max() / smallest).sqrt())
+        let (smallest, largest) = SymmetricEigen::new(&matrix)?.extremes();
+        (smallest > 0.0).then(|| (largest / smallest).sqrt())
     }
 }

@@ -1,7 +1,8 @@
 //! E-optimality: the variance along the worst direction, `1 / λ_min(D)`.
 
 use super::{Criterion, ValueAndGradient};
-use nalgebra::{DMatrix, SymmetricEigen};
+use crate::symmetric_eigen::SymmetricEigen;
+use nalgebra::DMatrix;
 
 /// `log ‖1/λ‖_p`, a smooth bound on `-log λ_min`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,23 +23,20 @@ impl Criterion for EOptimal {
     }
 
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
-        let eigen = SymmetricEigen::new(information.clone());
-        let smallest = eigen.eigenvalues.min();
+        let eigen = SymmetricEigen::new(information)?;
+        let (smallest, _) = eigen.extremes();
         if smallest <= 0.0 || !smallest.is_finite() {
             return None;
         }
         let p = self.order;
-        let low: Vec<f64> = eigen.eigenvalues.iter().map(|l| (smallest / l).powf(p)).collect();
+        let low: Vec<f64> = eigen.values.iter().map(|l| (smallest / l).powf(p)).collect();
         let sum: f64 = low.iter().sum();
-        let mut vectors = eigen.eigenvectors.clone();
-        for ((mut column, l), share) in vectors.column_iter_mut().zip(eigen.eigenvalues.iter()).zip(&low) {
-            column *= -share / (sum * l);
-        }
-        Some((-smallest.ln() + sum.ln() / p, vectors * eigen.eigenvectors.transpose()))
+        let slopes: Vec<f64> = eigen.values.iter().zip(&low).map(|(l, share)| -share / (sum * l)).collect();
+        Some((-smallest.ln() + sum.ln() / p, eigen.weighted(&slopes)))
     }
 
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
-        let smallest = SymmetricEigen::new(information.clone()).eigenvalues.min();
+        let (smallest, _) = SymmetricEigen::new(information)?.extremes();
         (smallest > 0.0).then(|| smallest.recip())
     }
 }

@@ -1,7 +1,8 @@
 //! The directions that are known worst, in units of one's own: Kiefer's φ_p between A- and E-optimality.
 
 use super::{Criterion, ValueAndGradient};
-use nalgebra::{DMatrix, SymmetricEigen};
+use crate::symmetric_eigen::SymmetricEigen;
+use nalgebra::DMatrix;
 
 /// `log ‖1/λ‖_p` of the eigenvalues λ of `Tᵀ D T`, with derivative `-T U diag(λ^(-p-1)) Uᵀ Tᵀ / Σ λ^-p`: the p-norm of
 /// the variances along the axes of the confidence ellipsoid of `x`, where `θ = T x`. Order 1 is A-optimality of x (the
@@ -35,19 +36,16 @@ impl Criterion for WorstDirections {
         if self.units.shape() != information.shape() {
             return None;
         }
-        let eigen = SymmetricEigen::new(self.units.tr_mul(information) * &self.units);
-        let smallest = eigen.eigenvalues.min();
+        let eigen = SymmetricEigen::new(&(self.units.tr_mul(information) * &self.units))?;
+        let (smallest, _) = eigen.extremes();
         if !(smallest > 0.0 && smallest.is_finite()) {
             return None;
         }
         // Relative to the largest term, so that no power overflows.
-        let shares: Vec<f64> = eigen.eigenvalues.iter().map(|value| (smallest / value).powf(self.order)).collect();
+        let shares: Vec<f64> = eigen.values.iter().map(|value| (smallest / value).powf(self.order)).collect();
         let sum: f64 = shares.iter().sum();
-        let mut vectors = eigen.eigenvectors.clone();
-        for ((mut column, value), share) in vectors.column_iter_mut().zip(eigen.eigenvalues.iter()).zip(&shares) {
-            column *= -share / (sum * value);
-        }
-        let derivative = &self.units * (vectors * eigen.eigenvectors.transpose()) * self.units.transpose();
+        let slopes: Vec<f64> = eigen.values.iter().zip(&shares).map(|(value, share)| -share / (sum * value)).collect();
+        let derivative = &self.units * eigen.weighted(&slopes) * self.units.transpose();
         Some((sum.ln() / self.order - smallest.ln(), derivative))
     }
 

@@ -5,16 +5,17 @@
 //! curved about as the motion's size is, measured in its limits.
 
 use super::DesignTask;
+use super::envelope::EnvelopeFactor;
 use crate::motion::Motion;
 use crate::optimisers::{CurvatureFacts, Step};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVectorView};
 
 /// `σ G + C`, one block a joint: `G` the mean square of the motion in units of its limits, `C` the curvature of the
 /// limits that push, and `σ` the criterion's share, from the last step.
 pub(super) struct Metric {
     size: Vec<DMatrix<f64>>,
     limits: Vec<DMatrix<f64>>,
-    factors: Vec<Cholesky<f64, Dyn>>,
+    factors: Vec<EnvelopeFactor>,
     size_weights: Motion,
     weights: Motion,
     /// Whether `size` holds numbers yet.
@@ -107,8 +108,12 @@ impl Metric {
         } else {
             let squared: f64 = (0..self.size.len())
                 .map(|joint| {
-                    let own = DVector::from_column_slice(&gradient[joint * self.each..(joint + 1) * self.each]);
-                    self.size[joint].clone().cholesky().map_or(0.0, |factor| own.dot(&factor.solve(&own)))
+                    let own = &gradient[joint * self.each..(joint + 1) * self.each];
+                    let mut solved = own.to_vec();
+                    EnvelopeFactor::new(&self.size[joint]).map_or(0.0, |factor| {
+                        factor.solve(&mut solved);
+                        own.iter().zip(&solved).map(|(a, b)| a * b).sum()
+                    })
                 })
                 .sum();
             self.share = (squared / self.square(&self.size, at).max(1e-6)).sqrt() / 0.2;
@@ -126,7 +131,7 @@ impl Metric {
                 block.column_mut(k).fill(0.0);
                 block[(k, k)] = 1.0;
             }
-            let Some(factor) = block.cholesky() else { return false };
+            let Some(factor) = EnvelopeFactor::new(&block) else { return false };
             self.factors.push(factor);
         }
         true
@@ -135,8 +140,7 @@ impl Metric {
     /// `v ← (σ G + C)⁻¹ v`.
     pub(super) fn divide(&self, vector: &mut [f64]) {
         for (own, factor) in vector.chunks_exact_mut(self.each).zip(&self.factors) {
-            let solved = factor.solve(&DVector::from_column_slice(own));
-            own.copy_from_slice(solved.as_slice());
+            factor.solve(own);
         }
     }
 
@@ -144,8 +148,8 @@ impl Metric {
         let parts = v.chunks_exact(self.each).zip(blocks);
         parts
             .map(|(own, block)| {
-                let own = DVector::from_column_slice(own);
-                own.dot(&(block * &own))
+                let own = DVectorView::from_slice(own, self.each);
+                own.dot(&(block * own))
             })
             .sum()
     }

@@ -1,6 +1,7 @@
 //! When a search ends outside the limits: a search for the limits alone.
 
 use super::assess::{Assessment, assess};
+use super::effort::most_of_restoration;
 use super::rounds::Rounds;
 use super::{DesignProgress, DesignSettings, DesignTask, ranges};
 use crate::criteria::{Criterion, ValueAndGradient};
@@ -72,12 +73,15 @@ pub(crate) fn restored(
     };
     // Without a criterion nothing says how long a step may be where no limit pushes.
     let [plain, rounds] = [false, true].map(|shaped| Rounds::new(task, fine, logged.len(), shaped));
+    let most = most_of_restoration(task, settings, fine.len());
     for start in 0..=STARTS {
         let mut parameters =
             if start == 0 { best.parameters.clone() } else { task.family.random(&positions, &speeds, &mut random) };
         let mut margins = vec![MARGIN; task.limits.constraints().len()];
         for _ in 0..ROUNDS {
-            let budget = settings.polish_evaluations.max(EVALUATIONS);
+            // A part of what is left, so that other starts have their turn.
+            let left = most.saturating_sub(evaluations);
+            let budget = settings.polish_evaluations.max(EVALUATIONS).min(left.div_ceil(3).max(1));
             let found = plain.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
                 violation <= 0.0 || report(value, violation, evaluations)
             })?;
@@ -89,7 +93,7 @@ pub(crate) fn restored(
                 best = assessed;
             }
             if whole {
-                let budget = settings.polish_evaluations;
+                let budget = settings.polish_evaluations.min(most.saturating_sub(evaluations).max(1));
                 let found = rounds.polish(criterion, &margins, parameters.into(), budget, |value, violation| {
                     report(value, violation, evaluations)
                 })?;
@@ -100,14 +104,14 @@ pub(crate) fn restored(
                 }
                 return Ok((best, evaluations));
             }
-            if !on_samples || report(0.0, best.violation, evaluations) {
+            if !on_samples || evaluations >= most || report(0.0, best.violation, evaluations) {
                 break;
             }
             for (margin, c) in margins.iter_mut().zip(&worst) {
                 *margin += if *c > 0.0 { c.min(WIDEST) + 1e-6 } else { 0.0 };
             }
         }
-        if report(0.0, best.violation, evaluations) {
+        if evaluations >= most || report(0.0, best.violation, evaluations) {
             break;
         }
     }

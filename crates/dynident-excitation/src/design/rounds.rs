@@ -23,7 +23,7 @@ const FULL_EVALUATIONS: f64 = 1000.0;
 /// Violation at which a start is distinguished from others well enough.
 const LOOSE: f64 = 3e-3;
 /// One in so many starts is followed to the end.
-const FOLLOWED: usize = 4;
+pub(super) const FOLLOWED: usize = 4;
 /// Weight of what is still violated when starts are compared, in the criterion's scale.
 const VIOLATION_WEIGHT: f64 = 10.0;
 

@@ -2,11 +2,13 @@
 //! that limit wider.
 
 use super::assess::extremes;
+use super::effort::most_of_changes;
 use super::restoration::Anything;
 use super::rounds::Rounds;
 use super::{DesignSettings, DesignTask, grid, ranges};
 use crate::limits::{Relaxation, Widened, relaxation};
 use crate::optimisers::OptimiserError;
+use core::sync::atomic::{AtomicUsize, Ordering};
 use dynident_model::sample::Random;
 use std::collections::BTreeMap;
 
@@ -40,9 +42,16 @@ pub fn single_changes(
     parameters: &[f64],
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Relaxation>, OptimiserError> {
-    let coarse = settings.search_grid(task.family, task.limits);
+    let coarse = settings.search_grid(task);
     let fine = grid(task.family.duration_s(), 2 * coarse - 1);
     let worst = extremes(task, parameters, &fine);
+    // Searches follow one another, so that their evaluations are counted alike on any number of threads.
+    let (most, used) = (most_of_changes(task, settings, fine.len()), AtomicUsize::new(0));
+    let stop = || {
+        used.fetch_add(1, Ordering::Relaxed);
+        used.load(Ordering::Relaxed) > most || stop()
+    };
+    let stop: &(dyn Fn() -> bool + Sync) = &stop;
     let mut found: Vec<(f64, Vec<usize>, Relaxation)> = Vec::new();
     for rows in groups(task, &worst).into_iter().take(MOST_TRIED) {
         if stop() {

@@ -129,8 +129,9 @@ impl Basis for BSplineBasis {
         let (first, functions) = self.functions(time_s * per_span);
         let scales = [1.0, per_span, per_span.powi(2), per_span.powi(3)];
         // All functions add up to 1: with one number for both ends its function is what the others leave, exactly at
-        // rest where they are.
-        if ends == 1 {
+        // rest where they are; nothing where the ends' own functions are nothing.
+        let of_ends = ends == 1 && (first < 3 || first + DEGREE + 3 >= points);
+        if of_ends {
             out[0][0] = 1.0;
         }
         for (offset, function) in functions.iter().enumerate() {
@@ -139,7 +140,7 @@ impl Basis for BSplineBasis {
                 let value = function[order] * scales[order];
                 if (3..points - 3).contains(&point) {
                     out[point - 3 + ends][order] += value;
-                    if ends == 1 {
+                    if of_ends {
                         out[0][order] -= value;
                     }
                 } else if ends == 2 {
@@ -188,6 +189,24 @@ mod tests {
         {
             // Rounding of numbers up to 120.
             assert!((motion.q[sample] - value).abs() < 1e-12 && (motion.dq[sample] - slope).abs() < 1e-12);
+        }
+    }
+
+    /// Away from the ends no more than six functions are not zero, so that a sample costs no more however many there
+    /// are; the sum of all is one everywhere.
+    #[test]
+    fn supports_are_six_spans() {
+        let basis = BSplineBasis { settings: BSplineSettings { control_points: 80, returns: true }, duration_s: 10.0 };
+        for sample in 0..=200 {
+            let time_s = f64::from(sample) * 0.05;
+            let mut row = vec![[0.0; 4]; basis.columns()];
+            basis.row(0, time_s, &mut row);
+            let sum: f64 = row.iter().map(|function| function[0]).sum();
+            assert!((sum - 1.0).abs() < 1e-14, "{time_s} {sum}");
+            let acting = row.iter().filter(|function| function.iter().any(|value| *value != 0.0)).count();
+            assert!(acting <= 6, "{time_s}: {acting}");
+            // The ends' functions act on three spans of 10/75 s.
+            assert!(row[0] == [0.0; 4] || !(0.41..9.59).contains(&time_s), "{time_s}");
         }
     }
 
