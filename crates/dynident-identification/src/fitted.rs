@@ -1,4 +1,5 @@
-//! From recordings to an estimate: drives, cut-off, friction, factors, parameters, with the torque's lag among the unknowns.
+//! From recordings to an estimate: drives, cut-off, friction, factors, parameters, with the torque's lag among the
+//! unknowns.
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};

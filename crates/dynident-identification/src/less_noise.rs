@@ -26,10 +26,10 @@ const NOISY: &str = "noise of the positions biases the least squares by which it
 /// A cut-off that would be lowered by less is kept.
 const WORTH_LOWERING: f64 = 0.8;
 
-/// The settings with the estimator that `auto` took; `robot` is the task's with the drive inertia that was seen. Where it took instruments and the cut-off was left to the data,
-/// rows and estimate are made again with a cut-off that lets less noise into the regressor, and with friction as stated
-/// in any case: what least squares,
-/// held-out errors and delays are made from then shows the robot and not the noise.
+/// The settings with the estimator that `auto` took; `robot` is the task's with the drive inertia that was seen. Where
+/// it took instruments and the cut-off was left to the data, rows and estimate are made again with a cut-off that lets
+/// less noise into the regressor, and with friction as stated in any case: what least squares, held-out errors and
+/// delays are made from then shows the robot and not the noise.
 pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
     robot: &ParametricModel,

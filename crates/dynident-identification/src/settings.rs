@@ -63,8 +63,8 @@ pub struct IdentificationSettings {
     /// Intervals for every parameter over all consistent sets that the data do not reject; some thousand fits, so not
     /// by default.
     pub intervals: bool,
-    /// Joints whose drives the training logs show to have inertia or not: it is tested for all of them together, and they
-    /// have it where it is seen. None by default; joints that have a drive inertia by their terms are passed over.
+    /// Joints whose drives the training logs show to have inertia or not: it is tested for all of them together, and
+    /// they have it where it is seen. None by default; joints that have a drive inertia by their terms are passed over.
     pub drive_inertia: Vec<String>,
     /// Joints whose friction the training logs choose; none by default.
     pub friction: Vec<FrictionSearch>,
