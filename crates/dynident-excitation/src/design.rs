@@ -85,7 +85,11 @@ impl DesignSettings {
     /// Samples of the search grid.
     pub(crate) fn search_grid(&self, family: &dyn Family, limits: &LimitSet) -> usize {
         let each = family.parameters() / family.joints().max(1);
-        let of_place = if limits.has_places() { (PLACE_RATE_HZ * family.duration_s()) as usize } else { 0 };
+        let of_place = if limits.has_places() {
+            (limits.model().own_scale().round_hertz(PLACE_RATE_HZ) * family.duration_s()) as usize
+        } else {
+            0
+        };
         // Whole registers.
         self.search_samples.unwrap_or_else(|| 96.max((5 * each).max(of_place).next_multiple_of(16))).max(8)
     }
@@ -107,7 +111,7 @@ impl Effort {
     const MANY_SHORT: Self = Self { starts: 12, rounds: 12, evaluations_per_start: 300 };
 }
 
-/// Rate of the search grid where places are limited, Hz.
+/// Rate of the search grid where places are limited, Hz of a usual arm.
 const PLACE_RATE_HZ: f64 = 12.5;
 
 /// What is to be designed.
