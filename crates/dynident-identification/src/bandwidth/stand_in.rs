@@ -132,20 +132,14 @@ impl StandIn {
             let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
             let mut pieces = Thinned::new(thinning, dof);
             let mut block = MotionBlock::default();
-            let (mut samples, mut is_whole) = (0, false);
-            while samples < each * thinning {
-                if !stream.next_block(&mut block).map_err(named)? {
-                    is_whole = true;
-                    break;
-                }
+            let mut samples = 0;
+            while samples < each * thinning && stream.next_block(&mut block).map_err(named)? {
                 let rows = block.rows.min(each * thinning - samples);
                 pieces.take(&block, &places, rows, &decimator)?;
                 samples += rows;
             }
             used += samples as u64;
-            // What is left of a text is estimated by its bytes, which are no property of the motion.
-            let behind = if is_whole { None } else { recording.estimated_rows() };
-            seen += behind.unwrap_or(samples as u64).max(samples as u64);
+            seen += recording.estimated_rows().unwrap_or(samples as u64).max(samples as u64);
             for (joint, &place) in places.iter().enumerate() {
                 reference_hz[joint] = reference_hz[joint].max(faded[place].unwrap_or(asked).min(highest_hz));
                 let noise = position_noise.get(place).copied().unwrap_or(0.0);
