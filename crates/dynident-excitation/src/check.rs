@@ -17,7 +17,10 @@ use serde::{Deserialize, Serialize};
 /// A ratio above 1 by more than this is a violation.
 pub const VIOLATION: f64 = 1e-6;
 
-/// The rate that the project checks at.
+/// The rate that the project checks motions of usual arms at; of others by [`OwnScale::round_hertz`], so that a motion
+/// of a watch or a crane is looked at as often.
+///
+/// [`OwnScale::round_hertz`]: dynident_model::OwnScale::round_hertz
 pub const CHECK_RATE_HZ: f64 = 10_000.0;
 
 /// Most samples that a check looks at: a bound on its time (some minutes), not on memory.

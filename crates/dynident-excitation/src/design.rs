@@ -85,7 +85,11 @@ impl DesignSettings {
         let many_optima = task.criteria.last().is_some_and(|criterion| criterion.has_many_optima());
         let least = if many_optima && family.is_linear() { LEAST_SAMPLES_OF_MANY } else { LEAST_SAMPLES };
         let each = family.parameters() / family.joints().max(1);
-        let of_place = if limits.has_places() { (PLACE_RATE_HZ * family.duration_s()) as usize } else { 0 };
+        let of_place = if limits.has_places() {
+            (limits.model().own_scale().round_hertz(PLACE_RATE_HZ) * family.duration_s()) as usize
+        } else {
+            0
+        };
         // Whole registers.
         self.search_samples.unwrap_or_else(|| least.max((5 * each).max(of_place).next_multiple_of(16))).max(8)
     }
@@ -96,7 +100,7 @@ impl DesignSettings {
 const LEAST_SAMPLES: usize = 96;
 const LEAST_SAMPLES_OF_MANY: usize = 64;
 
-/// Rate of the search grid where places are limited, Hz.
+/// Rate of the search grid where places are limited, Hz of a usual arm.
 const PLACE_RATE_HZ: f64 = 12.5;
 
 /// What is to be designed.

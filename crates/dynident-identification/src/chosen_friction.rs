@@ -3,7 +3,7 @@
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator};
 use crate::friction::{
-    CandidateColumn, ConstantsError, FrictionConstants, FrictionSearch, JointFriction, candidate_columns,
+    CandidateColumn, ConstantsError, FrictionConstants, FrictionSearch, JointFriction, JointScale, candidate_columns,
     choose_friction as choose_terms, chosen_model, step_columns,
 };
 use crate::likelihood::deviance;
@@ -90,11 +90,12 @@ pub fn choose_friction(
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
     };
     // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.
-    let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, *joint))).collect();
+    let scale = |joint: usize| JointScale::of(robot.model(), joint);
+    let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, scale(*joint)))).collect();
     let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(step_width).collect();
     let is_loaded = logs.recordings.iter().any(|recording| recording.payload.is_some());
     let all = |((joint, search), width): (&(usize, &FrictionSearch), &Option<f64>)| {
-        let mut columns = candidate_columns(search, *joint, *width);
+        let mut columns = candidate_columns(search, scale(*joint), *width);
         columns.retain(|column| !(is_loaded && column.term.needs_load()));
         (*joint, columns)
     };

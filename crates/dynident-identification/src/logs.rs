@@ -5,9 +5,12 @@ use crate::recording::{LogError, Recording, Role};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{KeptLog, LogPass, ParallelFilterSettings, motion_band_hz};
 use dynident_model::Model;
-use dynident_recording::MotionSettings;
 use dynident_recording::filter::CutoffChoice;
+use dynident_recording::{FilterError, MotionSettings};
 use std::sync::OnceLock;
+
+/// Longest lag that can be stated, seconds of a usual arm.
+const LONGEST_STATED_LAG_S: f64 = 0.5;
 
 /// What the positions of one log say about its noise.
 #[derive(Clone, Debug)]
@@ -47,7 +50,7 @@ impl<'a> Logs<'a> {
     /// highest that any of the logs `deciding` asks for. A model and its test must not differ in their filters.
     ///
     /// # Errors
-    /// Logs that cannot be read.
+    /// Logs that cannot be read; a stated lag that no drive of such a robot has.
     pub fn new(
         model: &Model,
         recordings: &'a [Recording],
@@ -56,6 +59,15 @@ impl<'a> Logs<'a> {
         cutoff_of_model_hz: Option<f64>,
         execution: Execution<'a>,
     ) -> Result<Self, LogError> {
+        let longest_s = model.own_scale().seconds(LONGEST_STATED_LAG_S);
+        let stated = settings.torque_lag_s.as_ref();
+        let mut stated = (0..model.dof()).filter_map(|joint| stated.and_then(|lags| lags.at(joint)));
+        if let Some(value) = stated.find(|lag_s| lag_s.abs() > longest_s) {
+            let fix = "give seconds, at most half an own second of the robot (0.5 s of an arm of 1.2 m)";
+            let source = FilterError::Setting { name: "torque_lag_s", value, fix };
+            let log = recordings.first().map_or("", |recording| &recording.name);
+            return Err(LogError::recording(log, source.into()));
+        }
         let mut motion = settings.clone();
         if let Some(cutoff_hz) = cutoff_of_model_hz {
             motion.differentiator = motion.differentiator.with_cutoff(cutoff_hz);

@@ -193,13 +193,15 @@ impl Shortfall {
     }
 }
 
-/// Names that sentences take, and how much parameters count.
+/// Names that sentences take, how much parameters count, and what depends on the robot's size.
 pub(crate) struct Names {
     pub(crate) joints: Vec<String>,
     pub(crate) parameters: Vec<String>,
     /// Of each parameter, the torque that one of its unit makes along the last motion, as a share of the joints' own;
     /// empty where the last run shows no torque.
     pub(crate) shares: Vec<f64>,
+    /// The longest lag with which an iteration converges, seconds.
+    pub(crate) most_lag_s: f64,
 }
 
 /// What is not met after the last of `records`; nothing if the iteration has converged.
@@ -232,9 +234,8 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
     if let Some(lag) = own.and_then(|own| unexplained_lag(&own.lag, &evidence.log_rates_hz)) {
         found.push(Shortfall::Lag { lag_s: lag.lag_s, half_width_95_s: lag.half_width_95_s });
     }
-    if let Some(lag_s) = last.knowledge().map(|known| known.lag.longest_s()).filter(|lag_s| *lag_s > limits.most_lag_s)
-    {
-        found.push(Shortfall::LongLag { lag_s, allowed_s: limits.most_lag_s });
+    if let Some(lag_s) = last.knowledge().map(|known| known.lag.longest_s()).filter(|lag_s| *lag_s > names.most_lag_s) {
+        found.push(Shortfall::LongLag { lag_s, allowed_s: names.most_lag_s });
     }
     for (place, shown) in evidence.joints.iter().enumerate() {
         if let Some((now, then)) = changed_lag(&good, place) {

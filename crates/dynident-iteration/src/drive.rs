@@ -141,7 +141,8 @@ impl Iteration {
             }
             None => Vec::new(),
         };
-        Ok(Names { joints: robot.joint_names(), parameters: robot.base().expressions(), shares })
+        let most_lag_s = self.settings.settled.most_lag_s(robot.model());
+        Ok(Names { joints: robot.joint_names(), parameters: robot.base().expressions(), shares, most_lag_s })
     }
 
     /// Where the trajectories ask for more torque than the joints have, by the last good model.

@@ -45,7 +45,7 @@ pub fn derived_controllers(
 ) -> Result<DerivedControllers, SimulationError> {
     let dof = robot.dof();
     let bandwidth =
-        bandwidth_hz.values("bandwidth_hz", dof, "give more than 0 and at most 100 Hz", |f| f > 0.0 && f <= 100.0)?;
+        bandwidth_hz.values("bandwidth_hz", dof, "give more than 0 and at most 100000 Hz", |f| f > 0.0 && f <= 1e5)?;
     let typical = with_typical_drives(robot);
     let parameters = typical.as_deref().unwrap_or(robot.nominal());
     let mut model = ControllerModel::from_parameters(robot.model(), robot.terms(), parameters)?;

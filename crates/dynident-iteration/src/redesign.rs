@@ -265,7 +265,8 @@ impl Redesign {
         names: &[String],
     ) -> Result<(), NotRedesigned> {
         let motion_at = |times: &[f64], out: &mut Motion| self.family.motion(&found.parameters, times, out);
-        let reports = check_limits(limits, model, self.family.duration_s(), CHECK_RATE_HZ, motion_at)?;
+        let rate_hz = model.own_scale().round_hertz(CHECK_RATE_HZ);
+        let reports = check_limits(limits, model, self.family.duration_s(), rate_hz, motion_at)?;
         let worst = reports.iter().filter(|report| report.violated);
         if let Some(worst) = worst.max_by(|a, b| a.worst_ratio.total_cmp(&b.worst_ratio)) {
             let what = format!("{} ({})", worst.kind, worst.joint);

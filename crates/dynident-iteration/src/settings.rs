@@ -6,6 +6,7 @@ use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::payload::Payload;
+use dynident_model::Model;
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
 use dynident_simulation::controllers::{ControllerSettings, FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{SimulationError, require};
@@ -121,8 +122,20 @@ pub struct SettledSettings {
     /// torque (root mean squares). Default 5.
     pub most_unexplained_percent: f64,
     /// Longest lag between torque and motion that is taken off and still lets the iteration converge, seconds: with a
-    /// longer one the robot is not where its log says, whatever the tracking is. Default 0.01.
-    pub most_lag_s: f64,
+    /// longer one the robot is not where its log says, whatever the tracking is. By default a hundredth of the robot's
+    /// own second: 10 ms of an arm of 1.2 m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_lag_s: Option<f64>,
+}
+
+/// Longest lag that still lets an iteration converge, seconds of a usual arm.
+const MOST_LAG_S: f64 = 0.01;
+
+impl SettledSettings {
+    /// The longest lag that still lets an iteration with such a robot converge, seconds.
+    pub(crate) fn most_lag_s(&self, model: &Model) -> f64 {
+        self.most_lag_s.unwrap_or_else(|| model.own_scale().seconds(MOST_LAG_S))
+    }
 }
 
 impl Default for SettledSettings {
@@ -135,7 +148,7 @@ impl Default for SettledSettings {
             tracking_ratio: 1.5,
             floor_ratio: 2.0,
             most_unexplained_percent: 5.0,
-            most_lag_s: 0.01,
+            most_lag_s: None,
         }
     }
 }
@@ -246,7 +259,7 @@ impl IterationSettings {
         within("settled.tracking_ratio", settled.tracking_ratio, 1.0, 1e6, "give 1 or more")?;
         within("settled.floor_ratio", settled.floor_ratio, 1.0, 1e6, "give 1 or more")?;
         let unexplained = settled.most_unexplained_percent;
-        within("settled.most_lag_s", settled.most_lag_s, 0.0, 0.5, "give seconds, 0 to 0.5")?;
+        within("settled.most_lag_s", settled.most_lag_s.unwrap_or(0.0), 0.0, 1e4, "give seconds, 0 to 10000")?;
         within("settled.most_unexplained_percent", unexplained, 0.0, 1e6, "give 0 or a positive percentage")
     }
 }

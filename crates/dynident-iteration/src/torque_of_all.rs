@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector, SymmetricEigen};
 /// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 2048;
 
-/// Samples a second that are looked at, about: torques of rigid bodies change little in between.
+/// Samples a second of a usual arm that are looked at, about: torques of rigid bodies change little in between.
 const RATE_HZ: f64 = 500.0;
 
 /// The 95 % point of the standard normal distribution, one-sided.
@@ -52,7 +52,7 @@ pub(crate) fn largest_torque(
     let (mut workspace, mut panels) = (BatchWorkspace::new(robot.model()), Panels::default());
     let mut largest = LargestTorque { of_all: vec![0.0; dof], beyond_bodies: vec![0.0; dof] };
     let whole = reference.motion();
-    let step = ((reference.rate_hz() / RATE_HZ) as usize).max(1);
+    let step = ((reference.rate_hz() / robot.model().own_scale().round_hertz(RATE_HZ)) as usize).max(1);
     let samples: Vec<usize> = (0..whole.samples).step_by(step).collect();
     for some in samples.chunks(SAMPLES_AT_ONCE) {
         let part = samples_of(whole, some);

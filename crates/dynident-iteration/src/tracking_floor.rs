@@ -12,7 +12,7 @@ use dynident_simulation::{Integrator, LoopSettings, Plant, Record, Reference, Ru
 
 /// Seed of the noise: a floor is the same for the same run.
 const SEED: u64 = 17;
-/// Longest delay of the feedback that is looked for, s.
+/// Longest delay of the feedback that is looked for, seconds of a usual arm.
 const LONGEST_S: f64 = 10e-3;
 /// What is left of the squared tracking errors with a delay that explains them, at most: more than half of an error is
 /// then the delay's.
@@ -59,7 +59,7 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
         .then(one_late)
         .flatten()
         .and_then(|one_late| delay_in_samples(record, &plain, &one_late))
-        .filter(|late| *late <= samples(LONGEST_S));
+        .filter(|late| *late <= samples(known.robot.model().own_scale().seconds(LONGEST_S)));
     if let Some(late) = late
         && let Some(run) = simulated(reference, known, &fastest, of_log + late)
         && left(record, &run) <= LEFT * left(record, &plain)

@@ -14,6 +14,7 @@
 //! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
 //! | other ones in their place | [`Model::with_inertials`] |
 //! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; one by one: [`terms::TorqueTerm`] |
+//! | what a second and a metre of a usual arm are to this robot | [`Model::own_scale`] |
 //! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
 //! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_sdf`], [`rewrite_dh`] |
 //! | a URDF of any model | [`write_urdf`] |
@@ -59,6 +60,7 @@ mod inertial;
 mod joint;
 pub mod loops;
 pub mod mjcf;
+mod own_scale;
 mod place;
 mod read;
 pub mod sample;
@@ -79,6 +81,7 @@ pub use inertial::{INERTIAL_NAMES, InertialParameters};
 pub use joint::{Joint, JointKind, JointLimits, JointMap, JointSpring, Mimic, MimicSource};
 pub use loops::{LoopClosure, LoopError};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
+pub use own_scale::OwnScale;
 pub use place::{Located, line_and_column};
 pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot, read_robot};
 pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, SdfWriteError, read_sdf, rewrite_sdf};

@@ -12,7 +12,7 @@ use crate::sensors::SensorSettings;
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 
-/// A velocity that no robot has: beyond it a run counts as diverged, rad/s (m/s).
+/// A velocity that no robot has: beyond it a run counts as diverged, rad/s (m/s) of a usual arm.
 const BEYOND: f64 = 1e4;
 
 /// Where a run starts.
@@ -96,6 +96,7 @@ impl RunLimits {
             upper: place("limits.upper", &self.upper, f64::INFINITY)?,
             speed: positive("limits.speed", &self.speed)?,
             error: positive("limits.tracking_error", &self.tracking_error)?,
+            beyond: vec![f64::INFINITY; joints],
         })
     }
 }
@@ -134,6 +135,8 @@ struct Limits {
     upper: Vec<f64>,
     speed: Vec<f64>,
     error: Vec<f64>,
+    /// Velocities that no such robot has.
+    beyond: Vec<f64>,
 }
 
 /// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques,
@@ -163,7 +166,9 @@ pub fn closed_loop(
 ) -> Result<Run, SimulationError> {
     let joints = plant.dof();
     settings.validate(joints)?;
-    let limits = settings.limits.values(joints)?;
+    let own = plant.model().own_scale();
+    let beyond = plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), BEYOND)).collect();
+    let limits = Limits { beyond, ..settings.limits.values(joints)? };
     require_length("joints of the reference", joints, reference.joints())?;
     require_length("joints of the controller", joints, controller.joints())?;
     let samples = reference.samples();
@@ -268,7 +273,7 @@ fn arrays(run: &mut Run) -> Arrays<'_> {
 fn verdict(plant: &Plant, limits: &Limits, target: &[f64], time_s: f64, names: &[String]) -> Option<RunStatus> {
     for joint in 0..target.len() {
         let (q, dq) = (plant.q()[joint], plant.dq()[joint]);
-        if dq.abs() > BEYOND {
+        if dq.abs() > limits.beyond[joint] {
             return Some(RunStatus::Diverged { time_s, reason: Divergence::Speed { joint, value: dq } });
         }
         let error = target[joint] - q;

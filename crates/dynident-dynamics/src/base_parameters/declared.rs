@@ -111,11 +111,17 @@ impl States {
     fn inside_limits(model: &Model, samples: usize) -> Self {
         let mut random = Random::new(SEED);
         let mut states = Self { samples, q: Vec::new(), dq: Vec::new(), ddq: Vec::new() };
+        let own = model.own_scale();
         for joint in model.joints() {
-            let usual = if joint.turns() { core::f64::consts::PI } else { 1.0 };
+            let usual = if joint.turns() { core::f64::consts::PI } else { own.metres(1.0) };
             let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
             let (lower, upper) = limits.unwrap_or((-usual, usual));
-            let most = joint.limits.velocity.filter(|most| *most > 0.0 && most.is_finite()).unwrap_or(2.0);
+            let most = joint
+                .limits
+                .velocity
+                .filter(|most| *most > 0.0 && most.is_finite())
+                .unwrap_or(own.velocity(joint.turns(), 2.0));
+            let quickest = own.acceleration(joint.turns(), 5.0);
             for _ in 0..samples {
                 states.q.push(match random.uniform(0.0, 8.0) as usize {
                     0 => lower,
@@ -123,7 +129,7 @@ impl States {
                     _ => random.uniform(lower, upper),
                 });
                 states.dq.push(random.uniform(-most, most));
-                states.ddq.push(random.uniform(-5.0, 5.0));
+                states.ddq.push(random.uniform(-quickest, quickest));
             }
         }
         states

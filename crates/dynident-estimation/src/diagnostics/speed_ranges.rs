@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Below this velocity a joint counts as at rest, rad/s (m/s).
+/// Below this velocity a joint counts as at rest, rad/s (m/s) of a usual arm.
 const STATIC: f64 = 0.005;
-/// Below this velocity it counts as reversing, rad/s (m/s): friction's regime.
+/// Below this velocity it counts as reversing, rad/s (m/s) of a usual arm: friction's regime.
 const REVERSAL: f64 = 0.1;
 
 /// Sums of squared residuals by the joint's own velocity: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
-/// rad/s on).
+/// rad/s on), of an arm of usual length; speeds of other machines are given in their own units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedRanges {
     sums: [(usize, f64); 3],
@@ -28,16 +28,16 @@ pub struct SpeedRangeFigures {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangesReport {
-    /// |q̇| below 0.005 rad/s (m/s).
+    /// |q̇| below 0.005 rad/s (m/s) of an arm of 1.2 m, as much in its own units of another machine.
     pub at_rest: SpeedRangeFigures,
-    /// |q̇| from there to 0.1 rad/s (m/s).
+    /// |q̇| from there to 0.1 rad/s (m/s), likewise.
     pub reversal: SpeedRangeFigures,
-    /// |q̇| from 0.1 rad/s (m/s) on.
+    /// |q̇| from 0.1 rad/s (m/s) on, likewise.
     pub fast: SpeedRangeFigures,
 }
 
 impl SpeedRanges {
-    /// A residual at a velocity.
+    /// A residual at a velocity, rad/s (m/s) as it would be of a usual arm.
     pub fn add(&mut self, speed: f64, residual: f64) {
         let speed = speed.abs();
         let place = usize::from(speed >= STATIC) + usize::from(speed >= REVERSAL);

@@ -18,11 +18,11 @@ pub(super) fn candidates(robot: &ParametricModel, rows: &MotionRows) -> Vec<Mist
         all.extend([PI / 180.0, TAU, 180.0 / PI, TAU.recip()].map(|factor| Mistake::PositionUnit { factor }));
     }
     // Units of time, where the rate looks like another one or the robot would be too fast.
-    let is_odd = !is_rate_of_a_recorder(rows.rate_hz)
+    let is_odd = !is_rate_of_a_recorder(model, rows.rate_hz)
         || beyond_limits(model, rows).iter().any(|beyond| beyond.quantity == "velocity");
     for factor in [1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9] {
         // Stamps that are a factor too large make a rate that is as much too low.
-        if is_odd && is_rate_of_a_recorder(rows.rate_hz / factor) {
+        if is_odd && is_rate_of_a_recorder(model, rows.rate_hz / factor) {
             all.push(Mistake::TimeUnit { factor });
         }
     }

@@ -11,7 +11,7 @@ use dynident_recording::report::ChannelReport;
 const POSITION_SHARE: f64 = 0.02;
 /// Times its limit that a velocity may be: descriptions state rated velocities.
 const VELOCITY_TIMES: f64 = 1.5;
-/// Rates that recorders of robots have, Hz.
+/// Rates that recorders of usual arms have, Hz; those of others have the same in their own seconds.
 const RATES_HZ: [f64; 2] = [4.0, 50_000.0];
 
 /// A joint that would be where, or as fast as, it cannot be.
@@ -62,7 +62,7 @@ pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
             _ => false,
         }
     };
-    !is_rate_of_a_recorder(report.rate_hz) || report.channels.iter().any(is_behind)
+    !is_rate_of_a_recorder(model, report.rate_hz) || report.channels.iter().any(is_behind)
 }
 
 /// Whether a log has jumps that no motion makes: readings of it would mean nothing.
@@ -71,9 +71,10 @@ pub(super) fn has_jumps(report: &ImportReport) -> bool {
     report.channels.iter().filter(is_measured).any(|channel| channel.turns > 0 || channel.lone_samples > 0)
 }
 
-/// Whether a recorder of robots has such a rate.
-pub(super) fn is_rate_of_a_recorder(rate_hz: f64) -> bool {
-    (RATES_HZ[0]..=RATES_HZ[1]).contains(&rate_hz)
+/// Whether a recorder of such a robot has this rate.
+pub(super) fn is_rate_of_a_recorder(model: &Model, rate_hz: f64) -> bool {
+    let [lowest, highest] = RATES_HZ.map(|usual_hz| model.own_scale().hertz(usual_hz));
+    (lowest..=highest).contains(&rate_hz)
 }
 
 fn extremes(values: &[f64]) -> [f64; 2] {

@@ -91,7 +91,7 @@ impl Corrected {
             left: best.iter().zip(&explained.torque).map(share).collect(),
             left_of_all: if all > 0.0 { left_of_all / all } else { 0.0 },
             beyond: beyond_limits(self.robot.model(), &self.rows),
-            plausible_rate: is_rate_of_a_recorder(self.rows.rate_hz),
+            plausible_rate: is_rate_of_a_recorder(self.robot.model(), self.rows.rate_hz),
             consistent_score: explained.consistent_score(),
             free_score: explained.free_score(),
             alone_score: explained.alone_score(),

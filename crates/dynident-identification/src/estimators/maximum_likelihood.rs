@@ -27,9 +27,9 @@ const MOST_DIFFERENCE: f64 = 0.1;
 const NO_MOTION: f64 = 1e-4;
 /// Noise of a torque counts as at least this share of its root mean square.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Least steps of central differences of the regressor by position, velocity and acceleration; it is linear in the
-/// last. Where the noise of the mean period is larger, so is the step: the slope of a step of friction is that over the
-/// noise.
+/// Least steps of central differences of the regressor by position, velocity and acceleration of a usual arm; it is
+/// linear in the last. Where the noise of the mean period is larger, so is the step: the slope of a step of friction is
+/// that over the noise.
 const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
@@ -185,7 +185,15 @@ pub(super) fn periodic(
         max_iterations: 50,
     };
     let std = |place: usize| single[(place, place)].max(0.0).sqrt();
-    let steps = |order: usize, joint: usize| LEAST_STEPS[order].max(std(order * dof + joint) / (most as f64).sqrt());
+    let own = model.model().own_scale();
+    let least = |order: usize, joint: usize| {
+        let turns = model.model().joints()[joint].turns();
+        let [position, velocity, acceleration] = LEAST_STEPS;
+        let of_order =
+            [own.position(turns, position), own.velocity(turns, velocity), own.acceleration(turns, acceleration)];
+        of_order[order]
+    };
+    let steps = |order: usize, joint: usize| least(order, joint).max(std(order * dof + joint) / (most as f64).sqrt());
     let steps: Vec<f64> = (0..3 * dof).map(|variable| steps(variable / dof, variable % dof)).collect();
     let mut instants = Instants::new(model, steps);
     let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {

@@ -272,7 +272,8 @@ fn settled(
         difference: experiment.difference,
     };
     let SimulatedStart { values, name, mut sigma } = start;
-    let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs())).max(1e-9);
+    let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let largest = if largest > 0.0 { largest } else { 1.0 };
     let scale = values.iter().zip(std).map(|(value, std)| value.abs().max(*std).max(1e-3 * largest)).collect();
     let mut fit = SimulatedProblem {
         names: rows.model.layout().columns().iter().map(Column::symbol).collect(),
@@ -375,7 +376,9 @@ fn deviations(
         .map(|joint| {
             let rows = count[joint] as f64;
             let least = LEAST_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
-            (squares[joint] / (rows - share).max(1.0)).sqrt().max(least).max(1e-12)
+            let sigma = (squares[joint] / (rows - share).max(1.0)).sqrt().max(least);
+            // Of a joint without torque and without residual.
+            if sigma > 0.0 { sigma } else { 1.0 }
         })
         .collect()
 }

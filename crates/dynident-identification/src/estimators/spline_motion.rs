@@ -74,8 +74,12 @@ pub(super) fn spline_motion(
         parameters: start.values.clone(),
         held,
     };
-    let settings =
-        SplineMotionSettings { rank: estimation.rank, covariance: estimation.covariance, ..settings.clone() };
+    let settings = SplineMotionSettings {
+        rank: estimation.rank,
+        covariance: estimation.covariance,
+        own_second_s: rows.model.model().own_scale().seconds(1.0),
+        ..settings.clone()
+    };
     let pilot = torque_sigma(problem, &start.values)?;
     let mut torque = SplineTorque::new(model, temperatures_c);
     let mut fitted = |settings: &SplineMotionSettings| -> Result<_, EstimatorError> {

@@ -1,6 +1,7 @@
 //! Residual diagnostics and the 95 % band of a held-out log, joint by joint, in the pass that validates.
 
-use dynident_dynamics::{Column, PanelLayout};
+use crate::regressor_model::RegressorModel;
+use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, Normality, NormalityReport, SpeedRanges, SpeedRangesReport, Whiteness, WhitenessReport,
     student_half_width,
@@ -70,6 +71,8 @@ pub(crate) struct JointWatch {
     /// Places among the panel's columns whose sum is the velocity: viscous friction, or its two directions. None where
     /// there are no such columns.
     speed: Vec<usize>,
+    /// What a rad/s (m/s) of a usual arm is to the joint.
+    usual_speed: f64,
     whiteness: Whiteness,
     normality: Normality,
     regimes: SpeedRanges,
@@ -79,7 +82,8 @@ pub(crate) struct JointWatch {
 }
 
 impl JointWatch {
-    pub(crate) fn new(layout: &PanelLayout, joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
+    pub(crate) fn new(model: &RegressorModel, joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
+        let layout = model.layout();
         let columns = layout.joint_columns(joint);
         let all = layout.columns();
         let places = |is: &dyn Fn(&TorqueTerm) -> bool| -> Vec<usize> {
@@ -106,6 +110,7 @@ impl JointWatch {
             own,
             sigma: uncertainty.map(|uncertainty| (uncertainty.joint_sigma[joint], uncertainty.width)),
             speed,
+            usual_speed: model.model().own_scale().velocity(model.model().joints()[joint].turns(), 1.0),
             whiteness: Whiteness::default(),
             normality: Normality::default(),
             regimes: SpeedRanges::default(),
@@ -124,7 +129,8 @@ impl JointWatch {
             self.whiteness.add(residual);
             self.normality.add(residual);
             if !self.speed.is_empty() {
-                self.regimes.add(self.speed.iter().map(|column| panel[column * rows + row]).sum(), residual);
+                let speed: f64 = self.speed.iter().map(|column| panel[column * rows + row]).sum();
+                self.regimes.add(speed / self.usual_speed, residual);
             }
             if let Some((sigma, width)) = self.sigma {
                 let variance: f64 = (0..self.own.nrows())

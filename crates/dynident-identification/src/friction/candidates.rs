@@ -1,21 +1,23 @@
 //! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one
 //! a column.
 
+use dynident_model::Model;
 use dynident_model::terms::{
     Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power,
     PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
 };
 
-/// Widths of the smooth Coulomb step, rad/s or m/s; beside them the sign and what the study states.
+/// Widths of the smooth Coulomb step, rad/s or m/s of a usual arm, as all velocities here; beside them the sign and
+/// what the study states.
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
-/// Stribeck velocities, rad/s or m/s.
+/// Stribeck velocities.
 const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
 /// Width of the step under the Stribeck term as a share of its velocity, at most, while it is chosen: beyond
 /// half its velocity the step is done.
 pub(super) const STRIBECK_WIDTH: f64 = 0.25;
 const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
-/// Yield displacements of the Maxwell-slip elements, rad or m.
+/// Yield displacements of the Maxwell-slip elements, rad, or m of a usual arm.
 const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
 
 /// What a candidate model is made of.
@@ -160,29 +162,55 @@ pub struct FrictionSearch {
     /// Velocity below which the sign step counts as zero, rad/s or m/s. 0 by default.
     pub dead_band: f64,
     /// Width of the step of load-dependent friction where the logs show no smooth step and none is stated, rad/s or
-    /// m/s. 0.02 by default.
-    pub width: f64,
+    /// m/s. By default [`CoulombShape::USUAL_WIDTH`] of a usual arm.
+    pub width: Option<f64>,
 }
 
 impl FrictionSearch {
     /// The search for a joint's friction with the defaults.
     pub fn of(joint: impl Into<String>) -> Self {
-        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: 0.02 }
+        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: None }
+    }
+}
+
+/// What velocities and positions of a usual arm are to one joint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointScale {
+    joint: usize,
+    /// A rad/s (m/s).
+    pub(crate) velocity: f64,
+    /// A rad (m).
+    position: f64,
+}
+
+impl JointScale {
+    #[cfg(test)]
+    pub(super) const fn usual(joint: usize) -> Self {
+        Self { joint, velocity: 1.0, position: 1.0 }
+    }
+
+    pub(crate) fn of(model: &Model, joint: usize) -> Self {
+        let (own, turns) = (model.own_scale(), model.joints()[joint].turns());
+        Self { joint, velocity: own.velocity(turns, 1.0), position: own.position(turns, 1.0) }
     }
 }
 
 /// Viscous friction with a Coulomb step: the columns that tell how wide the step is before anything else is chosen.
-pub(crate) fn step_columns(search: &FrictionSearch, joint: usize) -> Vec<CandidateColumn> {
+pub(crate) fn step_columns(search: &FrictionSearch, joint: JointScale) -> Vec<CandidateColumn> {
     let is_step = |column: &CandidateColumn| matches!(column.kind, FrictionKind::Viscous | FrictionKind::Coulomb);
     candidate_columns(search, joint, None).into_iter().filter(is_step).collect()
 }
 
-/// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid. `width` is about
+/// The columns to choose from at a joint; a term's columns stand together, in the order of its grid. `width` is about
 /// that of the step at rest, if that is known: a point of the grid, for what lies between two points looks like a
 /// further term.
-pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Option<f64>) -> Vec<CandidateColumn> {
+pub(crate) fn candidate_columns(
+    search: &FrictionSearch,
+    JointScale { joint, velocity, position }: JointScale,
+    width: Option<f64>,
+) -> Vec<CandidateColumn> {
     let sign = CoulombShape::Sign { dead_band: search.dead_band };
-    let mut widths = WIDTHS.to_vec();
+    let mut widths = WIDTHS.map(|width| width * velocity).to_vec();
     let mut alone = vec![sign];
     match search.coulomb {
         Some(CoulombShape::Smooth { width }) if !widths.contains(&width) => widths.push(width),
@@ -193,7 +221,7 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Op
     widths.sort_by(f64::total_cmp);
     let load_width = match (width, search.coulomb) {
         (Some(width), _) | (None, Some(CoulombShape::Smooth { width })) => width,
-        _ => search.width,
+        _ => search.width.unwrap_or(CoulombShape::USUAL_WIDTH * velocity),
     };
     let mut columns = Vec::new();
     let mut add = |terms: Vec<TorqueTerm>, grid: Option<usize>| {
@@ -217,22 +245,22 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Op
         let of = |direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape });
         add(both.map(of).to_vec(), Some(step));
     }
-    for (step, &width) in SIGMOID_WIDTHS.iter().enumerate() {
+    for (step, width) in SIGMOID_WIDTHS.map(|width| width * velocity).into_iter().enumerate() {
         for offset_speed in [-0.5 * width, 0.5 * width] {
             add(vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })], Some(step));
         }
     }
-    for (step, &speed) in STRIBECK_SPEEDS.iter().enumerate() {
+    for (step, speed) in STRIBECK_SPEEDS.map(|speed| speed * velocity).into_iter().enumerate() {
         for exponent in STRIBECK_EXPONENTS {
             let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
             add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })], Some(step));
         }
     }
     for exponent in [PowerExponent::CubeRoot, PowerExponent::Quadratic] {
-        add(vec![TorqueTerm::Power(Power { joint, exponent, rounding: Power::ROUNDING })], None);
+        add(vec![TorqueTerm::Power(Power { joint, exponent, rounding: Power::ROUNDING * velocity })], None);
     }
     add(vec![TorqueTerm::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })], None);
-    for yield_displacement in YIELDS {
+    for yield_displacement in YIELDS.map(|displacement| displacement * position) {
         add(vec![TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement })], None);
     }
     columns

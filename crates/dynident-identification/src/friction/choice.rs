@@ -3,7 +3,7 @@
 //! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see
 //! [`CrossValidation`]); how one joint's are searched is in `search`.
 
-use super::candidates::{CandidateColumn, FrictionKind};
+use super::candidates::{CandidateColumn, FrictionKind, JointScale};
 use super::search::search;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 const FOLDS: [usize; 2] = [10, 5];
 /// Rounds over all joints: from the second on, the others have the friction that was chosen for them.
 const ROUNDS: usize = 2;
-/// Root mean square velocity below which a joint does not move, rad/s or m/s: what the position noise of a standing
-/// joint looks like.
+/// Root mean square velocity below which a joint does not move, rad/s or m/s of a usual arm: what the position noise of
+/// a standing joint looks like.
 const MOVING: f64 = 1.0e-3;
 
 /// How the friction of one joint was chosen.
@@ -176,7 +176,8 @@ pub(crate) fn choose_friction(
     let of_joint = |joint: usize, columns: &[CandidateColumn], before: &[Option<Vec<usize>>]| {
         let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
-        if speed < MOVING {
+        let scale = JointScale::of(model.model(), joint);
+        if speed < MOVING * scale.velocity {
             return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
         }
         // The stated model, as far as the data excite it, without this joint's friction, and with that of others as
@@ -194,7 +195,7 @@ pub(crate) fn choose_friction(
         let further = further_columns((model, plain), (wide, wide_problem));
         let common: Vec<usize> = stated.chain(others.flatten().copied()).chain(further).collect();
         match validation.joint(joint, &common, &variable, &weights) {
-            Ok(prepared) => Ok(search(name(joint), folds, &prepared, columns)),
+            Ok(prepared) => Ok(search((name(joint), scale), folds, &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {
                 Ok((refused(joint, "fewer rows than columns once a block is left out"), Vec::new()))
             }

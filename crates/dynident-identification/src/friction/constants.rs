@@ -1,6 +1,6 @@
 //! The constants of a term's curve (width of a step, Stribeck velocity, ..) as coordinates that can be moved.
 
-use super::candidates::STRIBECK_WIDTH;
+use super::candidates::{JointScale, STRIBECK_WIDTH};
 use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Sigmoid, Stribeck, TorqueTerm};
 
 /// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. The width of a step
@@ -30,7 +30,7 @@ pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
     }
 }
 
-/// Bounds of velocities, rad/s (m/s), and of exponents.
+/// Bounds of velocities, rad/s (m/s) of a usual arm, and of exponents.
 const VELOCITIES: [f64; 2] = [1.0e-4, 10.0];
 const EXPONENTS: [f64; 2] = [0.5, 3.0];
 /// Furthest that a step is from rest, in units of its width.
@@ -41,10 +41,11 @@ fn within(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
     logarithm.clamp(least.ln(), most.ln()).exp()
 }
 
-/// The term with its constants at these coordinates.
-pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
+/// The term of a joint with its constants at these coordinates.
+pub(super) fn at(term: &TorqueTerm, coordinates: &[f64], scale: JointScale) -> TorqueTerm {
+    let velocities = VELOCITIES.map(|usual| usual * scale.velocity);
     let shape = |shape: CoulombShape| match (shape, coordinates) {
-        (CoulombShape::Smooth { .. }, [width, ..]) => CoulombShape::Smooth { width: within(*width, VELOCITIES) },
+        (CoulombShape::Smooth { .. }, [width, ..]) => CoulombShape::Smooth { width: within(*width, velocities) },
         _ => shape,
     };
     match (term, coordinates) {
@@ -54,7 +55,7 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
         }
         (TorqueTerm::Load(own), _) => TorqueTerm::Load(LoadFriction { shape: shape(own.shape), ..*own }),
         (TorqueTerm::Stribeck(own), [speed, exponent]) => {
-            let speed = within(*speed, VELOCITIES);
+            let speed = within(*speed, velocities);
             let shape = match own.shape {
                 CoulombShape::Smooth { .. } => CoulombShape::Smooth { width: STRIBECK_WIDTH * speed },
                 dry @ CoulombShape::Sign { .. } => dry,
@@ -62,7 +63,7 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
             TorqueTerm::Stribeck(Stribeck { speed, exponent: within(*exponent, EXPONENTS), shape, ..*own })
         }
         (TorqueTerm::Sigmoid(own), [steepness, shift]) => {
-            let steepness = 2.0 / within((2.0 / steepness.exp()).ln(), VELOCITIES);
+            let steepness = 2.0 / within((2.0 / steepness.exp()).ln(), velocities);
             let offset_speed = 2.0 * shift.clamp(-MOST_SHIFT, MOST_SHIFT) / steepness;
             TorqueTerm::Sigmoid(Sigmoid { steepness, offset_speed, ..*own })
         }
@@ -71,8 +72,8 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
 }
 
 /// The name of the constant behind a coordinate, and its value where the coordinates are these.
-pub(super) fn value_at(term: &TorqueTerm, place: usize, coordinates: &[f64]) -> (&'static str, f64) {
-    match (at(term, coordinates), place) {
+pub(super) fn value_at(term: &TorqueTerm, place: usize, coordinates: &[f64], scale: JointScale) -> (&'static str, f64) {
+    match (at(term, coordinates, scale), place) {
         (TorqueTerm::Stribeck(own), 0) => ("speed", own.speed),
         (TorqueTerm::Stribeck(own), _) => ("exponent", own.exponent),
         (TorqueTerm::Sigmoid(own), 0) => ("steepness", own.steepness),
@@ -116,7 +117,7 @@ pub(super) fn with_one_step(mut terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
 ///
 /// # Panics
 /// If there is no term.
-pub(super) fn mean_term(weighted: &[(&TorqueTerm, f64)]) -> TorqueTerm {
+pub(super) fn mean_term(weighted: &[(&TorqueTerm, f64)], scale: JointScale) -> TorqueTerm {
     let total: f64 = weighted.iter().map(|(_, weight)| weight).sum();
     let mut mean = coordinates(weighted[0].0);
     for (place, value) in mean.iter_mut().enumerate() {
@@ -126,7 +127,7 @@ pub(super) fn mean_term(weighted: &[(&TorqueTerm, f64)]) -> TorqueTerm {
             .sum();
         *value = sum / total;
     }
-    at(weighted[0].0, &mean)
+    at(weighted[0].0, &mean, scale)
 }
 
 #[cfg(test)]
@@ -135,6 +136,7 @@ mod tests {
 
     const SMOOTH: CoulombShape = CoulombShape::Smooth { width: 0.03 };
     const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
+    const USUAL: JointScale = JointScale::usual(0);
 
     fn stribeck(shape: CoulombShape) -> TorqueTerm {
         TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 1.5, shape })
@@ -160,7 +162,7 @@ mod tests {
         let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: SMOOTH });
         for term in [stribeck(SMOOTH), stribeck(SIGN), sigmoid, coulomb] {
             let own = coordinates(&term);
-            let back = coordinates(&at(&term, &own));
+            let back = coordinates(&at(&term, &own, USUAL));
             // Logarithms and back: a few roundings.
             assert!(own.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-12) && own.len() == back.len(), "{term:?}");
         }
@@ -170,9 +172,9 @@ mod tests {
         for (place, name) in names.into_iter().enumerate() {
             let mut moved = own.clone();
             moved[place] += 0.5;
-            let values: Vec<_> = (0..2).map(|place| value_at(&stribeck(SMOOTH), place, &moved)).collect();
+            let values: Vec<_> = (0..2).map(|place| value_at(&stribeck(SMOOTH), place, &moved, USUAL)).collect();
             assert!(values.iter().map(|(name, _)| *name).eq(names), "{values:?}");
-            let ratio = values[place].1 / value_at(&stribeck(SMOOTH), place, &own).1;
+            let ratio = values[place].1 / value_at(&stribeck(SMOOTH), place, &own, USUAL).1;
             assert!((ratio - 0.5_f64.exp()).abs() < 1e-12, "{name}: {ratio}");
         }
     }

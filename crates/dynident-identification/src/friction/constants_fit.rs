@@ -9,6 +9,7 @@
 //! deviation. The last step's covariance is that of the constants, and parameters answer to them by
 //! `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`: their error bars have to hold it.
 
+use super::candidates::JointScale;
 use super::choice::{FrictionConstant, JointFriction};
 use super::constants::{at, coordinates, step_of, value_at};
 use super::weak_terms::without_weakest;
@@ -32,6 +33,7 @@ const SETTLED: (f64, f64) = (0.1, 2.0e-3);
 pub(crate) struct FrictionConstants {
     /// Joints with their terms.
     joints: Vec<(usize, Vec<TorqueTerm>)>,
+    scales: Vec<JointScale>,
     axes: Vec<Axis>,
 }
 
@@ -98,7 +100,8 @@ impl FrictionConstants {
         let of_joint = |own: &JointFriction| Some((model.model().joint_index(&own.joint)?, own.terms.clone()?));
         let joints: Vec<(usize, Vec<TorqueTerm>)> = chosen.iter().filter_map(of_joint).collect();
         let axes = joints.iter().enumerate().flat_map(|(joint, (_, terms))| axes_of(joint, terms)).collect();
-        Self { joints, axes }
+        let scales = joints.iter().map(|(joint, _)| JointScale::of(model.model(), *joint)).collect();
+        Self { joints, scales, axes }
     }
 
     /// Whether there is none to move.
@@ -117,7 +120,7 @@ impl FrictionConstants {
                     own[axis.place] += step;
                 }
                 if !own.is_empty() {
-                    *term = at(term, &own);
+                    *term = at(term, &own, self.scales[place]);
                 }
             }
         }
@@ -150,7 +153,7 @@ impl FrictionConstants {
         let term = &self.joints[axis.joint].1[number];
         let mut own = coordinates(term);
         own[axis.place] += step;
-        at(term, &own)
+        at(term, &own, self.scales[axis.joint])
     }
 
     /// The terms on both sides of the centre along every axis: columns that a pass has to have beside the model's.
@@ -293,7 +296,7 @@ impl FrictionConstants {
                 let value = |sigmas: f64| {
                     let mut moved = own.clone();
                     moved[axis.place] += sigmas * std;
-                    value_at(term, axis.place, moved.as_slice())
+                    value_at(term, axis.place, moved.as_slice(), self.scales[place])
                 };
                 let (name, middle) = value(0.0);
                 let mut ends = [value(-HALF_WIDTH_95).1, value(HALF_WIDTH_95).1];

@@ -9,7 +9,7 @@
 //! A constant of a term (a width, a velocity) is taken between two neighbours of its grid, whose columns together say
 //! what the column between them would: so no further term is needed to patch up a grid that is too coarse.
 
-use super::candidates::{CandidateColumn, FrictionKind};
+use super::candidates::{CandidateColumn, FrictionKind, JointScale};
 use super::choice::{FrictionCandidate, JointFriction};
 use super::constants::{mean_term, with_one_step};
 use dynident_estimation::{FoldErrors, JointFolds};
@@ -34,11 +34,11 @@ impl ScoredCandidate {
     }
 
     /// Its terms that have a value at all, with their constants; both directions of one that has two.
-    fn terms(&self, columns: &[CandidateColumn]) -> Vec<TorqueTerm> {
-        self.kinds.iter().flat_map(|&kind| self.terms_of(columns, kind)).collect()
+    fn terms(&self, columns: &[CandidateColumn], scale: JointScale) -> Vec<TorqueTerm> {
+        self.kinds.iter().flat_map(|&kind| self.terms_of(columns, kind, scale)).collect()
     }
 
-    fn terms_of(&self, columns: &[CandidateColumn], kind: FrictionKind) -> Vec<TorqueTerm> {
+    fn terms_of(&self, columns: &[CandidateColumn], kind: FrictionKind, scale: JointScale) -> Vec<TorqueTerm> {
         let present = self.present(columns, kind);
         if !kind.takes_one() {
             let mut stated: Vec<TorqueTerm> = Vec::new();
@@ -54,7 +54,7 @@ impl ScoredCandidate {
         let weighted = |number: usize| -> Vec<(&TorqueTerm, f64)> {
             present.iter().map(|&(place, value)| (&columns[place].stated[number], value)).collect()
         };
-        (0..columns[first].stated.len()).map(|number| mean_term(&weighted(number))).collect()
+        (0..columns[first].stated.len()).map(|number| mean_term(&weighted(number), scale)).collect()
     }
 
     /// Symbols of the parameters that are not zero, each once.
@@ -169,7 +169,7 @@ fn add_terms(
 
 /// The choice for one joint, and the places of its columns.
 pub(super) fn search(
-    joint: String,
+    (joint, scale): (String, JointScale),
     count: usize,
     folds: &JointFolds,
     columns: &[CandidateColumn],
@@ -204,7 +204,7 @@ pub(super) fn search(
     let friction = JointFriction {
         joint,
         chosen: best.present_name(columns),
-        terms: Some(with_one_step(best.terms(columns))),
+        terms: Some(with_one_step(best.terms(columns, scale))),
         constants: Vec::new(),
         folds: count,
         candidates: met.iter().enumerate().map(candidate).collect(),

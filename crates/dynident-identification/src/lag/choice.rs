@@ -24,8 +24,9 @@ const UNLIKE: f64 = 4.0;
 const OWN_SHARE: f64 = 0.5;
 /// Halvings of the interval that holds the spread between joints: to a millionth of what they differ by.
 const BISECTIONS: usize = 20;
-/// Standard deviation of a lag of which nothing is known but that it is one of a drive or a bus, seconds.
-const USUAL_LAG_S: f64 = 5.0e-3;
+/// Standard deviation of a lag of which nothing is known but that it is one of a drive or a bus, seconds of a usual arm
+/// ([`OwnScale`](dynident_model::OwnScale)): drives and buses are made as fast as their machine needs them.
+pub(super) const USUAL_LAG_S: f64 = 5.0e-3;
 
 /// Whose lag was taken off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -158,7 +159,7 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
 /// a lag that the study states.
 fn lag_error(fit: &LagFit, choice: &LagChoice) -> Option<DMatrix<f64>> {
     let answers = fit.answers();
-    let usual = |std_s: f64| (std_s.powi(-2) + USUAL_LAG_S.powi(-2)).powf(-0.5);
+    let usual = |std_s: f64| (std_s.powi(-2) + fit.usual_lag_s.powi(-2)).powf(-0.5);
     Some(match choice.kind {
         LagKind::Stated => return None,
         LagKind::Joints => {
@@ -198,7 +199,8 @@ pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
 /// has a lag of its noise.
 fn telling_joints(fit: &LagFit) -> Vec<usize> {
     let lags = fit.joints.iter().enumerate().filter_map(|(joint, lag)| Some((joint, lag.as_ref()?)));
-    let telling: Vec<usize> = lags.clone().filter(|(_, lag)| lag.std_s < USUAL_LAG_S).map(|(joint, _)| joint).collect();
+    let telling: Vec<usize> =
+        lags.clone().filter(|(_, lag)| lag.std_s < fit.usual_lag_s).map(|(joint, _)| joint).collect();
     if telling.is_empty() { lags.map(|(joint, _)| joint).collect() } else { telling }
 }
 

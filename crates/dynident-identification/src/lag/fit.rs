@@ -6,6 +6,7 @@
 //! is the lag `δ` itself. The last step's covariance, from time segments, is the lag's. What the model cannot say
 //! (backlash, elasticity) is in it as far as it differs from segment to segment.
 
+use super::choice::USUAL_LAG_S;
 use super::measured::TorqueLag;
 use super::rows::{DelayRows, NODES, lagrange};
 use super::samples::DelayCheck;
@@ -20,7 +21,7 @@ use dynident_estimation::{
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Longest lag looked for, seconds: drives and buses stay below.
+/// Longest lag looked for, seconds of a usual arm: drives and buses stay below.
 const LONGEST_DELAY_S: f64 = 0.1;
 /// Steps at most; two to four are usual.
 const MOST_STEPS: usize = 12;
@@ -40,6 +41,8 @@ pub struct LagFit {
     pub(crate) joints: Vec<Option<TorqueLag>>,
     /// Filtered rows by joint.
     pub(crate) rows: Vec<usize>,
+    /// Standard deviation of a lag of which nothing is known, seconds.
+    pub(crate) usual_lag_s: f64,
 }
 
 impl LagFit {
@@ -117,9 +120,11 @@ fn fitted(
     let (logs, settings) = with;
     let cutoff_hz = logs.motion.differentiator.cutoff_hz();
     let dof = model.model().dof();
+    let own = model.model().own_scale();
+    let longest_s = own.seconds(LONGEST_DELAY_S);
     let start = |joint: usize| {
-        let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, LONGEST_DELAY_S)? / check.rate_hz());
-        checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-LONGEST_DELAY_S, LONGEST_DELAY_S)
+        let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, longest_s)? / check.rate_hz());
+        checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-longest_s, longest_s)
     };
     let mut samples = Samples::new((checks, unknowns), with, (0..dof).into_par_iter().map(start).collect())?;
     let quick =
@@ -132,7 +137,7 @@ fn fitted(
         for joint in 0..dof {
             let (rest, std) = (step.values[first + joint], step.std[first + joint]);
             has_settled &= rest.abs() <= (SETTLED.0 * std).max(SETTLED.1 / fastest_hz);
-            samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-LONGEST_DELAY_S, LONGEST_DELAY_S);
+            samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-longest_s, longest_s);
         }
         samples.follow()?;
         if has_settled {
@@ -141,10 +146,11 @@ fn fitted(
     }
     let last_step = WeightedSettings { covariance: settings.covariance, ..quick };
     let last = weighted_least_squares(&samples.problem(|rows| &rows.factor)?, &last_step)?;
-    let joints = (0..dof).map(|joint| samples.joint_lag(&last, first, joint, fastest_hz)).collect();
+    let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();
-    Ok(LagFit { parameters: unknowns.values.len(), first, joints, rows, last })
+    let usual_lag_s = own.seconds(USUAL_LAG_S);
+    Ok(LagFit { parameters: unknowns.values.len(), first, joints, rows, last, usual_lag_s })
 }
 
 impl<'a> Samples<'a> {
@@ -174,15 +180,15 @@ impl<'a> Samples<'a> {
         Ok(())
     }
 
-    /// The lag of one joint from the last step, if it settled.
-    fn joint_lag(&self, last: &Estimate, first: usize, joint: usize, fastest_hz: f64) -> Option<TorqueLag> {
-        let column = first + joint;
+    /// The lag in `column` of the last step, if it settled below the longest.
+    fn joint_lag(&self, last: &Estimate, column: usize, longest_s: f64, fastest_hz: f64) -> Option<TorqueLag> {
+        let joint = column - self.unknowns.count();
         let (rest, std) = (last.values[column], last.std[column]);
         let lag_s = self.lag_s[joint] + rest;
         let excited = last.rank.fixed.iter().all(|fixed| fixed.column != column);
         let settled = rest.abs() <= (0.5 * std).max(1.0e3 * SETTLED.1 / fastest_hz);
         let half_width = last.half_width_95[column];
-        if !excited || !settled || lag_s.abs() >= 0.999 * LONGEST_DELAY_S || half_width >= LONGEST_DELAY_S {
+        if !excited || !settled || lag_s.abs() >= 0.999 * longest_s || half_width >= longest_s {
             return None;
         }
         let of_log = |(check, rows): (&DelayCheck<'_>, &Vec<DelayRows>)| {

@@ -5,13 +5,13 @@ use dynident_model::Model;
 use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError};
 use serde::{Deserialize, Serialize};
 
-/// Speeds that no robot measures come from positions at least this far apart, s: quantised positions of neighbouring
-/// samples say nothing.
+/// Speeds that no robot measures come from positions at least this far apart, seconds of a usual arm: quantised
+/// positions of neighbouring samples say nothing.
 const SPEED_SPAN_S: f64 = 0.01;
 
 /// The default distance from the path that stops a joint that turns, rad.
 const TRACKING_RAD: f64 = 0.3;
-/// The same of a joint that slides, m.
+/// The same of a joint that slides, m of a usual arm.
 const TRACKING_M: f64 = 0.1;
 /// Room above the description's velocity and effort: controllers overshoot, and sensors are noisy.
 const ROOM: f64 = 1.1;
@@ -58,13 +58,15 @@ impl EnvelopeSettings {
             Ok::<Vec<Option<f64>>, SimulationError>(values.into_iter().map(Some).collect())
         };
         let limits = |joint: usize| &joints[joint].limits;
-        let path = |joint: usize| Some(if joints[joint].turns() { TRACKING_RAD } else { TRACKING_M });
+        let own = model.own_scale();
+        let path = |joint: usize| Some(if joints[joint].turns() { TRACKING_RAD } else { own.metres(TRACKING_M) });
         Ok(Envelope {
             lower: each("lower", &self.lower, false, &|joint| limits(joint).lower)?,
             upper: each("upper", &self.upper, false, &|joint| limits(joint).upper)?,
             speed: each("speed", &self.speed, true, &|joint| limits(joint).velocity.map(|limit| ROOM * limit))?,
             torque: each("torque", &self.torque, true, &|joint| limits(joint).effort.map(|limit| ROOM * limit))?,
             tracking_error: each("tracking_error", &self.tracking_error, true, &path)?,
+            speed_span_s: own.seconds(SPEED_SPAN_S),
         })
     }
 }
@@ -82,6 +84,9 @@ pub struct Envelope {
     pub torque: Vec<Option<f64>>,
     /// Largest distance from the path, rad (m).
     pub tracking_error: Vec<Option<f64>>,
+    /// Speeds that no robot measures come from positions at least this far apart, s.
+    #[serde(skip)]
+    pub speed_span_s: f64,
 }
 
 impl Envelope {
@@ -100,6 +105,7 @@ impl Envelope {
             speed: sorted(&self.speed),
             torque: sorted(&self.torque),
             tracking_error: sorted(&self.tracking_error),
+            speed_span_s: self.speed_span_s,
         }
     }
 
@@ -209,7 +215,7 @@ impl<'a> EnvelopeWatch<'a> {
         let envelope = self.envelope?;
         let (joints, last) = (record.joints.len(), record.samples.checked_sub(1)?);
         let time_s = record.times_s[last];
-        while self.from + 1 < last && time_s - record.times_s[self.from + 1] >= SPEED_SPAN_S {
+        while self.from + 1 < last && time_s - record.times_s[self.from + 1] >= envelope.speed_span_s {
             self.from += 1;
         }
         let span_s = time_s - record.times_s[self.from];
@@ -218,7 +224,7 @@ impl<'a> EnvelopeWatch<'a> {
             let q = record.q[at];
             let speed = match dq {
                 Some(dq) => Some(dq[joint]),
-                None => (span_s >= SPEED_SPAN_S).then(|| (q - record.q[self.from * joints + joint]) / span_s),
+                None => (span_s >= envelope.speed_span_s).then(|| (q - record.q[self.from * joints + joint]) / span_s),
             };
             let broken = envelope
                 .of_position(joint, q)
@@ -261,6 +267,7 @@ mod tests {
             speed: vec![None, Some(0.5)],
             torque: vec![Some(9.0), None],
             tracking_error: none,
+            speed_span_s: SPEED_SPAN_S,
         }
     }
 

@@ -208,6 +208,7 @@ fn the_book_tells_the_protocol() {
         speed: each(2.5),
         torque: vec![Some(96.0), Some(30.0)],
         tracking_error: each(0.3),
+        speed_span_s: 0.01,
     });
     let own = [
         ToClient::Run { run: 1, rate_hz: 1000.0, duration_s: 10.0, trajectory, controller, envelope: envelope.clone() },

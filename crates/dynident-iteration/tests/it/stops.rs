@@ -164,6 +164,7 @@ fn envelope() -> Envelope {
         speed: none.clone(),
         torque: none.clone(),
         tracking_error: none,
+        speed_span_s: 0.01,
     }
 }
 

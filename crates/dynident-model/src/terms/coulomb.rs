@@ -24,6 +24,10 @@ pub enum CoulombShape {
 }
 
 impl CoulombShape {
+    /// The width of a smooth step that is usual, rad/s or m/s of a usual arm
+    /// ([`OwnScale::velocity`](crate::OwnScale::velocity)).
+    pub const USUAL_WIDTH: f64 = 0.02;
+
     /// The step at velocity `dq`.
     #[inline]
     pub fn step(self, dq: f64) -> f64 {

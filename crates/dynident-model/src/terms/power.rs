@@ -23,7 +23,8 @@ pub struct Power {
 }
 
 impl Power {
-    /// The rounding that is usual: below any velocity that a differentiated encoder separates from rest, rad/s or m/s.
+    /// The rounding that is usual: below any velocity that a differentiated encoder separates from rest, rad/s or m/s
+    /// of a usual arm ([`OwnScale::velocity`](crate::OwnScale::velocity)).
     pub const ROUNDING: f64 = 1.0e-3;
 }
 

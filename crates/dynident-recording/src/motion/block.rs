@@ -17,21 +17,22 @@ pub struct MotionSettings {
     /// Also pass the torque through the differentiator's smoothing, as [`MotionBlock::tau_smooth`].
     pub smooth_torque: bool,
     /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
-    /// samples; 0 to 60, 0 by default.
+    /// samples; 0 to 1,000,000, 0 by default.
     pub trim_s: f64,
     /// Leave everything as it was logged: by default single torque samples far from their neighbours and torque that is
     /// repeated while its joint moves do not count, and lone spikes of a position are replaced; see
     /// [`SetAside`](crate::SetAside).
     pub keep_outliers: bool,
     /// Seconds by which torque comes after its motion, one for all joints or one for each; it is taken at the time of
-    /// the motion that it belongs to. Negative where it comes before; -0.5 to 0.5. Left out, it is taken as logged:
+    /// the motion that it belongs to. Negative where it comes before; `identify` allows half an own second of the robot
+    /// (0.5 s of an arm of 1.2 m). Left out, it is taken as logged:
     /// then `identify` estimates it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_lag_s: Option<OneOrMany<f64>>,
 }
 
-/// Longest lag that can be stated, seconds.
-const LONGEST_LAG_S: f64 = 0.5;
+/// Longest lag that can be stated for any robot, seconds.
+const LONGEST_LAG_S: f64 = 1e4;
 
 impl MotionSettings {
     /// Checks the settings.
@@ -39,9 +40,9 @@ impl MotionSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
-        require((0.0..=60.0).contains(&self.trim_s), "trim_s", self.trim_s, "give seconds, 0 to 60")?;
+        require((0.0..=1e6).contains(&self.trim_s), "trim_s", self.trim_s, "give seconds, 0 to 1000000")?;
         for lag_s in self.torque_lag_s.iter().flat_map(OneOrMany::values) {
-            let fix = "give seconds, -0.5 to 0.5";
+            let fix = "give seconds, -10000 to 10000";
             require((-LONGEST_LAG_S..=LONGEST_LAG_S).contains(lag_s), "torque_lag_s", *lag_s, fix)?;
         }
         self.differentiator.validate()

@@ -44,6 +44,8 @@ pub struct MotionStream {
     joints: Vec<String>,
     clock: Clock,
     cutoff: CutoffChoice,
+    /// The cut-off of the differentiator, Hz.
+    in_force_hz: f64,
     position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
@@ -207,11 +209,11 @@ impl MotionStream {
             trim: (settings.trim_s * clock.rate_hz).round() as usize,
             context: context.map(|samples| samples.max(torque_shift.reach())),
             unsettled: {
-                let cutoff_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
                 let reach = context.unwrap_or(0);
-                ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_hz) as usize).min(reach)
+                ((UNSETTLED_PERIODS * clock.rate_hz / in_force_hz) as usize).min(reach)
             },
             segmenter: Segmenter::new(channels),
+            in_force_hz,
             time_check: TimeCheck::new(clock.median_step_s),
             clock,
             cutoff,
@@ -505,6 +507,7 @@ impl MotionStream {
 
     /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
     pub fn report(&self) -> ImportReport {
+        let cutoff_hz = self.in_force_hz;
         let mut report = ImportReport {
             file: self.rows_in.reader().label().to_owned(),
             rows: self.rows,
@@ -523,8 +526,8 @@ impl MotionStream {
             set_aside: self.rows_in.set_aside(),
             bridged: self.rows_in.bridged(),
             channels: self.checks.iter().map(ChannelCheck::report).collect(),
-            velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
-            acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
+            velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz, cutoff_hz)).collect(),
+            acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz, cutoff_hz)).collect(),
             cutoff: self.cutoff.clone(),
             position_noise: self.position_noise.clone(),
             findings: Vec::new(),

@@ -70,9 +70,10 @@ impl Comparison {
         }
     }
 
-    pub(crate) fn report(&self, rate_hz: f64) -> DerivativeComparison {
+    /// The lag is looked for within a period of the cut-off: what is later is none of this motion.
+    pub(crate) fn report(&self, rate_hz: f64, cutoff_hz: f64) -> DerivativeComparison {
         let ratio = (self.difference / self.power).sqrt();
-        let reach = ((0.1 * rate_hz).ceil() as usize).clamp(3, 100).min(self.derived.len() / 4);
+        let reach = ((rate_hz / cutoff_hz).ceil() as usize).clamp(3, 100).min(self.derived.len() / 4);
         DerivativeComparison {
             joint: self.joint.clone(),
             correlation: {
@@ -94,7 +95,7 @@ mod tests {
         for (derived, logged) in pieces {
             comparison.see(derived, logged);
         }
-        comparison.report(1000.0)
+        comparison.report(1000.0, 10.0)
     }
 
     /// A short first piece at nearly constant velocity, in which noise decides the sign of a centred correlation.

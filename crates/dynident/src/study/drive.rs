@@ -33,8 +33,9 @@ pub struct DriveSection {
     pub viscous: bool,
     /// Coulomb friction. `"smooth"` by default.
     pub coulomb: CoulombChoice,
-    /// Width of the smooth step, rad/s or m/s; 0.02 by default.
-    pub coulomb_width: f64,
+    /// Width of the smooth step, rad/s or m/s. By default 0.02 rad/s (m/s) of an arm of 1.2 m, and of other robots as
+    /// much in their own seconds, which go by their length and gravity: 0.017 rad/s for a UR10, 0.033 for a TX40.
+    pub coulomb_width: Option<f64>,
     /// Velocity below which the sign counts as zero, rad/s or m/s; 0 by default.
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
@@ -62,7 +63,7 @@ impl Default for DriveSection {
             drive_inertia: None,
             viscous: true,
             coulomb: CoulombChoice::Smooth,
-            coulomb_width: 0.02,
+            coulomb_width: None,
             coulomb_dead_band: 0.0,
             offset: true,
             offsets: OffsetChoice::Shared,
@@ -150,7 +151,9 @@ impl DriveSection {
     }
 
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
-        Expected::Positive.check("drive.coulomb_width", self.coulomb_width)?;
+        if let Some(width) = self.coulomb_width {
+            Expected::Positive.check("drive.coulomb_width", width)?;
+        }
         Expected::NotNegative.check("drive.coulomb_dead_band", self.coulomb_dead_band)?;
         if let Some(percent) = self.gain_std_percent {
             Expected::Range(0.0, 100.0).check("drive.gain_std_percent", percent)?;

@@ -1,6 +1,7 @@
 //! Friction in the study file: laws beyond viscous, Coulomb and offset, and whether the data choose them.
 
 use crate::error::{Expected, StudyError};
+use dynident_model::Model;
 use dynident_model::terms::{
     CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent,
     Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous, TorqueTerm,
@@ -86,17 +87,15 @@ fn yes() -> bool {
     true
 }
 
-/// Velocity below which a power of it is rounded, rad/s or m/s: below any velocity that a differentiated encoder
-/// separates from rest.
-const ROUNDING: f64 = 1.0e-3;
 /// Elements of one joint: each is a column.
 const MOST_ELEMENTS: f64 = 50.0;
 
 impl FrictionTerm {
-    /// The parameters of this law at `joint`, whose Coulomb step is `step`.
-    pub(crate) fn terms(&self, joint: usize, step: CoulombShape) -> Vec<TorqueTerm> {
+    /// The parameters of this law at `joint` of `model`, whose Coulomb step is `step`.
+    pub(crate) fn terms(&self, model: &Model, joint: usize, step: CoulombShape) -> Vec<TorqueTerm> {
+        let rounding = model.own_scale().velocity(model.joints()[joint].turns(), Power::ROUNDING);
         let both = [Direction::Forward, Direction::Backward];
-        let power = |exponent| vec![TorqueTerm::Power(Power { joint, exponent, rounding: ROUNDING })];
+        let power = |exponent| vec![TorqueTerm::Power(Power { joint, exponent, rounding })];
         match self {
             Self::AsymmetricViscous {} => {
                 both.map(|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction })).to_vec()
@@ -177,13 +176,13 @@ impl FrictionTerm {
         let within = |name: &str, value: f64, from: f64, to: f64| Expected::Range(from, to).check(name, value);
         match self {
             Self::Stribeck { speed, exponent, width } => {
-                within("speed", *speed, 1.0e-6, 1.0e3)?;
+                within("speed", *speed, 1.0e-9, 1.0e6)?;
                 within("exponent", *exponent, 0.1, 10.0)?;
-                width.map_or(Ok(()), |width| within("width", width, 1.0e-6, 1.0e3))
+                width.map_or(Ok(()), |width| within("width", width, 1.0e-9, 1.0e6))
             }
             Self::Sigmoid { steepness, offset_speed } => {
-                within("steepness", *steepness, 1.0e-3, 1.0e6)?;
-                within("offset_speed", *offset_speed, -1.0e3, 1.0e3)
+                within("steepness", *steepness, 1.0e-6, 1.0e9)?;
+                within("offset_speed", *offset_speed, -1.0e6, 1.0e6)
             }
             Self::Temperature { reference_c, viscous, coulomb } => {
                 if !viscous && !coulomb {
@@ -191,7 +190,7 @@ impl FrictionTerm {
                 }
                 within("reference_c", *reference_c, -273.15, 1.0e3)
             }
-            Self::Load { width } => width.map_or(Ok(()), |width| within("width", width, 1.0e-6, 1.0e3)),
+            Self::Load { width } => width.map_or(Ok(()), |width| within("width", width, 1.0e-9, 1.0e6)),
             Self::MaxwellSlip { yield_displacements } => {
                 within("number of yield_displacements", yield_displacements.len() as f64, 1.0, MOST_ELEMENTS)?;
                 for (place, value) in yield_displacements.iter().enumerate() {

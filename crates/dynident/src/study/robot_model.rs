@@ -143,18 +143,19 @@ pub(super) fn torque_terms(
         model.joint_index(joint).ok_or_else(|| unknown(joint))?;
     }
 
-    let mut terms = terms_per_joint(model, |joint| drive_choice(drive, &model.joints()[joint].name));
+    let mut terms = terms_per_joint(model, |joint| drive_choice(drive, model, joint));
     for (joint, description) in model.joints().iter().enumerate() {
         let own = drive.joints.get(&description.name);
-        let step = friction_step(drive, &description.name);
+        let step = friction_step(drive, model, joint);
         let further = own.and_then(|own| own.terms.as_ref()).unwrap_or(&drive.terms);
-        terms.extend(further.iter().flat_map(|term| term.terms(joint, step)));
+        terms.extend(further.iter().flat_map(|term| term.terms(model, joint, step)));
     }
     for section in coupling {
         let [first, second] = &section.joints;
         let first = model.joint_index(first).ok_or_else(|| unknown(first))?;
         let second = model.joint_index(second).ok_or_else(|| unknown(second))?;
-        let coulomb = shape(section.coulomb.unwrap_or(drive.coulomb), drive, &JointDrive::default());
+        let width = width(drive, &JointDrive::default(), model, first);
+        let coulomb = shape(section.coulomb.unwrap_or(drive.coulomb), drive, &JointDrive::default(), width);
         let effects = [
             section.inertia.then_some(CouplingEffect::Inertia),
             section.viscous.then_some(CouplingEffect::Viscous),
@@ -168,29 +169,37 @@ pub(super) fn torque_terms(
     Ok(terms)
 }
 
-pub(crate) fn drive_choice(drive: &DriveSection, joint: &str) -> DriveChoice {
+pub(crate) fn drive_choice(drive: &DriveSection, model: &Model, joint: usize) -> DriveChoice {
     let default = JointDrive::default();
-    let own = drive.joints.get(joint).unwrap_or(&default);
+    let own = drive.joints.get(&model.joints()[joint].name).unwrap_or(&default);
     DriveChoice {
         drive_inertia: drive.drive_inertia_of(joint).unwrap_or(false),
         viscous: own.viscous.unwrap_or(drive.viscous),
-        coulomb: shape(own.coulomb.unwrap_or(drive.coulomb), drive, own),
+        coulomb: shape(own.coulomb.unwrap_or(drive.coulomb), drive, own, width(drive, own, model, joint)),
         offset: own.offset.unwrap_or(drive.offset),
     }
 }
 
 /// The step of friction that is no Coulomb friction: the joint's Coulomb step, or a smooth one where it has none.
-pub(crate) fn friction_step(drive: &DriveSection, joint: &str) -> CoulombShape {
-    let width = drive.joints.get(joint).and_then(|own| own.coulomb_width).unwrap_or(drive.coulomb_width);
-    drive_choice(drive, joint).coulomb.unwrap_or(CoulombShape::Smooth { width })
+pub(crate) fn friction_step(drive: &DriveSection, model: &Model, joint: usize) -> CoulombShape {
+    let default = JointDrive::default();
+    let own = drive.joints.get(&model.joints()[joint].name).unwrap_or(&default);
+    let smooth = || CoulombShape::Smooth { width: width(drive, own, model, joint) };
+    drive_choice(drive, model, joint).coulomb.unwrap_or_else(smooth)
 }
 
-fn shape(choice: CoulombChoice, drive: &DriveSection, own: &JointDrive) -> Option<CoulombShape> {
+/// The width of a joint's smooth step, rad/s (m/s): the key's, or that of a usual arm in the robot's own units.
+fn width(drive: &DriveSection, own: &JointDrive, model: &Model, joint: usize) -> f64 {
+    let usual = || model.own_scale().velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
+    own.coulomb_width.or(drive.coulomb_width).unwrap_or_else(usual)
+}
+
+fn shape(choice: CoulombChoice, drive: &DriveSection, own: &JointDrive, width: f64) -> Option<CoulombShape> {
     match choice {
         CoulombChoice::None => None,
         CoulombChoice::Sign => {
             Some(CoulombShape::Sign { dead_band: own.coulomb_dead_band.unwrap_or(drive.coulomb_dead_band) })
         }
-        CoulombChoice::Smooth => Some(CoulombShape::Smooth { width: own.coulomb_width.unwrap_or(drive.coulomb_width) }),
+        CoulombChoice::Smooth => Some(CoulombShape::Smooth { width }),
     }
 }

@@ -113,7 +113,7 @@ impl SimulationSection {
     /// # Errors
     /// The first key that is wrong, and what it may be.
     pub fn validate(&self, joints: usize) -> Result<(), StudyError> {
-        Expected::Range(1.0, 1e6).check("rate_hz", self.rate_hz)?;
+        Expected::Range(1e-3, 1e6).check("rate_hz", self.rate_hz)?;
         Expected::Range(0.0, 90.0).check("off_percent", self.off_percent)?;
         for (what, values) in
             [("viscous", &self.viscous), ("coulomb", &self.coulomb), ("drive_inertia", &self.drive_inertia)]

@@ -10,6 +10,7 @@ use dynident_identification::estimators::SimulatedLoopSettings;
 use dynident_identification::friction::{FrictionSearch, JointFriction};
 use dynident_identification::payload::Payload;
 use dynident_identification::{DriveInertiaChoice, IdentificationSettings, IdentificationTask, Recording};
+use dynident_model::Joint;
 use dynident_recording::{FilterError, RecordingError, Reference};
 use std::path::Path;
 use std::sync::Arc;
@@ -194,14 +195,14 @@ impl Study {
             Some(choice) => choice == FrictionChoice::Auto,
             None => by_default,
         };
-        let names = robot.model().joints().iter().map(|joint| &joint.name).filter(|name| is_chosen(name));
-        let search = |name: &String| FrictionSearch {
-            coulomb: drive_choice(&self.drive, name).coulomb,
+        let model = robot.model();
+        let search = |(joint, description): (usize, &Joint)| FrictionSearch {
+            coulomb: drive_choice(&self.drive, model, joint).coulomb,
             dead_band: self.drive.coulomb_dead_band,
             width: self.drive.coulomb_width,
-            ..FrictionSearch::of(name)
+            ..FrictionSearch::of(&description.name)
         };
-        names.map(search).collect()
+        model.joints().iter().enumerate().filter(|(_, joint)| is_chosen(&joint.name)).map(search).collect()
     }
 
     /// Joints whose friction is left as it is by default although no key states it, with the reason.

@@ -17,7 +17,7 @@ fn they_hold_the_truth_and_nothing_inconsistent() {
     let mut study = Study::load(&path).unwrap();
     study.estimator.intervals = true;
     // The simulated friction's own step: a model that is not the truth has intervals that do not hold it.
-    study.drive.coulomb_width = 0.01;
+    study.drive.coulomb_width = Some(0.01);
     let options = RunOptions { data: None, threads: 2, progress: &Silent };
     let found = identify(&study, &path, &options).unwrap().result;
     let intervals = found.possible_intervals.clone().unwrap();

@@ -26,8 +26,8 @@ const LEAST_TORQUE_SIGMA: f64 = 1e-7;
 const SETTLED: f64 = 0.05;
 /// However much the unknowns bend to the torque, at least this share of its noise stays in its residuals.
 const LEAST_SHARE: f64 = 0.1;
-/// What lasts longer than this in the torque's residuals is the model's error and not noise: a filter that took it away
-/// would take what slow motion says of the parameters as well.
+/// Own seconds: what lasts longer than this in the torque's residuals is the model's error and not noise: a filter that
+/// took it away would take what slow motion says of the parameters as well.
 const LONGEST_NOISE_S: f64 = 0.1;
 /// After so many steps orders of autoregressions fall only, and after so many levels stay: what goes to and fro between
 /// two descriptions of the noise that are as good as each other comes to rest.
@@ -151,7 +151,9 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
             (state, residuals) = (candidate, found);
         }
         if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_STAY) {
-            torque_levels(&pieces, &residuals, paid, &mut noise, (settings.most_autoregression, iterations));
+            let longest_noise_s = LONGEST_NOISE_S * settings.own_second_s;
+            let most = (settings.most_autoregression, iterations, longest_noise_s);
+            torque_levels(&pieces, &residuals, paid, &mut noise, most);
         }
         let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
         converged = length <= settings.tolerance && change <= SETTLED && iterations > 2;
@@ -200,7 +202,7 @@ fn begin<'a>(
         // Each log's share of the unknowns is its share of the samples.
         let least = (all * joints).div_ceil(settings.max_unknowns).max(2);
         let mut ladder = Vec::new();
-        let mut step = LONGEST_SPACING_S * rate_hz;
+        let mut step = LONGEST_SPACING_S * settings.own_second_s * rate_hz;
         while step.round() as usize > least {
             ladder.push(step.round() as usize);
             step /= CLOSER;
@@ -294,7 +296,7 @@ fn torque_levels(
     residuals: &[Vec<Vec<f64>>],
     paid: &Paid,
     noise: &mut [LogNoise],
-    (most, iterations): (usize, usize),
+    (most, iterations, longest_noise_s): (usize, usize, f64),
 ) {
     for (log, own) in noise.iter_mut().enumerate() {
         for joint in 0..own.colours.len() {
@@ -317,7 +319,7 @@ fn torque_levels(
             let (colour, variance) = from_covariances(&covariances[..=most.min(rows / 4)], rows);
             let row_s = pieces.iter().find(|piece| piece.record.log == log);
             let row_s = row_s.map_or(1.0, |piece| piece.mean_of as f64 / piece.record.rate_hz);
-            let (colour, variance) = shortened(colour, variance, &covariances, (-row_s / LONGEST_NOISE_S).exp());
+            let (colour, variance) = shortened(colour, variance, &covariances, (-row_s / longest_noise_s).exp());
             own.colours[joint] = colour;
             own.torque_variance[joint] = covariances[0].max(least_sigma(pieces, log, joint).powi(2));
             own.torque_std[joint] = variance.sqrt().max(least_sigma(pieces, log, joint));

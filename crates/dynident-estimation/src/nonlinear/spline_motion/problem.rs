@@ -130,6 +130,10 @@ pub struct SplineMotionSettings {
     pub tolerance: f64,
     /// Most steps. Default 30; five to ten are usual.
     pub max_iterations: usize,
+    /// Seconds to which a second of a usual arm corresponds: the unit of the longest spacing of knots (0.5) and of the
+    /// longest memory of the torque's noise (0.1). Default 1.
+    #[serde(skip)]
+    pub own_second_s: f64,
     /// Seconds between two knots; by default what the positions make likeliest.
     pub knot_spacing_s: Option<f64>,
     /// Most unknowns of the motion over all joints and logs: knots move apart where there would be more. Default
@@ -145,6 +149,7 @@ impl Default for SplineMotionSettings {
             most_autoregression: 4,
             tolerance: 0.03,
             max_iterations: 30,
+            own_second_s: 1.0,
             knot_spacing_s: None,
             max_unknowns: 60_000,
         }
@@ -156,16 +161,18 @@ impl SplineMotionSettings {
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for an order above 16, a tolerance outside 1e-6 to 1, fewer than two iterations,
-    /// fewer than a thousand unknowns, or rank settings out of range.
+    /// fewer than a thousand unknowns, a second that is not positive, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         let fix = "give 0 to 16";
         require(self.most_autoregression <= 16, "most_autoregression", self.most_autoregression as f64, fix)?;
         within("tolerance", self.tolerance, 1.0e-6..=1.0, "give a length in error bars from 1e-6 to 1")?;
+        let is_second = self.own_second_s > 0.0 && self.own_second_s.is_finite();
+        require(is_second, "own_second_s", self.own_second_s, "give a positive number")?;
         require(self.max_iterations >= 2, "max_iterations", self.max_iterations as f64, "give at least 2")?;
-        let fix = "give seconds, above 0 and at most 10";
+        let fix = "give seconds, above 0 and at most 10000";
         require(
-            self.knot_spacing_s.is_none_or(|s| s > 0.0 && s <= 10.0),
+            self.knot_spacing_s.is_none_or(|s| s > 0.0 && s <= 1e4),
             "knot_spacing_s",
             self.knot_spacing_s.unwrap_or_default(),
             fix,

@@ -8,7 +8,7 @@ use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::seen_from;
-use crate::study::{Folders, Study, StudyInput, StudyLogSource, StudyRobot};
+use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
 use dynident_excitation::{Family, Motion, grid};
@@ -20,9 +20,6 @@ use std::path::Path;
 /// What is checked of a table, and of a log.
 const SPLINE: &str = "the quintic spline through the samples of the table";
 const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
-
-/// Longest trajectory, s: the check at 10 kHz looks at every sample.
-const MAX_DURATION_S: f64 = 3600.0;
 
 /// Most samples of a log.
 const MAX_SAMPLES: usize = 2_000_000;
@@ -47,14 +44,16 @@ pub fn check_trajectory(
     let table = table::trajectory(trajectory, &joints, &study.motion)?;
     let given = table.given;
     let duration_s = given.duration_s();
-    if duration_s > MAX_DURATION_S {
-        let message = format!("{duration_s} s: at most {MAX_DURATION_S} s can be checked; give a part of it");
+    let longest_s = DesignSection::longest_s(setup.robot.model());
+    if duration_s > longest_s {
+        let message = format!("{duration_s} s: at most {longest_s:.0} s can be checked; give a part of it");
         return Err(Error::States { path: trajectory.to_owned(), line: 1, message });
     }
     setup.notes.extend(table.note);
     setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
-    let check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, SPLINE, &motion_at, &|| Ok(Vec::new()))?;
+    let check_rate_hz = setup.robot.model().own_scale().round_hertz(CHECK_RATE_HZ);
+    let check = LimitCheck::of(&setup, study_path, duration_s, check_rate_hz, SPLINE, &motion_at, &|| Ok(Vec::new()))?;
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);

@@ -7,7 +7,7 @@ use dynident_excitation::limits::{LimitSet, Relaxation, diagnose};
 use dynident_excitation::{Motion, grid};
 use std::path::Path;
 
-/// Rate of the diagnosis, Hz.
+/// Rate of the diagnosis, Hz of a usual arm.
 const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
 
 /// Every limit as a motion uses it.
@@ -74,7 +74,8 @@ fn sentences(
     motion_at: &dyn Fn(&[f64], &mut Motion),
     single: Vec<Relaxation>,
 ) -> Vec<String> {
-    let times = grid(duration_s, (duration_s * DIAGNOSIS_RATE_HZ).ceil() as usize + 1);
+    let rate_hz = set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ);
+    let times = grid(duration_s, (duration_s * rate_hz).ceil() as usize + 1);
     let mut motion = Motion::default();
     motion_at(&times, &mut motion);
     let mut diagnosis = diagnose(set, &times, &motion);

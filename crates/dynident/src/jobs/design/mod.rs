@@ -17,10 +17,10 @@ pub(super) use family::{MotionFamily, motion_family};
 pub use outcome::DesignOutcome;
 pub(super) use table::trajectory as trajectory_table;
 
-use crate::error::Error;
+use crate::error::{Error, Expected};
 use crate::jobs::options::RunOptions;
 use crate::result::WindowedFile;
-use crate::study::{CriterionChoice, Study};
+use crate::study::{CriterionChoice, DesignSection, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::{DesignProgress, Motion, grid};
@@ -47,6 +47,8 @@ pub fn design_study(
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<DesignOutcome, Error> {
     let mut setup = DesignSetup::for_search(study, study_path, options)?;
+    let longest = Expected::Range(0.0, DesignSection::longest_s(setup.robot.model()));
+    longest.check("duration_s", setup.section.duration_s).map_err(Error::section(study_path, "design"))?;
 
     // The best motion of the family.
     let found = match &setup.section.criterion {
@@ -61,13 +63,14 @@ pub fn design_study(
 
     // Its limits, by a check that shares nothing with the search, and what it says about the parameters.
     let duration_s = found.family.duration_s();
+    let check_rate_hz = setup.robot.model().own_scale().round_hertz(CHECK_RATE_HZ);
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let single = || match found.windowed {
         Some(_) => Ok(Vec::new()),
         None => changes(&setup, study_path, &found),
     };
     let mut check =
-        LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, "the motion itself", &motion_at, &single)?;
+        LimitCheck::of(&setup, study_path, duration_s, check_rate_hz, "the motion itself", &motion_at, &single)?;
     check.diagnosis.extend(found.windowed.iter().flat_map(WindowedFile::sentences));
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);

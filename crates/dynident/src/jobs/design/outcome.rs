@@ -21,7 +21,7 @@ use nalgebra::DMatrix;
 use std::path::Path;
 use std::time::Instant;
 
-/// Rate of the pictures, Hz.
+/// Rate of the pictures, Hz of a usual arm.
 const PICTURES_HZ: f64 = 100.0;
 
 /// What a job has cost so far.
@@ -190,6 +190,10 @@ impl DesignOutcome {
         &*self.family
     }
 
+    fn pictures_hz(&self) -> f64 {
+        self.robot.model().own_scale().round_hertz(PICTURES_HZ)
+    }
+
     /// The times `0, 1/rate, ..` up to the end, which stands last even if the rate does not divide the duration, and
     /// the motion there; of a log with gaps that of its longest piece.
     pub fn sampled(&self, rate_hz: f64) -> (Vec<f64>, Motion) {
@@ -229,7 +233,7 @@ impl DesignOutcome {
     /// # Errors
     /// A motion that cannot be drawn.
     pub fn preview_svg(&self) -> Result<String, Error> {
-        let (times_s, motion) = self.sampled(PICTURES_HZ);
+        let (times_s, motion) = self.sampled(self.pictures_hz());
         pictures::preview(&self.file, &self.limits, (&times_s, &motion), self.torque_nm(&motion).as_deref())
     }
 
@@ -239,7 +243,7 @@ impl DesignOutcome {
     /// # Errors
     /// A motion that cannot be drawn.
     pub fn path_svg(&self) -> Result<String, Error> {
-        pictures::path(&self.file, &self.limits, self.robot.model(), &self.sampled(PICTURES_HZ).1)
+        pictures::path(&self.file, &self.limits, self.robot.model(), &self.sampled(self.pictures_hz()).1)
     }
 
     /// `fitness.svg`: best and mean fitness by generation (the paper's Fig. 7); none for a search without generations.

@@ -23,12 +23,15 @@ use dynident_excitation::families::{
 };
 use dynident_excitation::limits::{AssumedLimits, Limits};
 use dynident_excitation::{DesignSettings, Family};
+use dynident_model::Model;
 use name_or_table::name_or_table;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Longest motion, s: the re-check at 10 kHz looks at every one of its samples.
+/// Longest motion, s of a usual arm: the re-check at 10 kHz looks at every one of its samples.
 const MAX_DURATION_S: f64 = 3600.0;
+/// Longest motion of any robot, s.
+const MOST_DURATION_S: f64 = 1e7;
 
 /// Most samples of a search grid, and of the log that is planned.
 const MAX_SAMPLES: f64 = 1e6;
@@ -248,13 +251,18 @@ pub enum TorqueNoise {
 }
 
 impl DesignSection {
+    /// Longest motion of a robot that can be checked, s.
+    pub(crate) fn longest_s(model: &Model) -> f64 {
+        model.own_scale().seconds(MAX_DURATION_S)
+    }
+
     /// Checks everything that needs no robot.
     ///
     /// # Errors
     /// The first key whose value has no meaning, with what it may be.
     pub fn validate(&self) -> Result<(), StudyError> {
         let within = |key: &str, value: f64, least: f64, most: f64| Expected::Range(least, most).check(key, value);
-        within("duration_s", self.duration_s, 0.1, MAX_DURATION_S)?;
+        within("duration_s", self.duration_s, 1e-3, MOST_DURATION_S)?;
         self.optimiser.validate()?;
         if !self.parameters.is_empty() && !matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
             let fix = "they are strokes of a windowed design: give criterion = { kind = \"windowed-condition\" }";
@@ -265,7 +273,7 @@ impl DesignSection {
             return Err(StudyError::conflict("start_posture", fix));
         }
         let search = &self.search;
-        within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
+        within("search.rate_hz", search.rate_hz, 1e-4, 1e7)?;
         within("duration_s times search.rate_hz", self.duration_s * search.rate_hz, 0.0, MAX_SAMPLES)?;
         for (key, value, least) in [
             ("search.starts", search.starts.unwrap_or(1), 1),

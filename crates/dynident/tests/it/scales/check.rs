@@ -1,11 +1,11 @@
 //! `check`: the same reading, the same findings.
 
-use super::{AS_IT_IS, Differences, Scale, example, scales};
+use super::{AS_IT_IS, Differences, STATED, Scale, example, scales};
 use dynident::result::StudyCheck;
 use dynident::{RunOptions, Silent, check};
 
 fn examined(scale: Scale) -> StudyCheck {
-    let (_folder, job) = example(scale);
+    let (_folder, job) = example(scale, STATED);
     let options = RunOptions { data: None, threads: 2, progress: &Silent };
     check(&job.study, &job.path, &options).unwrap().check
 }

@@ -40,11 +40,10 @@ fn iterated(scale: Scale) -> IterationsFile {
         {}
         [drive]
         friction = "stated"
-        coulomb_width = {:e}
         [controller]
         kind = "computed-torque"
-        kp = 100.0
-        kd = 20.0
+        kp = {:e}
+        kd = {:e}
         [simulation]
         rate_hz = {:e}
         integrator = {{ kind = "rk4" }}
@@ -60,7 +59,8 @@ fn iterated(scale: Scale) -> IterationsFile {
         differentiator = {{ method = "butterworth", cutoff_hz = {:e} }}
         "#,
         scale.robot("arm.urdf"),
-        0.02 / scale.time,
+        100.0 / scale.time.powi(2),
+        20.0 / scale.time,
         RATE_HZ / scale.time,
         list([0.5, 0.5], damping),
         list([0.8, 0.5], torque),

@@ -20,12 +20,20 @@ struct Scale {
 
 const AS_IT_IS: Scale = Scale { mass: 1.0, length: 1.0, time: 1.0 };
 
-/// A watch gear and a crane; links of half a millimetre and of half a kilometre. Time is not among them: the choice of
-/// the cut-off looks at pieces of eight seconds.
-fn scales() -> [Scale; 4] {
-    let [watch, crane] = [1e-3, 1e3].map(|mass| Scale { mass, ..AS_IT_IS });
-    let [short, long] = [1e-3, 1e3].map(|length| Scale { length, ..AS_IT_IS });
-    [watch, crane, short, long]
+/// A thousand times as heavy, long and slow, and a thousandth: a watch gear and a crane, links of half a millimetre and
+/// of half a kilometre, motions of milliseconds and of hours. Every day two scales of all three at once and those of
+/// time; one by one in long tests.
+fn scales_by(less: f64, more: f64) -> Vec<Scale> {
+    let mixed =
+        [Scale { mass: less, length: more, time: more }, Scale { mass: more, length: less, time: less }].into_iter();
+    let slow = [less, more].map(|time| Scale { time, ..AS_IT_IS });
+    let heavy = [less, more].map(|mass| Scale { mass, ..AS_IT_IS });
+    let long = [less, more].map(|length| Scale { length, ..AS_IT_IS });
+    mixed.chain(slow).chain(heavy).chain(long).take(dynident_testing::count(4, 8)).collect()
+}
+
+fn scales() -> Vec<Scale> {
+    scales_by(1e-3, 1e3)
 }
 
 impl Scale {
@@ -100,18 +108,22 @@ fn times(text: &str, key: &str, factor: f64) -> String {
 
 /// What tells of two designs and of two iterations whether they are one: powers of two, about 10^±3. Products with them
 /// are exact, so that a search of many steps takes the same ones, and what differs is not rounding grown large.
-fn binary_scales() -> [Scale; 4] {
-    let [watch, crane] = [THOUSANDTH, THOUSAND].map(|mass| Scale { mass, ..AS_IT_IS });
-    let [short, long] = [THOUSANDTH, THOUSAND].map(|length| Scale { length, ..AS_IT_IS });
-    [watch, crane, short, long]
+fn binary_scales() -> Vec<Scale> {
+    scales_by(THOUSANDTH, THOUSAND)
+}
+
+/// The same with the motion's own time.
+fn binary_sizes() -> Vec<Scale> {
+    let mass = [THOUSANDTH, THOUSAND].map(|mass| Scale { mass, ..AS_IT_IS });
+    let length = [THOUSANDTH, THOUSAND].map(|length| Scale { length, ..AS_IT_IS });
+    mass.into_iter().chain(length).collect()
 }
 
 const THOUSAND: f64 = 1024.0;
 const THOUSANDTH: f64 = 1.0 / THOUSAND;
 
-/// The README's example on another scale. The width of the step of Coulomb friction is a velocity, which the study
-/// states.
-fn example(scale: Scale) -> (tempfile::TempDir, Job) {
+/// The README's example on another scale, with further keys of `[drive]`.
+fn example(scale: Scale, drive: &str) -> (tempfile::TempDir, Job) {
     let folder = tempfile::tempdir().unwrap();
     let read = |name: &str| std::fs::read_to_string(repository(name)).unwrap();
     std::fs::write(folder.path().join("arm.urdf"), scale.urdf(&read("robots/ur10.urdf"))).unwrap();
@@ -121,11 +133,14 @@ fn example(scale: Scale) -> (tempfile::TempDir, Job) {
     }
     let study = read("examples/ur10_simulated.toml")
         .replace("file = \"../robots/ur10.urdf\"", &scale.robot("arm.urdf"))
-        .replace("[drive]", &format!("[drive]\nfriction = \"stated\"\ncoulomb_width = {:e}", 0.02 / scale.time))
+        .replace("[drive]", &format!("[drive]\n{drive}"))
         .replace("ur10_simulated/", "");
     let job = Job::new(folder.path(), &study);
     (folder, job)
 }
+
+/// Viscous friction and a smooth step.
+const STATED: &str = "friction = \"stated\"";
 
 /// What differs by more than its tolerance between a scale and the original.
 struct Differences {
