@@ -171,9 +171,10 @@ pub(super) fn torque_terms(
 
 pub(crate) fn drive_choice(drive: &DriveSection, model: &Model, joint: usize) -> DriveChoice {
     let default = JointDrive::default();
-    let own = drive.joints.get(&model.joints()[joint].name).unwrap_or(&default);
+    let name = &model.joints()[joint].name;
+    let own = drive.joints.get(name).unwrap_or(&default);
     DriveChoice {
-        drive_inertia: drive.drive_inertia_of(joint).unwrap_or(false),
+        drive_inertia: drive.drive_inertia_of(name).unwrap_or(false),
         viscous: own.viscous.unwrap_or(drive.viscous),
         coulomb: shape(own.coulomb.unwrap_or(drive.coulomb), drive, own, width(drive, own, model, joint)),
         offset: own.offset.unwrap_or(drive.offset),
