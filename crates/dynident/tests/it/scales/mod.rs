@@ -121,7 +121,10 @@ fn example(scale: Scale) -> (tempfile::TempDir, Job) {
     }
     let study = read("examples/ur10_simulated.toml")
         .replace("file = \"../robots/ur10.urdf\"", &scale.robot("arm.urdf"))
-        .replace("[drive]", &format!("[drive]\nfriction = \"stated\"\ncoulomb_width = {:e}", 0.02 / scale.time))
+        .replace(
+            "[format]",
+            &format!("[drive]\nfriction = \"stated\"\ncoulomb_width = {:e}\n\n[format]", 0.02 / scale.time),
+        )
         .replace("ur10_simulated/", "");
     let job = Job::new(folder.path(), &study);
     (folder, job)
