@@ -1,5 +1,6 @@
 //! Whether the torque holds the inertia of the drives is the logs' to say: simulated arms with and without it.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
+use dynident::model::terms::TorqueTerm;
 use dynident::result::ResultFile;
 use dynident::validate;
 use dynident_identification::{Execution, Logs, choose_drive_inertia};
@@ -23,6 +24,7 @@ fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
 /// A study that names files and columns, and what `drive` states.
 fn job(folder: &Path, description: &Path, dof: usize, drive: &str) -> Job {
     let columns = format(dof).split("[format]").nth(1).map(|columns| format!("[format]{columns}")).unwrap();
+    let description = description.display().to_string();
     let text = format!("robot.file = {description:?}\nlog = [{{ file = \"log.csv\" }}]\n{drive}\n{columns}");
     Job::new(folder, &text)
 }
@@ -36,7 +38,7 @@ fn tested(job: &Job) -> (f64, usize) {
     let logs = Logs::new(robot.model(), &task.recordings, filters, &[0], None, alone).unwrap();
     let (found, choice) = choose_drive_inertia((&logs, &task.settings), &task.robot, (&[0], &[])).unwrap();
     let choice = choice.unwrap();
-    assert_eq!(found.terms().iter().any(|term| term.is_drive_inertia()), choice.seen);
+    assert_eq!(found.terms().iter().any(TorqueTerm::is_drive_inertia), choice.seen);
     assert_eq!(choice.seen, choice.standard_deviations.unwrap() >= choice.needed);
     (choice.standard_deviations.unwrap(), choice.drives.len())
 }
