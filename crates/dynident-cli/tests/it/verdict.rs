@@ -150,7 +150,7 @@ fn a_reversed_torque_is_found_without_held_out_logs() {
     let data = examples.display().to_string();
     // Friction that is chosen cannot be negative: the free fit has none then, and is no better than the consistent set.
     for (friction, words) in [("stated", "fitted to"), ("auto", "opposite sign")] {
-        let study = study.replace("[drive]", &format!("[drive]\nfriction = \"{friction}\""));
+        let study = study.replace("[format]", &format!("[drive]\nfriction = \"{friction}\"\n\n[format]"));
         std::fs::write(out.path().join("study.toml"), study).unwrap();
         let ran = run_in(out.path(), &["identify", "study.toml", "--out", "found", "--data", &data]);
         assert_eq!(ran.status, 1, "{}", ran.stderr);

@@ -44,12 +44,16 @@ fn each(rows: &mut [Row], change: impl Fn(&mut Row)) {
     rows.iter_mut().for_each(change);
 }
 
+/// The inertia of the drives, which `check` does not look for.
+const WITH_DRIVES: &str = "[drive]\ndrive_inertia = true\n\n[format]";
+
 /// The README's example with one mistake, checked.
 fn checked(case: &Case) -> StudyCheck {
     let folder = tempfile::tempdir().unwrap();
     let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
     let mut study = study
         .replace("../robots/ur10.urdf", &repository("robots/ur10.urdf").display().to_string())
+        .replace("[format]", WITH_DRIVES)
         .replace("ur10_simulated/", "");
     let [from, to] = case.study;
     if !from.is_empty() {
@@ -187,6 +191,7 @@ fn signs_of_single_joints_and_of_all_are_named() {
         let columns = if offset == 1 { POSITION } else { TORQUE };
         study = study
             .replace("../robots/ur10.urdf", &repository("robots/ur10.urdf").display().to_string())
+            .replace("[format]", WITH_DRIVES)
             .replace("ur10_simulated/", &format!("{}/", repository("examples/ur10_simulated").display()))
             .replace(columns, &format!("{columns}, sign = {signs:?}"));
         problems(&check_text(folder.path(), &study))
@@ -346,7 +351,7 @@ fn one_absurd_torque_is_left_out_and_named() {
     let read = |name: &str| std::fs::read_to_string(repository(name)).unwrap();
     let study = read("examples/ur10_simulated.toml")
         .replace("../robots/ur10.urdf", &repository("robots/ur10.urdf").display().to_string())
-        .replace("[drive]", "[drive]\nfriction = \"stated\"")
+        .replace("[format]", "[drive]\nfriction = \"stated\"\n\n[format]")
         .replace("ur10_simulated/", "");
     std::fs::write(folder.path().join("test.csv"), read("examples/ur10_simulated/test.csv")).unwrap();
     let train = read("examples/ur10_simulated/train.csv");

@@ -1,7 +1,8 @@
 //! Whether the torque holds the inertia of the drives is the logs' to say: simulated arms with and without it.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
+use dynident::model::terms::TorqueTerm;
 use dynident::result::ResultFile;
-use dynident::{RunOptions, Silent, Study, identify, validate};
+use dynident::validate;
 use dynident_identification::{Execution, Logs, choose_drive_inertia};
 use std::path::Path;
 
@@ -10,19 +11,20 @@ const NOISE: (f64, f64) = (0.2, 1.0e-5);
 /// Logs of each kind.
 const SEEDS: u64 = 20;
 
-/// A log of 10 s at 100 Hz with noise.
+/// A log of 20 s at 100 Hz with noise.
 fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
     let (mut random, dof) = (Random(1000 + seed), truth.drive.len());
     let noisy = |q: &[f64], tau: &[f64]| {
         let q = q.iter().map(|q| q + NOISE.1 * random.normal()).collect::<Vec<_>>();
         [q, tau.iter().map(|tau| tau + NOISE.0 * random.normal()).collect()].concat()
     };
-    write_log(path, truth, &Motion::new(dof, seed), (100.0, 10.0), &header(dof), noisy);
+    write_log(path, truth, &Motion::new(dof, seed), (100.0, 20.0), &header(dof), noisy);
 }
 
 /// A study that names files and columns, and what `drive` states.
 fn job(folder: &Path, description: &Path, dof: usize, drive: &str) -> Job {
     let columns = format(dof).split("[format]").nth(1).map(|columns| format!("[format]{columns}")).unwrap();
+    let description = description.display().to_string();
     let text = format!("robot.file = {description:?}\nlog = [{{ file = \"log.csv\" }}]\n{drive}\n{columns}");
     Job::new(folder, &text)
 }
@@ -36,12 +38,13 @@ fn tested(job: &Job) -> (f64, usize) {
     let logs = Logs::new(robot.model(), &task.recordings, filters, &[0], None, alone).unwrap();
     let (found, choice) = choose_drive_inertia((&logs, &task.settings), &task.robot, (&[0], &[])).unwrap();
     let choice = choice.unwrap();
-    assert_eq!(found.terms().iter().any(|term| term.is_drive_inertia()), choice.seen);
+    assert_eq!(found.terms().iter().any(TorqueTerm::is_drive_inertia), choice.seen);
     assert_eq!(choice.seen, choice.standard_deviations.unwrap() >= choice.needed);
     (choice.standard_deviations.unwrap(), choice.drives.len())
 }
 
-/// What is there is found, and what is not there is a standard normal figure: the chance of four of them is 3e-5.
+/// What is there is found, and what is not there is a standard normal figure: of forty some 5 % chance that one is
+/// beyond three, for which the daily seeds are fixed.
 #[test]
 fn drives_are_found_where_they_are() {
     let folder = tempfile::tempdir().unwrap();
@@ -56,7 +59,7 @@ fn drives_are_found_where_they_are() {
                 let (figure, drives) = tested(&job);
                 // The inertia of the first axes' drives joins with that of their links.
                 assert_eq!(drives, apart, "{robot}");
-                assert_eq!(figure >= 4.0, has_drives, "{robot}, seed {seed}: {figure}");
+                assert_eq!(figure >= 3.0, has_drives, "{robot}, seed {seed}: {figure}");
                 if !has_drives {
                     figures.push(figure);
                 }
@@ -105,7 +108,7 @@ fn what_the_logs_say_is_what_a_key_would() {
     }
 }
 
-/// One joint cannot tell its drive from its link; an estimator that is not least squares makes no test.
+/// One joint cannot tell its drive from its link.
 #[test]
 fn what_cannot_be_tested_says_why() {
     let folder = tempfile::tempdir().unwrap();
@@ -120,21 +123,4 @@ fn what_cannot_be_tested_says_why() {
     let choice = study.drive_inertia_choice.unwrap();
     assert!(!choice.seen && choice.untested.as_ref().unwrap().contains("cannot tell"), "{choice:?}");
     assert!(choice.sentence().starts_with("not tested"));
-
-    let robust = job(folder.path(), &path, 2, "estimator.method = \"maximum-likelihood\"").identify().result;
-    assert!(robust.drive_inertia_choice.is_some_and(|choice| choice.untested.is_some()));
-}
-
-/// The simulated arm of README has drives, and its study is files and columns.
-#[test]
-fn the_example_states_nothing() {
-    let path = repository("examples/ur10_simulated.toml");
-    let study = Study::load(&path).unwrap();
-    assert_eq!(study.drive, dynident::study::DriveSection::default());
-    let options = RunOptions { data: None, threads: 2, progress: &Silent };
-    let found = identify(&study, &path, &options).unwrap().result;
-    assert!(found.drive_inertia_choice.unwrap().seen);
-    // Some 1 % of the torque is noise; without the drives' inertia 4 % is left.
-    let error = found.validation[0].physical.as_ref().unwrap().relative_error_percent.unwrap();
-    assert!(error < 1.2, "{error} %");
 }

@@ -15,13 +15,13 @@ fn options() -> RunOptions<'static> {
     RunOptions { data: None, threads: 2, progress: &Silent }
 }
 
-/// The UR10 of the examples with stated friction, which takes no search.
+/// The UR10 of the examples with stated friction, which takes no search, and stated drives.
 fn study() -> (Study, PathBuf) {
     let path = repository("examples/ur10_simulated.toml");
     let mut text = std::fs::read_to_string(&path).unwrap();
     text = text.replacen("[drive]\n", "[drive]\nfriction = \"stated\"\n", 1);
     if !text.contains("friction = \"stated\"") {
-        text.push_str("\n[drive]\nfriction = \"stated\"\n");
+        text.push_str("\n[drive]\nfriction = \"stated\"\ndrive_inertia = true\n");
     }
     (Study::parse(&text, &path).unwrap(), path)
 }

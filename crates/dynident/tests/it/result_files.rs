@@ -23,6 +23,17 @@ fn a_result_and_an_inspection_read_back() {
     }
 }
 
+/// The simulated arm of README has drives, and its study is files and columns.
+#[test]
+fn the_example_states_nothing_of_its_drives() {
+    let study = Study::load(&repository("examples/ur10_simulated.toml")).unwrap();
+    assert_eq!(study.drive, dynident::study::DriveSection::default());
+    assert!(EXAMPLE.drive_inertia_choice.as_ref().unwrap().seen);
+    // Some 1 % of the torque is noise; without the drives' inertia 4 % is left.
+    let error = EXAMPLE.validation[0].physical.as_ref().unwrap().relative_error_percent.unwrap();
+    assert!(error < 1.2, "{error} %");
+}
+
 #[test]
 fn a_robot_that_failed_and_a_motion_that_is_not_finite_read_back() {
     let fault = RobotFault::Hung { waiting_for: "sample".to_owned(), limit_s: 2.0 };
@@ -76,6 +87,7 @@ fn an_older_result_reads_without_the_keys_that_came_later() {
         "base_parameter_covariance",
         "possible_intervals",
         "essential",
+        "drive_inertia_choice",
         "friction_choice",
         "payloads",
         "offsets",

@@ -133,7 +133,7 @@ fn example(scale: Scale, drive: &str) -> (tempfile::TempDir, Job) {
     }
     let study = read("examples/ur10_simulated.toml")
         .replace("file = \"../robots/ur10.urdf\"", &scale.robot("arm.urdf"))
-        .replace("[drive]", &format!("[drive]\n{drive}"))
+        .replace("[format]", &format!("[drive]\n{drive}\n\n[format]"))
         .replace("ur10_simulated/", "");
     let job = Job::new(folder.path(), &study);
     (folder, job)
