@@ -44,7 +44,7 @@ pub struct DesignSettings {
     /// `rounds`, `evaluations_per_start` and `time_limit_s` is given, it gets less of everything.
     pub starts: Option<usize>,
     /// Rounds of restarts around the best, of half as many starts and two at least. Default 1, for condition numbers
-    /// 24, with 24 or more numbers a joint 8.
+    /// 36, with 24 or more numbers a joint 8.
     pub rounds: Option<usize>,
     /// Evaluations of one start or restart at most. Default 1,000, for condition numbers 1,000 and 500, with 24 or more
     /// numbers a joint 2,000.

@@ -19,10 +19,10 @@ impl Effort {
     /// three seeds: log det higher than by many short ones in eight of nine cases, in half the time.
     const FEW_LONG: Self = Self { starts: 8, rounds: 1, evaluations_per_start: 1_000, evaluations_per_restart: 1_000 };
     /// For criteria with many local optima. Descents that have the time to wander outside the limits end in better ones
-    /// than four times as many that have not, and restarts around the best, with half the evaluations, find more than
-    /// further starts: the same arms, condition number, ten seconds of a core: lower in eight of nine cases than by
-    /// twelve starts and restarts of 300.
-    const RESTARTS: Self = Self { starts: 3, rounds: 24, evaluations_per_start: 1_000, evaluations_per_restart: 500 };
+    /// than four times as many that have not, and restarts around the best find more than further starts. The same
+    /// arms, condition number, about eight seconds of a core: lower in eight of nine cases than by twelve starts and
+    /// restarts of 300 evaluations, in six to eight seconds; restarts of 500 end no worse than of 1,000.
+    const RESTARTS: Self = Self { starts: 3, rounds: 36, evaluations_per_start: 1_000, evaluations_per_restart: 500 };
     /// The same for families with many numbers, whose descents are long: their starts end near each other, and restarts
     /// around the best find more than further starts (80 spline points on UR10, condition number: one start of 6,000
     /// evaluations 4.35, one of 2,000 and three rounds of restarts 4.05).
@@ -47,14 +47,14 @@ impl Effort {
         }
     }
 
-    /// Less of everything until the evaluations are no more than `most`: first of restarts, then of starts, last of each
-    /// one's evaluations.
+    /// Less of everything until the evaluations are no more than `most`: first of restarts, then of starts, last of
+    /// each one's evaluations.
     fn within(mut self, most: usize) -> Self {
         while self.evaluations() > most {
             if self.rounds > 0 {
                 self.rounds /= 2;
             } else if self.starts > LEAST_STARTS {
-                self.starts /= 2;
+                self.starts = (self.starts / 2).max(LEAST_STARTS);
             } else {
                 let searches = self.evaluations() / self.evaluations_per_start.max(1);
                 self.evaluations_per_start = (most / searches.max(1)).max(LEAST_EVALUATIONS);
@@ -85,9 +85,9 @@ const RICH: usize = 24;
 const LEAST_STARTS: usize = 2;
 const LEAST_EVALUATIONS: usize = 60;
 
-/// Products that a design of open length costs at most, about a minute of a core: a twelve-joint search of the defaults
-/// is far below it, a humanoid with its links kept apart is not.
-const MOST_PRODUCTS: f64 = 3e11;
+/// Products that a design of open length costs at most, about a minute of a core: the defaults of an arm are below it,
+/// a humanoid with its links kept apart is not.
+const MOST_PRODUCTS: f64 = 1e12;
 
 /// Shares of [`MOST_PRODUCTS`]: of the searches, of the polishes, and of a search for the limits alone.
 const SEARCH_SHARE: f64 = 0.4;
@@ -95,8 +95,9 @@ const POLISH_SHARE: f64 = 0.25;
 const RESTORATION_SHARE: f64 = 0.2;
 const CHANGES_SHARE: f64 = 0.15;
 
-/// Products for the distance of two links at one sample, bodies of some dozen corners.
-const PRODUCTS_OF_A_PAIR: f64 = 400.0;
+/// Products that the distance of two links at one sample counts for, bodies of some dozen corners: with its share of
+/// what comes after a search, where every limit is looked at between samples.
+const PRODUCTS_OF_A_PAIR: f64 = 4000.0;
 
 /// Whether the settings leave it open how long the search may take.
 fn is_open(settings: &DesignSettings) -> bool {
