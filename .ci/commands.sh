@@ -40,10 +40,9 @@ run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
 # Logs as factors, in two files and in one: the same model.
-sed -e "s#\"\.\./robots#\"$PWD/robots#; s#\"ur10_simulated#\"$PWD/examples/ur10_simulated#" examples/ur10_simulated.toml >"$out/factors.toml"
-run 2 "$dynident" reduce "$out/factors.toml" --out "$out/train.factors"
-run 0 "$dynident" reduce "$out/factors.toml" --like "$out/result/result.json" --out "$out/train.factors"
-run 0 "$dynident" reduce "$out/factors.toml" --like "$out/result/result.json" --log test --arm left --recorded-at 2026-01-05 --out "$out/test.factors"
+run 2 "$dynident" reduce examples/ur10_simulated.toml --out "$out/train.factors"
+run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result.json" --out "$out/train.factors"
+run 0 "$dynident" reduce examples/ur10_simulated.toml --like "$out/result/result.json" --log test --arm left --recorded-at 2026-01-05 --out "$out/test.factors"
 run 0 "$dynident" merge "$out/test.factors" "$out/train.factors" --out "$out/both.factors"
 run 0 "$dynident" identify --factors "$out/both.factors" --out "$out/of_factors"
 for form in c cpp rust python matlab mjcf urdf sdf ros2-yaml json simulator simulator-table; do

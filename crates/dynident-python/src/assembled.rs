@@ -24,7 +24,7 @@ pub(crate) fn assembled(
     for (log, samples) in study.log.iter_mut().zip(samples) {
         log.samples = samples;
     }
-    callables.into_study(py, &mut study)?;
+    callables.attach(py, &mut study)?;
     Ok(study)
 }
 

@@ -53,7 +53,7 @@ impl Callables {
     }
 
     /// Puts the code into the sections that name it.
-    pub(crate) fn into_study(&self, py: Python<'_>, study: &mut dynident::Study) -> PyResult<()> {
+    pub(crate) fn attach(&self, py: Python<'_>, study: &mut dynident::Study) -> PyResult<()> {
         let Some(functions) = &self.0 else { return Ok(()) };
         let named = |name: &str| -> PyResult<Option<Bound<'_, PyDict>>> {
             functions.bind(py).get_item(name)?.map(|own| Ok(own.cast_into::<PyDict>()?)).transpose()
@@ -73,13 +73,13 @@ impl Callables {
             study.estimator.code = Code(Some(Arc::new(Rule { function: function_of(&own)? })));
         }
         if let Some(design) = &mut study.design {
-            into_family(&mut design.family, &named)?;
+            attach_family(&mut design.family, &named)?;
         }
         Ok(())
     }
 }
 
-fn into_family<'py>(
+fn attach_family<'py>(
     family: &mut FamilyChoice,
     named: &impl Fn(&str) -> PyResult<Option<Bound<'py, PyDict>>>,
 ) -> PyResult<()> {
@@ -90,7 +90,7 @@ fn into_family<'py>(
             }
             Ok(())
         }
-        FamilyChoice::Joined(joined) => joined.parts.iter_mut().try_for_each(|part| into_family(part, named)),
+        FamilyChoice::Joined(joined) => joined.parts.iter_mut().try_for_each(|part| attach_family(part, named)),
         _ => Ok(()),
     }
 }

@@ -22,6 +22,9 @@ use std::sync::{Mutex, OnceLock};
 /// Samples of one block of a batch: enough for full lanes, little enough for the cache.
 const BLOCK: usize = 128;
 
+/// Rows of a regressor that are written at once: their pages fit into the first level of the address cache.
+const ROWS_AT_ONCE: usize = 16;
+
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type Matrices<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
@@ -406,6 +409,7 @@ impl Robot {
             PanelLayout::new(&self.model, columns)
         });
         let columns = layout.columns().len();
+        let size = (dof * columns).max(1);
         let motion = Motion::of(dof, q, dq, ddq)?;
         // Memory that nobody has written to is zero, and nothing but zeros stands in the other columns.
         let is_zero = out.is_none();
@@ -421,10 +425,15 @@ impl Robot {
                         out.fill(0.0);
                     }
                     for joint in 0..dof {
-                        let (panel, places) = (panels.joint(joint), layout.joint_columns(joint));
-                        for (row, to) in out.chunks_exact_mut(columns.max(1)).skip(joint).step_by(dof).enumerate() {
-                            for (entry, &column) in panel[row..].iter().step_by(motion.samples).zip(places) {
-                                to[column] = *entry;
+                        let panel = panels.joint(joint);
+                        // A few rows at a time, or every number written is a page of its own.
+                        for (part, rows) in out.chunks_mut(ROWS_AT_ONCE * size).enumerate() {
+                            let from = part * ROWS_AT_ONCE;
+                            for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+                                let entries = &panel[place * motion.samples + from..];
+                                for (row, entry) in rows.chunks_exact_mut(size).zip(entries) {
+                                    row[joint * columns + column] = *entry;
+                                }
                             }
                         }
                     }

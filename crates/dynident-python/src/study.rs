@@ -22,6 +22,7 @@ type Columns<'py> = (Vec<String>, Vec<Bound<'py, PyArrayDyn<f64>>>);
 ///
 /// Read with ``Study.load(path)`` or ``Study.parse(text)``; put together from objects with ``dynident.study(...)``.
 #[pyclass(frozen, module = "dynident")]
+#[allow(clippy::struct_field_names, reason = "the study that it is")]
 pub(crate) struct Study {
     pub(crate) study: dynident::Study,
     pub(crate) path: PathBuf,

@@ -23,7 +23,7 @@ pub(crate) fn factors(file: &FactorsFile) -> String {
     let header = ["log", "arm", "recorded", "hash", "rows"].map(str::to_owned);
     text += &table(&header, 4..5, file.logs.iter().take(LISTED).map(row).collect());
     if count > LISTED {
-        text += &format!("  and {} more\n", count - LISTED);
+        text += &wrapped(&format!("  and {} more", count - LISTED), 2);
     }
     text
 }

@@ -42,18 +42,18 @@ fn factors_give_the_model_that_the_logs_give() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path();
     let study = study(folder);
-    // As many segments as the fit itself has: the same numbers, so the same bits.
+    // As many segments as the fit itself has, and the study's order of logs: the same numbers, so the same bits.
     let reduce = |log: &str, further: &[&str]| {
         let file = format!("{log}.factors");
         ran(folder, 0, &[&["reduce", &study, "--log", log, "--segments", "64", "--out", &file], further].concat())
     };
-    let said = json(&reduce("b", &["--json", "--arm", "left", "--recorded-at", "2026-01-05"]));
+    let said = json(&reduce("b", &["--json", "--arm", "second", "--recorded-at", "2026-01-05"]));
     assert_eq!(said["schema"], "dynident/factors/1");
     assert_eq!(said["logs"][0]["name"], "b");
     assert_eq!(said["logs"][0]["recorded_at"], "2026-01-05T00:00:00Z");
     assert_eq!(said["bytes"], std::fs::metadata(folder.join("b.factors")).unwrap().len());
-    assert!(reduce("a", &["--arm", "right"]).contains("1 log of "));
-    assert_eq!(reduce("a", &["--arm", "right", "--quiet"]), "");
+    assert!(reduce("a", &["--arm", "first"]).contains("1 log of "));
+    assert_eq!(reduce("a", &["--arm", "first", "--quiet"]), "");
 
     ran(folder, 0, &["merge", "a.factors", "b.factors", "--out", "ab.factors"]);
     let other_way = json(&ran(folder, 0, &["merge", "b.factors", "ab.factors", "--out", "ba.factors", "--json"]));
@@ -73,14 +73,14 @@ fn factors_give_the_model_that_the_logs_give() {
         assert_eq!(found["provenance"]["command"], Value::String(command));
     }
     // One robot alone is the fit to its log alone.
-    status(&["identify", "--out", "left", "--quiet", "--factors", "ab.factors", "--arm", "left"]);
+    status(&["identify", "--out", "second", "--quiet", "--factors", "ab.factors", "--arm", "second"]);
     status(&["identify", "--out", "b", "--quiet", "--factors", "b.factors"]);
-    assert_eq!(result(&folder.join("left"))["base_parameters"], result(&folder.join("b"))["base_parameters"]);
-    // Like a model: its cut-off and friction stand in for what the study leaves open.
-    let open = std::fs::read_to_string(&study).unwrap().replace("friction = \"stated\"\ncoulomb = \"smooth\"\n", "");
-    std::fs::write(folder.join("open.toml"), open.replace(", cutoff_hz = 10.0", "")).unwrap();
+    assert_eq!(result(&folder.join("second"))["base_parameters"], result(&folder.join("b"))["base_parameters"]);
+    // Like a model: its cut-off stands in for what the study leaves open.
+    let open = std::fs::read_to_string(&study).unwrap().replace(", cutoff_hz = 10.0", "");
+    std::fs::write(folder.join("open.toml"), open).unwrap();
     let left_open = ["reduce", "open.toml", "--log", "b", "--segments", "64", "--out", "like.factors"];
-    assert!(ran(folder, 2, &left_open).contains("left to the logs"));
+    assert!(ran(folder, 2, &left_open).contains("cut-off is left to the logs"));
     ran(folder, 0, &[&left_open[..], &["--like", "logs/result.json"]].concat());
     status(&["identify", "--out", "like", "--quiet", "--factors", "like.factors"]);
     assert_eq!(result(&folder.join("like"))["base_parameters"], result(&folder.join("b"))["base_parameters"]);

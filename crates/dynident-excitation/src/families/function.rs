@@ -141,8 +141,7 @@ impl FunctionFamily {
             let one = DVector::from_element(times_s.len(), 1.0);
             let found = basis.clone().svd(true, true).solve(&one, 1e-12).ok()?;
             let worst = (&basis * &found - one).amax();
-            // False for NaN as well.
-            if !(worst < STANDING) {
+            if worst.is_nan() || worst >= STANDING {
                 return None;
             }
             standing.extend(found.iter());

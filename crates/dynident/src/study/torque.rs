@@ -104,13 +104,13 @@ impl TorqueSection {
                 DeclaredLaw::Table(TorqueTable::new(points.clone()).map_err(|error| wrong(error.into()))?)
             }
             (None, None, Some(file)) => DeclaredLaw::Table(read_table(file)?),
-            (None, None, None) => match &self.function {
-                Some(name) => self.own_law(name, names.len()).map_err(wrong)?,
-                None => {
+            (None, None, None) => {
+                let Some(name) = &self.function else {
                     let fix = "give expression, table or table_file";
                     return Err(wrong(StudyError::missing("no expression", fix)));
-                }
-            },
+                };
+                self.own_law(name, names.len()).map_err(wrong)?
+            }
         };
         let usual = match law {
             DeclaredLaw::Expression(_) | DeclaredLaw::Function(_) => "Nm",
