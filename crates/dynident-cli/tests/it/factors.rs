@@ -11,18 +11,18 @@ fn study(folder: &Path) -> String {
     let text = std::fs::read_to_string(broken().join("good.toml")).unwrap();
     let (before, after) = text.split_once("[[log]]").unwrap();
     let rest = after.lines().skip_while(|line| line.starts_with("file") || line.is_empty());
-    let rest: String = rest.map(|line| format!("{line}\n")).collect();
+    let rest = rest.collect::<Vec<_>>().join("\n");
     let stated = format!(
         "{before}\n{rest}\n\
-         [drive]\nfriction = \"stated\"\ncoulomb = \"smooth\"\n\n\
+         [drive]\nfriction = \"stated\"\ndrive_inertia = false\ncoulomb = \"smooth\"\n\n\
          [motion]\ntorque_lag_s = 0.0\ndifferentiator = {{ method = \"butterworth\", cutoff_hz = 10.0 }}\n\n\
          [estimator]\nmethod = \"weighted\"\n\n\
          [[log]]\nname = \"a\"\nfile = {log:?}\nrows = [0, 800]\n\n\
          [[log]]\nname = \"b\"\nfile = {log:?}\nrows = [800, 1500]\n"
     );
     let path = folder.join("stated.toml");
-    std::fs::write(&path, stated.replace("file = \"arm.urdf\"", &format!("file = {:?}", broken().join("arm.urdf"))))
-        .unwrap();
+    let arm = broken().join("arm.urdf").display().to_string();
+    std::fs::write(&path, stated.replace("file = \"arm.urdf\"", &format!("file = {arm:?}"))).unwrap();
     path.display().to_string()
 }
 

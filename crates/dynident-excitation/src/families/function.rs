@@ -310,7 +310,7 @@ mod tests {
         adjoint.reset(3, 50);
         let mut random = Random::new(9);
         for values in [&mut adjoint.q, &mut adjoint.dq, &mut adjoint.ddq, &mut adjoint.dddq] {
-            values.iter_mut().for_each(|value| *value = random.normal());
+            values.fill_with(|| random.normal());
         }
         let gradient = |family: &dyn Family| {
             let mut gradient = vec![0.0; 27];

@@ -142,7 +142,7 @@ mod tests {
         for step in [0.05, 0.1, 0.37, 1.0] {
             let smooth = |i: usize| (20.0 * (1.5 * i as f64 * 0.001).sin() / step).round() * step;
             let stepped: Vec<f64> = (0..20_000).map(smooth).collect();
-            let q: Vec<f64> = (0..20_000).map(|i| (1.5 * i as f64 * 0.001 + 0.7).cos()).collect();
+            let q: Vec<f64> = (0..20_000).map(|i| (1.5 * f64::from(i) * 0.001 + 0.7).cos()).collect();
             let extremes = [-1.0, 1.0].map(|sign| sign * stepped.iter().copied().fold(0.0, f64::max));
             assert!(held_runs(&stepped, &q, extremes).is_empty(), "{step}");
         }
@@ -153,7 +153,7 @@ mod tests {
     fn what_is_cut_off_at_an_extreme_is_saturated() {
         let noise = normal(12, 8000);
         let tau: Vec<f64> = (0..8000).map(|i| 20.0 * (6.0 * i as f64 * 0.001).sin() + 0.05 * noise[i]).collect();
-        let q: Vec<f64> = (0..8000).map(|i| (6.0 * i as f64 * 0.001 + 0.7).cos()).collect();
+        let q: Vec<f64> = (0..8000).map(|i| (6.0 * f64::from(i) * 0.001 + 0.7).cos()).collect();
         for limit in [19.0, 12.0, 4.0] {
             let clipped: Vec<f64> = tau.iter().map(|tau| tau.clamp(-limit, limit)).collect();
             let found = held_runs(&clipped, &q, [-limit, limit]);

@@ -12,7 +12,7 @@ use dynident::result::ValueSource;
 fn masses_come_nearer_to_the_truth() {
     let robots = ["robots/ur10.urdf", "robots/panda_arm7.urdf"];
     let (mut found_errors, mut described_errors) = (Vec::new(), Vec::new());
-    let (mut told, mut held, mut all) = (Vec::new(), 0, 0);
+    let (mut told, mut held, mut all) = (Vec::new(), 0_usize, 0_usize);
     for case in 0..dynident_testing::count(6, 40) {
         let description = repository(robots[case % robots.len()]);
         let mut random = Random(100 + case as u64);

@@ -169,7 +169,9 @@ fn saturated_torque_does_not_reach_the_model() {
     let limit = 0.8 * clean.iter().map(|row| row[column].abs()).fold(0.0, f64::max);
     let cut = clean.iter().filter(|row| row[column].abs() > limit).count();
     let mut bad = clean.clone();
-    bad.iter_mut().for_each(|row| row[column] = row[column].clamp(-limit, limit));
+    for row in &mut bad {
+        row[column] = row[column].clamp(-limit, limit);
+    }
     let found = fitted(folder.path(), &bad);
     let import = serde_json::to_value(&found.result.logs[0].import).unwrap();
     let told = set_aside(&import, NAMES[LIFT], "saturated").unwrap();
