@@ -170,7 +170,7 @@ fn stated_terms_are_fitted_and_bad_constants_refused() {
     let terms =
         "laws = [{ law = \"stribeck\", speed = 0.08, exponent = 2.0 }, { law = \"load\" }, { law = \"quadratic\" },
         { law = \"maxwell-slip\", yield_displacements = [0.001, 0.01] }]";
-    let job = job(folder.path(), terms);
+    let job = job(folder.path(), &format!("coulomb_width = {STEP}\n{terms}"));
     let found = job.identify();
     let elbow = &found.result.joints[1].terms;
     let value = |symbol: &str| elbow.iter().find(|term| term.symbol == symbol).unwrap().value;

@@ -123,8 +123,11 @@ fn locked_joints_and_a_tilted_base() {
         writeln!(text, "{t},{}", row.join(",")).unwrap();
     }
     std::fs::write(folder.path().join("log.csv"), text).unwrap();
+    // The default of an arm with fewer joints is another one.
+    let width = truth.coulomb_width(0);
     let text = format!(
-        "robot = {{ file = {:?}, lock = {{ wrist_3_joint = 0.7 }}, base_rpy_rad = [0.3, -0.4, 0.2] }}\ndrive.friction = \"stated\"\n\
+        "robot = {{ file = {:?}, lock = {{ wrist_3_joint = 0.7 }}, base_rpy_rad = [0.3, -0.4, 0.2] }}\n\
+         drive.friction = \"stated\"\ndrive.coulomb_width = {width:?}\n\
          log = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
         ur10(),
         format(5)

@@ -22,7 +22,8 @@ fn warm_log(path: &Path, truth: &Truth, seed: u64, from: f64, seconds: f64) {
         let warm = temperature(t, from);
         for joint in 0..2 {
             let [viscous, coulomb] = CHANGES[joint];
-            tau[joint] += (warm[joint] - 30.0) * (viscous * dq[joint] + coulomb * (dq[joint] / 0.02).tanh());
+            tau[joint] += (warm[joint] - 30.0)
+                * (viscous * dq[joint] + coulomb * (dq[joint] / truth.coulomb_width(joint)).tanh());
         }
         writeln!(text, "{t},{},{},{},{},{},{}", q[0], q[1], tau[0], tau[1], warm[0], warm[1]).unwrap();
     }

@@ -1,6 +1,7 @@
 //! A robot whose parameters are known, and logs of it: inverse dynamics of the bodies plus friction written out by
 //! hand.
 use dynident::dynamics::{Workspace, inverse_dynamics};
+use dynident::model::terms::CoulombShape;
 use dynident::model::{InertialParameters, Model, load_robot};
 use dynident::{IdentificationOutcome, RunOptions, Silent, Study, StudyRobot, identify};
 pub(crate) use dynident_testing::{recordings, repository};
@@ -8,9 +9,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// Width of the Coulomb step of the truth: the default of a study.
-const WIDTH: f64 = 0.02;
 
 /// Pseudo-random numbers in [-1, 1): a linear congruential generator (Knuth's MMIX constants).
 pub(crate) struct Random(pub(crate) u64);
@@ -72,10 +70,15 @@ impl Truth {
         truth
     }
 
+    /// Width of the step of a joint's Coulomb friction: the default of a study.
+    pub(crate) fn coulomb_width(&self, joint: usize) -> f64 {
+        self.model.own_scale().velocity(self.model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH)
+    }
+
     pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
         let bodies = inverse_dynamics(&self.model, workspace, q, dq, ddq);
         let drives = self.drive.iter().enumerate().map(|(j, [inertia, viscous, coulomb, offset])| {
-            inertia * ddq[j] + viscous * dq[j] + coulomb * (dq[j] / WIDTH).tanh() + offset
+            inertia * ddq[j] + viscous * dq[j] + coulomb * (dq[j] / self.coulomb_width(j)).tanh() + offset
         });
         bodies.iter().zip(drives).map(|(body, drive)| body + drive).collect()
     }
