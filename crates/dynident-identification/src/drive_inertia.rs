@@ -132,19 +132,16 @@ pub fn choose_drive_inertia(
     let fit = || -> Result<(Estimate, Vec<Estimate>), IdentificationError> {
         let rows = passes.with_gains(passes.rows_once(RegressorModel::from(with_drives.clone()))?)?;
         let is_plain = rows.columns.is_plain();
-        Ok(match rows.gains {
-            Some((estimate, _)) => (estimate, Vec::new()),
-            None => {
-                let estimate = plain_estimate(&settings.estimation, &rows.problem)?;
-                let weighted = settings.estimation.weighted();
-                let of_logs = if is_plain && rows.problem.logs().len() > 1 {
-                    fits_of_single_logs(&rows.problem, &weighted, &estimate)
-                } else {
-                    Vec::new()
-                };
-                (estimate, of_logs)
-            }
-        })
+        if let Some((estimate, _)) = rows.gains {
+            return Ok((estimate, Vec::new()));
+        }
+        let estimate = plain_estimate(&settings.estimation, &rows.problem)?;
+        let of_logs = if is_plain && rows.problem.logs().len() > 1 {
+            fits_of_single_logs(&rows.problem, &settings.estimation.weighted(), &estimate)
+        } else {
+            Vec::new()
+        };
+        Ok((estimate, of_logs))
     };
     let (fit, of_logs) = match fit() {
         Ok(fits) => fits,
