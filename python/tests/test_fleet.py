@@ -120,7 +120,7 @@ def test_what_is_left_to_the_logs_is_refused_or_taken_from_a_model(planar: dynid
 
 
 def test_factors_of_other_robots_are_not_merged(some: list[dynident.Factors], planar: dynident.Robot) -> None:
-    other = {**STATED, "drive": {"viscous": True, "coulomb": "sign", "offset": False}}
+    other = {**STATED, "drive": {"drive_inertia": False, "viscous": True, "coulomb": "sign", "offset": False}}
     with pytest.raises(dynident.ResultError, match=r"\[drive\] differ"):
         fleet.merge([some[0], fleet.reduce(planar, recorded(0), **other)])
 
