@@ -44,7 +44,8 @@ pub(crate) fn with_variation(
         return None;
     }
     let count = training.columns.base();
-    let alone = fits_of_single_logs(problem, settings, estimate);
+    let alone: Vec<Estimate> =
+        (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, settings, estimate).ok()).collect();
     let is_friction: Vec<bool> = training.model.layout().columns()[..count].iter().map(of_friction).collect();
     let [bodies, friction] = [false, true].map(|kind| {
         let columns: Vec<usize> = (0..count).filter(|&column| is_friction[column] == kind).collect();
@@ -61,16 +62,6 @@ pub(crate) fn with_variation(
     });
     let further = DMatrix::from_fn(count, count, |row, column| of_one[(row, column)] * apart(row) * apart(column));
     Some((estimate.with_further_error(&further), found))
-}
-
-/// Each log's own least squares, with what it does not excite as in the estimate of all; logs that carry no fit are
-/// left out.
-pub(crate) fn fits_of_single_logs(
-    problem: &LinearProblem,
-    settings: &WeightedSettings,
-    estimate: &Estimate,
-) -> Vec<Estimate> {
-    (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, settings, estimate).ok()).collect()
 }
 
 /// Least squares on one log, with what it does not excite as in the estimate of all.

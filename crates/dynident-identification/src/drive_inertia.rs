@@ -11,11 +11,8 @@
 //!
 //! with R the correlations of the n estimates: standard normal where no drive has inertia, whatever their number.
 //! Rotors only add, so a negative one speaks against the others. F is Student's distribution with the ν degrees of
-//! freedom of s_i, and Φ⁻¹ F in Wallace's form (Ann. Math. Statist. 30 (1959) 1121). Where several logs carry a fit
-//! each, every log has its own Z and their sum counts, over the root of their number: friction that is another on
-//! another day would pass for inertia in one fit of all.
+//! freedom of s_i, and Φ⁻¹ F in Wallace's form (Ann. Math. Statist. 30 (1959) 1121).
 
-use crate::between_logs::fits_of_single_logs;
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
 use crate::logs::Logs;
@@ -129,22 +126,15 @@ pub fn choose_drive_inertia(
     let estimation = EstimationSettings { covariance: CovarianceMethod::Jackknife, ..settings.estimation.clone() };
     let settings = IdentificationSettings { estimation, ..settings.clone() };
     let passes = TrainingPasses { logs, settings: &settings, training, payloads, known_arm: None };
-    let fit = || -> Result<(Estimate, Vec<Estimate>), IdentificationError> {
+    let fit = || -> Result<Estimate, IdentificationError> {
         let rows = passes.with_gains(passes.rows_once(RegressorModel::from(with_drives.clone()))?)?;
-        let is_plain = rows.columns.is_plain();
-        if let Some((estimate, _)) = rows.gains {
-            return Ok((estimate, Vec::new()));
-        }
-        let estimate = plain_estimate(&settings.estimation, &rows.problem)?;
-        let of_logs = if is_plain && rows.problem.logs().len() > 1 {
-            fits_of_single_logs(&rows.problem, &settings.estimation.weighted(), &estimate)
-        } else {
-            Vec::new()
-        };
-        Ok((estimate, of_logs))
+        Ok(match rows.gains {
+            Some((estimate, _)) => estimate,
+            None => plain_estimate(&settings.estimation, &rows.problem)?,
+        })
     };
-    let (fit, of_logs) = match fit() {
-        Ok(fits) => fits,
+    let fit = match fit() {
+        Ok(fit) => fit,
         Err(IdentificationError::Estimation(EstimationError::TooFewRows { .. })) => {
             return untested("fewer rows than it would take");
         }
@@ -155,14 +145,7 @@ pub fn choose_drive_inertia(
         return untested("no joint of which torque could tell it is moved");
     }
     let columns: Vec<usize> = excited.iter().map(|(_, column)| *column).collect();
-    // Friction that is another on another day looks like anything in one fit of all days, and like nothing in each.
-    let tell = |of: &&Estimate| columns.iter().all(|&column| of.std[column] > 0.0);
-    let days: Vec<f64> = of_logs.iter().filter(tell).map(|of| together(of, &columns)).collect();
-    let found = if days.len() > 1 && days.len() == of_logs.len() {
-        days.iter().sum::<f64>() / (days.len() as f64).sqrt()
-    } else {
-        together(&fit, &columns)
-    };
+    let found = together(&fit, &columns);
     let seen = found >= SEEN;
     let drives = excited.iter().map(|&(joint, column)| DriveInertiaEstimate {
         joint: name(joint),

@@ -9,7 +9,7 @@ fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
     let mean = Truth::near(&description, 0.3, false);
     let logs: Vec<String> = (0..3).map(|log| format!("{{ file = \"{log}.csv\" }}")).collect();
     let study = format!(
-        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{}]\nestimator.physical = false\n\
+        "robot.file = {:?}\ndrive.friction = \"stated\"\ndrive.drive_inertia = false\nlog = [{}]\nestimator.physical = false\n\
          parallel_filter.factor = 2\n{}",
         description.display().to_string(),
         logs.join(", "),

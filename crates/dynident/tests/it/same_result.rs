@@ -16,7 +16,7 @@ fn study(folder: &Path) -> (Job, Truth) {
         });
     }
     let text = format!(
-        "robot.file = {:?}\nlog = [{{ file = \"log1.csv\" }}, {{ file = \"log2.csv\" }}, \
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log1.csv\" }}, {{ file = \"log2.csv\" }}, \
          {{ file = \"log3.csv\", role = \"validate\" }}, {{ file = \"log4.csv\", fraction = [0.1, 0.9], role = \"validate\" }}]\n\
          {}",
         repository("robots/ur10.urdf").display().to_string(),
