@@ -71,6 +71,8 @@ pub fn estimate_by(
         let mut alone = vec![0.0; joints];
         alone[joint] = 1.0;
         let own = stacked.combined(&alone)?;
+        // What no θ explains: the last row, whose regressor is zero.
+        torque[joint * each + each - 1] = own.entry(each - 1, each - 1);
         for (row, value) in own.residual(&known).iter().enumerate() {
             torque[joint * each + row] = *value;
             for (place, &column) in split.free.iter().enumerate() {
