@@ -16,11 +16,11 @@ use dynident_identification::{
     DiagnosisChoice, Execution, Identification, IdentificationError, IdentificationTask, Recording, RegressorModel,
     identify,
 };
-use dynident_model::Model;
 use dynident_model::terms::{
     Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, DriveChoice, LoadFriction, Offset,
     Sigmoid, Stribeck, TorqueTerm, Viscous, terms_per_joint,
 };
+use dynident_model::{Joint, Model};
 
 /// What the friction of every joint truly is, beside an offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -166,8 +166,7 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
     let failed = |reason: String| BenchmarkError::Excitation { robot: cell.robot.name.to_owned(), reason };
     let model = cell.robot.model().map_err(failed)?;
     let with_terms = |terms| ParametricModel::new(model.clone(), terms).map_err(|source| failed(source.to_string()));
-    let usual = DriveChoice { viscous: true, coulomb: Some(USUAL_STEP), offset: true, ..DriveChoice::default() };
-    let plain = with_terms(terms_per_joint(&model, |_| usual))?;
+    let plain = with_terms(terms_per_joint(&model, |joint| usual_drive(&model, joint)))?;
     let exact = with_terms((0..model.dof()).flat_map(|joint| cell.truth.terms(joint)).collect())?;
     let mut figures = FrictionFigures::default();
     for run in 0..runs {
@@ -195,8 +194,22 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
     Ok(figures)
 }
 
-/// The step of a study that says nothing.
-pub(crate) const USUAL_STEP: CoulombShape = CoulombShape::Smooth { width: 0.02 };
+/// The drive that a study which says nothing begins with: the step's width is that of a usual arm in the robot's own
+/// units.
+pub(crate) fn usual_drive(model: &Model, joint: usize) -> DriveChoice {
+    let width = model.own_scale().velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
+    let coulomb = Some(CoulombShape::Smooth { width });
+    DriveChoice { viscous: true, coulomb, offset: true, ..DriveChoice::default() }
+}
+
+/// The search for friction of such a study, joint by joint.
+pub(crate) fn usual_searches(model: &Model) -> Vec<FrictionSearch> {
+    let search = |(joint, description): (usize, &Joint)| {
+        let coulomb = usual_drive(model, joint).coulomb;
+        FrictionSearch { coulomb, ..FrictionSearch::of(&description.name) }
+    };
+    model.joints().iter().enumerate().map(search).collect()
+}
 
 /// For plain friction: the robot without its Coulomb step; none for others.
 fn plain_without(plain: &ParametricModel, truth: FrictionTruth) -> Option<ParametricModel> {
@@ -245,8 +258,7 @@ impl Made {
         task.settings.diagnosis = DiagnosisChoice::Never;
         task.settings.consistency = None;
         if chosen {
-            let search = |name| FrictionSearch { coulomb: Some(USUAL_STEP), ..FrictionSearch::of(name) };
-            task.settings.friction = robot.joint_names().into_iter().map(search).collect();
+            task.settings.friction = usual_searches(robot.model());
         }
         identify(&task, Execution::default())
     }

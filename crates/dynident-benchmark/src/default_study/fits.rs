@@ -2,12 +2,11 @@
 
 use super::cases::DefaultCase;
 use super::simulated::{CaseRobot, Simulated};
-use crate::friction_truths::USUAL_STEP;
+use crate::friction_truths::usual_searches;
 use crate::simulated_logs::PERIOD_S;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{EstimateStatus, SplineMotionSettings};
 use dynident_identification::estimators::{Estimator, InstrumentSettings, NoiseLevels, PeriodSettings};
-use dynident_identification::friction::FrictionSearch;
 use dynident_identification::{
     DiagnosisChoice, Execution, Identification, IdentificationError, IdentificationSettings, IdentificationTask,
     Recording, RegressorModel, identify,
@@ -21,26 +20,31 @@ const HIGHEST: f64 = 0.45;
 /// Samples of all joints up to which estimators that estimate the motion as well are asked.
 const MOST_FOR_MOTION: f64 = 75_000.0;
 
-/// Settings of `identify` for a study that has files and columns alone, of a robot with these joints.
-pub fn default_settings(joints: &[String]) -> IdentificationSettings {
+/// Settings of `identify` for a study of this robot that has files and columns alone.
+pub fn default_settings(robot: &ParametricModel) -> IdentificationSettings {
+    let mut settings = with_friction_stated();
+    settings.friction = usual_searches(robot.model());
+    settings.drive_inertia = robot.joint_names();
+    settings
+}
+
+/// The same where keys state the friction and the drives.
+fn with_friction_stated() -> IdentificationSettings {
     let mut settings = IdentificationSettings::default();
     settings.estimation.estimator = Estimator::Auto(InstrumentSettings::default());
-    let search = |name: &String| FrictionSearch { coulomb: Some(USUAL_STEP), ..FrictionSearch::of(name) };
-    settings.friction = joints.iter().map(search).collect();
-    settings.drive_inertia = joints.to_vec();
     settings
 }
 
 impl Simulated {
     /// As a study without keys does it. Other readings of the logs, which change nothing of the model, are not tried.
     pub(super) fn by_default(&self, robot: &CaseRobot) -> Result<Identification, IdentificationError> {
-        let settings = default_settings(&robot.described.joint_names());
+        let settings = default_settings(&robot.described);
         self.fit(&robot.described, settings)
     }
 
     /// As by default in all else, with the true laws and their constants stated.
     pub(super) fn with_laws_stated(&self, robot: &CaseRobot) -> Result<Identification, IdentificationError> {
-        self.fit(&robot.with_true_laws, default_settings(&[]))
+        self.fit(&robot.with_true_laws, with_friction_stated())
     }
 
     /// With the true laws, their constants and the true lag stated, and a cut-off; none where it leaves nothing.

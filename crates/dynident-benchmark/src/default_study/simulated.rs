@@ -1,7 +1,7 @@
 //! One recording of a case, with all that is true of it.
 
 use super::cases::DefaultCase;
-use crate::friction_truths::{FrictionTruth, TOLD, USUAL_STEP, share};
+use crate::friction_truths::{FrictionTruth, TOLD, share, usual_drive};
 use crate::simulated_logs::{PERIOD_S, left_unsaid, model_error, panels, random_series, rms, sampled, torque, truth};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
@@ -10,7 +10,7 @@ use dynident_excitation::families::Fourier;
 use dynident_identification::RegressorModel;
 use dynident_model::sample::Random;
 
-use dynident_model::terms::{DriveChoice, TorqueTerm, terms_per_joint};
+use dynident_model::terms::{TorqueTerm, terms_per_joint};
 use dynident_model::{InertialParameters, Mat3, Model, Transform, Vec3};
 use dynident_recording::{JointSamples, Log, filter::cutoff};
 use fnv::FnvHasher;
@@ -42,8 +42,7 @@ pub(super) struct CaseRobot {
 impl CaseRobot {
     pub(super) fn new(case: &DefaultCase) -> Result<Self, String> {
         let model = case.robot.model()?;
-        let usual = DriveChoice { viscous: true, coulomb: Some(USUAL_STEP), offset: true, ..DriveChoice::default() };
-        let terms = terms_per_joint(&model, |_| usual);
+        let terms = terms_per_joint(&model, |joint| usual_drive(&model, joint));
         let laws = (0..model.dof()).flat_map(|joint| case.friction.of(joint).terms(joint)).collect();
         let with = |terms| ParametricModel::new(model.clone(), terms).map_err(|source| source.to_string());
         Ok(Self { described: with(terms)?, with_true_laws: with(laws)? })

@@ -34,7 +34,7 @@ fn the_default_is_that_of_a_study_of_files_and_columns_alone() -> Result<(), Box
     let folders = Folders::new(&study, &path, None);
     let robot = StudyRobot::new(&study, &path, &folders)?;
     let task = study.task(&path, &robot, &folders)?;
-    let own = default_settings(&robot.parametric.joint_names());
+    let own = default_settings(&robot.parametric);
     assert_eq!(format!("{:?}", task.settings), format!("{own:?}"));
     Ok(())
 }

@@ -14,6 +14,7 @@ pub(crate) mod new_study;
 pub(crate) mod options;
 pub(crate) mod predict;
 mod provenance;
+mod recorded_velocities;
 pub(crate) mod reduce;
 pub(crate) mod simulate;
 pub(crate) mod validate;

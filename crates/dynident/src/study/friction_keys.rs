@@ -2,7 +2,7 @@
 
 use super::friction::{FrictionChoice, FrictionTerm};
 use super::{CoulombChoice, JointDrive};
-use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
+use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, TorqueTerm};
 
 impl JointDrive {
     /// The keys of `[drive.joints.NAME]` that state these terms of a joint's friction, and no others. Drive inertia and
@@ -42,8 +42,70 @@ impl JointDrive {
             TorqueTerm::Coulomb(Coulomb { shape: CoulombShape::Smooth { width }, .. }) => {
                 (self.coulomb, self.coulomb_width) = (Some(CoulombChoice::Smooth), Some(*width));
             }
+            // The step by direction is the joint's, which has a key of its own.
+            TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape: CoulombShape::Smooth { width }, .. }) => {
+                self.coulomb_width = Some(*width);
+                return FrictionTerm::stating(term);
+            }
             further => return FrictionTerm::stating(further),
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::DriveSection;
+    use crate::study::robot_model::torque_terms;
+    use dynident_model::load_robot;
+    use dynident_model::terms::{
+        Direction, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent, Sigmoid, Stribeck, Viscous,
+    };
+    use std::path::Path;
+
+    /// What is stored of a chosen friction gives that friction again, with none of its constants a default.
+    #[test]
+    fn keys_state_the_terms_that_they_came_from() {
+        let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");
+        let model = load_robot(&robot).unwrap().model;
+        let joint = 1;
+        let both = [Direction::Forward, Direction::Backward];
+        let shape = CoulombShape::Smooth { width: 0.0123 };
+        let viscous = vec![TorqueTerm::Viscous(Viscous { joint })];
+        let coulomb = |shape| vec![TorqueTerm::Coulomb(Coulomb { joint, shape })];
+        let by_direction = both
+            .map(|direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape }))
+            .to_vec();
+        let viscous_by_direction =
+            both.map(|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction })).to_vec();
+        let wide = CoulombShape::Smooth { width: 0.07 };
+        let stribeck = vec![TorqueTerm::Stribeck(Stribeck { joint, speed: 0.28, exponent: 2.0, shape: wide })];
+        let sigmoid = vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 21.0, offset_speed: 0.03 })];
+        let rounding = model.own_scale().velocity(true, Power::ROUNDING);
+        let powers = [PowerExponent::CubeRoot, PowerExponent::Quadratic]
+            .map(|exponent| TorqueTerm::Power(Power { joint, exponent, rounding }))
+            .to_vec();
+        let load = vec![TorqueTerm::Load(LoadFriction { joint, shape: wide })];
+        let slip = [0.001, 0.03]
+            .map(|yield_displacement| TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement }))
+            .to_vec();
+        let laws: [Vec<Vec<TorqueTerm>>; 8] = [
+            vec![viscous.clone(), coulomb(shape)],
+            vec![viscous.clone(), coulomb(CoulombShape::Sign { dead_band: 0.004 })],
+            vec![viscous.clone(), by_direction.clone()],
+            vec![viscous_by_direction, by_direction.clone(), stribeck.clone()],
+            vec![viscous.clone(), coulomb(shape), stribeck, powers],
+            vec![viscous.clone(), sigmoid],
+            vec![viscous.clone(), by_direction, load],
+            vec![viscous, slip],
+        ];
+        for law in laws {
+            let terms = law.concat();
+            let mut drive = DriveSection { viscous: false, coulomb: CoulombChoice::None, ..DriveSection::default() };
+            drive.offset = false;
+            drive.joints.insert(model.joints()[joint].name.clone(), JointDrive::stating(&terms));
+            assert_eq!(torque_terms(&drive, &[], &model).unwrap(), terms);
+        }
     }
 }

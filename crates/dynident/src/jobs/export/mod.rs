@@ -5,13 +5,11 @@ mod simulator;
 pub use simulator::{export_simulator, export_simulator_of};
 
 use crate::error::Error;
+use crate::jobs::recorded_velocities::recorded_velocities;
 use crate::result::ResultFile;
 use crate::study::{Folders, Study, StudyRobot};
-use dynident_export::{
-    ExportError, Exported, PayloadBody, PayloadReader, RecordedVelocity, RobotModel, Target, export, payload_command,
-};
+use dynident_export::{ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, payload_command};
 use dynident_identification::Role;
-use dynident_identification::rows::VelocityHistogram;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
 
@@ -88,21 +86,12 @@ fn robot_model(
             .ok_or_else(|| wrong(format!("no value of `{symbol}`: use the study that the result was made with")))
     };
     let values = robot.terms().iter().map(|term| value(term.symbol())).collect::<Result<_, _>>()?;
-    let velocities = recorded_velocities(stored, model.dof());
+    // Results of before velocities were kept have none.
+    let training = stored.logs.iter().filter(|log| log.role == Role::Identify);
+    let velocities = recorded_velocities(training.map(|log| &log.velocities[..]), model.dof());
     let made = RobotModel::new(model, robot.terms().to_vec(), values);
     made.and_then(|made| made.with_velocities(velocities))
         .map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
-}
-
-/// The velocities of the logs that were fitted to; nothing of results of before they were kept.
-fn recorded_velocities(stored: &ResultFile, dof: usize) -> Vec<Vec<RecordedVelocity>> {
-    let training: Vec<_> = stored.logs.iter().filter(|log| log.role == Role::Identify).collect();
-    let of_joint = |joint: usize| {
-        let histograms = training.iter().filter_map(|log| log.velocities.get(joint));
-        let moving = histograms.flat_map(VelocityHistogram::moving);
-        moving.map(|(velocity, samples)| RecordedVelocity { velocity, samples: samples as f64 }).collect()
-    };
-    (0..dof).map(of_joint).collect()
 }
 
 /// The payload called `name` of a `result.json` (where it has one only, `name` may be none) as the command by which the

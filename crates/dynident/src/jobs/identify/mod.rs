@@ -1,5 +1,6 @@
 //! Logs to a model: the main job.
 
+mod joint_values;
 mod model_files;
 mod sections;
 
@@ -264,8 +265,7 @@ fn exported_model(
         ));
     }
     let sources = sources(found.model(), found.estimate());
-    let values = (&found.inertials()[..], &found.consistent.parameters[..]);
-    model_files(robot, &found.model().parametric, values, (&sources, &found.consistent.parameter_std))
+    model_files(robot, found, &sources)
 }
 
 /// What the result has beside the identification itself.

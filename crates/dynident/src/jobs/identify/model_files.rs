@@ -1,16 +1,19 @@
 //! The user's own description with the identified values; of a D-H table or an MJCF a URDF beside it, of an SDF a URDF
 //! alone.
 
+use super::joint_values::JointValues;
 use crate::result::{InputFile, Provenance, ValueSource};
 use crate::study::StudyRobot;
 use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::HALF_WIDTH_95;
+use dynident_export::NearestFriction;
+use dynident_identification::Identification;
 use dynident_model::mjcf::{Loss, included_from};
 use dynident_model::terms::JointProperty;
 use dynident_model::{
-    Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Model, Robot, link_changes,
-    rewrite_dh, rewrite_mjcf, rewrite_sdf, rewrite_urdf, write_urdf,
+    Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, LinkChange, Model, Robot, link_changes, rewrite_dh,
+    rewrite_mjcf, rewrite_sdf, rewrite_urdf, write_urdf,
 };
 use std::path::Path;
 
@@ -31,22 +34,23 @@ pub(super) struct ModelFiles {
 /// none.
 pub(super) fn model_files(
     robot: &StudyRobot,
-    model: &ParametricModel,
-    (inertials, parameters): (&[InertialParameters], &[f64]),
-    (sources, std): (&[[ValueSource; 10]], &[Option<f64>]),
+    found: &Identification,
+    sources: &[[ValueSource; 10]],
 ) -> Result<ModelFiles, String> {
+    let (model, inertials) = (&found.model().parametric, &found.inertials()[..]);
+    let (parameters, std) = (&found.consistent.parameters[..], &found.consistent.parameter_std[..]);
+    let JointValues { changes: joints, nearest } = JointValues::of(found, inertials, parameters)?;
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
-    let sources = (sources, std);
-    note_sources(model, parameters, sources, lost_in_urdf, &mut links);
-    let joints = joint_changes(model, parameters);
+    let known = Known { model, parameters, std, sources, nearest: &nearest };
+    known.note(lost_in_urdf, &mut links);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
     match format {
         DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None, sdf: None }),
         DescriptionFormat::Mjcf => {
             let mjcf = keeping(robot, model.model(), inertials).and_then(|mut links| {
-                note_sources(model, parameters, sources, |property| property.is_none(), &mut links);
+                known.note(|property| property.is_none(), &mut links);
                 let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
                 rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
             });
@@ -54,7 +58,7 @@ pub(super) fn model_files(
         }
         DescriptionFormat::Sdf => {
             let sdf = keeping(robot, model.model(), inertials).and_then(|mut links| {
-                note_sources(model, parameters, sources, lost_in_urdf, &mut links);
+                known.note(lost_in_urdf, &mut links);
                 rewrite_sdf(text, &links, &joints).map_err(|error| error.to_string())
             });
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: None, sdf: Some(sdf) })
@@ -69,28 +73,6 @@ pub(super) fn model_files(
 /// URDF, SDF and the D-H table have no drive inertia.
 fn lost_in_urdf(property: Option<JointProperty>) -> bool {
     !matches!(property, Some(JointProperty::Damping | JointProperty::Friction))
-}
-
-/// New damping, friction and drive inertia of the joints.
-fn joint_changes(model: &ParametricModel, parameters: &[f64]) -> Vec<JointChange> {
-    let mut joints: Vec<JointChange> = Vec::new();
-    let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
-    for (term, &value) in terms {
-        let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
-        let name = &model.model().joints()[joint].name;
-        let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {
-            let joint = name.clone();
-            joints.push(JointChange { joint, damping: None, friction: None, drive_inertia: None, stiffness: None });
-            joints.len() - 1
-        });
-        *match property {
-            JointProperty::Damping => &mut joints[place].damping,
-            JointProperty::Friction => &mut joints[place].friction,
-            JointProperty::DriveInertia => &mut joints[place].drive_inertia,
-            JointProperty::Stiffness => &mut joints[place].stiffness,
-        } = Some(value);
-    }
-    joints
 }
 
 /// The changes of an MJCF, in which bodies behind locked joints must keep their mass, for MuJoCo takes no body with a
@@ -150,43 +132,57 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
     Ok(links)
 }
 
-/// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's drive
-/// the file does not hold.
-fn note_sources(
-    model: &ParametricModel,
-    parameters: &[f64],
-    (sources, std): (&[[ValueSource; 10]], &[Option<f64>]),
-    lost: fn(Option<JointProperty>) -> bool,
-    changes: &mut [LinkChange],
-) {
-    for (index, (body, sources)) in model.model().bodies().iter().zip(sources).enumerate() {
-        let of = |which: ValueSource| -> String {
-            let names = (0..10).filter(|&k| sources[k] == which).map(|k| INERTIAL_NAMES[k]);
-            let names: Vec<&str> = names.collect();
-            if names.is_empty() { "none".to_owned() } else { names.join(" ") }
-        };
-        let mut text = format!(
-            "about the link's frame, measured: {}; partly, in sums with others: {}; not measured, near the description: {}",
-            of(ValueSource::Measured),
-            of(ValueSource::Partly),
-            of(ValueSource::Nominal)
-        );
-        if let Some(std) = std[10 * index] {
-            let _ = write!(text, "; mass {:.4} kg ± {:.2e} kg (95 %)", parameters[10 * index], HALF_WIDTH_95 * std);
-        }
-        let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
-        let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && lost(term.property()));
-        let lost: Vec<String> =
-            lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();
-        if !lost.is_empty() {
-            let _ = write!(text, "; of this joint's drive this file does not hold {}", lost.join(", "));
-        }
-        let set = changes.iter_mut().find_map(|change| match change {
-            LinkChange::Set { link, note, .. } if link == body.name() => Some(note),
-            _ => None,
-        });
-        if let Some(note) = set {
-            *note = Some(note.take().map_or(text.clone(), |note| format!("{note}; {text}")));
+/// What a body's comment tells of its values.
+struct Known<'a> {
+    model: &'a ParametricModel,
+    parameters: &'a [f64],
+    std: &'a [Option<f64>],
+    sources: &'a [[ValueSource; 10]],
+    nearest: &'a [Option<NearestFriction>],
+}
+
+impl Known<'_> {
+    /// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's
+    /// drive the file does not hold or holds as something near to it.
+    fn note(&self, lost: fn(Option<JointProperty>) -> bool, changes: &mut [LinkChange]) {
+        let Self { model, parameters, std, sources, nearest } = self;
+        for (index, (body, sources)) in model.model().bodies().iter().zip(*sources).enumerate() {
+            let of = |which: ValueSource| -> String {
+                let names = (0..10).filter(|&k| sources[k] == which).map(|k| INERTIAL_NAMES[k]);
+                let names: Vec<&str> = names.collect();
+                if names.is_empty() { "none".to_owned() } else { names.join(" ") }
+            };
+            let mut text = format!(
+                "about the link's frame, measured: {}; partly, in sums with others: {}; not measured, near the description: {}",
+                of(ValueSource::Measured),
+                of(ValueSource::Partly),
+                of(ValueSource::Nominal)
+            );
+            if let Some(std) = std[10 * index] {
+                let _ = write!(text, "; mass {:.4} kg ± {:.2e} kg (95 %)", parameters[10 * index], HALF_WIDTH_95 * std);
+            }
+            let terms = model.terms().iter().zip(&parameters[model.model().inertial_count()..]);
+            let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && lost(term.property()));
+            let lost: Vec<String> =
+                lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();
+            if !lost.is_empty() {
+                let _ = write!(text, "; of this joint's drive this file does not hold {}", lost.join(", "));
+            }
+            if let Some(Some(nearest)) = nearest.get(index) {
+                let unit = if model.model().joints()[index].turns() { "Nm" } else { "N" };
+                let _ = write!(
+                    text,
+                    "; its damping and friction are the nearest to the friction that was found, over the fitted motion off by {:.3} {unit} rms",
+                    nearest.rms_error
+                );
+            }
+            let set = changes.iter_mut().find_map(|change| match change {
+                LinkChange::Set { link, note, .. } if link == body.name() => Some(note),
+                _ => None,
+            });
+            if let Some(note) = set {
+                *note = Some(note.take().map_or(text.clone(), |note| format!("{note}; {text}")));
+            }
         }
     }
 }

@@ -1,0 +1,17 @@
+//! The velocities that logs went through, as the nearest friction of a joint is fitted over them.
+
+use dynident_export::RecordedVelocity;
+use dynident_identification::rows::VelocityHistogram;
+
+/// Joint by joint the velocities of all logs, each of which has a histogram for each joint or none at all.
+pub(super) fn recorded_velocities<'a>(
+    logs: impl Iterator<Item = &'a [VelocityHistogram]>,
+    dof: usize,
+) -> Vec<Vec<RecordedVelocity>> {
+    let logs: Vec<&[VelocityHistogram]> = logs.collect();
+    let of_joint = |joint: usize| {
+        let moving = logs.iter().filter_map(|log| log.get(joint)).flat_map(VelocityHistogram::moving);
+        moving.map(|(velocity, samples)| RecordedVelocity { velocity, samples: samples as f64 }).collect()
+    };
+    (0..dof).map(of_joint).collect()
+}
