@@ -8,7 +8,7 @@ use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
-use crate::friction::{ConstantsError, JointFriction};
+use crate::friction::ConstantsError;
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::likelihood::schwarz;
@@ -235,15 +235,8 @@ fn fitted_once<'a>(
         let friction = ChosenFriction::as_stated(first);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
-        let mut logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let mut friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
-        for cutoff_hz in cutoff.iter().flat_map(CutoffByError::higher_hz) {
-            if !friction.joints.iter().any(JointFriction::lacks_blocks) {
-                break;
-            }
-            logs = logs.with_cutoff(&settings.motion, cutoff_hz);
-            friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
-        }
+        let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
+        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
         let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };

@@ -81,10 +81,12 @@ fn run_figures(
         Some(ratios.iter().sum::<f64>() / ratios.len() as f64)
     };
     let tellable = made.tellable(case, robot).map_err(failed)?;
+    // What cannot be chosen from a log stays as a study begins.
     let terms_of = |joint: usize| {
         let name = &robot.described.model().joints()[joint].name;
-        let own = default.training.friction_choice.iter().find(|one| one.joint == *name);
-        own.and_then(|own| own.terms.clone())
+        let own = default.training.friction_choice.iter().find(|one| one.joint == *name)?;
+        let stated = || robot.described.terms().iter().filter(|term| term.own_joint() == Some(joint)).cloned();
+        Some(own.terms.clone().unwrap_or_else(|| stated().collect()))
     };
     let is_told = |joint: &usize| {
         let truth = case.friction.of(*joint);

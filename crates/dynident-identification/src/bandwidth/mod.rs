@@ -67,21 +67,7 @@ impl CutoffByError {
         let alike = self.candidates.iter().filter(|candidate| candidate.predicted_error_percent <= ALIKE * least);
         alike.map(|candidate| candidate.cutoff_hz).fold(self.cutoff_hz, f64::max)
     }
-
-    /// Cut-offs above that whose parameters are still good, lowest first: where there are rows enough to choose
-    /// friction from, if there are none at that one.
-    pub(crate) fn higher_hz(&self) -> impl Iterator<Item = f64> {
-        let errors = self.candidates.iter().map(|candidate| candidate.predicted_error_percent);
-        let (least, above) = (errors.fold(f64::INFINITY, f64::min), self.highest_alike_hz());
-        let is_good =
-            move |one: &&CutoffCandidate| one.cutoff_hz > above && one.predicted_error_percent <= STILL_GOOD * least;
-        self.candidates.iter().filter(is_good).map(|one| one.cutoff_hz)
-    }
 }
-
-/// Friction is chosen at a cut-off whose predicted error is at most this factor of the least: parameters there are worse
-/// than they could be, but those of a law that cannot be chosen are not known at all.
-const STILL_GOOD: f64 = 2.0;
 
 /// Tries cut-offs on a simulated copy of the recordings `training` and returns the best; `None` where the cut-off is
 /// not left to the data, or where the recordings are too short for a copy to say anything.

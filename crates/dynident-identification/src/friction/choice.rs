@@ -39,19 +39,11 @@ pub struct JointFriction {
     pub candidates: Vec<FrictionCandidate>,
 }
 
-/// Why nothing is chosen from few rows.
-const TOO_FEW_BLOCKS: &str = "the training logs are too short to be cut into blocks";
-
 impl JointFriction {
     /// A joint whose friction stays as it is stated, for this reason.
     pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
         let chosen = format!("as the study states: {reason}");
         Self { joint: joint.into(), chosen, terms: None, constants: Vec::new(), folds: 0, candidates: Vec::new() }
-    }
-
-    /// True where the rows were too few to choose from, which a higher cut-off has more of.
-    pub(crate) fn lacks_blocks(&self) -> bool {
-        self.terms.is_none() && self.chosen.ends_with(TOO_FEW_BLOCKS)
     }
 
     /// The same with these terms in the place of what was chosen before: with other constants, or fewer.
@@ -172,7 +164,8 @@ pub(crate) fn choose_friction(
     let refused = |joint: usize, reason: &str| JointFriction::as_stated(name(joint), reason);
     let choose: Vec<usize> = candidates.iter().map(|(joint, _)| *joint).collect();
     let Some((validation, folds)) = cross_validation(wide_problem)? else {
-        return Ok(choose.iter().map(|&joint| refused(joint, TOO_FEW_BLOCKS)).collect());
+        let reason = "the training logs are too short to be cut into blocks";
+        return Ok(choose.iter().map(|&joint| refused(joint, reason)).collect());
     };
     let weights = weights(plain, equal_weights);
     let rows = wide_problem.joint_rows();
