@@ -110,7 +110,13 @@ class Robot:
         self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
     ) -> tuple[_Array, _Array, _Array]: ...
     def regressor(
-        self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None, ddq: npt.ArrayLike | None = None
+        self,
+        q: npt.ArrayLike,
+        dq: npt.ArrayLike | None = None,
+        ddq: npt.ArrayLike | None = None,
+        *,
+        base: bool = False,
+        out: _Array | None = None,
     ) -> _Array: ...
     @staticmethod
     def _restore(text: str, path: str | PathLike[str], settings: str) -> Robot: ...

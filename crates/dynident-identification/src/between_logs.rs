@@ -3,9 +3,13 @@
 //! Each training log is fitted alone. Where two logs differ by more than their own bars, the parameters themselves vary
 //! from log to log: with `z² = (θ_a − θ_b)² / (σ_a² + σ_b²)` and its mean k² over the pairs of logs and the parameters
 //! of one kind (bodies and drives; friction), their variance between logs is `τ² = (k² − 1) σ̄²`, σ̄² the mean variance
-//! of a single log's fit. An estimate from L logs then errs by τ²/L more about the mean of all days, and by τ² more
-//! about what a further day will show: its bar is for that, `Σ + (1 + 1/L) τ²`. Method of moments as by DerSimonian and
-//! Laird, Controlled Clinical Trials 7 (1986) 177, with one k for parameters of one kind.
+//! of a single log's fit. Method of moments as by DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177, with
+//! one k for parameters of one kind.
+//!
+//! The fit to all logs weighs what each of them would say alone, `θ̂ = Σ_l A_l θ_l` with `A_l = N⁻¹ N_l` and the
+//! information N_l of log l. So with T the variation between logs it errs by `Σ_l A_l T A_lᵀ` more about the mean of all
+//! days, friction that varies making errors of bodies and drives wherever the logs hold different motion; and by T more
+//! about what a further day will show. Its bars are for that: `Σ + Σ_l A_l T A_lᵀ + T`.
 
 use crate::training::Training;
 use dynident_dynamics::Column;
@@ -32,8 +36,8 @@ pub struct BetweenLogs {
     pub friction: Option<f64>,
 }
 
-/// The estimate with what varies between the training logs in its covariance, and by how much that was. `None` for a
-/// single log.
+/// The estimate with what varies between the training logs in its covariance, as of what a further day will show, and
+/// by how much that was. `None` for a single log.
 pub(crate) fn with_variation(
     training: &Training,
     settings: &WeightedSettings,
@@ -51,17 +55,69 @@ pub(crate) fn with_variation(
         let columns: Vec<usize> = (0..count).filter(|&column| is_friction[column] == kind).collect();
         variation(&alone, &columns)
     });
-    let found = BetweenLogs { bodies, friction };
 
-    // Σ + (1 + 1/L) τ², with the correlations of the single fits.
+    // T with the correlations of the single fits, then what it makes of the fit to all.
     let k = |column: usize| if is_friction[column] { friction } else { bodies }.unwrap_or(1.0).max(1.0);
-    let of_a_day = 1.0 + (alone.len().max(1) as f64).recip();
-    let apart = |column: usize| (of_a_day * (k(column).powi(2) - 1.0).max(0.0)).sqrt();
+    let apart = |column: usize| (k(column).powi(2) - 1.0).sqrt();
     let of_one: DMatrix<f64> = alone.iter().fold(DMatrix::zeros(count, count), |sum, one| {
         sum + one.covariance.view((0, 0), (count, count)) / alone.len().max(1) as f64
     });
-    let further = DMatrix::from_fn(count, count, |row, column| of_one[(row, column)] * apart(row) * apart(column));
-    Some((estimate.with_further_error(&further), found))
+    let between = DMatrix::from_fn(count, count, |row, column| of_one[(row, column)] * apart(row) * apart(column));
+    let of_mean = error_of_all(problem, estimate, &between).unwrap_or_else(|| &between / alone.len().max(1) as f64);
+    Some((estimate.with_further_error(&(of_mean + between)), BetweenLogs { bodies, friction }))
+}
+
+/// `Σ_l A_l T A_lᵀ` of the columns that T, `between`, is of. `None` where the rows of all logs do not determine the
+/// columns that the estimate leaves free.
+fn error_of_all(problem: &LinearProblem, estimate: &Estimate, between: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = between.nrows();
+    let is_free = |column: &usize| estimate.rank.fixed.iter().all(|fixed| fixed.column != *column);
+    let free: Vec<usize> = (0..count).filter(is_free).collect();
+    let weights: Vec<f64> =
+        estimate.joint_sigma.iter().map(|sigma| if *sigma > 0.0 { sigma.recip() } else { 1.0 }).collect();
+    let triangle_of = |problem: &LinearProblem| {
+        let factor = problem.combined(&weights).and_then(|factor| factor.selected(&free)).ok()?;
+        Some(factor.regressor_triangle())
+    };
+    // R of all rows with columns of one length, for N is R squared.
+    let mut all = triangle_of(problem)?;
+    let lengths: Vec<f64> = all.column_iter().map(|column| column.norm()).collect();
+    let shorten = |triangle: &mut DMatrix<f64>| {
+        for (mut column, length) in triangle.column_iter_mut().zip(&lengths) {
+            column /= *length;
+        }
+    };
+    if lengths.contains(&0.0) {
+        return None;
+    }
+    shorten(&mut all);
+    let varied = DMatrix::from_fn(free.len(), free.len(), |row, column| {
+        between[(free[row], free[column])] * lengths[row] * lengths[column]
+    });
+    let mut error = DMatrix::zeros(free.len(), free.len());
+    for log in 0..problem.logs().len() {
+        let mut own = triangle_of(&rows_of(problem, log).ok()?)?;
+        shorten(&mut own);
+        let from_right = all.tr_solve_upper_triangular(&(own.transpose() * own))?;
+        let influence = all.solve_upper_triangular(&from_right)?;
+        error += &influence * &varied * influence.transpose();
+    }
+    let mut further = DMatrix::zeros(count, count);
+    for (row, &to_row) in free.iter().enumerate() {
+        for (column, &to_column) in free.iter().enumerate() {
+            further[(to_row, to_column)] = error[(row, column)] / (lengths[row] * lengths[column]);
+        }
+    }
+    further.iter().all(|value| value.is_finite()).then_some(further)
+}
+
+/// The rows of one log.
+fn rows_of(problem: &LinearProblem, log: usize) -> Result<LinearProblem, EstimationError> {
+    let mut alone = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec());
+    for rows in problem.equations().iter().filter(|rows| rows.log == log) {
+        alone.add(&problem.logs()[log], rows.joint, rows.columns.clone(), rows.factor.clone())?;
+    }
+    Ok(alone)
 }
 
 /// Least squares on one log, with what it does not excite as in the estimate of all.
@@ -71,17 +127,13 @@ fn fit_alone(
     settings: &WeightedSettings,
     estimate: &Estimate,
 ) -> Result<Estimate, EstimationError> {
-    let mut alone = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
-        .with_fallback(estimate.values.clone())?
-        .with_unexcited(problem.unexcited().clone())?;
-    for rows in problem.equations().iter().filter(|rows| rows.log == log) {
-        alone.add(&problem.logs()[log], rows.joint, rows.columns.clone(), rows.factor.clone())?;
-    }
+    let alone =
+        rows_of(problem, log)?.with_fallback(estimate.values.clone())?.with_unexcited(problem.unexcited().clone())?;
     weighted_least_squares(&alone, settings)
 }
 
 /// Whether a base parameter is a joint's own torque: what may be another on another day.
-fn of_friction(column: &Column) -> bool {
+pub(crate) fn of_friction(column: &Column) -> bool {
     !matches!(column, Column::Body { .. } | Column::Term(TorqueTerm::DriveInertia(_)))
 }
 

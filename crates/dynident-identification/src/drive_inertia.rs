@@ -13,8 +13,10 @@
 //! Rotors only add, so a negative one speaks against the others. F is Student's distribution with the ν degrees of
 //! freedom of s_i, and Φ⁻¹ F in Wallace's form (Ann. Math. Statist. 30 (1959) 1121).
 
+use crate::between_logs::of_friction;
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
+use crate::friction_by_log::with_friction_by_log;
 use crate::logs::Logs;
 use crate::payload::Payload;
 use crate::regressor_model::RegressorModel;
@@ -128,10 +130,13 @@ pub fn choose_drive_inertia(
     let passes = TrainingPasses { logs, settings: &settings, training, payloads, known_arm: None };
     let fit = || -> Result<Estimate, IdentificationError> {
         let rows = passes.with_gains(passes.rows_once(RegressorModel::from(with_drives.clone()))?)?;
-        Ok(match rows.gains {
-            Some((estimate, _)) => estimate,
-            None => plain_estimate(&settings.estimation, &rows.problem)?,
-        })
+        if let Some((estimate, _)) = rows.gains {
+            return Ok(estimate);
+        }
+        // Friction that is another on another day looks like drives where it is one for all logs.
+        let is_friction: Vec<bool> = rows.model.layout().columns().iter().map(of_friction).collect();
+        let apart = with_friction_by_log(&rows.problem, &is_friction)?;
+        Ok(plain_estimate(&settings.estimation, apart.as_ref().unwrap_or(&rows.problem))?)
     };
     let fit = match fit() {
         Ok(fit) => fit,

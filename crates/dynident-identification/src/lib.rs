@@ -131,6 +131,7 @@ pub mod examination;
 mod execution;
 mod fitted;
 pub mod friction;
+mod friction_by_log;
 mod identify;
 mod lag;
 mod less_noise;

@@ -9,7 +9,7 @@ fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
     let mean = Truth::near(&description, 0.3, false);
     let logs: Vec<String> = (0..3).map(|log| format!("{{ file = \"{log}.csv\" }}")).collect();
     let study = format!(
-        "robot.file = {:?}\ndrive.friction = \"stated\"\ndrive.drive_inertia = false\nlog = [{}]\nestimator.physical = false\n\
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{}]\nestimator.physical = false\n\
          parallel_filter.factor = 2\n{}",
         description.display().to_string(),
         logs.join(", "),
@@ -37,6 +37,9 @@ fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
             });
         }
         let result = job.identify().result;
+        // The robot's drives have none, and friction that is another every day must not look like it.
+        let drives = result.drive_inertia_choice.as_ref().unwrap();
+        assert!(!drives.seen && drives.standard_deviations.is_some(), "run {run}: {}", drives.sentence());
         differing += result.method.between_logs.unwrap().friction.unwrap() / runs as f64;
         for (found, truth) in result.base_parameters.iter().zip(&another) {
             if ["fv", "fc", "off"].iter().any(|symbol| found.expression.starts_with(symbol)) {

@@ -1,0 +1,52 @@
+//! The same rows with friction of each log's own: what bodies and drives say when friction is another on another day.
+//!
+//! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: bodies and drives are one machine's, friction and offsets are free in
+//! every log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
+
+use dynident_estimation::{EstimationError, LinearProblem, Unexcited};
+
+/// Friction is told apart between so many groups of logs at most; further logs share it with their neighbours, for
+/// every group adds its columns.
+const MOST_GROUPS: usize = 8;
+
+/// The problem with further columns for the friction of logs behind the first group, whose columns stay as they are.
+/// `None` where nothing is to be told apart: one log, or a prior, which says nothing of the further columns.
+///
+/// # Errors
+/// Columns that do not go together.
+pub(crate) fn with_friction_by_log(
+    problem: &LinearProblem,
+    is_friction: &[bool],
+) -> Result<Option<LinearProblem>, EstimationError> {
+    let groups = problem.logs().len().min(MOST_GROUPS);
+    if groups < 2 || problem.prior().is_some() {
+        return Ok(None);
+    }
+    let count = problem.columns().len();
+    let friction: Vec<usize> = (0..count).filter(|&column| is_friction.get(column) == Some(&true)).collect();
+    let group_of = |log: usize| log * groups / problem.logs().len();
+    let own = |column: usize, group: usize| match (group, friction.binary_search(&column)) {
+        (1.., Ok(place)) => count + (group - 1) * friction.len() + place,
+        _ => column,
+    };
+    let further = || (1..groups).flat_map(|_| &friction);
+    let names = problem.columns().iter().cloned().chain(further().map(|&column| problem.columns()[column].clone()));
+    let values = problem.fallback().iter().copied().chain(further().map(|&column| problem.fallback()[column]));
+    let in_all = |columns: &[usize]| {
+        columns
+            .iter()
+            .flat_map(|&column| (0..groups).map(move |group| (column, group)))
+            .map(|(c, g)| own(c, g))
+            .collect()
+    };
+    let Unexcited { columns, silent } = problem.unexcited();
+    let unexcited = Unexcited { columns: in_all(columns), silent: in_all(silent) };
+    let mut apart = LinearProblem::new(names.collect(), problem.joints().to_vec())
+        .with_fallback(values.collect())?
+        .with_unexcited(unexcited)?;
+    for rows in problem.equations() {
+        let columns = rows.columns.iter().map(|&column| own(column, group_of(rows.log))).collect();
+        apart.add(&problem.logs()[rows.log], rows.joint, columns, rows.factor.clone())?;
+    }
+    Ok(Some(apart))
+}
