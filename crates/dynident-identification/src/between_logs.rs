@@ -7,9 +7,9 @@
 //! one k for parameters of one kind.
 //!
 //! The fit to all logs weighs what each of them would say alone, `θ̂ = Σ_l A_l θ_l` with `A_l = N⁻¹ N_l` and the
-//! information N_l of log l. So with T the variation between logs it errs by `Σ_l A_l T A_lᵀ` more about the mean of all
-//! days, friction that varies making errors of bodies and drives wherever the logs hold different motion; and by T more
-//! about what a further day will show. Its bars are for that: `Σ + Σ_l A_l T A_lᵀ + T`.
+//! information N_l of log l. So with T the variation between logs it errs by `Σ_l A_l T A_lᵀ` more about the mean of
+//! all days, friction that varies making errors of bodies and drives wherever the logs hold different motion; and by T
+//! more about what a further day will show. Its bars are for that: `Σ + Σ_l A_l T A_lᵀ + T`.
 
 use crate::training::Training;
 use dynident_dynamics::Column;

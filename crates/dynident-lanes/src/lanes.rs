@@ -1,5 +1,6 @@
 //! Lanes: one, four or eight `f64` that take every step together.
 
+use crate::exponential::{decay, tanh};
 use crate::register::Register;
 use crate::scalar::Scalar;
 use crate::sin_cos::sin_cos;
@@ -34,6 +35,15 @@ pub trait Lane: Scalar {
         assert!(index < Self::LANES);
         lanes[index]
     }
+
+    /// Every lane divided by a number.
+    fn divided_by(self, divisor: f64) -> Self;
+
+    /// Hyperbolic tangent of every lane, within 4 units of the last place.
+    fn tanh(self) -> Self;
+
+    /// `e^-x` of every lane, none of which is negative, within 4 units of the last place.
+    fn decay(self) -> Self;
 
     /// Sum over the lanes, from first to last.
     #[inline(always)]
@@ -208,6 +218,21 @@ impl<R: Register, B: Register> Lane for Wide<R, B> {
     #[inline(always)]
     fn store(self, out: &mut [f64]) {
         self.0.store(out);
+    }
+
+    #[inline(always)]
+    fn divided_by(self, divisor: f64) -> Self {
+        Self::of(self.0.div(R::splat(divisor)))
+    }
+
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        Self::of(tanh(self.0))
+    }
+
+    #[inline(always)]
+    fn decay(self) -> Self {
+        Self::of(decay(self.0))
     }
 
     #[inline(always)]

@@ -14,6 +14,7 @@
 mod aligned;
 mod dispatch;
 mod dual;
+mod exponential;
 mod kernel;
 mod lanes;
 mod portable;
@@ -26,6 +27,7 @@ mod x86;
 pub use aligned::AlignedBuffer;
 pub use dispatch::{Level, dispatch, dispatch_single};
 pub use dual::Dual;
+pub use exponential::{decay_all, tanh_all};
 pub use kernel::Kernel;
 pub use lanes::Lane;
 pub use scalar::Scalar;

@@ -106,6 +106,14 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
         self.map_bits(|bits| bits << 62)
     }
     #[inline(always)]
+    fn bits_shifted_by_52(self) -> Self {
+        self.map_bits(|bits| bits << 52)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(core::array::from_fn(|k| if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] }))
+    }
+    #[inline(always)]
     fn lowest_bit_mask(self) -> Self {
         self.map_bits(|bits| 0_u64.wrapping_sub(bits & 1))
     }

@@ -29,6 +29,10 @@ pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     fn bits_plus(self, addend: u64) -> Self;
     /// `bits << 62`.
     fn bits_shifted_by_62(self) -> Self;
+    /// `bits << 52`.
+    fn bits_shifted_by_52(self) -> Self;
+    /// The lesser of the two; `other` where one of them is not a number.
+    fn min(self, other: Self) -> Self;
     /// All ones where the lowest bit is set, else all zeros.
     fn lowest_bit_mask(self) -> Self;
     /// True when every |lane| is at most `bound` (false when one is not a number).

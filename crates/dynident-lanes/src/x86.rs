@@ -151,6 +151,14 @@ impl Register for Avx2 {
         Self(intrinsic!(_mm256_castsi256_pd(_mm256_slli_epi64::<62>(_mm256_castpd_si256(self.0)))))
     }
     #[inline(always)]
+    fn bits_shifted_by_52(self) -> Self {
+        Self(intrinsic!(_mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(self.0)))))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(intrinsic!(_mm256_min_pd(self.0, other.0)))
+    }
+    #[inline(always)]
     fn lowest_bit_mask(self) -> Self {
         let bit = intrinsic!(_mm256_and_si256(_mm256_castpd_si256(self.0), _mm256_set1_epi64x(1)));
         Self(intrinsic!(_mm256_castsi256_pd(_mm256_sub_epi64(_mm256_setzero_si256(), bit))))
@@ -227,6 +235,14 @@ impl Register for Avx512 {
     #[inline(always)]
     fn bits_shifted_by_62(self) -> Self {
         Self(intrinsic!(_mm512_castsi512_pd(_mm512_slli_epi64::<62>(_mm512_castpd_si512(self.0)))))
+    }
+    #[inline(always)]
+    fn bits_shifted_by_52(self) -> Self {
+        Self(intrinsic!(_mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(self.0)))))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(intrinsic!(_mm512_min_pd(self.0, other.0)))
     }
     #[inline(always)]
     fn lowest_bit_mask(self) -> Self {

@@ -1,9 +1,11 @@
 //! Coulomb friction: `τ = F_c s(q̇)` with a sign or a smooth step `s`.
 
+use super::JointMotion;
 use super::kind::{
     JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
     VelocityFriction, VelocityFunction, column_of_velocity, halves,
 };
+use dynident_lanes::tanh_all;
 use serde::{Deserialize, Serialize};
 
 /// The step near zero velocity.
@@ -38,6 +40,14 @@ impl CoulombShape {
         }
     }
 
+    /// The steps at the velocities `dq`, several at a time.
+    pub(super) fn steps(self, dq: &[f64], out: &mut [f64]) {
+        match self {
+            Self::Sign { .. } => out.iter_mut().zip(dq).for_each(|(to, &dq)| *to = self.step(dq)),
+            Self::Smooth { width } => tanh_all(dq, width, out),
+        }
+    }
+
     /// The step's derivative by the velocity; zero for the sign, which has none at the step.
     #[inline]
     pub fn slope(self, dq: f64) -> f64 {
@@ -66,6 +76,10 @@ impl VelocityFunction for CoulombShape {
 
     fn slope(&self, dq: f64) -> f64 {
         CoulombShape::slope(*self, dq)
+    }
+
+    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        self.steps(motion.dq_of(joint), out);
     }
 }
 

@@ -4,11 +4,11 @@
 //! `s`. All four parameters are positive where friction takes power. With a step that is a sign, the two Coulomb
 //! columns and an offset say the same: keep two of the three.
 
-use super::CoulombShape;
 use super::kind::{
     MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction,
     VelocityFunction, column_of_velocity, halves, smooth_friction,
 };
+use super::{CoulombShape, JointMotion};
 use serde::{Deserialize, Serialize};
 
 /// Sense of motion.
@@ -125,6 +125,11 @@ impl VelocityFunction for DirectionalCoulomb {
 
     fn slope(&self, dq: f64) -> f64 {
         if self.direction.holds(dq) { self.shape.slope(dq) } else { 0.0 }
+    }
+
+    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        self.shape.steps(motion.dq_of(joint), out);
+        out.iter_mut().for_each(|step| *step = self.direction.part(*step));
     }
 }
 

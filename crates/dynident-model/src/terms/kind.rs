@@ -125,6 +125,9 @@ pub trait VelocityFunction: Debug {
     }
 }
 
+/// Samples of which functions of the velocity keep what is between on the stack.
+pub(super) const PART: usize = 64;
+
 /// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same
 /// joints cannot be distinguished.
 #[derive(Clone, Debug, PartialEq)]

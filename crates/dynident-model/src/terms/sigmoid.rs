@@ -4,10 +4,12 @@
 //! it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE
 //! RA-L 4 (2019) 4147.
 
+use super::JointMotion;
 use super::kind::{
-    TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
+    PART, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
     column_of_velocity, smooth_friction,
 };
+use dynident_lanes::tanh_all;
 use serde::{Deserialize, Serialize};
 
 /// The step of one joint, Nm (N).
@@ -30,6 +32,16 @@ fn logistic(x: f64) -> f64 {
 impl VelocityFunction for Sigmoid {
     fn value(&self, dq: f64) -> f64 {
         logistic(self.steepness * (dq + self.offset_speed)) - logistic(self.steepness * self.offset_speed)
+    }
+
+    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        let at_rest = logistic(self.steepness * self.offset_speed);
+        let mut middle = [0.0; PART];
+        for (dq, out) in motion.dq_of(joint).chunks(PART).zip(out.chunks_mut(PART)) {
+            middle.iter_mut().zip(dq).for_each(|(to, dq)| *to = dq + self.offset_speed);
+            tanh_all(&middle[..dq.len()], 2.0 / self.steepness, out);
+            out.iter_mut().for_each(|tanh| *tanh = 0.5 * (1.0 + *tanh) - at_rest);
+        }
     }
 
     fn slope(&self, dq: f64) -> f64 {

@@ -3,10 +3,12 @@
 //! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`.
 //! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
-use super::CoulombShape;
 use super::kind::{
-    TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction, VelocityFunction, column_of_velocity,
+    PART, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction, VelocityFunction,
+    column_of_velocity,
 };
+use super::{CoulombShape, JointMotion};
+use dynident_lanes::decay_all;
 use serde::{Deserialize, Serialize};
 
 /// Extra friction of one joint near rest, Nm (N).
@@ -26,6 +28,24 @@ pub struct Stribeck {
 impl VelocityFunction for Stribeck {
     fn value(&self, dq: f64) -> f64 {
         (-(dq / self.speed).abs().powf(self.exponent)).exp() * self.shape.step(dq)
+    }
+
+    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        let mut decay = [0.0; PART];
+        for (dq, out) in motion.dq_of(joint).chunks(PART).zip(out.chunks_mut(PART)) {
+            for (to, &dq) in out.iter_mut().zip(dq) {
+                let x = (dq / self.speed).abs();
+                // The two usual exponents without a power.
+                *to = match self.exponent {
+                    1.0 => x,
+                    2.0 => x * x,
+                    other => x.powf(other),
+                };
+            }
+            decay_all(out, &mut decay);
+            self.shape.steps(dq, out);
+            out.iter_mut().zip(&decay).for_each(|(step, share)| *step *= share);
+        }
     }
 
     fn slope(&self, dq: f64) -> f64 {

@@ -125,17 +125,21 @@ pub struct Decimator {
     factor: usize,
     columns: usize,
     level: Level,
-    /// The last rows of each column, column-major with stride `length - 1 + factor`.
-    carry: Vec<f64>,
-    carried: usize,
-    /// Rows still to pass over before the next output's support begins.
+    /// The last rows of each column, column-major with stride `stride`: from `begin` to `end`.
+    recent: Vec<f64>,
+    stride: usize,
+    begin: usize,
+    end: usize,
+    /// Rows still to pass over, from `begin`, before the next output's support begins.
     skip: usize,
     outputs: u64,
-    scratch: Vec<f64>,
 }
 
 /// Coefficients are summed in blocks of this many, whatever the processor's lane count.
 const BLOCK: usize = 8;
+
+/// Recent rows have room for so many lengths of the filter before they are moved.
+const ROOM: usize = 4;
 
 impl Decimator {
     /// A decimator for panels of `columns` columns sampled at `rate_hz`.
@@ -151,11 +155,12 @@ impl Decimator {
             factor: settings.factor,
             columns,
             level: Level::detect(),
-            carry: vec![0.0; columns * (length - 1)],
-            carried: 0,
+            recent: Vec::new(),
+            stride: 0,
+            begin: 0,
+            end: 0,
             skip: 0,
             outputs: 0,
-            scratch: Vec::new(),
             taps,
         })
     }
@@ -182,45 +187,66 @@ impl Decimator {
     /// If `panel` has not `rows` times the number of columns entries.
     pub fn push(&mut self, panel: &[f64], rows: usize, out: &mut Vec<f64>) -> usize {
         assert_eq!(panel.len(), rows * self.columns, "panel of {rows} rows and {} columns", self.columns);
-        let stride = self.length - 1;
-        let available = self.carried + rows;
-        let (produced, first) = if available >= self.skip + self.length {
-            ((available - self.skip - self.length) / self.factor + 1, self.skip)
+        self.make_room(rows);
+        let available = self.end - self.begin + rows;
+        let produced = if available >= self.skip + self.length {
+            (available - self.skip - self.length) / self.factor + 1
         } else {
-            (0, self.skip)
+            0
         };
-        // Where the next output's support begins, in the joined rows.
-        let next = first + produced * self.factor;
-        let kept = available.saturating_sub(next).min(stride);
         out.resize(produced * self.columns, 0.0);
-        self.scratch.resize(available + BLOCK, 0.0);
         for column in 0..self.columns {
-            let carry = &mut self.carry[column * stride..(column + 1) * stride];
-            self.scratch[..self.carried].copy_from_slice(&carry[..self.carried]);
-            self.scratch[self.carried..available].copy_from_slice(&panel[column * rows..(column + 1) * rows]);
+            let recent = &mut self.recent[column * self.stride..(column + 1) * self.stride];
+            recent[self.end..self.end + rows].copy_from_slice(&panel[column * rows..(column + 1) * rows]);
             dispatch(
                 self.level,
                 Convolution {
                     taps: &self.taps,
-                    signal: &self.scratch,
-                    first,
+                    signal: &recent[self.begin..self.end + rows + BLOCK],
+                    first: self.skip,
                     factor: self.factor,
                     out: &mut out[column * produced..(column + 1) * produced],
                 },
             );
-            carry[..kept].copy_from_slice(&self.scratch[available - kept..available]);
         }
+        // Where the next output's support begins, in the rows from `begin` on.
+        let next = self.skip + produced * self.factor;
+        let kept = available.saturating_sub(next).min(self.length - 1);
+        self.end += rows;
+        self.begin = self.end - kept;
         self.skip = next.saturating_sub(available - kept);
-        self.carried = kept;
         self.outputs += produced as u64;
         produced
+    }
+
+    /// Room for further rows behind the recent ones: these move to the front of their columns only when it is used up,
+    /// for a long filter has many of them.
+    fn make_room(&mut self, rows: usize) {
+        if self.end + rows + BLOCK <= self.stride {
+            return;
+        }
+        let kept = self.end - self.begin;
+        let needed = kept + rows + BLOCK;
+        if needed > self.stride {
+            let stride = (ROOM * self.length + rows + BLOCK).max(needed);
+            let mut wider = vec![0.0; self.columns * stride];
+            for column in 0..self.columns {
+                let from = &self.recent[column * self.stride..][self.begin..self.end];
+                wider[column * stride..][..kept].copy_from_slice(from);
+            }
+            (self.recent, self.stride) = (wider, stride);
+        } else {
+            for recent in self.recent.chunks_exact_mut(self.stride) {
+                recent.copy_within(self.begin..self.end, 0);
+            }
+        }
+        (self.begin, self.end) = (0, kept);
     }
 
     /// Ends the signal: forgets its last rows, so that the next [`push`](Self::push) starts a new one. Returns the
     /// output rows produced since the start.
     pub fn finish(&mut self) -> u64 {
-        self.carried = 0;
-        self.skip = 0;
+        (self.begin, self.end, self.skip) = (0, 0, 0);
         core::mem::take(&mut self.outputs)
     }
 }
