@@ -1,8 +1,9 @@
 //! Hyperbolic tangent and decay of all lanes at once: what smooth friction is made of.
 //!
-//! `e^y = 2^n e^r` with n the integer nearest to `y / ln 2` and `|r| ≤ ln 2 / 2`, reduced by ln 2 in two parts (Cody and
-//! Waite, *Software Manual for the Elementary Functions*, 1980); `e^r − 1` by its power series to degree 13, whose next
-//! term is below 2^-57 of the sum. With `m = e^{2|x|} − 1` the tangent is `m / (m + 2)`: no digits are lost near zero.
+//! `e^y = 2^n e^r` with n the integer nearest to `y / ln 2` and `|r| ≤ ln 2 / 2`, reduced by ln 2 in two parts (Cody
+//! and Waite, *Software Manual for the Elementary Functions*, 1980); `e^r − 1` by its power series to degree 13, whose
+//! next term is below 2^-57 of the sum. With `m = e^{2|x|} − 1` the tangent is `m / (m + 2)`: no digits are lost near
+//! zero.
 
 use crate::dispatch::{Level, dispatch};
 use crate::kernel::Kernel;
