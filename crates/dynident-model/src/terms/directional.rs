@@ -129,7 +129,9 @@ impl VelocityFunction for DirectionalCoulomb {
 
     fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
         self.shape.steps(motion.dq_of(joint), out);
-        out.iter_mut().for_each(|step| *step = self.direction.part(*step));
+        for step in out.iter_mut() {
+            *step = self.direction.part(*step);
+        }
     }
 }
 

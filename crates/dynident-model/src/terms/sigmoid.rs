@@ -40,7 +40,9 @@ impl VelocityFunction for Sigmoid {
         for (dq, out) in motion.dq_of(joint).chunks(PART).zip(out.chunks_mut(PART)) {
             middle.iter_mut().zip(dq).for_each(|(to, dq)| *to = dq + self.offset_speed);
             tanh_all(&middle[..dq.len()], 2.0 / self.steepness, out);
-            out.iter_mut().for_each(|tanh| *tanh = 0.5 * (1.0 + *tanh) - at_rest);
+            for tanh in out.iter_mut() {
+                *tanh = 0.5 * (1.0 + *tanh) - at_rest;
+            }
         }
     }
 
