@@ -259,10 +259,21 @@ fn prediction_on_a_task() {
         "{:?} {expected}",
         checked.criterion_figure
     );
-    // Designed for the task, the motion predicts it better than the one that was designed for all parameters alike, at
-    // the same effort of search.
+    // Designed for another task, in which the elbow stands still, a motion predicts it better than the one that was
+    // designed for all parameters alike, at the same effort of search. (Of its own torque a motion that is best for all
+    // parameters is the best predictor there is: Kiefer and Wolfowitz, Canad. J. Math. 12 (1960) 363.)
+    let mut still = motion.clone();
+    let elbow = still.of(2);
+    for values in [&mut still.q, &mut still.dq, &mut still.ddq] {
+        values[elbow.clone()].fill(0.0);
+    }
+    let task = Sampled { joints: &outcome.file.joints, times_s: &times, motion: &still };
+    std::fs::write(folder.path().join("task.csv"), trajectory_csv(&task).unwrap()).unwrap();
+    let all_alike = folder.path().join("all_alike.csv");
+    std::fs::write(&all_alike, trajectory_csv(&sampled).unwrap()).unwrap();
+    let checked = check_trajectory(&study.study, &study.path, &all_alike, &Job::options(1)).unwrap().file;
     let for_task = designed(&study);
     assert!(for_task.file.feasible, "{:?}", for_task.file.diagnosis);
     let (own, other) = (for_task.file.criterion_figure.unwrap(), checked.criterion_figure.unwrap());
-    assert!(own <= other, "{own} {other}");
+    assert!(own < 0.95 * other, "{own} {other}");
 }

@@ -1,0 +1,122 @@
+//! Functions of many values, as many at once as the processor takes.
+
+use crate::dispatch::{Level, dispatch};
+use crate::kernel::Kernel;
+use crate::lanes::Lane;
+
+/// Writes `tanh(values / width)` to `out`, as many as there are in the shorter of the two; within 4 units of the last
+/// place, the same wherever in the slice a value stands.
+pub fn tanh_all(values: &[f64], width: f64, out: &mut [f64]) {
+    dispatch(Level::detect(), All { values, out, of: Tanh { width } });
+}
+
+/// Writes `e^{-values}` to `out`, as many as there are in the shorter of the two, for values that are not negative;
+/// within 4 units of the last place, and `e^-708` beyond 708.
+pub fn decay_all(values: &[f64], out: &mut [f64]) {
+    dispatch(Level::detect(), All { values, out, of: Decay });
+}
+
+trait OfLane: Copy {
+    fn of<T: Lane>(self, x: T) -> T;
+}
+
+#[derive(Clone, Copy)]
+struct Tanh {
+    width: f64,
+}
+
+impl OfLane for Tanh {
+    #[inline(always)]
+    fn of<T: Lane>(self, x: T) -> T {
+        x.divided_by(self.width).tanh()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Decay;
+
+impl OfLane for Decay {
+    #[inline(always)]
+    fn of<T: Lane>(self, x: T) -> T {
+        x.decay()
+    }
+}
+
+struct All<'a, F> {
+    values: &'a [f64],
+    out: &'a mut [f64],
+    of: F,
+}
+
+impl<F: OfLane> Kernel for All<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let count = self.values.len().min(self.out.len());
+        let whole = count - count % T::LANES;
+        let (values, out) = (&self.values[..count], &mut self.out[..count]);
+        for (from, to) in values.chunks_exact(T::LANES).zip(out.chunks_exact_mut(T::LANES)) {
+            self.of.of(T::load(from)).store(to);
+        }
+        let mut last = [0.0; 8];
+        last[..count - whole].copy_from_slice(&values[whole..]);
+        self.of.of(T::load(&last)).store(&mut last);
+        out[whole..].copy_from_slice(&last[..count - whole]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What four units of the last place are of a value.
+    fn near(found: f64, expected: f64) -> bool {
+        found == expected || (found - expected).abs() <= 4.0 * f64::EPSILON * expected.abs()
+    }
+
+    /// Numbers of every size and sign up to 1e4.
+    fn values() -> Vec<f64> {
+        let sizes = (-300..=80).map(|k| 10.0_f64.powf(f64::from(k) / 20.0));
+        let fine = (0..20_001).map(|k| f64::from(k) * 2.5e-3);
+        sizes.chain(fine).flat_map(|x| [x, -x]).collect()
+    }
+
+    #[test]
+    fn they_agree_with_the_standard_library_at_every_level() {
+        let values = values();
+        for level in Level::available() {
+            let mut out = vec![0.0; values.len()];
+            dispatch(level, All { values: &values, out: &mut out, of: Tanh { width: 0.3 } });
+            for (x, y) in values.iter().zip(&out) {
+                assert!(near(*y, (x / 0.3).tanh()), "{}: tanh({x} / 0.3) = {y}", level.name());
+            }
+            let sizes: Vec<f64> = values.iter().map(|x| x.abs().min(700.0)).collect();
+            dispatch(level, All { values: &sizes, out: &mut out, of: Decay });
+            for (x, y) in sizes.iter().zip(&out) {
+                assert!(near(*y, (-x).exp()), "{}: e^-{x} = {y}", level.name());
+            }
+        }
+    }
+
+    #[test]
+    fn the_ends_are_right_and_what_is_no_number_stays_none() {
+        let mut out = [0.0; 6];
+        tanh_all(&[0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e300], 1.0, &mut out);
+        assert_eq!(out[..4], [0.0, -0.0, 1.0, -1.0]);
+        assert!(out[1].is_sign_negative() && out[4].is_nan() && out[5] == 1.0);
+        decay_all(&[0.0, f64::INFINITY, f64::NAN, 1e300], &mut out);
+        assert!(out[0] == 1.0 && out[1] < 1e-300 && out[2].is_nan() && out[3] < 1e-300);
+    }
+
+    #[test]
+    fn a_value_is_the_same_wherever_it_stands() {
+        let values = values();
+        let (mut all, mut one) = (vec![0.0; values.len()], [0.0]);
+        tanh_all(&values, 0.02, &mut all);
+        for (x, y) in values.iter().zip(&all).step_by(97) {
+            tanh_all(&[*x], 0.02, &mut one);
+            assert_eq!(y.to_bits(), one[0].to_bits(), "{x}");
+        }
+    }
+}
