@@ -7,7 +7,7 @@ use crate::study::StudyRobot;
 use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::HALF_WIDTH_95;
-use dynident_export::NearestFriction;
+use dynident_export::{ComparedOver, NearestFriction};
 use dynident_identification::Identification;
 use dynident_model::mjcf::{Loss, included_from};
 use dynident_model::terms::JointProperty;
@@ -170,9 +170,13 @@ impl Known<'_> {
             }
             if let Some(Some(nearest)) = nearest.get(index) {
                 let unit = if model.model().joints()[index].turns() { "Nm" } else { "N" };
+                let over = match nearest.over {
+                    ComparedOver::RecordedMotion => "over the fitted motion",
+                    ComparedOver::VelocityLimit => "up to the velocity limit",
+                };
                 let _ = write!(
                     text,
-                    "; its damping and friction are the nearest to the friction that was found, over the fitted motion off by {:.3} {unit} rms",
+                    "; its damping and friction are the nearest to the friction that was found, {over} off by {:.3} {unit} rms",
                     nearest.rms_error
                 );
             }
