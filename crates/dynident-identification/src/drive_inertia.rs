@@ -10,9 +10,9 @@
 //! ```
 //!
 //! with R the correlations of the n estimates: standard normal where no drive has inertia, whatever their number.
-//! Friction and offsets are free in every log (`friction_by_log.rs`): one friction for all days leaves what differs from
-//! day to day to the drives. Rotors only add, so a negative one speaks against the others. F is Student's distribution
-//! with the ν degrees of freedom of s_i, and Φ⁻¹ F in Wallace's form (Ann. Math. Statist. 30 (1959) 1121).
+//! Friction and offsets are free in every log (`friction_by_log.rs`): one friction for all days leaves what differs
+//! from day to day to the drives. Rotors only add, so a negative one speaks against the others. F is Student's
+//! distribution with the ν degrees of freedom of s_i, and Φ⁻¹ F in Wallace's form (Ann. Math. Statist. 30 (1959) 1121).
 
 use crate::between_logs::of_friction;
 use crate::error::IdentificationError;
