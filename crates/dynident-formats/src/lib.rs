@@ -58,6 +58,8 @@ mod mat;
 mod npy;
 mod packed;
 mod parquet;
+#[cfg(feature = "parquet")]
+mod parquet_pages;
 mod recognition;
 #[cfg(feature = "bags")]
 mod ros;

@@ -17,9 +17,10 @@ mod reading {
     use super::{FileError, Path, Table};
     use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
     use crate::kind::FileFormat;
+    use crate::parquet_pages::CheckedPages;
     use crate::table::slots;
     use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
-    use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+    use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
     use parquet::data_type::DataType;
     use parquet::errors::ParquetError;
     use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -207,7 +208,10 @@ mod reading {
             self.readers.clear();
             for (index, leaf) in self.leaves.iter().enumerate() {
                 if (leaf.begin..leaf.begin + leaf.count).any(|column| self.slot_of[column].is_some()) {
-                    self.readers.push((index, group.get_column_reader(leaf.index).map_err(error)?));
+                    let column = group.metadata().schema_descr().column(leaf.index);
+                    let pages = group.get_column_page_reader(leaf.index).map_err(error)?;
+                    let pages = Box::new(CheckedPages::new(pages, &column));
+                    self.readers.push((index, get_column_reader(column, pages)));
                 }
             }
             self.group += 1;

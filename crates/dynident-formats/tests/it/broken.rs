@@ -242,8 +242,8 @@ fn a_trace_that_is_not_whole_says_what_is_missing() {
 
 #[test]
 fn what_mutated_inputs_found_is_refused() {
-    // An attachment longer than its chunk; a column at a negative place.
-    for file in ["bags/wrong_length.mcap", "parquet/negative_place.parquet"] {
+    // An attachment longer than its chunk; a column at a negative place; a page shorter than its packed levels.
+    for file in ["bags/wrong_length.mcap", "parquet/negative_place.parquet", "parquet/short_page.parquet"] {
         let path = folder().join("../../fuzz/corpus").join(file);
         told(&drain(&path).expect_err(file), file.rsplit('/').next().unwrap());
     }
