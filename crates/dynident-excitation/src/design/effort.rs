@@ -19,13 +19,12 @@ impl Effort {
     /// three seeds: log det higher than by many short ones in eight of nine cases, in half the time.
     const FEW_LONG: Self = Self { starts: 8, rounds: 1, evaluations_per_start: 1_000, evaluations_per_restart: 1_000 };
     /// For criteria with many local optima. Descents that have the time to wander outside the limits end in better ones
-    /// than four times as many that have not, and restarts around the best find more than further starts. The same
-    /// arms, condition number, about eight seconds of a core: lower in eight of nine cases than by twelve starts and
-    /// restarts of 300 evaluations, in six to eight seconds; restarts of 500 end no worse than of 1,000.
+    /// than four times as many that have not, and restarts around the best find more than further starts; restarts of
+    /// 500 end no worse than of 1,000. Further rounds found nothing on the arms of docs/src/designs-compared.md, which
+    /// has what these end at.
     const RESTARTS: Self = Self { starts: 3, rounds: 36, evaluations_per_start: 1_000, evaluations_per_restart: 500 };
     /// The same for families with many numbers, whose descents are long: their starts end near each other, and restarts
-    /// around the best find more than further starts (80 spline points on UR10, condition number: one start of 6,000
-    /// evaluations 4.35, one of 2,000 and three rounds of restarts 4.05).
+    /// around the best find more than further starts.
     const LONG_RESTARTS: Self =
         Self { starts: 2, rounds: 8, evaluations_per_start: 2_000, evaluations_per_restart: 2_000 };
 

@@ -3,6 +3,7 @@
 use super::assess::{Assessment, assess};
 use super::effort::most_of_restoration;
 use super::rounds::Rounds;
+use super::way_inside::way_inside;
 use super::{DesignProgress, DesignSettings, DesignTask, ranges};
 use crate::criteria::{Criterion, ValueAndGradient};
 use crate::optimisers::OptimiserError;
@@ -89,7 +90,11 @@ pub(crate) fn restored(
             parameters = found.best.feasible;
             let (assessed, worst) = assess(task, criterion, parameters.clone(), fine, logged);
             let (whole, on_samples) = (assessed.violation <= 0.0, found.best.violation <= MARGIN);
-            if assessed.better_than(&best) {
+            // Most of what the criterion had found is still there a hair away from it.
+            if let Some(between) = way_inside(task, criterion, &best, &assessed, [fine, logged]) {
+                parameters.clone_from(&between.parameters);
+                best = between;
+            } else if assessed.better_than(&best) {
                 best = assessed;
             }
             if whole {

@@ -20,10 +20,16 @@ const PENALTY_GROWTH: f64 = 3.0;
 /// Evaluations that this slow way needs.
 const FULL_EVALUATIONS: f64 = 1000.0;
 
+/// Steps of a descent between two updates of the multipliers; all of them are remembered. Condition numbers bend
+/// sharply where eigenvalues meet: with twelve remembered a descent takes two to four times as many to its end.
+const DESCENT_STEPS: usize = 30;
+
 /// Violation at which a start is distinguished from others well enough.
 const LOOSE: f64 = 3e-3;
 /// One in so many starts is followed to the end.
 pub(super) const FOLLOWED: usize = 4;
+/// Scores that differ by less, in the criterion's scale, are the same motion's.
+const SAME: f64 = 1e-4;
 /// Weight of what is still violated when starts are compared, in the criterion's scale.
 const VIOLATION_WEIGHT: f64 = 10.0;
 
@@ -48,6 +54,17 @@ pub(super) struct Candidate {
     pub(super) score: f64,
 }
 
+/// Which starts of a round are followed to the end.
+#[derive(Clone, Copy)]
+pub(super) enum Worth {
+    /// The best of them.
+    Always,
+    /// The best of them if their score is below this one: descents that fall back to a known motion end there.
+    IfBelow(f64),
+    /// None.
+    Never,
+}
+
 /// The best of a round.
 pub(super) struct RoundResult {
     pub(super) best: Candidate,
@@ -63,23 +80,30 @@ impl<'a> Rounds<'a> {
 }
 
 impl Rounds<'_> {
-    /// Follows all starts until limits are nearly kept, then the best of them to the end.
+    /// Follows all starts until limits are nearly kept, then the best of them, where they are worth it, to the end.
     pub(super) fn run(
         &self,
         criterion: &dyn Criterion,
         margins: &[f64],
         starts: &[AugmentedLagrangianState],
         budget: usize,
+        worth: Worth,
         stop: impl Fn(f64, f64) -> bool + Sync,
     ) -> Result<RoundResult, OptimiserError> {
         let first = self.all(criterion, margins, starts, &self.descent(criterion, budget, LOOSE, 1e-4), &stop)?;
         let mut evaluations = evaluations(&first);
         let mut candidates = self.candidates(criterion, first);
+        let better = match worth {
+            Worth::Always => f64::INFINITY,
+            Worth::IfBelow(score) => score - SAME * criterion.scale(self.task.layout.columns().len()),
+            Worth::Never => f64::NEG_INFINITY,
+        };
+        if candidates.first().is_none_or(|best| best.score >= better) {
+            let best = candidates.into_iter().next().ok_or(OptimiserError::Start)?;
+            return Ok(RoundResult { best, evaluations });
+        }
         candidates.truncate(starts.len().div_ceil(FOLLOWED));
         let ends: Vec<AugmentedLagrangianState> = candidates.into_iter().map(|candidate| candidate.state).collect();
-        if ends.is_empty() {
-            return Err(OptimiserError::Start);
-        }
         let last = self.all(criterion, margins, &ends, &self.descent(criterion, budget, 1e-6, 1e-7), &stop)?;
         evaluations += self::evaluations(&last);
         let best = self.candidates(criterion, last).into_iter().next().ok_or(OptimiserError::Start)?;
@@ -137,7 +161,8 @@ impl Rounds<'_> {
         let first = if self.task.limits.has_places() { FIRST_PENALTY_OF_PLACES } else { FIRST_PENALTY };
         AugmentedLagrangianSettings {
             max_evaluations: evaluations,
-            max_inner_iterations: 30,
+            max_inner_iterations: DESCENT_STEPS,
+            memory: DESCENT_STEPS,
             initial_penalty: Some(first * (hurry * hurry).min(1e3) * criterion.scale(self.task.layout.columns().len())),
             penalty_growth: (PENALTY_GROWTH * hurry).min(10.0),
             feasibility_tolerance,

@@ -1,0 +1,92 @@
+//! From a motion a little outside the limits straight towards one inside them.
+
+use super::DesignTask;
+use super::assess::{Assessment, assess};
+use crate::criteria::Criterion;
+
+/// Violation above which a straight line is no small change.
+const SMALL: f64 = 0.02;
+
+/// First share of the way, and how often it is doubled: at the last, half of the motion is the other's.
+const FIRST_SHARE: f64 = 1.0 / 512.0;
+const DOUBLINGS: i32 = 9;
+
+/// `(1 - s) outside + s inside`, for the smallest of the shares s = 1/512, 1/256, .., 1/2 that keeps all limits between
+/// samples; none if `outside` is inside already or far outside, `inside` breaks a limit, the family is not linear
+/// in its parameters, or the result is worse than `inside`.
+///
+/// For a family that is linear in its parameters positions, velocities and accelerations, and with them all limits that
+/// are convex in them, change by no more than a straight line: what is broken by a share ε is kept after about ε of the
+/// way, and little of what the criterion had found is lost.
+pub(super) fn way_inside(
+    task: &DesignTask<'_>,
+    criterion: &dyn Criterion,
+    outside: &Assessment,
+    inside: &Assessment,
+    [fine, logged]: [&[f64]; 2],
+) -> Option<Assessment> {
+    let near = outside.violation > 0.0 && outside.violation <= SMALL;
+    if !near || inside.violation > 0.0 || !task.family.is_linear() {
+        return None;
+    }
+    let between = |share: f64| -> Vec<f64> {
+        outside.parameters.iter().zip(&inside.parameters).map(|(from, to)| from + share * (to - from)).collect()
+    };
+    (0..DOUBLINGS)
+        .map(|doubling| assess(task, criterion, between(FIRST_SHARE * f64::from(1 << doubling)), fine, logged).0)
+        .find(|assessed| assessed.violation <= 0.0)
+        .filter(|assessed| assessed.better_than(inside))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::criteria::DOptimal;
+    use crate::design::{grid, ranges};
+    use crate::families::{Fourier, FourierSettings};
+    use crate::family::Family;
+    use crate::limits::{LimitSet, Limits};
+    use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
+    use dynident_model::load_robot;
+    use dynident_model::sample::Random;
+
+    #[test]
+    fn a_hair_of_the_way_costs_a_hair_of_the_criterion() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+        let model = load_robot(path).unwrap().model;
+        let limits = LimitSet::new(&Limits::from_model(&model), &model).unwrap();
+        let family = Fourier::new(model.dof(), 10.0, &FourierSettings::default()).unwrap();
+        let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
+        let layout = PanelLayout::new(&model, base.base_columns());
+        let task = DesignTask {
+            family: &family,
+            criteria: &[&DOptimal],
+            limits: &limits,
+            layout: &layout,
+            torque_std_nm: &[1.0; 6],
+            prior: None,
+        };
+        let (fine, logged) = (grid(10.0, 127), grid(10.0, 1001));
+        let judged = |parameters: Vec<f64>| assess(&task, &DOptimal, parameters, &fine, &logged).0;
+        let way = |outside, inside| way_inside(&task, &DOptimal, outside, inside, [&fine, &logged]);
+        let (positions, speeds) = ranges(&limits);
+        let start = family.random(&positions, &speeds, &mut Random::new(3));
+        let scaled = |by: f64| judged(start.iter().map(|p| by * p).collect());
+        // The size at which the first limit is reached, from both sides.
+        let (mut below, mut above) = (0.0, 64.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (below + above);
+            *(if scaled(middle).violation <= 0.0 { &mut below } else { &mut above }) = middle;
+        }
+        let (outside, inside, far) = (scaled(1.001 * above), scaled(0.5 * below), scaled(2.0 * above));
+        assert!(outside.violation > 0.0 && inside.violation <= 0.0 && far.violation > SMALL);
+        let between = way(&outside, &inside).expect("a hair of the way is enough");
+        assert!(between.violation <= 0.0);
+        // A 256th of the way of half a motion, of 36 columns' squares: 36 · 2 · 0.5 / 256 nats, and as much again for
+        // the step before it.
+        let lost = between.figure.unwrap() - outside.figure.unwrap();
+        assert!(lost < 0.3, "{lost}");
+        assert!(way(&far, &inside).is_none(), "far outside a straight line is no small change");
+        assert!(way(&inside, &inside).is_none() && way(&outside, &far).is_none());
+    }
+}
