@@ -1,16 +1,19 @@
 //! What comes before a motion is commanded: its rehearsal, and slower ones.
 
+use crate::home::{FoundWays, HomeError};
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::RunPlan;
 use crate::record::RunRecord;
 use crate::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
+use crate::robot::Ways;
 use crate::settings::IterationSettings;
-use crate::supervision::NextMotion;
+use crate::supervision::{NextMotion, NextWays};
 use crate::typical_drives::with_typical_drives;
 use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Reference, SimulationError};
+use std::borrow::Cow;
 
 /// Every leg at each speed step before the first run, then the run itself: place, leg, share of its speed.
 pub(crate) fn motions<'a>(
@@ -25,12 +28,26 @@ pub(crate) fn motions<'a>(
     slow.chain(legs().map(|(number, leg)| (number, leg, 1.0))).collect()
 }
 
+/// The ways of every leg; none where the robot has no home.
+///
+/// # Errors
+/// Why there is no way to one of them.
+pub(crate) fn ways_of(task: &IterationTask, settings: &IterationSettings) -> Result<Vec<Option<FoundWays>>, HomeError> {
+    let envelope = settings.safety.envelope.as_ref();
+    let of_leg = |leg: &Leg| {
+        let home = settings.safety.home.as_ref();
+        home.map(|home| home.ways(task.robot.model(), leg.reference(), envelope)).transpose()
+    };
+    task.legs.iter().map(of_leg).collect()
+}
+
 /// What the rehearsal of a plan shows, if there is one. `robot` is with the friction in force.
-pub(crate) fn rehearsed(
-    task: &IterationTask,
+pub(crate) fn rehearsed<'a>(
+    task: &'a IterationTask,
     settings: &IterationSettings,
     robot: &ParametricModel,
     (plan, controller, model): (&RunPlan, &ControllerSettings, Option<&ControllerModel>),
+    ways: &[Option<FoundWays>],
     before: &[RunRecord],
 ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, SimulationError> {
     let Some(rehearsal) = &settings.safety.rehearsal else { return Ok(Ok(None)) };
@@ -43,9 +60,16 @@ pub(crate) fn rehearsed(
     };
     let known = robot.nominal()[..robot.model().inertial_count()].iter().any(|value| *value != 0.0);
     let typical = with_typical_drives(robot).unwrap_or_else(|| robot.nominal().to_vec());
+    let whole = |(leg, found): (&'a Leg, &Option<FoundWays>)| {
+        let reference = leg.reference();
+        let around = found.as_ref().map(|found| found.ways.around(reference)).transpose()?;
+        Ok(around.map_or(Cow::Borrowed(reference), Cow::Owned))
+    };
+    let references: Vec<Cow<'_, Reference>> =
+        task.legs.iter().zip(ways).map(whole).collect::<Result<_, SimulationError>>()?;
     let rehearsed = Rehearsed {
         robot,
-        legs: &task.legs,
+        references: &references,
         controller,
         model,
         believed: own.or(shown).or(known.then_some(&typical[..])),
@@ -60,10 +84,15 @@ pub(crate) fn next_motion(
     plan: &RunPlan,
     controller: &ControllerSettings,
     (leg, reference, speed): (usize, &Reference, f64),
+    ways: Option<(&Ways, &FoundWays)>,
 ) -> NextMotion {
-    let motion = reference.motion();
-    let largest = |(joint, name): (usize, String)| {
-        (name, motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs())))
+    let largest = |of: &[&Reference]| -> Vec<(String, f64)> {
+        let names = task.robot.joint_names().into_iter().enumerate();
+        let highest = |joint: usize| {
+            let all = of.iter().flat_map(|reference| &reference.motion().dq[reference.motion().of(joint)]);
+            all.fold(0.0_f64, |most, dq| most.max(dq.abs()))
+        };
+        names.map(|(joint, name)| (name, highest(joint))).collect()
     };
     NextMotion {
         run: plan.run,
@@ -72,7 +101,13 @@ pub(crate) fn next_motion(
         model_based: plan.model.is_some(),
         duration_s: reference.duration_s(),
         speed,
-        largest_speed: task.robot.joint_names().into_iter().enumerate().map(largest).collect(),
+        largest_speed: largest(&[reference]),
         rehearsal: None,
+        ways: ways.map(|(ways, found)| NextWays {
+            approach_s: ways.approach.duration_s(),
+            return_s: ways.back.duration_s(),
+            largest_speed: largest(&[&ways.approach, &ways.back]),
+            over_postures: [0, 1].map(|way| found.over[way].len()),
+        }),
     }
 }

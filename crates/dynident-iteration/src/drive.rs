@@ -1,11 +1,12 @@
 //! Robots, records and the policy together.
 
-use crate::before_motion::{motions, next_motion, rehearsed};
+use crate::before_motion::{motions, next_motion, rehearsed, ways_of};
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_run, identify_runs};
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
+use crate::home::HomeError;
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::parameter_shares::parameter_shares;
@@ -272,12 +273,19 @@ impl Iteration {
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
         let robot = self.robot(before)?;
-        let rehearsal = match rehearsed(task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
+        let refused = |why: &dyn core::fmt::Display| {
+            let reason = format!("run {} is not commanded: {why}", plan.run);
+            Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }))
+        };
+        let ways = match ways_of(task, &self.settings) {
+            Ok(ways) => ways,
+            Err(HomeError::Numbers(error)) => return Err(error.into()),
+            Err(none) => return refused(&none),
+        };
+        let with = (plan, &controller, model.as_ref());
+        let rehearsal = match rehearsed(task, &self.settings, &robot, with, &ways, before)? {
             Ok(rehearsal) => rehearsal,
-            Err(failure) => {
-                let reason = format!("run {} is not commanded: {failure}", plan.run);
-                return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
-            }
+            Err(failure) => return refused(&failure),
         };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
         for (number, leg, speed) in motions(task, &self.settings, before) {
@@ -286,11 +294,14 @@ impl Iteration {
             let run = (plan.run - 1) * legs.len() + number + 1;
             let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
             let reference = slow.as_ref().unwrap_or(leg.reference());
+            let found = ways[number].as_ref();
+            let own = found.map(|found| if speed < 1.0 { found.ways.slowed(speed) } else { Ok(found.ways.clone()) });
+            let own = own.transpose()?;
             let stop = supervisor.stop().cloned();
             if stop.as_ref().is_some_and(StopSignal::is_requested) {
                 return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
             }
-            let mut motion = next_motion(task, plan, &controller, (number, reference, speed));
+            let mut motion = next_motion(task, plan, &controller, (number, reference, speed), own.as_ref().zip(found));
             motion.rehearsal.clone_from(&rehearsal);
             if !supervisor.allows(&motion) {
                 if stop.as_ref().is_some_and(StopSignal::is_requested) {
@@ -304,6 +315,7 @@ impl Iteration {
                 envelope: self.settings.safety.envelope.as_ref(),
                 stop: stop.as_ref(),
                 speed,
+                ways: own.as_ref(),
                 ..RunRequest::new(run, reference, &controller)
             })?;
             match &came.status {

@@ -9,6 +9,7 @@
 //! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
 //! | gains from a nominal model and a bandwidth | [`derived_controllers`] |
 //! | a motion rehearsed before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
+//! | the ways from where the robot waits to the motion and back | [`HomeSettings`] in [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
 //! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
@@ -76,6 +77,7 @@ mod final_fit;
 mod forecast;
 mod gains;
 mod good_log;
+mod home;
 mod leg;
 mod model_parameters;
 mod motion;
@@ -114,6 +116,7 @@ pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
 pub use final_fit::friction_chosen;
 pub use forecast::{ForecastDirection, MotionForecast};
 pub use gains::{DerivedControllers, derived_controllers};
+pub use home::{FoundWays, HomeError, HomeSettings};
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
@@ -129,4 +132,4 @@ pub use safety::SafetySettings;
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
-pub use supervision::{NextMotion, Supervisor};
+pub use supervision::{NextMotion, NextWays, Supervisor};

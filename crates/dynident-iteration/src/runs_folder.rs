@@ -19,6 +19,9 @@ pub(crate) const RUN_FILE: &str = "run.json";
 /// The file of a run that a stop cut short.
 pub(crate) const INTERRUPTED_FILE: &str = "interrupted.json";
 
+/// What the names of the logs of a run's ways begin with.
+pub(crate) const WAYS: [&str; 2] = ["approach", "return"];
+
 /// The folders of an iteration that are there.
 pub(crate) struct RunsFolder {
     runs: PathBuf,
@@ -120,7 +123,13 @@ fn is_own(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let numbered = |rest: &str| rest.strip_suffix(".csv").is_some_and(|number| number.parse::<usize>().is_ok());
     let table = |first: &str, further: &str| name == first || name.strip_prefix(further).is_some_and(numbered);
-    let known = matches!(&*name, RUN_FILE | INTERRUPTED_FILE | PLAN_FILE)
+    let of_way = WAYS.iter().any(|way| {
+        name.strip_prefix(way)
+            .and_then(|rest| rest.strip_prefix('_'))
+            .is_some_and(|rest| rest == "log.csv" || rest.strip_prefix("log_").is_some_and(numbered))
+    });
+    let known = of_way
+        || matches!(&*name, RUN_FILE | INTERRUPTED_FILE | PLAN_FILE)
         || table("log.csv", "log_")
         || table("motion.csv", "motion_");
     known && file.symlink_metadata().is_ok_and(|meta| meta.is_file())

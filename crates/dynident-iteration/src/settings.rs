@@ -237,7 +237,7 @@ impl IterationSettings {
     /// # Errors
     /// Numbers out of range, controllers whose gains do not fit, a controller for the first run that needs a model.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
-        self.safety.validate()?;
+        self.safety.validate(joints)?;
         self.model_free.validate(joints)?;
         self.controller.validate(joints)?;
         self.first.as_ref().map_or(Ok(()), |first| first.validate(joints))?;

@@ -6,7 +6,9 @@ use crate::planner::PlannedMotion;
 use crate::record::RunRecord;
 use crate::robot::{RobotRun, read_log_table};
 use crate::run_motion::RunMotion;
-use crate::runs_folder::{INTERRUPTED, INTERRUPTED_FILE, PLAN_FILE, PLANNED, RUN_FILE, RunsFolder, UNFINISHED, remove};
+use crate::runs_folder::{
+    INTERRUPTED, INTERRUPTED_FILE, PLAN_FILE, PLANNED, RUN_FILE, RunsFolder, UNFINISHED, WAYS, remove,
+};
 use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -113,8 +115,8 @@ impl IterationStore {
         }
     }
 
-    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), and `motion.csv` of
-    /// each that is not the task's. What was planned for it is removed.
+    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), `approach_log.csv` and
+    /// `return_log.csv` beside it where it had ways, and `motion.csv` of each that is not the task's. What was planned for it is removed.
     ///
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
@@ -177,7 +179,11 @@ impl IterationStore {
         runs: &[RobotRun],
         how: &str,
     ) -> Result<Option<PathBuf>, IterationError> {
-        if runs.iter().all(|run| run.record.samples == 0) {
+        let is_empty = |run: &RobotRun| {
+            let ways = run.ways.as_ref().map_or(0, |ways| ways.approach.samples + ways.back.samples);
+            run.record.samples + ways == 0
+        };
+        if runs.iter().all(is_empty) {
             return Ok(None);
         }
         let name = |again: usize| match again {
@@ -208,6 +214,9 @@ impl IterationStore {
             .map_err(IterationError::file(&self.runs))?;
         for (leg, run) in runs.iter().enumerate() {
             write_synced(&fresh.path().join(log_name(leg)), run.record.csv().as_bytes())?;
+            for (way, record) in run.ways.iter().flat_map(|ways| WAYS.into_iter().zip([&ways.approach, &ways.back])) {
+                write_synced(&fresh.path().join(format!("{way}_{}", log_name(leg))), record.csv().as_bytes())?;
+            }
         }
         for (name, table) in motion.into_iter().flat_map(RunMotion::tables) {
             write_synced(&fresh.path().join(name), table.as_bytes())?;

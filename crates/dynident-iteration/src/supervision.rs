@@ -23,6 +23,21 @@ pub struct NextMotion {
     pub largest_speed: Vec<(String, f64)>,
     /// What its rehearsal has shown, if there was one.
     pub rehearsal: Option<Rehearsal>,
+    /// The ways to it and back, where the robot waits at a home.
+    pub ways: Option<NextWays>,
+}
+
+/// The ways of a motion that is about to be commanded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NextWays {
+    /// Length of the way to the motion, s.
+    pub approach_s: f64,
+    /// Length of the way back, s.
+    pub return_s: f64,
+    /// For each joint, by name, the largest velocity of both, rad/s (m/s).
+    pub largest_speed: Vec<(String, f64)>,
+    /// Postures in between that each goes over, since the straight one is not clear.
+    pub over_postures: [usize; 2],
 }
 
 /// Who watches over an iteration.

@@ -3,6 +3,7 @@
 
 mod differentiators;
 mod function_robots;
+mod home;
 mod identification;
 mod iteration;
 mod policy;

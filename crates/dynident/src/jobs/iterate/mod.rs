@@ -9,7 +9,7 @@ mod trajectory;
 pub(super) use trajectory::Trajectory;
 
 use crate::error::{Error, StudyError};
-use crate::jobs::design::{MotionFamily, motion_family};
+use crate::jobs::design::{MotionFamily, limits_of, motion_family};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::output::write_whole;
@@ -19,6 +19,7 @@ use crate::result::IterationsFile;
 use crate::study::{Folders, IterationSection, PriorChoice, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
+use dynident_excitation::limits::Limits;
 use dynident_iteration::{
     Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, MotionPlanner, NextMotion,
     Redesign, RunRecord, StopSignal, Supervisor, iterate_supervised,
@@ -151,6 +152,8 @@ fn iterated(
     }
     section.check_legs(&robot).map_err(in_section)?;
     section.check_gains(study, &robot).map_err(in_section)?;
+    // Before anything is looked for.
+    section.home_settings(&robot, Limits::default()).map_err(in_section)?;
     section.redesign(study).map_err(in_section)?;
 
     // What an earlier call has left in the folder.
@@ -190,7 +193,11 @@ fn iterated(
     };
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
     let references: Vec<_> = legs.iter().map(Leg::reference).collect();
-    let settings = section.guarded(settings, study, &robot, &references).map_err(in_section)?;
+    let limits = match section.home {
+        Some(_) => limits_of(study, &robot).map_err(Error::section(study_path, "design.limits"))?,
+        None => Limits::default(),
+    };
+    let settings = section.guarded(settings, (study, limits), &robot, &references).map_err(in_section)?;
     let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {

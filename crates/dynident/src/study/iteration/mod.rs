@@ -10,6 +10,7 @@ pub use legs::{LegOrder, LegSection};
 pub use motion::MotionChoice;
 
 use super::FrictionChoice;
+use super::StartPosture;
 use super::Study;
 use super::design::name_or_table::name_or_table;
 use crate::error::StudyError;
@@ -128,6 +129,12 @@ pub struct IterationSection {
     pub rate_hz: Option<f64>,
     /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
     pub speed_steps: Vec<f64>,
+    /// Where the robot waits between runs, rad (m), all joints by name or in the model's order: every run goes from
+    /// there to its motion and back, within the limits of `[design]`. Without it the robot has to stand where the motion
+    /// begins.
+    pub home: Option<StartPosture>,
+    /// Share of the velocity and acceleration limits that the ways from home and back have; 0.2 by default.
+    pub approach_speed: f64,
     /// Tracking this many times worse than that of the last good run rejects a run.
     pub worse_factor: f64,
     /// How often a step is halved before the controller without a model comes back.
@@ -176,6 +183,8 @@ impl Default for IterationSection {
             envelope: EnvelopeSettings::default(),
             rehearsal: RehearsalSettings::default(),
             speed_steps: Vec::new(),
+            home: None,
+            approach_speed: 0.2,
             rate_hz: None,
             worse_factor,
             most_halvings,
