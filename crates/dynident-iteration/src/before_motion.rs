@@ -6,7 +6,7 @@ use crate::model_parameters::ModelParameters;
 use crate::policy::RunPlan;
 use crate::record::RunRecord;
 use crate::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
-use crate::robot::Ways;
+use crate::robot::{RunPurpose, Ways};
 use crate::settings::IterationSettings;
 use crate::supervision::{NextMotion, NextWays};
 use crate::typical_drives::with_typical_drives;
@@ -15,17 +15,46 @@ use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Reference, SimulationError};
 use std::borrow::Cow;
 
-/// Every leg at each speed step before the first run, then the run itself: place, leg, share of its speed.
+/// A motion on the way to a run, or the run itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Commanded<'a> {
+    /// Place of the leg, from 0.
+    pub(crate) place: usize,
+    pub(crate) leg: &'a Leg,
+    /// Share of its speed.
+    pub(crate) speed: f64,
+    pub(crate) purpose: RunPurpose,
+}
+
+impl Commanded<'_> {
+    /// Whether it is what the run is made for.
+    pub(crate) fn is_run(&self) -> bool {
+        self.speed == 1.0 && !matches!(self.purpose, RunPurpose::WarmUp { .. })
+    }
+
+    /// Its begin of a sentence about what came before a run.
+    pub(crate) fn words(&self) -> String {
+        match self.purpose {
+            RunPurpose::WarmUp { pass, of } => format!("in pass {pass} of {of} of the warm-up"),
+            RunPurpose::Run => format!("at {} of its speed", self.speed),
+        }
+    }
+}
+
+/// Every leg at each speed step before the first run, then in every pass of a warm-up, then the run itself.
 pub(crate) fn motions<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
     before: &[RunRecord],
-) -> Vec<(usize, &'a Leg, f64)> {
-    let legs = || task.legs.iter().enumerate();
+    passes: usize,
+) -> Vec<Commanded<'a>> {
+    let legs = |speed: f64, purpose: RunPurpose| {
+        task.legs.iter().enumerate().map(move |(place, leg)| Commanded { place, leg, speed, purpose })
+    };
     let steps = if before.is_empty() { &settings.safety.speed_steps[..] } else { &[] };
-    let slow = steps.iter().filter(|&&step| step < 1.0);
-    let slow = slow.flat_map(|&step| legs().map(move |(number, leg)| (number, leg, step)));
-    slow.chain(legs().map(|(number, leg)| (number, leg, 1.0))).collect()
+    let slow = steps.iter().filter(|&&step| step < 1.0).flat_map(|&step| legs(step, RunPurpose::Run));
+    let warm = (1..=passes).flat_map(|pass| legs(1.0, RunPurpose::WarmUp { pass, of: passes }));
+    slow.chain(warm).chain(legs(1.0, RunPurpose::Run)).collect()
 }
 
 /// The ways of every leg; none where the robot has no home.
@@ -81,9 +110,8 @@ pub(crate) fn rehearsed<'a>(
 /// What somebody who is asked hears of a motion.
 pub(crate) fn next_motion(
     task: &IterationTask,
-    plan: &RunPlan,
-    controller: &ControllerSettings,
-    (leg, reference, speed): (usize, &Reference, f64),
+    (plan, controller): (&RunPlan, &ControllerSettings),
+    (motion, reference): (&Commanded<'_>, &Reference),
     ways: Option<(&Ways, &FoundWays)>,
 ) -> NextMotion {
     let largest = |of: &[&Reference]| -> Vec<(String, f64)> {
@@ -96,11 +124,12 @@ pub(crate) fn next_motion(
     };
     NextMotion {
         run: plan.run,
-        leg: (leg, task.legs.len()),
+        leg: (motion.place, task.legs.len()),
         controller: controller.name().to_owned(),
         model_based: plan.model.is_some(),
         duration_s: reference.duration_s(),
-        speed,
+        speed: motion.speed,
+        purpose: motion.purpose,
         largest_speed: largest(&[reference]),
         rehearsal: None,
         ways: ways.map(|(ways, found)| NextWays {

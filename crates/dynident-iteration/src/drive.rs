@@ -1,12 +1,12 @@
 //! Robots, records and the policy together.
 
-use crate::before_motion::{motions, next_motion, rehearsed, ways_of};
+use crate::before_motion::motions;
+use crate::commanding::Came;
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_run, identify_runs};
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
-use crate::home::HomeError;
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::parameter_shares::parameter_shares;
@@ -14,7 +14,7 @@ use crate::planner::{MotionPlanner, PlannedMotion};
 use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
+use crate::robot::{Robot, RobotRun, RunPurpose, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::run_logs::RunLog;
 use crate::run_motion::{RunMotion, legs_along};
@@ -22,6 +22,7 @@ use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
 use crate::supervision::{Supervisor, Watching};
+use crate::warm_up::{WarmUpWatch, passes};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
 use dynident_simulation::Record;
@@ -30,6 +31,7 @@ use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// A torque this much above a limit is no matter of rounding or of the model's last digits.
 const BEYOND: f64 = 1.001;
@@ -266,85 +268,42 @@ impl Iteration {
         before: &[RunRecord],
         earlier: &[GoodLog],
         supervisor: &mut dyn Supervisor,
+        last_motion: &mut Option<Instant>,
     ) -> Result<PlannedRun, IterationError> {
         let legs = legs_along(&self.task, next.motion.as_ref())?;
         let task = &IterationTask { legs: legs.into_owned(), ..self.task.clone() };
         let legs = &task.legs;
-        let controller = plan.controller(&self.settings);
-        let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
-        let robot = self.robot(before)?;
-        let refused = |why: &dyn core::fmt::Display| {
-            let reason = format!("run {} is not commanded: {why}", plan.run);
-            Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }))
-        };
-        let ways = match ways_of(task, &self.settings) {
-            Ok(ways) => ways,
-            Err(HomeError::Numbers(error)) => return Err(error.into()),
-            Err(none) => return refused(&none),
-        };
-        let with = (plan, &controller, model.as_ref());
-        let rehearsal = match rehearsed(task, &self.settings, &robot, with, &ways, before)? {
-            Ok(rehearsal) => rehearsal,
-            Err(failure) => return refused(&failure),
+        let prepared = match self.prepared(task, plan, before)? {
+            Ok(prepared) => prepared,
+            Err(status) => return Ok(PlannedRun::Stopped(status)),
         };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg, speed) in motions(task, &self.settings, before) {
-            let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
-            // Numbers of runs differ from leg to leg: noise and folders go by them.
-            let run = (plan.run - 1) * legs.len() + number + 1;
-            let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
-            let reference = slow.as_ref().unwrap_or(leg.reference());
-            let found = ways[number].as_ref();
-            let own = found.map(|found| if speed < 1.0 { found.ways.slowed(speed) } else { Ok(found.ways.clone()) });
-            let own = own.transpose()?;
-            let stop = supervisor.stop().cloned();
-            if stop.as_ref().is_some_and(StopSignal::is_requested) {
-                return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
-            }
-            let mut motion = next_motion(task, plan, &controller, (number, reference, speed), own.as_ref().zip(found));
-            motion.rehearsal.clone_from(&rehearsal);
-            if !supervisor.allows(&motion) {
-                if stop.as_ref().is_some_and(StopSignal::is_requested) {
-                    return Ok(PlannedRun::Interrupted(runs, "before a run".to_owned()));
-                }
-                let reason = format!("run {} was not allowed", plan.run);
-                return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
-            }
-            let came = robot.run(&RunRequest {
-                model: model.as_ref(),
-                envelope: self.settings.safety.envelope.as_ref(),
-                stop: stop.as_ref(),
-                speed,
-                ways: own.as_ref(),
-                ..RunRequest::new(run, reference, &controller)
-            })?;
-            match &came.status {
-                RobotStatus::Waiting { .. } => {
-                    let reason = came.status.to_string();
-                    return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
-                }
-                RobotStatus::Failed { fault } => {
-                    let reason = format!("run {}: {fault}", plan.run);
-                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
-                }
-                RobotStatus::Interrupted { .. } => {
-                    let how = came.status.to_string();
-                    runs.push(came);
+        let passes = passes(&self.settings.safety, (legs, &prepared.ways), *last_motion);
+        let mut warm_up = WarmUpWatch::new(legs, &prepared.ways);
+        for motion in motions(task, &self.settings, before, passes) {
+            let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[motion.place] };
+            let with = (task, plan, &prepared);
+            let came = match self.commanded(*robot, with, &motion, supervisor, last_motion)? {
+                Came::Run(came) => came,
+                Came::Stopped(status) => return Ok(PlannedRun::Stopped(status)),
+                Came::Interrupted(came, how) => {
+                    runs.extend(came);
                     return Ok(PlannedRun::Interrupted(runs, how));
                 }
-                RobotStatus::Done
-                | RobotStatus::Simulated { .. }
-                | RobotStatus::Stopped { .. }
-                | RobotStatus::LeftEnvelope { .. } => {}
-            }
+            };
             let done = came.status.is_done();
-            if slow.is_some() {
+            if !motion.is_run() {
                 if !done {
                     let reason = format!(
-                        "at {speed} of its speed run {} ended early: {}. Look at the robot; the same command begins it anew",
-                        plan.run, came.status
+                        "{} run {} ended early: {}. Look at the robot; the same command begins it anew",
+                        motion.words(),
+                        plan.run,
+                        came.status
                     );
                     return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+                }
+                if let RunPurpose::WarmUp { pass, .. } = motion.purpose {
+                    warm_up.add(pass, motion.leg.reference(), &came.record);
                 }
                 continue;
             }
@@ -353,8 +312,9 @@ impl Iteration {
                 break;
             }
         }
-        let mut record = self.recorded((plan, next), controller.name(), legs, &runs);
-        record.rehearsal = rehearsal;
+        let mut record = self.recorded((plan, next), prepared.controller.name(), legs, &runs);
+        record.rehearsal = prepared.rehearsal;
+        record.warm_up = warm_up.shown();
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             self.examine(&mut record, &records, before, earlier)?;
@@ -461,6 +421,7 @@ impl Iteration {
             accepted: false,
             reason: None,
             rehearsal: None,
+            warm_up: None,
             estimate: None,
             pooled: None,
             evidence: None,
@@ -543,6 +504,8 @@ pub fn iterate_supervised(
     };
     let mut good: Option<Vec<GoodLog>> = None;
     let mut stopped: Option<String> = None;
+    // By this call; what moved before nobody knows.
+    let mut last_motion: Option<Instant> = None;
     loop {
         let stop = supervisor.stop().cloned();
         let (plan, next) = match iteration.next(&records)? {
@@ -571,7 +534,7 @@ pub fn iterate_supervised(
             let reason = format!("{why}. Look at the robot; the same command goes on with run {}", plan.run);
             return outcome(IterationStatus::Waiting { reason }, records);
         }
-        match iteration.made(robots, (&plan, next), &records, good, supervisor)? {
+        match iteration.made(robots, (&plan, next), &records, good, supervisor, &mut last_motion)? {
             PlannedRun::Stopped(status) => return outcome(status, records),
             PlannedRun::Interrupted(runs, how) => {
                 let kept = store.map_or(Ok(None), |store| store.keep_interrupted(plan.run, &runs, &how))?;

@@ -67,6 +67,7 @@
 
 mod before_motion;
 mod clipping;
+mod commanding;
 mod convergence;
 mod differentiator_choice;
 mod drive;
@@ -106,6 +107,7 @@ mod supervision;
 mod torque_of_all;
 mod tracking_floor;
 mod typical_drives;
+mod warm_up;
 
 pub use convergence::Shortfall;
 pub use differentiator_choice::{DifferentiatorCandidate, DifferentiatorChoice};
@@ -125,7 +127,7 @@ pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
 pub use redesign::{Redesign, RedesignSettings};
 pub use rehearsal::{Rehearsal, RehearsalFailure, RehearsalSettings};
-pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
+pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunPurpose, RunRequest, SimulatedRobot, StopSignal};
 pub use run_logs::RunLog;
 pub use run_motion::RunMotion;
 pub use safety::SafetySettings;
@@ -133,3 +135,4 @@ pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, Settled
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use supervision::{NextMotion, NextWays, Supervisor};
+pub use warm_up::WarmUp;

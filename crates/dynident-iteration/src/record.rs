@@ -6,6 +6,7 @@ use crate::forecast::MotionForecast;
 use crate::model_parameters::ModelParameters;
 use crate::rehearsal::Rehearsal;
 use crate::run_motion::RunMotion;
+use crate::warm_up::WarmUp;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +51,9 @@ pub struct RunRecord {
     /// What its rehearsal had shown; none where there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rehearsal: Option<Rehearsal>,
+    /// What the warm-up before it has shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<WarmUp>,
     /// What it says about the parameters by itself; none if it determines nothing.
     pub estimate: Option<RunEstimate>,
     /// What all good runs up to this one say together; none where this is the first or no good one, and where runs are

@@ -2,7 +2,7 @@
 
 use crate::record::RunRecord;
 use crate::rehearsal::Rehearsal;
-use crate::robot::{RobotRun, StopSignal};
+use crate::robot::{RobotRun, RunPurpose, StopSignal};
 
 /// A motion that is about to be commanded.
 #[derive(Clone, Debug)]
@@ -19,6 +19,8 @@ pub struct NextMotion {
     pub duration_s: f64,
     /// Share of the trajectory's own speed; 1 but for slow runs before the first.
     pub speed: f64,
+    /// What it is made for.
+    pub purpose: RunPurpose,
     /// For each joint, by name, the largest velocity of the motion, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
     /// What its rehearsal has shown, if there was one.

@@ -2,7 +2,7 @@
 
 use super::interruption;
 use crate::terminal;
-use dynident::iteration::NextMotion;
+use dynident::iteration::{NextMotion, RunPurpose};
 use dynident::study::{RobotChoice, Study};
 use std::io::{BufRead, IsTerminal};
 
@@ -33,6 +33,10 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let of = if legs > 1 { format!(", trajectory {} of {legs}", leg + 1) } else { String::new() };
     let model = if motion.model_based { "with the model so far" } else { "without a model" };
     let share = if motion.speed < 1.0 { format!(" at {} of its speed", motion.speed) } else { String::new() };
+    let what = match motion.purpose {
+        RunPurpose::WarmUp { pass, of } => format!("pass {pass} of {of} that warm up for run {}", motion.run),
+        RunPurpose::Run => format!("run {}", motion.run),
+    };
     let speeds = |of: &[(String, f64)]| -> String {
         of.iter().map(|(joint, speed)| format!("{joint} {speed:.2}")).collect::<Vec<_>>().join(", ")
     };
@@ -52,8 +56,7 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
         )
     });
     let question = format!(
-        "run {}{of}: {:.1} s{share} under {} {model}; largest velocities, rad/s (m/s): {}{ways}\nIs the robot clear?",
-        motion.run,
+        "{what}{of}: {:.1} s{share} under {} {model}; largest velocities, rad/s (m/s): {}{ways}\nIs the robot clear?",
         motion.duration_s,
         motion.controller,
         speeds(&motion.largest_speed)

@@ -23,6 +23,11 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
         }
     }
     for run in &file.runs {
+        if let Some(warm_up) = &run.warm_up {
+            text += &wrapped(&format!("Before run {}: {}.", run.run, warm_up.sentence(&file.joints)), 4);
+        }
+    }
+    for run in &file.runs {
         if let Some(forecast) = &run.forecast {
             text += &wrapped(&format!("Run {}: {}.", run.run, forecast.sentence()), 4);
         }

@@ -42,6 +42,21 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use thiserror::Error;
 
+/// What a motion is made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RunPurpose {
+    /// A run.
+    #[default]
+    Run,
+    /// So that the robot is warm: a pass along the motion of the run after it.
+    WarmUp {
+        /// Number of the pass, from 1.
+        pass: usize,
+        /// How many there are.
+        of: usize,
+    },
+}
+
 /// What a robot is asked to do.
 #[derive(Clone, Copy, Debug)]
 pub struct RunRequest<'a> {
@@ -59,6 +74,8 @@ pub struct RunRequest<'a> {
     pub stop: Option<&'a StopSignal>,
     /// Share of the trajectory's own speed that the reference has; 1 but for slow runs before the first.
     pub speed: f64,
+    /// What it is made for.
+    pub purpose: RunPurpose,
     /// The ways to the motion and back: the robot waits where the approach begins, and is left where the return ends.
     /// Without them it has to stand where the motion begins.
     pub ways: Option<&'a Ways>,
@@ -67,12 +84,27 @@ pub struct RunRequest<'a> {
 impl<'a> RunRequest<'a> {
     /// A run without a model, an envelope and anybody who may stop it: set the fields.
     pub fn new(run: usize, reference: &'a Reference, controller: &'a ControllerSettings) -> Self {
-        Self { run, reference, controller, model: None, envelope: None, stop: None, speed: 1.0, ways: None }
+        Self {
+            run,
+            reference,
+            controller,
+            model: None,
+            envelope: None,
+            stop: None,
+            speed: 1.0,
+            purpose: RunPurpose::Run,
+            ways: None,
+        }
     }
 
-    /// Name of the folder for its files: a slow run is no other's.
+    /// Name of the folder for its files: a slow run, or one that warms up, is no other's.
     pub fn folder_name(&self) -> String {
-        if self.speed < 1.0 { format!("run_{}_speed_{}", self.run, self.speed) } else { format!("run_{}", self.run) }
+        let run = format!("run_{}", self.run);
+        match self.purpose {
+            RunPurpose::WarmUp { pass, .. } => format!("{run}_warm_up_{pass}"),
+            RunPurpose::Run if self.speed < 1.0 => format!("{run}_speed_{}", self.speed),
+            RunPurpose::Run => run,
+        }
     }
 
     /// What is commanded where one controller runs through all of it: approach, motion and return, or the motion alone.

@@ -1,7 +1,7 @@
 //! The built-in simulator as a robot.
 
 use super::ways::{WayRecords, cut};
-use super::{Robot, RobotRun, RobotStatus, RunRequest};
+use super::{Robot, RobotRun, RobotStatus, RunPurpose, RunRequest};
 use dynident_simulation::Plant;
 use dynident_simulation::SimulationError;
 use dynident_simulation::{LoopSettings, closed_loop};
@@ -58,6 +58,9 @@ impl Robot for SimulatedRobot {
         }
         // Any odd number spreads neighbours over the seeds.
         settings.sensors.seed ^= (request.run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        if let RunPurpose::WarmUp { pass, .. } = request.purpose {
+            settings.sensors.seed ^= (pass as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+        }
         let run = closed_loop(&mut self.plant, controller.as_mut(), &*request.whole()?, &settings)?;
         let record = settings.sensors.record(self.plant.model(), &run)?;
         let status = match &run.status {

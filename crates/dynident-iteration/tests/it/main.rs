@@ -14,3 +14,4 @@ mod robots;
 mod simulated_arm;
 mod stops;
 mod verdict;
+mod warm_up;

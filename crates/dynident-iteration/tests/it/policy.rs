@@ -52,6 +52,7 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         accepted,
         reason: None,
         rehearsal: None,
+        warm_up: None,
         estimate: Some(estimate),
         pooled: None,
         evidence: Some(evidence()),

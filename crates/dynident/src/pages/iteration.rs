@@ -109,6 +109,14 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
         page.add(Heading::new("What the motions were to bring"));
         page.add(Text { paragraphs: vec![FORECASTS.to_owned()], points });
     }
+    let warmed = file.runs.iter().filter_map(|run| Some((run_name(run), run.warm_up.as_ref()?)));
+    let points: Vec<(Tone, String)> = warmed
+        .map(|(run, warm_up)| (Tone::Plain, format!("before run {run}: {}", warm_up.sentence(&file.joints))))
+        .collect();
+    if !points.is_empty() {
+        page.add(Heading::new("Warm-up"));
+        page.add(Text { paragraphs: Vec::new(), points });
+    }
     if let Some(shown) = last_shown(file) {
         page.add(Heading::new("What the last log shows"));
         page.add(shown);

@@ -4,7 +4,7 @@ use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
 use dynident_identification::examination::TorqueLag;
-use dynident_iteration::{DifferentiatorChoice, RunEvidence, Shortfall};
+use dynident_iteration::{DifferentiatorChoice, RunEvidence, Shortfall, WarmUp};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -181,6 +181,9 @@ pub struct IterationRun {
     pub reason: Option<String>,
     /// For each joint the largest distance from the trajectory, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
+    /// What the warm-up before it has shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<WarmUp>,
     /// What it determines by itself.
     pub parameters: Vec<IterationParameter>,
     /// What all good runs up to this one determine together; empty for the first, for those that do not count, and

@@ -92,4 +92,24 @@ fn what_is_wrong_with_a_home_is_said() {
     assert!(error.contains("approach_speed"), "{error}");
     let error = wrong("home = [0.2, 0.1]\nleg = [{ hold = { joint1 = 0.0 } }]");
     assert!(error.contains("locked = false"), "{error}");
+    // A person behind a folder is not asked for passes.
+    let error = wrong(
+        "warm_up_s = 60.0\nmodel_free = { kind = \"joint-pd\", kp = 400.0, kd = 40.0 }\nrobot = { kind = \"folder\", folder = \"exchange\" }",
+    );
+    assert!(error.contains("warm_up_s") && error.contains("without a log"), "{error}");
+}
+
+/// A warm-up is in the result and on the page: how often, and what friction took.
+#[test]
+fn a_warm_up_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = study(folder.path(), "", "warm_up_s = 5.0").replace("rate_hz = 500.0", "rate_hz = 500.0\nviscous = 1.0");
+    let file = iterated(folder.path(), &text).unwrap();
+    // The motion lasts three seconds.
+    let shown = file.runs[0].warm_up.as_ref().unwrap();
+    assert!(shown.passes == 2 && shown.lost_power_w[0] > 0.0, "{shown:?}");
+    assert!(shown.change_percent().unwrap().abs() < 0.1);
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("warmed up with its motion 2 times, 6 s"));
+    assert!(IterationsFile::read(&folder.path().join("out/iterations.json")).unwrap().runs[0].warm_up.is_some());
 }

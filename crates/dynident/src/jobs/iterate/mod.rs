@@ -154,6 +154,7 @@ fn iterated(
     section.check_gains(study, &robot).map_err(in_section)?;
     // Before anything is looked for.
     section.home_settings(&robot, Limits::default()).map_err(in_section)?;
+    section.check_warm_up().map_err(in_section)?;
     section.redesign(study).map_err(in_section)?;
 
     // What an earlier call has left in the folder.

@@ -91,6 +91,7 @@ impl IterationReport<'_> {
                 outcome: record.outcome.clone(),
                 reason: record.reason.clone(),
                 max_tracking_error_rad: record.max_tracking_error_rad.clone(),
+                warm_up: record.warm_up.clone(),
                 parameters: parameters(record.estimate.as_ref()),
                 pooled: parameters(record.pooled.as_ref()),
                 evidence: record.evidence.clone(),

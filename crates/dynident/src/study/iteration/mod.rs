@@ -135,6 +135,10 @@ pub struct IterationSection {
     pub home: Option<StartPosture>,
     /// Share of the velocity and acceleration limits that the ways from home and back have; 0.2 by default.
     pub approach_speed: f64,
+    /// How long the motion of a run is made over and over before the first run of a call, s, so that friction is at its
+    /// working temperature; again where the robot has stood longer than this. 0 by default: not at all. Not of a robot
+    /// behind a folder, which a person warms up.
+    pub warm_up_s: f64,
     /// Tracking this many times worse than that of the last good run rejects a run.
     pub worse_factor: f64,
     /// How often a step is halved before the controller without a model comes back.
@@ -185,6 +189,7 @@ impl Default for IterationSection {
             speed_steps: Vec::new(),
             home: None,
             approach_speed: 0.2,
+            warm_up_s: 0.0,
             rate_hz: None,
             worse_factor,
             most_halvings,

@@ -105,10 +105,24 @@ impl IterationSection {
             envelope: (outside || stated).then(|| self.envelope.envelope(model)).transpose()?,
             rehearsal: outside.then(|| self.rehearsal.clone()),
             speed_steps: self.speed_steps.clone(),
+            warm_up_s: self.warm_up_s,
             home: self.home_settings(robot, limits)?,
         };
         settings.safety.validate(model.dof())?;
         Ok(settings)
+    }
+
+    /// That somebody is there to be asked for passes along the motion.
+    ///
+    /// # Errors
+    /// A folder: a call makes one run there, and its person knows how warm the robot is.
+    pub(crate) fn check_warm_up(&self) -> Result<(), StudyError> {
+        let folder = matches!(self.robot, RobotChoice::Folder(_));
+        if folder && self.warm_up_s != 0.0 {
+            let fix = "behind a folder every run is a call of its own: run trajectory.csv some minutes without a log before you log it, and take the key out";
+            return Err(StudyError::conflict("warm_up_s", fix));
+        }
+        Ok(())
     }
 
     /// Where the robot waits, and what the ways from there keep.
@@ -148,9 +162,9 @@ impl IterationSection {
             RobotChoice::Folder(folder) => folder.wait_s = 0.0,
         }
         own.envelope = EnvelopeSettings::default();
-        // A robot outside is moved to another place, or at another speed; its motion is the same.
+        // A robot outside is moved to another place, or at another speed, or warmed up longer; its motion is the same.
         if self.is_outside() {
-            (own.home, own.approach_speed) = (None, Self::default().approach_speed);
+            (own.home, own.approach_speed, own.warm_up_s) = (None, Self::default().approach_speed, 0.0);
         }
         own
     }
