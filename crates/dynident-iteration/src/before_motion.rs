@@ -36,7 +36,7 @@ impl Commanded<'_> {
     pub(crate) fn words(&self) -> String {
         match self.purpose {
             RunPurpose::WarmUp { pass, of } => format!("in pass {pass} of {of} of the warm-up"),
-            RunPurpose::Run => format!("at {} of its speed", self.speed),
+            RunPurpose::Run | RunPurpose::HeldOut => format!("at {} of its speed", self.speed),
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_run, identify_runs};
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
+use crate::held_out::{HeldOutCame, HeldOutMotion};
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::parameter_shares::parameter_shares;
@@ -42,6 +43,7 @@ pub struct Iteration {
     task: IterationTask,
     settings: IterationSettings,
     planner: Option<Arc<dyn MotionPlanner>>,
+    pub(crate) held_out: Option<HeldOutMotion>,
 }
 
 /// How an iteration went.
@@ -80,7 +82,7 @@ impl Iteration {
     pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
         task.validate()?;
         settings.validate(task.robot.dof())?;
-        Ok(Self { task, settings, planner: None })
+        Ok(Self { task, settings, planner: None, held_out: None })
     }
 
     /// The same with motions that are planned from what is known, in place of the task's in every run.
@@ -145,7 +147,13 @@ impl Iteration {
             None => Vec::new(),
         };
         let most_lag_s = self.settings.settled.most_lag_s(robot.model());
-        Ok(Names { joints: robot.joint_names(), parameters: robot.base().expressions(), shares, most_lag_s })
+        Ok(Names {
+            joints: robot.joint_names(),
+            parameters: robot.base().expressions(),
+            shares,
+            most_lag_s,
+            held_out: self.held_out.is_some(),
+        })
     }
 
     /// Where the trajectories ask for more torque than the joints have, by the last good model.
@@ -425,6 +433,7 @@ impl Iteration {
             estimate: None,
             pooled: None,
             evidence: None,
+            held_out: None,
         }
     }
 
@@ -507,6 +516,38 @@ pub fn iterate_supervised(
     // By this call; what moved before nobody knows.
     let mut last_motion: Option<Instant> = None;
     loop {
+        if let Some(why) = stopped.as_ref().filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
+            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", records.len() + 1);
+            if !matches!(iteration.next(&records)?, Next::Finished(_)) {
+                return outcome(IterationStatus::Waiting { reason }, records);
+            }
+        }
+        // What is known is judged before it is used further.
+        if let Some(held_out) = iteration.held_out_due(&records)? {
+            match iteration.held_out_made(held_out, &mut *robots[0], &records, supervisor, &mut last_motion)? {
+                HeldOutCame::Stopped(status) => return outcome(status, records),
+                HeldOutCame::Interrupted(came, how) => {
+                    let run = records.len();
+                    let runs: Vec<RobotRun> = came.into_iter().collect();
+                    let kept = store.map_or(Ok(None), |store| store.keep_interrupted(run, &runs, &how))?;
+                    let kept = kept.map_or_else(String::new, |path| format!("; what was recorded: {}", path.display()));
+                    let reason = format!("{how}{kept}. The same command goes on with the held-out run after run {run}");
+                    return outcome(IterationStatus::Interrupted { reason }, records);
+                }
+                HeldOutCame::Run(found, came) => {
+                    if let (Some(store), Some(last)) = (store, records.last()) {
+                        store.keep_held_out(last.run, &found, &came)?;
+                    }
+                    stopped = (!found.done).then(|| {
+                        format!("the held-out run after run {} ended early: {}", records.len(), found.outcome)
+                    });
+                    if let Some(last) = records.last_mut() {
+                        last.held_out = Some(found);
+                    }
+                }
+            }
+            continue;
+        }
         let stop = supervisor.stop().cloned();
         let (plan, next) = match iteration.next(&records)? {
             Next::Run(plan) => (plan, iteration.next_motion(&records, store, stop.as_ref())?),
@@ -530,10 +571,6 @@ pub fn iterate_supervised(
             Some(good) => good,
             None => good.insert(iteration.good_logs(&records, store)?),
         };
-        if let Some(why) = stopped.filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
-            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", plan.run);
-            return outcome(IterationStatus::Waiting { reason }, records);
-        }
         match iteration.made(robots, (&plan, next), &records, good, supervisor, &mut last_motion)? {
             PlannedRun::Stopped(status) => return outcome(status, records),
             PlannedRun::Interrupted(runs, how) => {

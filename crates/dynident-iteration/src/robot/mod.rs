@@ -55,6 +55,8 @@ pub enum RunPurpose {
         /// How many there are.
         of: usize,
     },
+    /// Another motion, to judge the model that a run has given: the run's number is that one's.
+    HeldOut,
 }
 
 /// What a robot is asked to do.
@@ -102,6 +104,7 @@ impl<'a> RunRequest<'a> {
         let run = format!("run_{}", self.run);
         match self.purpose {
             RunPurpose::WarmUp { pass, .. } => format!("{run}_warm_up_{pass}"),
+            RunPurpose::HeldOut => format!("{run}_held_out"),
             RunPurpose::Run if self.speed < 1.0 => format!("{run}_speed_{}", self.speed),
             RunPurpose::Run => run,
         }

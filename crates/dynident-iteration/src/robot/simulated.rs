@@ -58,9 +58,11 @@ impl Robot for SimulatedRobot {
         }
         // Any odd number spreads neighbours over the seeds.
         settings.sensors.seed ^= (request.run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        if let RunPurpose::WarmUp { pass, .. } = request.purpose {
-            settings.sensors.seed ^= (pass as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
-        }
+        settings.sensors.seed ^= match request.purpose {
+            RunPurpose::Run => 0,
+            RunPurpose::WarmUp { pass, .. } => (pass as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f),
+            RunPurpose::HeldOut => 0x1656_67b1_9e37_79f9,
+        };
         let run = closed_loop(&mut self.plant, controller.as_mut(), &*request.whole()?, &settings)?;
         let record = settings.sensors.record(self.plant.model(), &run)?;
         let status = match &run.status {

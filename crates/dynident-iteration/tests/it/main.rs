@@ -3,6 +3,7 @@
 
 mod differentiators;
 mod function_robots;
+mod held_out;
 mod home;
 mod identification;
 mod iteration;
