@@ -5,10 +5,10 @@
 //!
 //! A stop message, or the end of its input, stops the robot at the next sample; so does a sample outside of the
 //! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
-//! (default 50) of the part (default motion), with a word in the marker file before: die, hang, wait (for a message), ignore (a stop), orphan (dies
-//! while a process that it started holds its output), garbage, nan, null, joints, backwards, flood, megabyte, stop,
-//! short, turn; or it sends all samples `afterwards`; or at its hello: deaf, protocol, names, modes,
-//! homeless (it does not know of ways).
+//! (default 50) of the part (default motion), with a word in the marker file before: die, hang, wait (for a message),
+//! ignore (a stop), orphan (dies while a process that it started holds its output), garbage, nan, null, joints,
+//! backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello: deaf,
+//! protocol, names, modes, homeless (it does not know of ways).
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 

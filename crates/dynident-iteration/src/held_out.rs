@@ -48,6 +48,26 @@ pub struct HeldOutRun {
     pub reason: Option<String>,
 }
 
+impl HeldOutRun {
+    /// In words, with the joints' names.
+    pub fn sentence(&self, joints: &[String]) -> String {
+        let tracking = self.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
+        let Some(evidence) = &self.evidence else {
+            let why = self.reason.as_ref().unwrap_or(&self.outcome);
+            return format!("the held-out run tells nothing: {why}");
+        };
+        let shown = joints.iter().zip(&evidence.joints).filter_map(|(name, shown)| Some((name, shown.prediction?)));
+        let worst = shown.min_by(|a, b| a.1.inside.total_cmp(&b.1.inside));
+        let Some((name, worst)) = worst else { return "the held-out run has no rows that count".to_owned() };
+        format!(
+            "of the held-out motion the model holds {:.0} % of the torque or more in its 95 % band (least at {name}, off by {:.3} Nm root mean square, band {:.3}), largest distance from the path {tracking:.2e} rad (m)",
+            100.0 * worst.inside,
+            worst.rms_error,
+            worst.half_width
+        )
+    }
+}
+
 /// What came of a held-out run.
 pub(crate) enum HeldOutCame {
     Run(HeldOutRun, Box<RobotRun>),

@@ -134,7 +134,8 @@ impl HomeSettings {
     /// [`speed`](Self::speed) of its velocity and acceleration limits (and of the envelope's velocity); where one is
     /// not limited, of the highest that the motion itself has. Where the straight way breaks a limit it goes over one
     /// or two postures in between, the first of 500 random ones (with the same seed always) over which it does not, at
-    /// rest in each. All limits are looked at by [`check_limits`]. A robot that is there already has a way of one sample.
+    /// rest in each. All limits are looked at by [`check_limits`]. A robot that is there already has a way of one
+    /// sample.
     ///
     /// # Errors
     /// Why there is no way; nothing has moved then.

@@ -183,7 +183,8 @@ impl IterationStore {
     }
 
     /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), `approach_log.csv` and
-    /// `return_log.csv` beside it where it had ways, and `motion.csv` of each that is not the task's. What was planned for it is removed.
+    /// `return_log.csv` beside it where it had ways, and `motion.csv` of each that is not the task's. What was planned
+    /// for it is removed.
     ///
     /// # Errors
     /// A folder that cannot be written; then the run is not there.

@@ -35,6 +35,7 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let share = if motion.speed < 1.0 { format!(" at {} of its speed", motion.speed) } else { String::new() };
     let what = match motion.purpose {
         RunPurpose::WarmUp { pass, of } => format!("pass {pass} of {of} that warm up for run {}", motion.run),
+        RunPurpose::HeldOut => format!("the held-out motion after run {}", motion.run),
         RunPurpose::Run => format!("run {}", motion.run),
     };
     let speeds = |of: &[(String, f64)]| -> String {

@@ -28,6 +28,11 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
         }
     }
     for run in &file.runs {
+        if let Some(held_out) = &run.held_out {
+            text += &wrapped(&format!("After run {}: {}.", run.run, held_out.sentence(&file.joints)), 4);
+        }
+    }
+    for run in &file.runs {
         if let Some(forecast) = &run.forecast {
             text += &wrapped(&format!("Run {}: {}.", run.run, forecast.sentence()), 4);
         }

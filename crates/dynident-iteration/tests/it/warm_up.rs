@@ -76,8 +76,7 @@ fn passes_come_before_the_first_run_of_a_call() {
     let shown = outcome.runs[0].warm_up.as_ref().unwrap();
     let duration_s = simulated_arm::reference().duration_s();
     assert!(shown.passes == 3 && (shown.duration_s - 3.0 * duration_s).abs() < 1e-9);
-    // Of dry friction F and viscous friction v, from |dq| and dq² of the motion alone. The step of friction is 0.1 rad/s
-    // wide, which takes some percent.
+    // Of dry and viscous friction, from the velocities of the motion alone.
     let reference = simulated_arm::reference();
     let motion = reference.motion();
     let (mut way, mut square) = ([0.0; 2], [0.0; 2]);

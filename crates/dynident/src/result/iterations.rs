@@ -4,7 +4,7 @@ use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
 use dynident_identification::examination::TorqueLag;
-use dynident_iteration::{DifferentiatorChoice, RunEvidence, Shortfall, WarmUp};
+use dynident_iteration::{DifferentiatorChoice, HeldOutRun, RunEvidence, Shortfall, WarmUp};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -184,6 +184,10 @@ pub struct IterationRun {
     /// What the warm-up before it has shown; none where there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
+    /// The run of the held-out motion after it, and how well the model that it gave predicts that; none where there was
+    /// none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutRun>,
     /// What it determines by itself.
     pub parameters: Vec<IterationParameter>,
     /// What all good runs up to this one determine together; empty for the first, for those that do not count, and

@@ -99,6 +99,46 @@ fn what_is_wrong_with_a_home_is_said() {
     assert!(error.contains("warm_up_s") && error.contains("without a log"), "{error}");
 }
 
+/// A motion that is never fitted judges the model, tests the robot that is found, and is told of.
+#[test]
+fn a_held_out_motion_judges_and_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = vec!["t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned()];
+    rows.extend((0..=400).map(|k| {
+        let (t, w) = (f64::from(k) * 0.01, core::f64::consts::TAU / 2.0);
+        let [q, dq, ddq] = [0.1 * (1.0 - (w * t).cos()), 0.1 * w * (w * t).sin(), 0.1 * w * w * (w * t).cos()];
+        format!("{t},{},{q},{},{dq},{},{ddq}", 0.2 - 2.0 * q, -2.0 * dq, -2.0 * ddq)
+    }));
+    std::fs::write(folder.path().join("other.csv"), rows.join("\n") + "\n").unwrap();
+    let with = |held_out: &str| {
+        study(folder.path(), "", &format!("held_out = {held_out}"))
+            .replace("rate_hz = 500.0", "rate_hz = 500.0\nsensors = { torque_std = 0.02 }")
+    };
+    let file = iterated(folder.path(), &with("{ every = 1, trajectory = \"other.csv\" }")).unwrap();
+    let judged = file.runs[0].held_out.as_ref().unwrap();
+    assert!(judged.done && judged.max_tracking_error_rad.len() == 2, "{}", judged.outcome);
+    let joints = &judged.evidence.as_ref().unwrap().joints;
+    assert!(joints.iter().all(|joint| joint.prediction.unwrap().rows > 100));
+    let out = folder.path().join("out");
+    assert!(out.join("runs/held_out_1/log.csv").is_file());
+    assert!(
+        std::fs::read_to_string(out.join("report.html")).unwrap().contains("of the held-out motion the model holds")
+    );
+    let result: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("result.json")).unwrap()).unwrap();
+    let tested = result["logs"].as_array().unwrap().iter().find(|log| log["role"] == "validate").unwrap();
+    assert!(tested["import"]["file"].as_str().unwrap().ends_with("out/runs/held_out_1/log.csv"), "{tested}");
+    let wrong = |held_out: &str| iterated(folder.path(), &with(held_out)).unwrap_err().to_string();
+    let error = wrong("{}");
+    assert!(error.contains("held_out.trajectory") && error.contains("[design]"), "{error}");
+    let error = wrong("{ every = 0, trajectory = \"other.csv\" }");
+    assert!(error.contains("held_out.every"), "{error}");
+    let error = wrong("{ trajectory = \"other.csv\", design = {} }");
+    assert!(error.contains("held_out.design"), "{error}");
+    let error = wrong("{ trajectory = \"other.csv\" }\nleg = [{ hold = { joint1 = 0.0 } }]");
+    assert!(error.contains("one motion"), "{error}");
+}
+
 /// A warm-up is in the result and on the page: how often, and what friction took.
 #[test]
 fn a_warm_up_is_told() {

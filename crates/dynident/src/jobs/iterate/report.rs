@@ -92,6 +92,7 @@ impl IterationReport<'_> {
                 reason: record.reason.clone(),
                 max_tracking_error_rad: record.max_tracking_error_rad.clone(),
                 warm_up: record.warm_up.clone(),
+                held_out: record.held_out.clone(),
                 parameters: parameters(record.estimate.as_ref()),
                 pooled: parameters(record.pooled.as_ref()),
                 evidence: record.evidence.clone(),

@@ -1,11 +1,13 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
 mod differentiator_key;
+mod held_out;
 mod legs;
 mod motion;
 mod safety;
 
 pub use differentiator_key::{Automatic, DifferentiatorKey};
+pub use held_out::HeldOutSection;
 pub use legs::{LegOrder, LegSection};
 pub use motion::MotionChoice;
 
@@ -82,6 +84,8 @@ pub struct IterationSection {
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = super::design::name_or_table::schema))]
     pub motion: MotionChoice,
+    /// A motion that is run to judge the newest model and never fitted; none by default.
+    pub held_out: Option<HeldOutSection>,
     /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or
     /// design unless it has its own.
     pub leg: Vec<LegSection>,
@@ -130,8 +134,8 @@ pub struct IterationSection {
     /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
     pub speed_steps: Vec<f64>,
     /// Where the robot waits between runs, rad (m), all joints by name or in the model's order: every run goes from
-    /// there to its motion and back, within the limits of `[design]`. Without it the robot has to stand where the motion
-    /// begins.
+    /// there to its motion and back, within the limits of `[design]`. Without it the robot has to stand where the
+    /// motion begins.
     pub home: Option<StartPosture>,
     /// Share of the velocity and acceleration limits that the ways from home and back have; 0.2 by default.
     pub approach_speed: f64,
@@ -169,6 +173,7 @@ impl Default for IterationSection {
         Self {
             trajectory: None,
             motion: MotionChoice::default(),
+            held_out: None,
             leg: Vec::new(),
             order: LegOrder::default(),
             robot: RobotChoice::default(),
