@@ -1,9 +1,9 @@
 //! A motion is commanded: prepared, allowed, run, and what it came to.
 
 use crate::before_motion::{Commanded, next_motion, rehearsed, ways_of};
-use crate::drive::Iteration;
 use crate::error::IterationError;
 use crate::home::{FoundWays, HomeError};
+use crate::iteration::Iteration;
 use crate::leg::IterationTask;
 use crate::policy::RunPlan;
 use crate::record::RunRecord;

@@ -1,9 +1,9 @@
 //! The robot that all good runs tell: a task for the whole identification.
 
-use crate::drive::Iteration;
 use crate::error::IterationError;
 use crate::good_log::GoodLog;
 use crate::held_out::held_out_settings;
+use crate::iteration::Iteration;
 use crate::record::RunRecord;
 use crate::run_logs::{RunLog, identification_settings, recordings as recordings_of};
 use crate::store::IterationStore;

@@ -3,7 +3,7 @@
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
 use crate::forecast::MotionForecast;
-use crate::held_out::HeldOutRun;
+use crate::held_out_motion::HeldOutRun;
 use crate::model_parameters::ModelParameters;
 use crate::rehearsal::Rehearsal;
 use crate::run_motion::RunMotion;

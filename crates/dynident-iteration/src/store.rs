@@ -2,7 +2,7 @@
 
 use crate::error::IterationError;
 use crate::forecast::MotionForecast;
-use crate::held_out::HeldOutRun;
+use crate::held_out_motion::HeldOutRun;
 use crate::planner::PlannedMotion;
 use crate::record::RunRecord;
 use crate::robot::{RobotRun, read_log_table};

@@ -25,7 +25,7 @@ fn study(folder: &Path, design: &str, iteration: &str) -> String {
     }));
     std::fs::write(folder.join("sines.csv"), rows.join("\n") + "\n").unwrap();
     format!(
-        "[robot]\nfile = \"{}\"\n[simulation]\nrate_hz = 500.0\n[design.defaults]\nfloor = false\n{design}\n[controller]\nkind = \"pd-gravity\"\nkp = 400.0\nkd = 40.0\n\
+        "[robot]\nfile = \"{}\"\n[simulation]\nrate_hz = 500.0\n[design.defaults]\nfloor = false\n{design}\n[controller]\nkind = \"pd-gravity\"\nkp = [200.0, 60.0]\nkd = [20.0, 4.0]\n\
          [iteration]\ntrajectory = \"sines.csv\"\nmax_runs = 1\nstart = \"prior\"\n{iteration}\n",
         repository("robots/planar2r.urdf").display()
     )
@@ -129,7 +129,9 @@ fn a_held_out_motion_judges_and_tests() {
     let tested = result["logs"].as_array().unwrap().iter().find(|log| log["role"] == "validate").unwrap();
     assert!(tested["import"]["file"].as_str().unwrap().ends_with("out/runs/held_out_1/log.csv"), "{tested}");
     let wrong = |held_out: &str| iterated(folder.path(), &with(held_out)).unwrap_err().to_string();
-    let error = wrong("{}");
+    // Nothing says of which kind another motion might be.
+    let text = with("{}").replace("[design.defaults]\nfloor = false\n", "");
+    let error = iterated(folder.path(), &text).unwrap_err().to_string();
     assert!(error.contains("held_out.trajectory") && error.contains("[design]"), "{error}");
     let error = wrong("{ every = 0, trajectory = \"other.csv\" }");
     assert!(error.contains("held_out.every"), "{error}");
