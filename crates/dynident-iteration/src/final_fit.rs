@@ -8,7 +8,7 @@ use crate::record::RunRecord;
 use crate::run_logs::{RunLog, identification_settings, recordings as recordings_of};
 use crate::store::IterationStore;
 use dynident_identification::friction::JointFriction;
-use dynident_identification::{IdentificationTask, Role};
+use dynident_identification::{IdentificationTask, OffsetChoice, Role};
 
 impl Iteration {
     /// What [`identify`](dynident_identification::identify()) makes the iteration's result of: the logs of all good
@@ -35,6 +35,12 @@ impl Iteration {
         identification.payloads.clone_from(&settings.payloads);
         identification.settings = identification_settings(&task, &settings, runs.len());
         identification.settings.estimation.held.clear();
+        // As in the last fit of all runs.
+        let own_offsets =
+            good.last().and_then(|last| last.pooled.as_ref()).is_some_and(|all| !all.run_offsets.is_empty());
+        if own_offsets && self.settings().pool {
+            identification.settings.offsets = OffsetChoice::PerLog;
+        }
         // The runs that were never fitted test it, each by the log that it left.
         if let Some(held_out) = &self.held_out {
             let joints = task.robot.joint_names();

@@ -56,6 +56,11 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
             4,
         );
     }
+    if let Some(sentence) =
+        file.runs.iter().rfind(|run| run.accepted).and_then(|run| run.run_offsets_sentence(&file.joints))
+    {
+        text += &wrapped(&format!("NOTE: {sentence}."), 4);
+    }
     for unmet in &file.unmet {
         text += &wrapped(&format!("UNMET: {}. What would help: {}.", unmet.message, unmet.remedy), 4);
     }

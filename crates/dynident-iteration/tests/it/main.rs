@@ -12,6 +12,7 @@ mod pooling;
 mod redesign;
 mod rehearsals;
 mod robots;
+mod run_offsets;
 mod simulated_arm;
 mod stops;
 mod verdict;

@@ -128,6 +128,10 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
         page.add(Heading::new("The held-out motion"));
         page.add(Text { paragraphs: vec![HELD_OUT.to_owned()], points });
     }
+    if let Some(sentence) = last_good(file).and_then(|run| run.run_offsets_sentence(&file.joints)) {
+        page.add(Heading::new("Offsets of single runs"));
+        page.add(Text { paragraphs: Vec::new(), points: vec![(Tone::Plain, sentence)] });
+    }
     if let Some(shown) = last_shown(file) {
         page.add(Heading::new("What the last log shows"));
         page.add(shown);

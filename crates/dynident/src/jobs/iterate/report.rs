@@ -95,6 +95,7 @@ impl IterationReport<'_> {
                 held_out: record.held_out.clone(),
                 parameters: parameters(record.estimate.as_ref()),
                 pooled: parameters(record.pooled.as_ref()),
+                run_offsets: record.pooled.as_ref().map_or_else(Vec::new, |all| all.run_offsets.clone()),
                 evidence: record.evidence.clone(),
                 differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
                 forecast: record.forecast.as_ref().map(|forecast| {

@@ -16,11 +16,12 @@ use super::StartPosture;
 use super::Study;
 use super::design::name_or_table::name_or_table;
 use crate::error::StudyError;
-use dynident_identification::IdentificationSettings;
 use dynident_identification::estimators::Estimator;
+use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
-    IterationSettings, RehearsalSettings, RunIdentificationSettings, SafetySettings, Scheme, SettledSettings, StartWith,
+    IterationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings, Scheme,
+    SettledSettings, StartWith,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
@@ -223,7 +224,11 @@ impl IterationSection {
             DifferentiatorKey::Stated(stated) => (stated.clone(), false),
         };
         differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
-        let IdentificationSettings { mut estimation, consistency, mut friction, .. } = identification;
+        let IdentificationSettings { mut estimation, consistency, mut friction, offsets, .. } = identification;
+        let run_offsets = match offsets {
+            OffsetChoice::Shared => RunOffsets::WhereSeen,
+            OffsetChoice::PerLog => RunOffsets::PerRun,
+        };
         // A controller is to have the friction that the study states, unless a key says otherwise.
         friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
@@ -253,6 +258,7 @@ impl IterationSection {
                 friction,
                 consistency: consistency.filter(|_| !self.literal),
                 payloads: study.payloads(),
+                run_offsets,
             },
             start: self.start.unwrap_or_default(),
             first: self.first.clone(),
