@@ -5,10 +5,12 @@
 
 It offers both modes. In `run` it runs the control loop itself from the two files it is handed: joint PD and PID by their gains,
 model-based controllers through a small Newton-Euler recursion over the numbers of controller.json. In `step` it holds the
-torques that it is sent. It stops at a stop message, when its input ends, and when a sample leaves the envelope that a motion comes
-with: a simulated robot stands at once, a real one brakes here. --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction and drive inertia
-(kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the drives' torque (Nm).
---kp and --kd are the drives' own position loop, for the controller position-loop. Standard output belongs to the protocol; messages go to standard error.
+torques that it is sent. Where the study states a home it begins there, and runs approach, trajectory and return. It stops at a
+stop message, when its input ends, and when a sample leaves the envelope that a motion comes with: a simulated robot stands at
+once, a real one brakes here. --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction and
+drive inertia (kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the
+drives' torque (Nm). --kp and --kd are the drives' own position loop, for the controller position-loop. Standard output belongs
+to the protocol; messages go to standard error.
 """
 import argparse
 import csv
@@ -265,6 +267,12 @@ def breach(envelope, joints, q, dq, tau, q_d):
     return None
 
 
+def read_table(path):
+    """The rows of a table that was handed over: t_s, q, dq, ddq, and the model's torques if there is a model."""
+    with open(path, newline="", encoding="utf-8") as text:
+        return np.array([[float(x) for x in row] for row in list(csv.reader(text))[1:]])
+
+
 class Robot:
     def __init__(self, model, messages, most, own_loop, step_s):
         self.step_s = step_s
@@ -289,30 +297,37 @@ class Robot:
         # The files' order is the host's; this robot's own order is its hello's.
         order = [file["joints"].index(name) for name in self.joints]
         back = [self.joints.index(name) for name in file["joints"]]
-        with open(message["trajectory"], newline="", encoding="utf-8") as text:
-            rows = [[float(x) for x in row] for row in list(csv.reader(text))[1:]]
-        table, n = np.array(rows), len(order)
+        n = len(order)
         try:
             controller = Controller(file, [gains[back] for gains in self.own_loop])
         except Unknown as unknown:
             return send("end", status="stopped", reason=str(unknown))
         envelope = message.get("envelope")
-        first = [table[0, 1 + k * n: 1 + (k + 1) * n][order] for k in range(2)]
+        # From home to the trajectory and back, where the host says so: one controller runs through all of it.
+        parts = [("motion", read_table(message["trajectory"]))]
+        if "home" in message:
+            # The posture that a way shares with the trajectory is the trajectory's.
+            parts = [("approach", read_table(message["home"]["approach"])[:-1]), *parts,
+                     ("return", read_table(message["home"]["return"])[1:])]
+        rows = [(part, row) for part, table in parts for row in table]
+        first = [rows[0][1][1 + k * n: 1 + (k + 1) * n][order] for k in range(2)]
         self.start(message["rate_hz"], *first)
-        for row in table:
+        for part, row in rows:
+            where = f"{row[0]:.3f} s of the {part}"
             target = [row[1 + k * n: 1 + (k + 1) * n] for k in range(3)]
             q, dq = self.data.qpos.copy(), self.data.qvel.copy()
             if not np.all(np.isfinite(q)) or np.max(np.abs(dq)) > 100:
-                return send("end", status="stopped", reason=f"a joint moves too fast at {row[0]:.3f} s")
+                return send("end", status="stopped", reason=f"a joint moves too fast at {where}")
             # A drive gives what it can, and logs what it gives.
             ahead = row[1 + 3 * n:] if len(row) > 1 + 3 * n else None
             tau = np.clip(controller.torque(target, q[back], dq[back], ahead)[order], -self.most, self.most)
-            send("sample", t_s=row[0], q=q.tolist(), dq=dq.tolist(), tau=tau.tolist())
+            send("sample", part=part, t_s=row[0], q=q.tolist(), dq=dq.tolist(), tau=tau.tolist())
+            # Whatever ends a run early: the robot stays where it is, and does not go home.
             if self.messages.stop_asked():
                 return send("end", status="stopped", reason="the host asked for it")
             left = breach(envelope, self.joints, q, dq, tau, target[0][order])
             if left:
-                return send("end", status="stopped", reason=f"at {row[0]:.3f} s {left}")
+                return send("end", status="stopped", reason=f"at {where} {left}")
             self.advance(tau)
         send("end", status="done")
 
@@ -346,7 +361,7 @@ def main():
     robot = Robot(load(options.urdf, options.friction, options.damping, options.armature, options.step), messages, options.torque,
                   (options.kp, options.kd), options.step)
     send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
-         modes=["run", "step"])
+         modes=["run", "step"], capabilities=["home"])
     while (message := messages.next()) is not None:
         if message["type"] == "run":
             robot.run(message)

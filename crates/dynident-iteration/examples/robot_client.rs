@@ -1,13 +1,14 @@
 //! A robot program behind the line protocol, `docs/src/robot-protocol.md`: the simulator, served on standard input and
 //! output. What a program for a real robot looks like, and what the tests speak to.
 //!
-//!     robot_client ROBOT.urdf [--fault KIND] [--at SAMPLE] [--marker FILE] [--unwatched yes]
+//!     robot_client ROBOT.urdf [--fault KIND] [--part PART] [--at SAMPLE] [--marker FILE] [--unwatched yes]
 //!
 //! A stop message, or the end of its input, stops the robot at the next sample; so does a sample outside of the
 //! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
-//! (default 50), with a word in the marker file before: die, hang, wait (for a message), ignore (a stop), orphan (dies
-//! while a process that it started holds its output), garbage, nan, null, joints, backwards, flood, megabyte, stop,
-//! short, turn; or it sends all samples `afterwards`; or at its hello: deaf, protocol, names, modes.
+//! (default 50) of the part (default motion), with a word in the marker file before: die, hang, wait (for a message),
+//! ignore (a stop), orphan (dies while a process that it started holds its output), garbage, nan, null, joints,
+//! backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello: deaf,
+//! protocol, names, modes, homeless (it does not know of ways).
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 
@@ -29,6 +30,8 @@ struct Client {
     joints: Vec<String>,
     fault: String,
     at: usize,
+    /// The part of the run in which it misbehaves.
+    part: String,
     marker: String,
     watched: bool,
     /// What the host writes: read aside, so that a stop is heard in the middle of a motion.
@@ -42,11 +45,13 @@ fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or("give the robot's URDF file")?;
     let (mut fault, mut at, mut marker, mut watched) = (String::new(), 50, String::new(), true);
+    let mut part = "motion".to_owned();
     while let Some(name) = arguments.next() {
         let value = arguments.next().ok_or("an option without a value")?;
         match name.as_str() {
             "--fault" => fault = value,
             "--at" => at = value.parse()?,
+            "--part" => part = value,
             "--marker" => marker = value,
             "--unwatched" => watched = false,
             _ => return Err(format!("unknown option {name}").into()),
@@ -65,7 +70,7 @@ fn main() -> Result<()> {
             }
         }
     });
-    let mut client = Client { plant, joints, fault, at, marker, watched, messages };
+    let mut client = Client { plant, joints, fault, at, part, marker, watched, messages };
     client.hello()?;
     while let Ok(message) = client.messages.recv() {
         match message["type"].as_str() {
@@ -106,6 +111,7 @@ impl Client {
         let modes = if self.fault == "modes" { json!([]) } else { json!(["run", "step"]) };
         let hello = json!({
             "type": "hello", "protocol": protocol, "name": "simulator", "joints": self.joints, "modes": modes,
+            "capabilities": if self.fault == "homeless" { json!([]) } else { json!(["home"]) },
         });
         send(&hello)
     }
@@ -153,8 +159,8 @@ impl Client {
     }
 
     /// Misbehaves, if it is time for it. True if the run is over.
-    fn misbehave(&self, sample: usize, time_s: f64) -> Result<bool> {
-        if sample != self.at {
+    fn misbehave(&self, (part, sample): (&str, usize), time_s: f64) -> Result<bool> {
+        if sample != self.at || part != self.part {
             return Ok(false);
         }
         let zeros = vec![0.0; self.joints.len()];
@@ -213,55 +219,61 @@ impl Client {
         let settings: ControllerSettings = serde_json::from_value(controller["controller"].clone())?;
         let dof = self.plant.dof();
         let message_envelope = message["envelope"].clone();
-        let mut rows: Vec<Vec<f64>> = Vec::new();
-        for line in file("trajectory")?.lines().skip(1) {
-            rows.push(line.split(',').map(str::parse).collect::<core::result::Result<_, _>>()?);
-        }
-        let mut motion = Motion::default();
-        motion.reset(dof, rows.len());
-        for (sample, row) in rows.iter().enumerate() {
-            for joint in 0..dof {
-                let at = joint * motion.samples + sample;
-                motion.q[at] = row[1 + joint];
-                motion.dq[at] = row[1 + dof + joint];
-                motion.ddq[at] = row[1 + 2 * dof + joint];
-            }
-        }
         let rate_hz = message["rate_hz"].as_f64().ok_or("no rate")?;
-        let reference = Reference::new(rate_hz, motion)?;
+        // One controller runs through all parts; where one ends, the next begins.
+        let mut parts = vec![("motion", table(&file("trajectory")?, dof, rate_hz)?)];
+        if let Value::Object(home) = &message["home"] {
+            let way =
+                |key: &str| table(&std::fs::read_to_string(home[key].as_str().unwrap_or_default())?, dof, rate_hz);
+            parts.insert(0, ("approach", way("approach")?));
+            parts.push(("return", way("return")?));
+        }
         let mut controller = settings.build(dof, None)?;
-        self.plant.set_state(
-            0.0,
-            &first(&reference.motion().q, rows.len()),
-            &first(&reference.motion().dq, rows.len()),
-        );
+        let start = parts[0].1.motion().clone();
+        self.plant.set_state(0.0, &first(&start.q, start.samples), &first(&start.dq, start.samples));
         controller.reset();
+        let mut due = 0;
+        let last = parts.len() - 1;
         let mut target = ReferenceSample::new(dof);
         let mut tau = vec![0.0; dof];
         let mut kept = Vec::new();
-        for sample in 0..reference.samples() {
-            let time_s = sample as f64 / rate_hz;
-            self.plant.set_time_s(time_s);
-            target.take(&reference, sample);
-            let measured = Measured { q: self.plant.q(), dq: self.plant.dq() };
-            controller.torque(time_s, target.target(), measured, &mut tau);
-            let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));
-            let (own, path) = (turned(&tau), turned(target.target().q));
-            if self.misbehave(sample, time_s)? {
-                return Ok(());
-            }
-            let message = json!({ "type": "sample", "t_s": time_s, "q": q, "tau": own });
-            if self.fault == "afterwards" {
-                kept.push(message);
-            } else {
-                send(&message)?;
-            }
-            let why = if self.stop_asked() { Some(INTERRUPTED.to_owned()) } else { None };
-            if let Some(reason) = why.or_else(|| self.breach(&message_envelope, &q, &dq, &own, &path)) {
-                return send(&json!({ "type": "end", "status": "stopped", "reason": reason }));
-            }
-            if sample + 1 < reference.samples() {
-                self.plant.advance(&tau, 1.0 / rate_hz, Integrator::default())?;
+        for (place, (part, reference)) in parts.iter().enumerate() {
+            // The samples that a way shares with the motion are the motion's.
+            let samples = match *part {
+                "approach" => 0..reference.samples() - 1,
+                "return" => 1..reference.samples(),
+                _ => 0..reference.samples(),
+            };
+            for sample in samples {
+                let time_s = sample as f64 / rate_hz;
+                let due_s = f64::from(due) / rate_hz;
+                due += 1;
+                self.plant.set_time_s(due_s);
+                target.take(reference, sample);
+                let measured = Measured { q: self.plant.q(), dq: self.plant.dq() };
+                controller.torque(due_s, target.target(), measured, &mut tau);
+                let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));
+                let (own, path) = (turned(&tau), turned(target.target().q));
+                if self.misbehave((part, sample), time_s)? {
+                    return Ok(());
+                }
+                let mut message = json!({ "type": "sample", "t_s": time_s, "q": q, "tau": own });
+                if *part != "motion" {
+                    message["part"] = json!(part);
+                }
+                if self.fault == "afterwards" {
+                    kept.push(message);
+                } else {
+                    send(&message)?;
+                }
+                let why = if self.stop_asked() { Some(INTERRUPTED.to_owned()) } else { None };
+                if let Some(reason) = why.or_else(|| self.breach(&message_envelope, &q, &dq, &own, &path)) {
+                    self.mark(&format!("stopped in the {part} at {sample}"))?;
+                    return send(&json!({ "type": "end", "status": "stopped", "reason": reason }));
+                }
+                if place < last || sample + 1 < reference.samples() {
+                    self.plant.advance(&tau, 1.0 / rate_hz, Integrator::default())?;
+                }
             }
         }
         if !kept.is_empty() {
@@ -279,7 +291,7 @@ impl Client {
         let mut sample = 0;
         loop {
             let time_s = f64::from(sample) / rate_hz;
-            if self.misbehave(sample as usize, time_s)? {
+            if self.misbehave((&self.part, sample as usize), time_s)? {
                 return Ok(());
             }
             let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));
@@ -298,6 +310,25 @@ impl Client {
             sample += 1;
         }
     }
+}
+
+/// The reference of a table that was handed over.
+fn table(text: &str, dof: usize, rate_hz: f64) -> Result<Reference> {
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for line in text.lines().skip(1) {
+        rows.push(line.split(',').map(str::parse).collect::<core::result::Result<_, _>>()?);
+    }
+    let mut motion = Motion::default();
+    motion.reset(dof, rows.len());
+    for (sample, row) in rows.iter().enumerate() {
+        for joint in 0..dof {
+            let at = joint * motion.samples + sample;
+            motion.q[at] = row[1 + joint];
+            motion.dq[at] = row[1 + dof + joint];
+            motion.ddq[at] = row[1 + 2 * dof + joint];
+        }
+    }
+    Ok(Reference::new(rate_hz, motion)?)
 }
 
 /// The first sample of each joint.

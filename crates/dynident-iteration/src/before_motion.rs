@@ -1,36 +1,82 @@
 //! What comes before a motion is commanded: its rehearsal, and slower ones.
 
+use crate::home::{FoundWays, HomeError};
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::RunPlan;
 use crate::record::RunRecord;
 use crate::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
+use crate::robot::{RunPurpose, Ways};
 use crate::settings::IterationSettings;
-use crate::supervision::NextMotion;
+use crate::supervision::{NextMotion, NextWays};
 use crate::typical_drives::with_typical_drives;
 use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Reference, SimulationError};
+use std::borrow::Cow;
 
-/// Every leg at each speed step before the first run, then the run itself: place, leg, share of its speed.
+/// A motion on the way to a run, or the run itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Commanded<'a> {
+    /// Place of the leg, from 0.
+    pub(crate) place: usize,
+    pub(crate) leg: &'a Leg,
+    /// Share of its speed.
+    pub(crate) speed: f64,
+    pub(crate) purpose: RunPurpose,
+}
+
+impl Commanded<'_> {
+    /// Whether it is what the run is made for.
+    pub(crate) fn is_run(&self) -> bool {
+        self.speed == 1.0 && !matches!(self.purpose, RunPurpose::WarmUp { .. })
+    }
+
+    /// Its begin of a sentence about what came before a run.
+    pub(crate) fn words(&self) -> String {
+        match self.purpose {
+            RunPurpose::WarmUp { pass, of } => format!("in pass {pass} of {of} of the warm-up"),
+            RunPurpose::Run | RunPurpose::HeldOut => format!("at {} of its speed", self.speed),
+        }
+    }
+}
+
+/// Every leg at each speed step before the first run, then in every pass of a warm-up, then the run itself.
 pub(crate) fn motions<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
     before: &[RunRecord],
-) -> Vec<(usize, &'a Leg, f64)> {
-    let legs = || task.legs.iter().enumerate();
+    passes: usize,
+) -> Vec<Commanded<'a>> {
+    let legs = |speed: f64, purpose: RunPurpose| {
+        task.legs.iter().enumerate().map(move |(place, leg)| Commanded { place, leg, speed, purpose })
+    };
     let steps = if before.is_empty() { &settings.safety.speed_steps[..] } else { &[] };
-    let slow = steps.iter().filter(|&&step| step < 1.0);
-    let slow = slow.flat_map(|&step| legs().map(move |(number, leg)| (number, leg, step)));
-    slow.chain(legs().map(|(number, leg)| (number, leg, 1.0))).collect()
+    let slow = steps.iter().filter(|&&step| step < 1.0).flat_map(|&step| legs(step, RunPurpose::Run));
+    let warm = (1..=passes).flat_map(|pass| legs(1.0, RunPurpose::WarmUp { pass, of: passes }));
+    slow.chain(warm).chain(legs(1.0, RunPurpose::Run)).collect()
+}
+
+/// The ways of every leg; none where the robot has no home.
+///
+/// # Errors
+/// Why there is no way to one of them.
+pub(crate) fn ways_of(task: &IterationTask, settings: &IterationSettings) -> Result<Vec<Option<FoundWays>>, HomeError> {
+    let envelope = settings.safety.envelope.as_ref();
+    let of_leg = |leg: &Leg| {
+        let home = settings.safety.home.as_ref();
+        home.map(|home| home.ways(task.robot.model(), leg.reference(), envelope)).transpose()
+    };
+    task.legs.iter().map(of_leg).collect()
 }
 
 /// What the rehearsal of a plan shows, if there is one. `robot` is with the friction in force.
-pub(crate) fn rehearsed(
-    task: &IterationTask,
+pub(crate) fn rehearsed<'a>(
+    task: &'a IterationTask,
     settings: &IterationSettings,
     robot: &ParametricModel,
     (plan, controller, model): (&RunPlan, &ControllerSettings, Option<&ControllerModel>),
+    ways: &[Option<FoundWays>],
     before: &[RunRecord],
 ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, SimulationError> {
     let Some(rehearsal) = &settings.safety.rehearsal else { return Ok(Ok(None)) };
@@ -43,9 +89,16 @@ pub(crate) fn rehearsed(
     };
     let known = robot.nominal()[..robot.model().inertial_count()].iter().any(|value| *value != 0.0);
     let typical = with_typical_drives(robot).unwrap_or_else(|| robot.nominal().to_vec());
+    let whole = |(leg, found): (&'a Leg, &Option<FoundWays>)| {
+        let reference = leg.reference();
+        let around = found.as_ref().map(|found| found.ways.around(reference)).transpose()?;
+        Ok(around.map_or(Cow::Borrowed(reference), Cow::Owned))
+    };
+    let references: Vec<Cow<'_, Reference>> =
+        task.legs.iter().zip(ways).map(whole).collect::<Result<_, SimulationError>>()?;
     let rehearsed = Rehearsed {
         robot,
-        legs: &task.legs,
+        references: &references,
         controller,
         model,
         believed: own.or(shown).or(known.then_some(&typical[..])),
@@ -57,22 +110,33 @@ pub(crate) fn rehearsed(
 /// What somebody who is asked hears of a motion.
 pub(crate) fn next_motion(
     task: &IterationTask,
-    plan: &RunPlan,
-    controller: &ControllerSettings,
-    (leg, reference, speed): (usize, &Reference, f64),
+    (plan, controller): (&RunPlan, &ControllerSettings),
+    (motion, reference): (&Commanded<'_>, &Reference),
+    ways: Option<(&Ways, &FoundWays)>,
 ) -> NextMotion {
-    let motion = reference.motion();
-    let largest = |(joint, name): (usize, String)| {
-        (name, motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs())))
+    let largest = |of: &[&Reference]| -> Vec<(String, f64)> {
+        let names = task.robot.joint_names().into_iter().enumerate();
+        let highest = |joint: usize| {
+            let all = of.iter().flat_map(|reference| &reference.motion().dq[reference.motion().of(joint)]);
+            all.fold(0.0_f64, |most, dq| most.max(dq.abs()))
+        };
+        names.map(|(joint, name)| (name, highest(joint))).collect()
     };
     NextMotion {
         run: plan.run,
-        leg: (leg, task.legs.len()),
+        leg: (motion.place, task.legs.len()),
         controller: controller.name().to_owned(),
         model_based: plan.model.is_some(),
         duration_s: reference.duration_s(),
-        speed,
-        largest_speed: task.robot.joint_names().into_iter().enumerate().map(largest).collect(),
+        speed: motion.speed,
+        purpose: motion.purpose,
+        largest_speed: largest(&[reference]),
         rehearsal: None,
+        ways: ways.map(|(ways, found)| NextWays {
+            approach_s: ways.approach.duration_s(),
+            return_s: ways.back.duration_s(),
+            largest_speed: largest(&[&ways.approach, &ways.back]),
+            over_postures: [0, 1].map(|way| found.over[way].len()),
+        }),
     }
 }

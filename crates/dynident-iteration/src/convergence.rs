@@ -135,6 +135,29 @@ pub enum Shortfall {
         /// Mean half width of the band.
         half_width_nm: f64,
     },
+    /// No run of the held-out motion has judged the newest model yet.
+    #[error("the newest model has not been judged by a run of the held-out motion")]
+    NotHeldOut,
+    /// The held-out motion was not run to its end, or its log tells nothing.
+    #[error("the held-out run says nothing of the newest model: {reason}")]
+    HeldOutFailed {
+        /// Why.
+        reason: String,
+    },
+    /// The newest model does not predict a motion that it was not fitted to.
+    #[error(
+        "on the held-out motion the newest model holds {inside_percent:.0} % of joint {joint}'s torque in its 95 % band, off by {rms_error_nm:.3} Nm where the band is {half_width_nm:.3}"
+    )]
+    HeldOutPrediction {
+        /// The joint.
+        joint: String,
+        /// Share inside the band.
+        inside_percent: f64,
+        /// Root mean square error of the prediction, Nm (N).
+        rms_error_nm: f64,
+        /// Mean half width of the band.
+        half_width_nm: f64,
+    },
     /// Torque that no parameter of the model explains.
     #[error(
         "{percent:.1} % of joint {joint}'s torque is left unexplained beyond its noise, {allowed_percent:.1} % are allowed"
@@ -183,6 +206,15 @@ impl Shortfall {
             Self::LagChanges { .. } => {
                 "look for friction that the model has no term for, or elasticity: at reversals both look like a lag (friction = \"auto\")"
             }
+            Self::NotHeldOut => {
+                "allow the run: it comes when all else is met, or after every so many runs (held_out.every)"
+            }
+            Self::HeldOutFailed { .. } => {
+                "see the reason: a held-out motion that the robot can follow as well as its own"
+            }
+            Self::HeldOutPrediction { .. } => {
+                "what the fitted motion never showed: other friction terms (friction = \"auto\"), a motion that excites more (motion = \"redesign\"), elasticity, temperature"
+            }
             Self::Prediction { .. } => {
                 "look for what changed between the runs: temperature, load, sticking friction, sensor zeros"
             }
@@ -202,6 +234,8 @@ pub(crate) struct Names {
     pub(crate) shares: Vec<f64>,
     /// The longest lag with which an iteration converges, seconds.
     pub(crate) most_lag_s: f64,
+    /// Whether runs of another motion judge the model, in place of those that are fitted next.
+    pub(crate) held_out: bool,
 }
 
 /// What is not met after the last of `records`; nothing if the iteration has converged.
@@ -252,7 +286,8 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
                 found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
             }
         }
-        if let Some(prediction) = shown.prediction.filter(|prediction| prediction.inside < LEAST_INSIDE) {
+        let of_run = shown.prediction.filter(|_| !names.held_out);
+        if let Some(prediction) = of_run.filter(|prediction| prediction.inside < LEAST_INSIDE) {
             found.push(Shortfall::Prediction {
                 joint: joint(place),
                 inside_percent: 100.0 * prediction.inside,
@@ -267,7 +302,34 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
             found.push(Shortfall::Unexplained { joint: joint(place), percent, allowed_percent });
         }
     }
+    if names.held_out {
+        held_out(&mut found, last, names);
+    }
     found
+}
+
+/// What the held-out run after the last one speaks against.
+fn held_out(found: &mut Vec<Shortfall>, last: &RunRecord, names: &Names) {
+    let Some(run) = &last.held_out else {
+        found.push(Shortfall::NotHeldOut);
+        return;
+    };
+    let Some(evidence) = &run.evidence else {
+        let reason = run.reason.clone().unwrap_or_else(|| run.outcome.clone());
+        found.push(Shortfall::HeldOutFailed { reason });
+        return;
+    };
+    for (place, shown) in evidence.joints.iter().enumerate() {
+        let Some(prediction) = shown.prediction else { continue };
+        if prediction.inside < LEAST_INSIDE {
+            found.push(Shortfall::HeldOutPrediction {
+                joint: names.joints[place].clone(),
+                inside_percent: 100.0 * prediction.inside,
+                rms_error_nm: prediction.rms_error,
+                half_width_nm: prediction.half_width,
+            });
+        }
+    }
 }
 
 /// What is left of the lag that all joints share, where it is beyond its bar and moves torque. A torque that is held

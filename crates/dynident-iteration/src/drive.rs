@@ -1,45 +1,30 @@
 //! Robots, records and the policy together.
 
-use crate::before_motion::{motions, next_motion, rehearsed};
-use crate::convergence::{Names, Shortfall, shortfalls};
+use crate::before_motion::motions;
+use crate::commanding::Came;
+use crate::convergence::Shortfall;
 use crate::error::IterationError;
-use crate::estimate::{RunEstimate, identify_run, identify_runs};
+use crate::estimate::{identify_run, identify_runs};
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
+use crate::held_out::HeldOutCame;
+use crate::iteration::Iteration;
 use crate::leg::{IterationTask, Leg};
-use crate::model_parameters::ModelParameters;
-use crate::parameter_shares::parameter_shares;
-use crate::planner::{MotionPlanner, PlannedMotion};
+use crate::planner::PlannedMotion;
 use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
+use crate::robot::{Robot, RobotRun, RunPurpose, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::run_logs::RunLog;
 use crate::run_motion::{RunMotion, legs_along};
-use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
 use crate::supervision::{Supervisor, Watching};
-use dynident_dynamics::ParametricModel;
-use dynident_identification::friction::chosen_model;
-use dynident_simulation::Record;
-use dynident_simulation::controllers::ControllerModel;
-use dynident_simulation::{SimulationError, require_length};
-
+use crate::warm_up::{WarmUpWatch, passes};
+use dynident_simulation::{Record, require_length};
 use std::borrow::Cow;
-use std::sync::Arc;
-
-/// A torque this much above a limit is no matter of rounding or of the model's last digits.
-const BEYOND: f64 = 1.001;
-
-/// A task with its settings: what [`iterate()`] does.
-#[derive(Clone, Debug)]
-pub struct Iteration {
-    task: IterationTask,
-    settings: IterationSettings,
-    planner: Option<Arc<dyn MotionPlanner>>,
-}
+use std::time::Instant;
 
 /// How an iteration went.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,125 +55,6 @@ enum PlannedRun {
 }
 
 impl Iteration {
-    /// The iteration of a task.
-    ///
-    /// # Errors
-    /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
-    pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
-        task.validate()?;
-        settings.validate(task.robot.dof())?;
-        Ok(Self { task, settings, planner: None })
-    }
-
-    /// The same with motions that are planned from what is known, in place of the task's in every run.
-    #[must_use]
-    pub fn with_planner(mut self, planner: Arc<dyn MotionPlanner>) -> Self {
-        self.planner = Some(planner);
-        self
-    }
-
-    /// The task.
-    pub fn task(&self) -> &IterationTask {
-        &self.task
-    }
-
-    /// The settings.
-    pub fn settings(&self) -> &IterationSettings {
-        &self.settings
-    }
-
-    /// The legs of a run: the task's, along trajectories of its own where it had some.
-    ///
-    /// # Errors
-    /// A record of another task.
-    pub fn legs_of(&self, record: &RunRecord) -> Result<Cow<'_, [Leg]>, IterationError> {
-        legs_along(&self.task, record.motion.as_ref())
-    }
-
-    /// What comes after these records: it depends on nothing else. Where motions are planned an iteration that has
-    /// converged may still go on for a motion that is worth a run.
-    ///
-    /// # Errors
-    /// Records of another robot.
-    pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
-        let robot = self.robot(records)?;
-        let next = policy::next(records, &self.settings, robot.nominal(), &self.names(&robot, records)?);
-        if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) =
-            next
-            && let Some(reason) = self.beyond_torque(records)?
-        {
-            return Ok(Next::Finished(IterationStatus::Refused { reason }));
-        }
-        Ok(next)
-    }
-
-    /// What is not met after these records; nothing if the iteration has converged.
-    ///
-    /// # Errors
-    /// Records of another robot.
-    pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<Shortfall>, IterationError> {
-        let robot = self.robot(records)?;
-        Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))
-    }
-
-    /// Names, and how much each parameter counts along the motion of the last run.
-    fn names(&self, robot: &ParametricModel, records: &[RunRecord]) -> Result<Names, IterationError> {
-        let shown = records.last().and_then(|last| Some((last, last.evidence.as_ref()?)));
-        let shares = match shown {
-            Some((last, evidence)) => {
-                let torque_rms: Vec<f64> = evidence.joints.iter().map(|joint| joint.torque_rms).collect();
-                parameter_shares(robot, &self.legs_of(last)?, &torque_rms)
-            }
-            None => Vec::new(),
-        };
-        let most_lag_s = self.settings.settled.most_lag_s(robot.model());
-        Ok(Names { joints: robot.joint_names(), parameters: robot.base().expressions(), shares, most_lag_s })
-    }
-
-    /// Where the trajectories ask for more torque than the joints have, by the last good model.
-    fn beyond_torque(&self, records: &[RunRecord]) -> Result<Option<String>, IterationError> {
-        let Some(limits) = &self.task.torque_limits else { return Ok(None) };
-        let good = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
-        let Some(parameters) = good.and_then(RunEstimate::for_controller) else { return Ok(None) };
-        let mut model = self.controller_model(records, &parameters)?;
-        let dof = self.task.robot.dof();
-        let mut tau = vec![0.0; dof];
-        let motion = records.last().and_then(|record| record.motion.as_ref());
-        for leg in &*legs_along(&self.task, motion)? {
-            let (motion, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
-            for sample in 0..motion.samples {
-                let at = |values: &[f64]| -> Vec<f64> {
-                    (0..dof).map(|joint| values[joint * motion.samples + sample]).collect()
-                };
-                model.reference_torque(&at(&motion.q), &at(&motion.dq), &at(&motion.ddq), &mut tau);
-                for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
-                    if tau.abs() > limit * BEYOND {
-                        let name = &self.task.robot.model().joints()[joint].name;
-                        return Ok(Some(format!(
-                            "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
-                            tau.abs(),
-                            sample as f64 / rate_hz
-                        )));
-                    }
-                }
-            }
-        }
-        Ok(None)
-    }
-
-    /// The robot with the friction that a run before chose.
-    ///
-    /// # Errors
-    /// Friction that this robot cannot have: the run is another robot's.
-    pub fn robot(&self, records: &[RunRecord]) -> Result<Cow<'_, ParametricModel>, IterationError> {
-        let choices = records.iter().filter_map(|record| Some((record.run, &record.estimate.as_ref()?.friction)));
-        let Some((run, choice)) = choices.into_iter().find(|(_, choice)| !choice.is_empty()) else {
-            return Ok(Cow::Borrowed(&self.task.robot));
-        };
-        let chosen = chosen_model(&self.task.robot, choice);
-        chosen.map(Cow::Owned).map_err(|source| IterationError::ChosenFriction { run, source })
-    }
-
     /// The motion of the run after `records`, as an earlier call has planned it or planned now.
     fn next_motion(
         &self,
@@ -218,39 +84,6 @@ impl Iteration {
         Ok(NextRunMotion { motion: motion.or_else(|| good.motion.clone()), forecast: Some(forecast) })
     }
 
-    /// The task and how runs are identified, with the friction that a run before chose, if one did.
-    pub(crate) fn in_force(
-        &self,
-        before: &[RunRecord],
-    ) -> Result<(Cow<'_, IterationTask>, Cow<'_, RunIdentificationSettings>), IterationError> {
-        let settings = &self.settings.identification;
-        Ok(match self.robot(before)? {
-            Cow::Borrowed(_) => (Cow::Borrowed(&self.task), Cow::Borrowed(settings)),
-            Cow::Owned(robot) => (
-                Cow::Owned(IterationTask { robot, ..self.task.clone() }),
-                Cow::Owned(RunIdentificationSettings { friction: Vec::new(), ..settings.clone() }),
-            ),
-        })
-    }
-
-    /// The model of a controller with these parameters, after these records.
-    ///
-    /// # Errors
-    /// Parameters of another robot.
-    pub fn controller_model(
-        &self,
-        records: &[RunRecord],
-        parameters: &ModelParameters,
-    ) -> Result<ControllerModel, IterationError> {
-        let robot = self.robot(records)?;
-        Ok(match parameters {
-            ModelParameters::All(values) => ControllerModel::from_parameters(robot.model(), robot.terms(), values)?,
-            ModelParameters::Base(values) => {
-                ControllerModel::from_columns(robot.model(), &robot.base().base_columns(), values)?
-            }
-        })
-    }
-
     /// A run for its motion alone, if everything is met, motions are planned, and one is left.
     fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
         let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
@@ -265,74 +98,42 @@ impl Iteration {
         before: &[RunRecord],
         earlier: &[GoodLog],
         supervisor: &mut dyn Supervisor,
+        last_motion: &mut Option<Instant>,
     ) -> Result<PlannedRun, IterationError> {
         let legs = legs_along(&self.task, next.motion.as_ref())?;
         let task = &IterationTask { legs: legs.into_owned(), ..self.task.clone() };
         let legs = &task.legs;
-        let controller = plan.controller(&self.settings);
-        let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
-        let robot = self.robot(before)?;
-        let rehearsal = match rehearsed(task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
-            Ok(rehearsal) => rehearsal,
-            Err(failure) => {
-                let reason = format!("run {} is not commanded: {failure}", plan.run);
-                return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
-            }
+        let prepared = match self.prepared(task, plan, before)? {
+            Ok(prepared) => prepared,
+            Err(status) => return Ok(PlannedRun::Stopped(status)),
         };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg, speed) in motions(task, &self.settings, before) {
-            let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
-            // Numbers of runs differ from leg to leg: noise and folders go by them.
-            let run = (plan.run - 1) * legs.len() + number + 1;
-            let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
-            let reference = slow.as_ref().unwrap_or(leg.reference());
-            let stop = supervisor.stop().cloned();
-            if stop.as_ref().is_some_and(StopSignal::is_requested) {
-                return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
-            }
-            let mut motion = next_motion(task, plan, &controller, (number, reference, speed));
-            motion.rehearsal.clone_from(&rehearsal);
-            if !supervisor.allows(&motion) {
-                if stop.as_ref().is_some_and(StopSignal::is_requested) {
-                    return Ok(PlannedRun::Interrupted(runs, "before a run".to_owned()));
-                }
-                let reason = format!("run {} was not allowed", plan.run);
-                return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
-            }
-            let came = robot.run(&RunRequest {
-                model: model.as_ref(),
-                envelope: self.settings.safety.envelope.as_ref(),
-                stop: stop.as_ref(),
-                speed,
-                ..RunRequest::new(run, reference, &controller)
-            })?;
-            match &came.status {
-                RobotStatus::Waiting { .. } => {
-                    let reason = came.status.to_string();
-                    return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
-                }
-                RobotStatus::Failed { fault } => {
-                    let reason = format!("run {}: {fault}", plan.run);
-                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
-                }
-                RobotStatus::Interrupted { .. } => {
-                    let how = came.status.to_string();
-                    runs.push(came);
+        let passes = passes(&self.settings.safety, (legs, &prepared.ways), *last_motion);
+        let mut warm_up = WarmUpWatch::new(legs, &prepared.ways);
+        for motion in motions(task, &self.settings, before, passes) {
+            let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[motion.place] };
+            let with = (task, plan, &prepared);
+            let came = match self.commanded(*robot, with, &motion, supervisor, last_motion)? {
+                Came::Run(came) => came,
+                Came::Stopped(status) => return Ok(PlannedRun::Stopped(status)),
+                Came::Interrupted(came, how) => {
+                    runs.extend(came);
                     return Ok(PlannedRun::Interrupted(runs, how));
                 }
-                RobotStatus::Done
-                | RobotStatus::Simulated { .. }
-                | RobotStatus::Stopped { .. }
-                | RobotStatus::LeftEnvelope { .. } => {}
-            }
+            };
             let done = came.status.is_done();
-            if slow.is_some() {
+            if !motion.is_run() {
                 if !done {
                     let reason = format!(
-                        "at {speed} of its speed run {} ended early: {}. Look at the robot; the same command begins it anew",
-                        plan.run, came.status
+                        "{} run {} ended early: {}. Look at the robot; the same command begins it anew",
+                        motion.words(),
+                        plan.run,
+                        came.status
                     );
                     return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+                }
+                if let RunPurpose::WarmUp { pass, .. } = motion.purpose {
+                    warm_up.add(pass, motion.leg.reference(), &came.record);
                 }
                 continue;
             }
@@ -341,8 +142,9 @@ impl Iteration {
                 break;
             }
         }
-        let mut record = self.recorded((plan, next), controller.name(), legs, &runs);
-        record.rehearsal = rehearsal;
+        let mut record = self.recorded((plan, next), prepared.controller.name(), legs, &runs);
+        record.rehearsal = prepared.rehearsal;
+        record.warm_up = warm_up.shown();
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             self.examine(&mut record, &records, before, earlier)?;
@@ -449,9 +251,11 @@ impl Iteration {
             accepted: false,
             reason: None,
             rehearsal: None,
+            warm_up: None,
             estimate: None,
             pooled: None,
             evidence: None,
+            held_out: None,
         }
     }
 
@@ -531,7 +335,41 @@ pub fn iterate_supervised(
     };
     let mut good: Option<Vec<GoodLog>> = None;
     let mut stopped: Option<String> = None;
+    // By this call; what moved before nobody knows.
+    let mut last_motion: Option<Instant> = None;
     loop {
+        if let Some(why) = stopped.as_ref().filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
+            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", records.len() + 1);
+            if !matches!(iteration.next(&records)?, Next::Finished(_)) {
+                return outcome(IterationStatus::Waiting { reason }, records);
+            }
+        }
+        // What is known is judged before it is used further.
+        if let Some(held_out) = iteration.held_out_due(&records)? {
+            match iteration.held_out_made(held_out, &mut *robots[0], &records, supervisor, &mut last_motion)? {
+                HeldOutCame::Stopped(status) => return outcome(status, records),
+                HeldOutCame::Interrupted(came, how) => {
+                    let run = records.len();
+                    let runs: Vec<RobotRun> = came.into_iter().collect();
+                    let kept = store.map_or(Ok(None), |store| store.keep_interrupted(run, &runs, &how))?;
+                    let kept = kept.map_or_else(String::new, |path| format!("; what was recorded: {}", path.display()));
+                    let reason = format!("{how}{kept}. The same command goes on with the held-out run after run {run}");
+                    return outcome(IterationStatus::Interrupted { reason }, records);
+                }
+                HeldOutCame::Run(found, came) => {
+                    if let (Some(store), Some(last)) = (store, records.last()) {
+                        store.keep_held_out(last.run, &found, &came)?;
+                    }
+                    stopped = (!found.done).then(|| {
+                        format!("the held-out run after run {} ended early: {}", records.len(), found.outcome)
+                    });
+                    if let Some(last) = records.last_mut() {
+                        last.held_out = Some(found);
+                    }
+                }
+            }
+            continue;
+        }
         let stop = supervisor.stop().cloned();
         let (plan, next) = match iteration.next(&records)? {
             Next::Run(plan) => (plan, iteration.next_motion(&records, store, stop.as_ref())?),
@@ -555,11 +393,7 @@ pub fn iterate_supervised(
             Some(good) => good,
             None => good.insert(iteration.good_logs(&records, store)?),
         };
-        if let Some(why) = stopped.filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
-            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", plan.run);
-            return outcome(IterationStatus::Waiting { reason }, records);
-        }
-        match iteration.made(robots, (&plan, next), &records, good, supervisor)? {
+        match iteration.made(robots, (&plan, next), &records, good, supervisor, &mut last_motion)? {
             PlannedRun::Stopped(status) => return outcome(status, records),
             PlannedRun::Interrupted(runs, how) => {
                 let kept = store.map_or(Ok(None), |store| store.keep_interrupted(plan.run, &runs, &how))?;

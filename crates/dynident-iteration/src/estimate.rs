@@ -5,6 +5,7 @@ use crate::error::IterationError;
 use crate::leg::IterationTask;
 use crate::model_parameters::ModelParameters;
 use crate::run_logs::{RunLog, identification_settings, recordings};
+use crate::run_offsets::{RunOffset, choices, deviations, seen};
 use crate::settings::{RunIdentificationSettings, Scheme};
 use crate::step_by_step::step_by_step;
 use dynident_dynamics::ParametricModel;
@@ -16,7 +17,7 @@ use dynident_identification::examination::{
 };
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{
-    Execution, IdentificationSettings, Logs, Training, choose_friction, consistent_stage, training_rows,
+    Execution, IdentificationSettings, Logs, OffsetChoice, Training, choose_friction, consistent_stage, training_rows,
 };
 use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
@@ -55,6 +56,10 @@ pub struct RunEstimate {
     /// The differentiator that the run chose; none where it was stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
+    /// Where runs that were fitted together have constant torques of their own: by how much each deviates from the
+    /// mean, which the base parameters hold. Empty where they share one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub run_offsets: Vec<RunOffset>,
 }
 
 impl RunEstimate {
@@ -102,6 +107,7 @@ pub fn identify_run(
 /// As [`identify_run`] from several runs together, each weighted by its own noise joint by joint
 /// ([`LogNoise::Own`](dynident_identification::LogNoise::Own)): bars narrow with every run, and a run that followed its
 /// trajectory badly counts for what it tells. Residuals are those of the last run. Delays are those of all runs.
+/// Where one has a constant torque that the others have not, each gets its own ([`RunOffsets`](super::RunOffsets)).
 ///
 /// # Errors
 /// As [`identify_run`].
@@ -110,9 +116,29 @@ pub fn identify_runs(
     runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
+    match (settings.scheme, choices(&task.robot, runs, settings.run_offsets)) {
+        (Scheme::AllJoints, &[shared, own]) => {
+            let shared = fitted(task, runs, settings, shared)?;
+            // A fit that fails with more columns is no reason for any.
+            let own = fitted(task, runs, settings, own).ok();
+            Ok(own.filter(|own| own.impossible.is_none() && seen(&own.run_offsets, runs)).unwrap_or(shared))
+        }
+        (Scheme::AllJoints, &[one]) => fitted(task, runs, settings, one),
+        _ => fitted(task, runs, settings, OffsetChoice::Shared),
+    }
+}
+
+/// The fit with one offset of a joint for all runs, or one for each.
+fn fitted(
+    task: &IterationTask,
+    runs: &[RunLog<'_>],
+    settings: &RunIdentificationSettings,
+    offsets: OffsetChoice,
+) -> Result<RunEstimate, IterationError> {
     let recordings = recordings(task, runs, settings)?;
     let all: Vec<usize> = (0..recordings.len()).collect();
     let mut identification = identification_settings(task, settings, runs.len());
+    identification.offsets = offsets;
     let (robot, execution) = (&task.robot, Execution::default());
     let mut rounds = LagRounds::of(LagCandidates::Common);
     loop {
@@ -131,7 +157,7 @@ pub fn identify_runs(
         let with = (&logs, &identification.estimation);
         let fit = lag_fit(with, &training.model, (&training.columns, &found.values, &[]), &all)?;
         if !rounds.again(fit.as_ref(), &mut found) {
-            return all_joints((&logs, &identification), training, (&all, found, rounds.choice()));
+            return all_joints((&logs, &identification), training, (&all, found, rounds.choice()), runs);
         }
         identification.motion.torque_lag_s = rounds.torque_lag_s();
     }
@@ -152,9 +178,11 @@ fn all_joints(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: Training,
     (all, estimate, lag): (&[usize], Estimate, LagChoice),
+    runs: &[RunLog<'_>],
 ) -> Result<RunEstimate, IterationError> {
     let consistent = consistent_stage((logs, settings), &training, &estimate)?;
     let arm = training.columns.arm_estimate(&estimate);
+    let run_offsets = deviations(&training.columns.offsets, &estimate, runs);
     let mut joint_sigma = vec![0.0; training.model.dof()];
     training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
     let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();
@@ -172,6 +200,7 @@ fn all_joints(
         torque_lags,
         lag,
         differentiator: None,
+        run_offsets,
         values: arm.values,
     })
 }
@@ -207,6 +236,7 @@ fn joint_by_joint(
         torque_lags: Vec::new(),
         lag: LagChoice::default(),
         differentiator: None,
+        run_offsets: Vec::new(),
     })
 }
 

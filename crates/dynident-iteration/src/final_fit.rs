@@ -1,13 +1,14 @@
 //! The robot that all good runs tell: a task for the whole identification.
 
-use crate::drive::Iteration;
 use crate::error::IterationError;
 use crate::good_log::GoodLog;
+use crate::held_out::held_out_settings;
+use crate::iteration::Iteration;
 use crate::record::RunRecord;
-use crate::run_logs::{identification_settings, recordings};
+use crate::run_logs::{RunLog, identification_settings, recordings as recordings_of};
 use crate::store::IterationStore;
-use dynident_identification::IdentificationTask;
 use dynident_identification::friction::JointFriction;
+use dynident_identification::{IdentificationTask, OffsetChoice, Role};
 
 impl Iteration {
     /// What [`identify`](dynident_identification::identify()) makes the iteration's result of: the logs of all good
@@ -29,11 +30,34 @@ impl Iteration {
         let logs = self.logs_of(chosen, store)?;
         let runs: Vec<_> = logs.iter().map(GoodLog::as_run).collect();
         let (task, settings) = self.in_force(records)?;
-        let recordings = recordings(&task, &runs, &settings)?;
+        let recordings = recordings_of(&task, &runs, &settings)?;
         let mut identification = IdentificationTask::new(task.robot.clone(), recordings);
         identification.payloads.clone_from(&settings.payloads);
         identification.settings = identification_settings(&task, &settings, runs.len());
         identification.settings.estimation.held.clear();
+        // As in the last fit of all runs.
+        let own_offsets =
+            good.last().and_then(|last| last.pooled.as_ref()).is_some_and(|all| !all.run_offsets.is_empty());
+        if own_offsets && self.settings().pool {
+            identification.settings.offsets = OffsetChoice::PerLog;
+        }
+        // The runs that were never fitted test it, each by the log that it left.
+        if let Some(held_out) = &self.held_out {
+            let joints = task.robot.joint_names();
+            let settings = held_out_settings(&settings, records);
+            for record in records.iter().filter(|record| record.accepted) {
+                let Some(evidence) = record.held_out.as_ref().and_then(|run| run.evidence.as_ref()) else { continue };
+                let rate_hz = evidence.log_rates_hz.first().copied().unwrap_or(held_out.leg.reference().rate_hz());
+                let log = [store.held_out_log(record.run, &joints, rate_hz)?];
+                let legs = core::slice::from_ref(&held_out.leg);
+                let run = RunLog { run: record.run, legs, records: &log, joint_sigma: &[], differentiator: None };
+                for mut recording in recordings_of(&task, &[run], &settings)? {
+                    recording.role = Role::Validate;
+                    recording.name = format!("run {}, held out", record.run);
+                    identification.recordings.push(recording);
+                }
+            }
+        }
         Ok(Some(identification))
     }
 }

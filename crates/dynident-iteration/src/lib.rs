@@ -9,6 +9,7 @@
 //! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
 //! | gains from a nominal model and a bandwidth | [`derived_controllers`] |
 //! | a motion rehearsed before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
+//! | the ways from where the robot waits to the motion and back | [`HomeSettings`] in [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
 //! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
@@ -66,6 +67,7 @@
 
 mod before_motion;
 mod clipping;
+mod commanding;
 mod convergence;
 mod differentiator_choice;
 mod drive;
@@ -76,6 +78,10 @@ mod final_fit;
 mod forecast;
 mod gains;
 mod good_log;
+mod held_out;
+mod held_out_motion;
+mod home;
+mod iteration;
 mod leg;
 mod model_parameters;
 mod motion;
@@ -94,6 +100,7 @@ mod run_examination;
 mod run_information;
 mod run_logs;
 mod run_motion;
+mod run_offsets;
 mod runs_folder;
 mod safety;
 mod settings;
@@ -104,16 +111,20 @@ mod supervision;
 mod torque_of_all;
 mod tracking_floor;
 mod typical_drives;
+mod warm_up;
 
 pub use convergence::Shortfall;
 pub use differentiator_choice::{DifferentiatorCandidate, DifferentiatorChoice};
-pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
+pub use drive::{IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
 pub use estimate::{RunEstimate, identify_run, identify_runs};
 pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
 pub use final_fit::friction_chosen;
 pub use forecast::{ForecastDirection, MotionForecast};
 pub use gains::{DerivedControllers, derived_controllers};
+pub use held_out_motion::{HeldOutMotion, HeldOutRun};
+pub use home::{FoundWays, HomeError, HomeSettings};
+pub use iteration::Iteration;
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
@@ -122,11 +133,13 @@ pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
 pub use redesign::{Redesign, RedesignSettings};
 pub use rehearsal::{Rehearsal, RehearsalFailure, RehearsalSettings};
-pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
+pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunPurpose, RunRequest, SimulatedRobot, StopSignal};
 pub use run_logs::RunLog;
 pub use run_motion::RunMotion;
+pub use run_offsets::{RunOffset, RunOffsets};
 pub use safety::SafetySettings;
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
-pub use supervision::{NextMotion, Supervisor};
+pub use supervision::{NextMotion, NextWays, Supervisor};
+pub use warm_up::WarmUp;

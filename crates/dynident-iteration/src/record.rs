@@ -3,9 +3,11 @@
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
 use crate::forecast::MotionForecast;
+use crate::held_out_motion::HeldOutRun;
 use crate::model_parameters::ModelParameters;
 use crate::rehearsal::Rehearsal;
 use crate::run_motion::RunMotion;
+use crate::warm_up::WarmUp;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +52,9 @@ pub struct RunRecord {
     /// What its rehearsal had shown; none where there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rehearsal: Option<Rehearsal>,
+    /// What the warm-up before it has shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<WarmUp>,
     /// What it says about the parameters by itself; none if it determines nothing.
     pub estimate: Option<RunEstimate>,
     /// What all good runs up to this one say together; none where this is the first or no good one, and where runs are
@@ -59,6 +64,9 @@ pub struct RunRecord {
     /// What its log shows beside parameters; none where it did not get to its end, and in runs of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
+    /// The run of the held-out motion that came after it; kept in a folder of its own.
+    #[serde(skip)]
+    pub held_out: Option<HeldOutRun>,
 }
 
 impl RunRecord {
@@ -83,6 +91,12 @@ impl RunRecord {
         }
         if let Some(evidence) = &self.evidence {
             length("evidence.joints", evidence.joints.len(), joints)?;
+        }
+        if let Some(held_out) = &self.held_out {
+            length("max_tracking_error_rad", held_out.max_tracking_error_rad.len(), joints)?;
+            if let Some(evidence) = &held_out.evidence {
+                length("evidence.joints", evidence.joints.len(), joints)?;
+            }
         }
         for (name, estimate) in [("estimate", &self.estimate), ("pooled", &self.pooled)] {
             let Some(estimate) = estimate else { continue };

@@ -1,7 +1,6 @@
 //! A motion is rehearsed before it is commanded: its torque, the mass matrix of the controller's model, and the closed
 //! loop in simulation with robots that are not quite the model.
 
-use crate::leg::Leg;
 use crate::posture::{at_sample, inertia_matrix};
 use crate::rests::{highest_speeds, with_dry_steps};
 use crate::robot::{Breach, Envelope};
@@ -9,8 +8,11 @@ use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;
 use dynident_model::sample::Random;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
-use dynident_simulation::{LoopSettings, Plant, RunLimits, RunStatus, SimulationError, closed_loop, require};
+use dynident_simulation::{
+    LoopSettings, Plant, Reference, RunLimits, RunStatus, SimulationError, closed_loop, require,
+};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// A smaller share of the largest eigenvalue counts as none: rounding alone makes it.
@@ -98,7 +100,8 @@ pub enum RehearsalFailure {
 /// What is rehearsed.
 pub(crate) struct Rehearsed<'a> {
     pub(crate) robot: &'a ParametricModel,
-    pub(crate) legs: &'a [Leg],
+    /// The whole of what is commanded, trajectory by trajectory: with the ways, where there are some.
+    pub(crate) references: &'a [Cow<'a, Reference>],
     pub(crate) controller: &'a ControllerSettings,
     /// The controller's model.
     pub(crate) model: Option<&'a ControllerModel>,
@@ -123,7 +126,7 @@ impl Rehearsed<'_> {
             largest_torque: vec![0.0; dof],
             largest_tracking_error_rad: vec![0.0; dof],
         };
-        let path = self.legs.iter().find_map(|leg| self.envelope?.broken_by(leg.reference(), &names));
+        let path = self.references.iter().find_map(|reference| self.envelope?.broken_by(reference, &names));
         if let Some(breach) = path {
             return Ok(Err(RehearsalFailure::Path(breach)));
         }
@@ -142,7 +145,7 @@ impl Rehearsed<'_> {
         }
         // The torque along the motion.
         let mut tau = vec![0.0; dof];
-        for reference in self.legs.iter().map(Leg::reference) {
+        for reference in self.references {
             for sample in 0..reference.samples() {
                 let [q, dq, ddq] = at_sample(reference, sample);
                 known.reference_torque(&q, &dq, &ddq, &mut tau);
@@ -184,7 +187,7 @@ impl Rehearsed<'_> {
             })
             .collect();
         let terms: Vec<f64> = of_terms.iter().map(|value| factor() * value).collect();
-        let fastest = highest_speeds(self.legs.iter().map(Leg::reference));
+        let fastest = highest_speeds(self.references.iter().map(|reference| &**reference));
         let laws = with_dry_steps(self.robot.terms(), &fastest);
         let mut plant = Plant::new(&model.with_inertials(&bodies)?, &laws, &terms)?;
         let mut limits = RunLimits::default();
@@ -192,9 +195,9 @@ impl Rehearsed<'_> {
             envelope.limit(&mut limits);
         }
         let looped = LoopSettings { limits, ..LoopSettings::default() };
-        for leg in self.legs {
+        for reference in self.references {
             let mut controller = self.controller.build(model.dof(), self.model)?;
-            let run = closed_loop(&mut plant, controller.as_mut(), leg.reference(), &looped)?;
+            let run = closed_loop(&mut plant, controller.as_mut(), reference, &looped)?;
             let largest = shown.largest_tracking_error_rad.iter_mut().zip(&run.max_error);
             largest.for_each(|(most, error)| *most = most.max(*error));
             if !run.status.is_done() {
@@ -221,7 +224,7 @@ impl Rehearsed<'_> {
             random.uniform(lower, upper.max(lower))
         };
         let mut postures: Vec<Vec<f64>> = (0..count).map(|_| (0..joints.len()).map(&mut range).collect()).collect();
-        for reference in self.legs.iter().map(Leg::reference) {
+        for reference in self.references {
             let step = (reference.samples() / count.max(1)).max(1);
             let along = (0..reference.samples()).step_by(step);
             postures.extend(along.map(|sample| at_sample(reference, sample)).map(|[q, ..]| q));

@@ -12,6 +12,10 @@ const RUN: &str = "run_";
 pub(crate) const INTERRUPTED: &str = "interrupted_";
 /// What the folder of a motion that has been planned for a run begins with.
 pub(crate) const PLANNED: &str = "planned_";
+/// What the folder of a held-out run begins with.
+pub(crate) const HELD_OUT: &str = "held_out_";
+/// The file of a held-out run.
+pub(crate) const HELD_OUT_FILE: &str = "held_out.json";
 /// The file of a planned motion.
 pub(crate) const PLAN_FILE: &str = "plan.json";
 /// The file of a run.
@@ -19,12 +23,17 @@ pub(crate) const RUN_FILE: &str = "run.json";
 /// The file of a run that a stop cut short.
 pub(crate) const INTERRUPTED_FILE: &str = "interrupted.json";
 
+/// What the names of the logs of a run's ways begin with.
+pub(crate) const WAYS: [&str; 2] = ["approach", "return"];
+
 /// The folders of an iteration that are there.
 pub(crate) struct RunsFolder {
     runs: PathBuf,
     kept: Vec<PathBuf>,
     /// Planned motions with the numbers of their runs.
     planned: Vec<(usize, PathBuf)>,
+    /// Held-out runs with the numbers of the runs before them.
+    held_out: Vec<(usize, PathBuf)>,
     unfinished: Vec<PathBuf>,
 }
 
@@ -35,6 +44,7 @@ impl RunsFolder {
     /// Something of another's in the place of a run: nothing could be kept there.
     pub(crate) fn look(runs: &Path) -> Result<Self, IterationError> {
         let (mut kept, mut planned, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
+        let mut held_out = Vec::new();
         for entry in fs::read_dir(runs).map_err(IterationError::file(runs))? {
             let entry = entry.map_err(IterationError::file(runs))?;
             let name = entry.file_name().to_string_lossy().into_owned();
@@ -55,9 +65,14 @@ impl RunsFolder {
                 && is_folder(&entry)
             {
                 planned.push((number, entry.path()));
+            } else if let Some(number) = name.strip_prefix(HELD_OUT)
+                && let Ok(number) = number.parse()
+                && is_folder(&entry)
+            {
+                held_out.push((number, entry.path()));
             }
         }
-        Ok(Self { runs: runs.to_owned(), kept, planned, unfinished })
+        Ok(Self { runs: runs.to_owned(), kept, planned, held_out, unfinished })
     }
 
     /// Removes the runs and what was planned for them, if nothing but an iteration's files is in them.
@@ -65,7 +80,8 @@ impl RunsFolder {
     /// # Errors
     /// A folder behind a symbolic link, files of somebody else's: then nothing is removed.
     pub(crate) fn remove_runs(&self) -> Result<(), IterationError> {
-        if self.kept.is_empty() && self.planned.is_empty() {
+        let numbered = || self.planned.iter().chain(&self.held_out).map(|(_, folder)| folder);
+        if self.kept.is_empty() && numbered().next().is_none() {
             return Ok(());
         }
         if self.runs.is_symlink() {
@@ -73,7 +89,7 @@ impl RunsFolder {
                 "is a symbolic link, and runs are not removed through one: give another --out, or remove them";
             return Err(IterationError::State { path: self.runs.clone(), problem: problem.to_owned() });
         }
-        let folders = || self.kept.iter().chain(self.planned.iter().map(|(_, folder)| folder));
+        let folders = || self.kept.iter().chain(numbered());
         for folder in folders() {
             for file in files(folder)? {
                 if !is_own(&file) {
@@ -85,13 +101,17 @@ impl RunsFolder {
         folders().try_for_each(|folder| remove(folder))
     }
 
-    /// Removes what was planned for any run but `next`: other runs have been made, or those before are gone.
+    /// Removes what was planned for any run but `next`: other runs have been made, or those before are gone; and the
+    /// held-out runs after runs that are gone.
     ///
     /// # Errors
     /// What the system says.
     pub(crate) fn remove_plans_but(&self, next: usize) -> Result<(), IterationError> {
         let own = |folder: &PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
-        let stale = self.planned.iter().filter(|(run, folder)| *run != next && own(folder));
+        let plans = self.planned.iter().filter(|(run, _)| *run != next);
+        // A held-out run after a run that is gone judged another model.
+        let held_out = self.held_out.iter().filter(|(run, _)| *run >= next);
+        let stale = plans.chain(held_out).filter(|(_, folder)| own(folder));
         stale.into_iter().try_for_each(|(_, folder)| remove(folder))
     }
 
@@ -120,7 +140,13 @@ fn is_own(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let numbered = |rest: &str| rest.strip_suffix(".csv").is_some_and(|number| number.parse::<usize>().is_ok());
     let table = |first: &str, further: &str| name == first || name.strip_prefix(further).is_some_and(numbered);
-    let known = matches!(&*name, RUN_FILE | INTERRUPTED_FILE | PLAN_FILE)
+    let of_way = WAYS.iter().any(|way| {
+        name.strip_prefix(way)
+            .and_then(|rest| rest.strip_prefix('_'))
+            .is_some_and(|rest| rest == "log.csv" || rest.strip_prefix("log_").is_some_and(numbered))
+    });
+    let known = of_way
+        || matches!(&*name, RUN_FILE | INTERRUPTED_FILE | PLAN_FILE | HELD_OUT_FILE)
         || table("log.csv", "log_")
         || table("motion.csv", "motion_");
     known && file.symlink_metadata().is_ok_and(|meta| meta.is_file())

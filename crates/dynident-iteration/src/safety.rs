@@ -1,5 +1,6 @@
 //! What keeps runs safe, apart from the robot itself.
 
+use crate::home::HomeSettings;
 use crate::rehearsal::RehearsalSettings;
 use crate::robot::Envelope;
 use dynident_simulation::{SimulationError, require};
@@ -17,14 +18,24 @@ pub struct SafetySettings {
     /// Shares of its speed at which the motion is run before the first run, slowest first; those of 1 are the run
     /// itself. Default none. These runs are not identified.
     pub speed_steps: Vec<f64>,
+    /// How long the motion of a run is made over and over before it, s, so that friction is at its working temperature:
+    /// before the first run of a call, and again where the robot has stood longer than this. Default 0: not at all.
+    /// These passes are not identified.
+    pub warm_up_s: f64,
+    /// Where the robot waits between runs: every run goes from there to its motion and back. Default nowhere: the robot
+    /// has to stand where the motion begins.
+    pub home: Option<HomeSettings>,
 }
 
 impl SafetySettings {
-    /// Checks the numbers.
+    /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// Shares that are not within (0, 1]; [`RehearsalSettings::validate`].
-    pub fn validate(&self) -> Result<(), SimulationError> {
+    /// Shares that are not within (0, 1]; [`RehearsalSettings::validate`], [`HomeSettings::validate`].
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        let warm_up_s = self.warm_up_s;
+        require((0.0..=1e5).contains(&warm_up_s), "warm_up_s", warm_up_s, "give 0 to 100000 s")?;
+        self.home.as_ref().map_or(Ok(()), |home| home.validate(joints))?;
         for &step in &self.speed_steps {
             require(step > 0.0 && step <= 1.0, "speed_steps", step, "give shares of the speed: above 0, at most 1")?;
         }

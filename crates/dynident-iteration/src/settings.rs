@@ -1,5 +1,6 @@
 //! Settings of an iteration.
 
+use crate::run_offsets::RunOffsets;
 use crate::safety::SafetySettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
@@ -51,6 +52,9 @@ pub struct RunIdentificationSettings {
     pub consistency: Option<ConsistencySettings>,
     /// What legs carry. Default nothing.
     pub payloads: Vec<Payload>,
+    /// Whether runs that are fitted together share the constant torques of the joints that have one; by default unless
+    /// one run clearly has another.
+    pub run_offsets: RunOffsets,
 }
 
 impl Default for RunIdentificationSettings {
@@ -69,6 +73,7 @@ impl Default for RunIdentificationSettings {
             friction: Vec::new(),
             consistency: Some(ConsistencySettings::default()),
             payloads: Vec::new(),
+            run_offsets: RunOffsets::default(),
         }
     }
 }
@@ -237,7 +242,7 @@ impl IterationSettings {
     /// # Errors
     /// Numbers out of range, controllers whose gains do not fit, a controller for the first run that needs a model.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
-        self.safety.validate()?;
+        self.safety.validate(joints)?;
         self.model_free.validate(joints)?;
         self.controller.validate(joints)?;
         self.first.as_ref().map_or(Ok(()), |first| first.validate(joints))?;

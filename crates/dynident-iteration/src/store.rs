@@ -2,11 +2,15 @@
 
 use crate::error::IterationError;
 use crate::forecast::MotionForecast;
+use crate::held_out_motion::HeldOutRun;
 use crate::planner::PlannedMotion;
 use crate::record::RunRecord;
 use crate::robot::{RobotRun, read_log_table};
 use crate::run_motion::RunMotion;
-use crate::runs_folder::{INTERRUPTED, INTERRUPTED_FILE, PLAN_FILE, PLANNED, RUN_FILE, RunsFolder, UNFINISHED, remove};
+use crate::runs_folder::{
+    HELD_OUT, HELD_OUT_FILE, INTERRUPTED, INTERRUPTED_FILE, PLAN_FILE, PLANNED, RUN_FILE, RunsFolder, UNFINISHED, WAYS,
+    remove,
+};
 use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -21,6 +25,19 @@ pub const RUN_SCHEMA: &str = "dynident/run/1";
 
 /// Schema of `runs/planned_k/plan.json`.
 const PLAN_SCHEMA: &str = "dynident/planned-motion/1";
+
+/// Schema of `runs/held_out_k/held_out.json`.
+const HELD_OUT_SCHEMA: &str = "dynident/held-out-run/1";
+
+/// What `runs/held_out_k/held_out.json` holds.
+#[derive(Serialize, Deserialize)]
+struct HeldOutFile {
+    schema: String,
+    fingerprint: String,
+    run: usize,
+    #[serde(flatten)]
+    found: HeldOutRun,
+}
 
 /// What `runs/planned_k/plan.json` holds: the motion of a run that has not been made yet.
 #[derive(Serialize, Deserialize)]
@@ -109,12 +126,65 @@ impl IterationStore {
                 let folder = self.run_folder(record.run);
                 record.motion = Some(motion.with_tables(&folder, record.max_tracking_error_rad.len())?);
             }
+            record.held_out = self.held_out(record.run)?;
             records.push(record);
         }
     }
 
-    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), and `motion.csv` of
-    /// each that is not the task's. What was planned for it is removed.
+    /// Keeps the run of the held-out motion after a run: `held_out_k/`, with `held_out.json` and the log.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn keep_held_out(&self, run: usize, found: &HeldOutRun, came: &RobotRun) -> Result<(), IterationError> {
+        let folder = self.held_out_folder(run);
+        let fingerprint = self.fingerprint.clone();
+        let file = HeldOutFile { schema: HELD_OUT_SCHEMA.to_owned(), fingerprint, run, found: found.clone() };
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|error| IterationError::State { path: folder.join(HELD_OUT_FILE), problem: error.to_string() })?;
+        self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(came), None)
+    }
+
+    /// The held-out run after a run, if it is there.
+    fn held_out(&self, run: usize) -> Result<Option<HeldOutRun>, IterationError> {
+        let path = self.held_out_folder(run).join(HELD_OUT_FILE);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(IterationError::file(&path)(error)),
+        };
+        let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
+        let file: HeldOutFile = serde_json::from_str(&text)
+            .map_err(|error| wrong(format!("is no held-out run of an iteration ({error}); remove its folder")))?;
+        if file.schema != HELD_OUT_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
+            return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
+        }
+        Ok(Some(file.found))
+    }
+
+    /// The log of the held-out run after a run.
+    ///
+    /// # Errors
+    /// A log that is not there any more or holds something else.
+    pub(crate) fn held_out_log(&self, run: usize, joints: &[String], rate_hz: f64) -> Result<Record, IterationError> {
+        let path = self.held_out_log_path(run);
+        read_log_table(&path, joints, rate_hz).map_err(|error| IterationError::State {
+            problem: format!("{error}: put the log back, or remove its folder"),
+            path: path.clone(),
+        })
+    }
+
+    /// Where the log of the held-out run after a run stands.
+    pub fn held_out_log_path(&self, run: usize) -> PathBuf {
+        self.held_out_folder(run).join(log_name(0))
+    }
+
+    fn held_out_folder(&self, run: usize) -> PathBuf {
+        self.runs.join(format!("{HELD_OUT}{run}"))
+    }
+
+    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), `approach_log.csv` and
+    /// `return_log.csv` beside it where it had ways, and `motion.csv` of each that is not the task's. What was planned
+    /// for it is removed.
     ///
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
@@ -177,7 +247,11 @@ impl IterationStore {
         runs: &[RobotRun],
         how: &str,
     ) -> Result<Option<PathBuf>, IterationError> {
-        if runs.iter().all(|run| run.record.samples == 0) {
+        let is_empty = |run: &RobotRun| {
+            let ways = run.ways.as_ref().map_or(0, |ways| ways.approach.samples + ways.back.samples);
+            run.record.samples + ways == 0
+        };
+        if runs.iter().all(is_empty) {
             return Ok(None);
         }
         let name = |again: usize| match again {
@@ -208,6 +282,9 @@ impl IterationStore {
             .map_err(IterationError::file(&self.runs))?;
         for (leg, run) in runs.iter().enumerate() {
             write_synced(&fresh.path().join(log_name(leg)), run.record.csv().as_bytes())?;
+            for (way, record) in run.ways.iter().flat_map(|ways| WAYS.into_iter().zip([&ways.approach, &ways.back])) {
+                write_synced(&fresh.path().join(format!("{way}_{}", log_name(leg))), record.csv().as_bytes())?;
+            }
         }
         for (name, table) in motion.into_iter().flat_map(RunMotion::tables) {
             write_synced(&fresh.path().join(name), table.as_bytes())?;

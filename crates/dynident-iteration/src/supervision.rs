@@ -2,7 +2,7 @@
 
 use crate::record::RunRecord;
 use crate::rehearsal::Rehearsal;
-use crate::robot::{RobotRun, StopSignal};
+use crate::robot::{RobotRun, RunPurpose, StopSignal};
 
 /// A motion that is about to be commanded.
 #[derive(Clone, Debug)]
@@ -19,10 +19,27 @@ pub struct NextMotion {
     pub duration_s: f64,
     /// Share of the trajectory's own speed; 1 but for slow runs before the first.
     pub speed: f64,
+    /// What it is made for.
+    pub purpose: RunPurpose,
     /// For each joint, by name, the largest velocity of the motion, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
     /// What its rehearsal has shown, if there was one.
     pub rehearsal: Option<Rehearsal>,
+    /// The ways to it and back, where the robot waits at a home.
+    pub ways: Option<NextWays>,
+}
+
+/// The ways of a motion that is about to be commanded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NextWays {
+    /// Length of the way to the motion, s.
+    pub approach_s: f64,
+    /// Length of the way back, s.
+    pub return_s: f64,
+    /// For each joint, by name, the largest velocity of both, rad/s (m/s).
+    pub largest_speed: Vec<(String, f64)>,
+    /// Postures in between that each goes over, since the straight one is not clear.
+    pub over_postures: [usize; 2],
 }
 
 /// Who watches over an iteration.

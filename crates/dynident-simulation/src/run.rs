@@ -168,6 +168,47 @@ impl Run {
         self.reference.q[self.of(joint)].iter().zip(&self.q[self.of(joint)]).map(|(reference, q)| reference - q)
     }
 
+    /// The part with these samples, as far as the run got: times count from the first of them. Cut torques and
+    /// unsettled steps are those of the whole.
+    #[must_use]
+    pub fn of_samples(&self, range: core::ops::Range<usize>) -> Self {
+        let (joints, before) = (self.joints.len(), self.samples);
+        let range = range.start.min(before)..range.end.min(before);
+        let some = |values: &[f64]| -> Vec<f64> {
+            if values.len() < joints * before {
+                return Vec::new();
+            }
+            (0..joints).flat_map(|joint| values[joint * before..][range.clone()].iter().copied()).collect()
+        };
+        let Motion { q, dq, ddq, dddq, .. } = &*self.reference;
+        let [q, dq, ddq, dddq] = [q, dq, ddq, dddq].map(|values| some(values));
+        let reference = Motion { samples: range.len(), joints, q, dq, ddq, dddq };
+        let mut part = Self {
+            joints: self.joints.clone(),
+            samples: range.len(),
+            status: self.status.clone(),
+            reference: Arc::new(reference),
+            q: some(&self.q),
+            dq: some(&self.dq),
+            ddq: some(&self.ddq),
+            tau: some(&self.tau),
+            measured_q: some(&self.measured_q),
+            measured_dq: some(&self.measured_dq),
+            max_error: vec![0.0; joints],
+            rms_error: vec![0.0; joints],
+            saturated: self.saturated.clone(),
+            ..*self
+        };
+        for joint in 0..joints {
+            let (most, sum) = part
+                .tracking_error(joint)
+                .fold((0.0_f64, 0.0), |(most, sum), error| (most.max(error.abs()), sum + error * error));
+            part.max_error[joint] = most;
+            part.rms_error[joint] = (sum / range.len().max(1) as f64).sqrt();
+        }
+        part
+    }
+
     /// Drops all samples but the first `samples`.
     pub(crate) fn cut(&mut self, samples: usize) {
         let (before, joints) = (self.samples, self.joints.len());

@@ -2,7 +2,7 @@
 
 use super::interruption;
 use crate::terminal;
-use dynident::iteration::NextMotion;
+use dynident::iteration::{NextMotion, RunPurpose};
 use dynident::study::{RobotChoice, Study};
 use std::io::{BufRead, IsTerminal};
 
@@ -33,13 +33,34 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
     let of = if legs > 1 { format!(", trajectory {} of {legs}", leg + 1) } else { String::new() };
     let model = if motion.model_based { "with the model so far" } else { "without a model" };
     let share = if motion.speed < 1.0 { format!(" at {} of its speed", motion.speed) } else { String::new() };
-    let speeds: Vec<String> = motion.largest_speed.iter().map(|(joint, speed)| format!("{joint} {speed:.2}")).collect();
+    let what = match motion.purpose {
+        RunPurpose::WarmUp { pass, of } => format!("pass {pass} of {of} that warm up for run {}", motion.run),
+        RunPurpose::HeldOut => format!("the held-out motion after run {}", motion.run),
+        RunPurpose::Run => format!("run {}", motion.run),
+    };
+    let speeds = |of: &[(String, f64)]| -> String {
+        of.iter().map(|(joint, speed)| format!("{joint} {speed:.2}")).collect::<Vec<_>>().join(", ")
+    };
+    let ways = motion.ways.as_ref().map_or_else(String::new, |ways| {
+        let over = |way: usize| match ways.over_postures[way] {
+            0 => String::new(),
+            1 => " over a posture in between".to_owned(),
+            several => format!(" over {several} postures in between"),
+        };
+        format!(
+            "\n  from home {:.1} s{}, back {:.1} s{}; largest velocities on these ways: {}",
+            ways.approach_s,
+            over(0),
+            ways.return_s,
+            over(1),
+            speeds(&ways.largest_speed)
+        )
+    });
     let question = format!(
-        "run {}{of}: {:.1} s{share} under {} {model}; largest velocities, rad/s (m/s): {}\nIs the robot clear?",
-        motion.run,
+        "{what}{of}: {:.1} s{share} under {} {model}; largest velocities, rad/s (m/s): {}{ways}\nIs the robot clear?",
         motion.duration_s,
         motion.controller,
-        speeds.join(", ")
+        speeds(&motion.largest_speed)
     );
     agreed(&question).unwrap_or(false)
 }

@@ -23,6 +23,16 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
         }
     }
     for run in &file.runs {
+        if let Some(warm_up) = &run.warm_up {
+            text += &wrapped(&format!("Before run {}: {}.", run.run, warm_up.sentence(&file.joints)), 4);
+        }
+    }
+    for run in &file.runs {
+        if let Some(held_out) = &run.held_out {
+            text += &wrapped(&format!("After run {}: {}.", run.run, held_out.sentence(&file.joints)), 4);
+        }
+    }
+    for run in &file.runs {
         if let Some(forecast) = &run.forecast {
             text += &wrapped(&format!("Run {}: {}.", run.run, forecast.sentence()), 4);
         }
@@ -45,6 +55,11 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
             &format!("Last estimate: error over the Cramér-Rao bound {ratio:.2} (root mean square over parameters)."),
             4,
         );
+    }
+    if let Some(sentence) =
+        file.runs.iter().rfind(|run| run.accepted).and_then(|run| run.run_offsets_sentence(&file.joints))
+    {
+        text += &wrapped(&format!("NOTE: {sentence}."), 4);
     }
     for unmet in &file.unmet {
         text += &wrapped(&format!("UNMET: {}. What would help: {}.", unmet.message, unmet.remedy), 4);

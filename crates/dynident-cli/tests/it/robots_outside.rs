@@ -202,3 +202,31 @@ fn a_corrected_command_is_no_other_iteration() {
     assert!(said.contains("protective stop") && said.contains("ended early"), "{said}");
     assert!(folder.path().join("result/runs/run_1/run.json").exists() && script.exists());
 }
+
+/// A program that does not know of a home is not sent a run from there; a home that was corrected is no other
+/// iteration.
+#[test]
+fn a_home_needs_a_program_that_knows_it() {
+    let folder = tempfile::tempdir().unwrap();
+    robot(
+        folder.path(),
+        "printf '%s' \"$line\" >\"$1/heard\"; printf '%s\\n' '{\"type\":\"end\",\"status\":\"stopped\",\"reason\":\"seen\"}'",
+    );
+    let study = study(folder.path(), "");
+    let text = std::fs::read_to_string(&study).unwrap();
+    let soft = "home = [0.1, 0.1]\nrehearsal = { uncertainty_percent = 0.0, robots = 0 }\nenvelope = { tracking_error = 1.0 }\n";
+    let with_home = text.replace("[iteration]\n", &format!("[design.defaults]\nfloor = false\n[iteration]\n{soft}"));
+    std::fs::write(&study, &with_home).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    let words = said(&output);
+    assert!(words.contains("\"capabilities\":[\"home\"]") && words.contains("mode = \"step\""), "{words}");
+    assert!(!folder.path().join("heard").exists());
+    // The program has learned it, and home is another: the folder is still this iteration's.
+    let script = std::fs::read_to_string(folder.path().join("robot.sh")).unwrap();
+    let learned = script.replace("\"modes\":[\"run\"]", "\"modes\":[\"run\"],\"capabilities\":[\"home\"]");
+    std::fs::write(folder.path().join("robot.sh"), learned).unwrap();
+    std::fs::write(&study, with_home.replace("[0.1, 0.1]", "[0.1, 0.2]")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    let heard = std::fs::read_to_string(folder.path().join("heard")).unwrap_or_else(|_| panic!("{}", said(&output)));
+    assert!(heard.contains("\"home\":{\"approach\":") && heard.contains("return.csv"), "{heard}");
+}

@@ -22,6 +22,9 @@ const LAST_WORDS: usize = 2000;
 /// How often a silent program is looked at: whether it still lives.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// What a program that runs the ways of a run says of itself.
+const HOME: &str = "home";
+
 /// Why a line cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 enum LineError {
@@ -76,6 +79,8 @@ pub(super) struct Client {
     pub(super) places: Vec<usize>,
     /// Torque of each of the client's joints for what it logs as 1.
     pub(super) torque_per_unit: Vec<f64>,
+    /// Whether it runs the ways of a run.
+    pub(super) runs_ways: bool,
     run_ends: Option<(Instant, f64)>,
     stop: Option<StopSignal>,
     /// Deregisters when dropped.
@@ -118,6 +123,7 @@ impl Client {
             limits: settings.limits.clone(),
             places: Vec::new(),
             torque_per_unit: Vec::new(),
+            runs_ways: false,
             run_ends: None,
             stop: None,
             listening: None,
@@ -129,7 +135,7 @@ impl Client {
             Heard::Message(message) => message,
             Heard::StopRequested => return Ok(Started::StopRequested),
         };
-        let ToHost::Hello { protocol, joints: found, modes, logs, .. } = hello else {
+        let ToHost::Hello { protocol, joints: found, modes, logs, capabilities, .. } = hello else {
             return Err(RobotFault::OutOfTurn { found: hello.kind().to_owned(), expected: "hello".to_owned() });
         };
         if protocol != PROTOCOL {
@@ -149,6 +155,7 @@ impl Client {
             .filter(|_| found.len() == joints.len())
             .ok_or(RobotFault::OtherJoints { expected: joints.to_vec(), found })?;
         client.torque_per_unit = torque_per_unit(&logs, joints.len())?;
+        client.runs_ways = capabilities.iter().any(|own| own == HOME);
         Ok(Started::Ready(Box::new(client)))
     }
 

@@ -1,8 +1,8 @@
 //! The two ways of a run with a robot program.
 
 use super::client::{Client, Heard};
-use super::envelope::EnvelopeWatch;
-use super::protocol::{EndStatus, ToClient, ToHost};
+use super::protocol::{EndStatus, ToClient, ToHost, WayFiles};
+use super::recorder::Recorder;
 use super::stop_reason::Stopping;
 use super::{RobotFault, RobotStatus, RunRequest, handover};
 use dynident_simulation::Record;
@@ -13,31 +13,27 @@ use std::path::Path;
 /// Samples that are taken for each of the reference: a log may be finer, but not without end.
 const FINEST: usize = 100;
 
-/// A record to be filled sample by sample: until [`joint_major`] its arrays are sample-major.
-pub(super) fn empty_record(joints: &[String], rate_hz: f64) -> Record {
-    Record { joints: joints.to_vec(), rate_hz, samples: 0, times_s: Vec::new(), q: Vec::new(), tau: Vec::new() }
-}
-
-/// From sample-major to joint-major.
-pub(super) fn joint_major(mut record: Record) -> Record {
-    let (joints, samples) = (record.joints.len(), record.samples);
-    for values in [&mut record.q, &mut record.tau] {
-        *values = (0..joints * samples).map(|at| values[at % samples * joints + at / samples]).collect();
-    }
-    record
-}
-
 /// The client runs by itself and streams what it records.
 pub(super) fn run(
     client: &mut Client,
     request: &RunRequest<'_>,
     joints: &[String],
     folder: &Path,
-    record: &mut Record,
+    recorder: &mut Recorder<'_>,
 ) -> Result<RobotStatus, RobotFault> {
+    if request.ways.is_some() && !client.runs_ways {
+        return Err(RobotFault::NoWays);
+    }
     let [trajectory, controller] = handover::write(request, joints, folder)?;
+    let paths = handover::write_ways(request, folder)?;
     let reference = request.reference;
     let text = |path: &Path| path.to_string_lossy().into_owned();
+    let home = request.ways.zip(paths).map(|(ways, [approach, back])| WayFiles {
+        approach: text(&approach),
+        approach_s: ways.approach.duration_s(),
+        back: text(&back),
+        return_s: ways.back.duration_s(),
+    });
     client.send(
         &ToClient::Run {
             run: request.run,
@@ -46,26 +42,28 @@ pub(super) fn run(
             trajectory: text(&trajectory),
             controller: text(&controller),
             envelope: request.envelope.map(|envelope| envelope.in_order(&client.places)),
+            home,
         },
         "sample",
     )?;
-    let most = FINEST * reference.samples() + 1000;
-    let mut watch = EnvelopeWatch::new(request.envelope, reference);
+    let all = request.ways.map_or(0, |ways| ways.approach.samples() + ways.back.samples()) + reference.samples();
+    let most = FINEST * all + 1000;
     loop {
-        // Samples may come afterwards: what is left of the motion counts as well.
-        let left_s = (reference.duration_s() - record.times_s.last().copied().unwrap_or(0.0)).max(0.0);
-        match client.next("sample", client.message_s() + left_s)? {
+        // Samples may come afterwards: what is left of the run counts as well.
+        match client.next("sample", client.message_s() + recorder.left_s())? {
             Heard::StopRequested => {
-                let stopping = stopped(client, record, most, INTERRUPTED);
+                let stopping = stopped(client, recorder, most, INTERRUPTED);
                 return Ok(RobotStatus::Interrupted { stopping });
             }
-            Heard::Message(ToHost::Sample { t_s, q, dq, tau }) => {
-                if record.samples >= most {
+            Heard::Message(ToHost::Sample { part, t_s, q, dq, tau }) => {
+                if recorder.samples() >= most {
                     return Err(RobotFault::TooMuch { most, duration_s: reference.duration_s() });
                 }
-                let dq = keep_sample(client, record, (t_s, &q, dq.as_deref(), &tau))?;
-                if let Some(breach) = watch.look(record, dq.as_deref()) {
-                    let stopping = stopped(client, record, most, &breach.to_string());
+                recorder.enter(part)?;
+                let order = (&client.places[..], &client.torque_per_unit[..]);
+                let dq = keep_sample(order, recorder.record(), (t_s, &q, dq.as_deref(), &tau))?;
+                if let Some(breach) = recorder.look(dq.as_deref()) {
+                    let stopping = stopped(client, recorder, most, &breach.to_string());
                     return Ok(RobotStatus::LeftEnvelope { breach, stopping });
                 }
             }
@@ -73,11 +71,7 @@ pub(super) fn run(
                 return Ok(RobotStatus::Stopped { reason });
             }
             Heard::Message(ToHost::End { status: EndStatus::Done, .. }) => {
-                let (end_s, duration_s) = (record.times_s.last().copied().unwrap_or(0.0), reference.duration_s());
-                // Up to two samples of the slower of the two clocks may be missing, or a hundredth of the run.
-                if end_s < 0.99 * duration_s - 2.0 / reference.rate_hz() || record.samples == 0 {
-                    return Err(RobotFault::Short { end_s, duration_s });
-                }
+                recorder.require_whole()?;
                 return Ok(RobotStatus::Done);
             }
             Heard::Message(other) => {
@@ -91,15 +85,16 @@ pub(super) fn run(
 const INTERRUPTED: &str = "interrupted";
 
 /// Stops a client. Samples that it still sends are kept as long as they are such.
-fn stopped(client: &mut Client, record: &mut Record, most: usize, reason: &str) -> Stopping {
+fn stopped(client: &mut Client, recorder: &mut Recorder<'_>, most: usize, reason: &str) -> Stopping {
     let order = (client.places.clone(), client.torque_per_unit.clone());
     let mut fine = true;
     client.stop(reason, &mut |message| {
-        if let ToHost::Sample { t_s, q, dq, tau } = &message
+        if let ToHost::Sample { part, t_s, q, dq, tau } = &message
             && fine
-            && record.samples < most
+            && recorder.samples() < most
         {
-            fine = keep_sample_of((&order.0, &order.1), record, (*t_s, q, dq.as_deref(), tau)).is_ok();
+            let sent = (*t_s, &q[..], dq.as_deref(), &tau[..]);
+            fine = recorder.enter(*part).is_ok() && keep_sample((&order.0, &order.1), recorder.record(), sent).is_ok();
         }
     })
 }
@@ -107,12 +102,8 @@ fn stopped(client: &mut Client, record: &mut Record, most: usize, reason: &str) 
 /// A sample's time, positions, velocities and torques as a client sends them.
 type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
 
-fn keep_sample(client: &Client, record: &mut Record, sent: SentSample<'_>) -> Result<Option<Vec<f64>>, RobotFault> {
-    keep_sample_of((&client.places, &client.torque_per_unit), record, sent)
-}
-
 /// Appends a sample to the record; its velocities, if it has them.
-fn keep_sample_of(
+fn keep_sample(
     (places, torque_per_unit): (&[usize], &[f64]),
     record: &mut Record,
     (t_s, q, dq, tau): SentSample<'_>,
@@ -132,11 +123,14 @@ fn keep_sample_of(
 pub(super) fn steps(
     client: &mut Client,
     request: &RunRequest<'_>,
-    record: &mut Record,
+    recorder: &mut Recorder<'_>,
 ) -> Result<RobotStatus, RobotFault> {
-    let reference = request.reference;
+    // Checked with the request, here and below.
+    let Ok(reference) = request.whole() else {
+        return Ok(RobotStatus::Stopped { reason: "the ways do not belong to the motion".to_owned() });
+    };
+    let reference = &*reference;
     let joints = reference.joints();
-    // Checked with the request.
     let Ok(mut controller) = request.controller.build(joints, request.model) else {
         return Ok(RobotStatus::Stopped { reason: "the controller cannot be built".to_owned() });
     };
@@ -152,12 +146,12 @@ pub(super) fn steps(
         envelope: request.envelope.map(|envelope| envelope.in_order(&client.places)),
     };
     client.send(&begin, "state")?;
-    let mut watch = EnvelopeWatch::new(request.envelope, reference);
+    let mut before_s = None;
     let mut tau = vec![0.0; joints];
     for sample in 0..reference.samples() {
         let (time_s, q, dq) = match client.next("state", client.message_s())? {
             Heard::Message(ToHost::State { t_s, q, dq }) => (
-                time(t_s, sample, record.times_s.last())?,
+                time(t_s, sample, before_s.as_ref())?,
                 vector(&client.places, &q, "q", sample)?,
                 vector(&client.places, &dq, "dq", sample)?,
             ),
@@ -166,7 +160,7 @@ pub(super) fn steps(
                 return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "state".to_owned() });
             }
             Heard::StopRequested => {
-                let stopping = stopped(client, record, 0, INTERRUPTED);
+                let stopping = stopped(client, recorder, 0, INTERRUPTED);
                 return Ok(RobotStatus::Interrupted { stopping });
             }
         };
@@ -176,13 +170,16 @@ pub(super) fn steps(
         if tau.iter().any(|tau| !tau.is_finite()) {
             return Err(RobotFault::Torque { sample });
         }
+        before_s = Some(time_s);
+        let time_s = recorder.time_of_next(time_s);
+        let record = recorder.record();
         record.times_s.push(time_s);
         record.q.extend(q);
         record.tau.extend_from_slice(&tau);
         record.samples += 1;
         // Before the torque is sent: one beyond the envelope never is.
-        if let Some(breach) = watch.look(record, Some(&dq)) {
-            let stopping = stopped(client, record, 0, &breach.to_string());
+        if let Some(breach) = recorder.look(Some(&dq)) {
+            let stopping = stopped(client, recorder, 0, &breach.to_string());
             return Ok(RobotStatus::LeftEnvelope { breach, stopping });
         }
         let message = if sample + 1 < reference.samples() {
@@ -199,7 +196,7 @@ pub(super) fn steps(
             Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "end".to_owned() })
         }
         Heard::StopRequested => {
-            let stopping = stopped(client, record, 0, INTERRUPTED);
+            let stopping = stopped(client, recorder, 0, INTERRUPTED);
             Ok(RobotStatus::Interrupted { stopping })
         }
     }

@@ -1,6 +1,7 @@
 //! What no sample of a run may leave: a run that does is stopped.
 
 use super::stop_reason::{Breach, EnvelopeQuantity};
+use super::ways::RunPart;
 use dynident_model::Model;
 use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError};
 use serde::{Deserialize, Serialize};
@@ -181,7 +182,7 @@ struct Broken {
 impl Broken {
     fn breach(self, names: &[String], time_s: f64) -> Breach {
         let Self { joint, quantity, value, limit } = self;
-        Breach { joint: names[joint].clone(), quantity, value, limit, time_s }
+        Breach { joint: names[joint].clone(), quantity, value, limit, time_s, part: RunPart::Motion }
     }
 }
 

@@ -3,7 +3,8 @@
 use super::envelope::EnvelopeWatch;
 use super::log_table::{LogTableError, read_log_table};
 use super::stop_reason::Stopping;
-use super::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, conversation, handover};
+use super::ways::{RunPart, WayRecords};
+use super::{Breach, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, handover};
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,8 @@ pub struct FolderSettings {
 ///
 /// A log is taken once it is complete: its last line ends, and it reaches the trajectory's end. Files that are there
 /// are not written again unless they differ, so that a second pass disturbs nobody; where they differ and a log is
-/// there, that log belongs to another run, and is refused.
+/// there, that log belongs to another run, and is refused. Ways to the motion and back are in `approach.csv` and
+/// `return.csv`; logs of them, `approach_log.csv` and `return_log.csv`, are looked at where they are.
 #[derive(Debug)]
 pub struct FolderRobot {
     settings: FolderSettings,
@@ -65,6 +67,7 @@ impl FolderRobot {
             return Err(RobotFault::File { path, reason });
         }
         handover::write(request, &self.joints, folder)?;
+        handover::write_ways(request, folder)?;
         let ends = Instant::now() + Duration::from_secs_f64(self.settings.wait_s);
         loop {
             let run = self.look(request, folder)?;
@@ -79,19 +82,25 @@ impl FolderRobot {
     /// Looks once.
     fn look(&self, request: &RunRequest<'_>, folder: &Path) -> Result<RobotRun, RobotFault> {
         let log = folder.join("log.csv");
-        let waiting = |reason: String| RobotRun {
-            status: RobotStatus::Waiting { folder: folder.to_owned(), reason },
-            record: conversation::empty_record(&self.joints, request.reference.rate_hz()),
-            truth: None,
+        let waiting = |reason: String| {
+            let status = RobotStatus::Waiting { folder: folder.to_owned(), reason };
+            RobotRun::without_samples(status, &self.joints, request.reference.rate_hz())
         };
         if !log.exists() {
-            return Ok(waiting("run trajectory.csv on the robot and put the log here as log.csv".to_owned()));
+            let what = match request.ways {
+                None => "run trajectory.csv on the robot and put the log here as log.csv",
+                Some(_) => {
+                    "run approach.csv, trajectory.csv and return.csv one after another on the robot, and put the log of trajectory.csv here as log.csv"
+                }
+            };
+            return Ok(waiting(what.to_owned()));
         }
         let record = match read_log_table(&log, &self.joints, request.reference.rate_hz()) {
             Ok(record) => record,
             Err(error @ LogTableError::Incomplete { .. }) => return Ok(waiting(format!("log.csv: {error}"))),
             Err(error) => return Err(RobotFault::File { path: log, reason: error.to_string() }),
         };
+        let ways = self.way_records(request, folder)?;
         let stopped = std::fs::read_to_string(folder.join("stopped.txt")).ok();
         let (first, last) = (record.times_s[0], record.times_s[record.samples - 1]);
         let duration_s = request.reference.duration_s();
@@ -104,13 +113,39 @@ impl FolderRobot {
                 );
                 return Ok(waiting(reason));
             }
-            None => match EnvelopeWatch::first(request.envelope, request.reference, &record) {
-                Some(breach) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::SeenAfterwards },
-                None => RobotStatus::Done,
-            },
+            None => {
+                let breach = EnvelopeWatch::first(request.envelope, request.reference, &record);
+                match breach.or_else(|| breach_of_ways(request, ways.as_ref())) {
+                    Some(breach) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::SeenAfterwards },
+                    None => RobotStatus::Done,
+                }
+            }
         };
-        Ok(RobotRun { status, record, truth: None })
+        Ok(RobotRun { status, record, truth: None, ways })
     }
+
+    /// What somebody logged of the ways, where both logs are there.
+    fn way_records(&self, request: &RunRequest<'_>, folder: &Path) -> Result<Option<WayRecords>, RobotFault> {
+        let paths = ["approach_log.csv", "return_log.csv"].map(|name| folder.join(name));
+        if request.ways.is_none() || !paths.iter().all(|path| path.exists()) {
+            return Ok(None);
+        }
+        let read = |path: &PathBuf| {
+            let read = read_log_table(path, &self.joints, request.reference.rate_hz());
+            read.map_err(|error| RobotFault::File { path: path.clone(), reason: error.to_string() })
+        };
+        Ok(Some(WayRecords { approach: read(&paths[0])?, back: read(&paths[1])? }))
+    }
+}
+
+/// The first breach of the ways.
+fn breach_of_ways(request: &RunRequest<'_>, records: Option<&WayRecords>) -> Option<Breach> {
+    let (ways, records) = (request.ways?, records?);
+    let parts = [(RunPart::Approach, &ways.approach, &records.approach), (RunPart::Return, &ways.back, &records.back)];
+    parts.into_iter().find_map(|(part, way, record)| {
+        let breach = EnvelopeWatch::first(request.envelope, way, record)?;
+        Some(Breach { part, ..breach })
+    })
 }
 
 impl Robot for FolderRobot {
@@ -124,10 +159,8 @@ impl Robot for FolderRobot {
 
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
-        Ok(self.exchange(request, &self.settings.folder.join(request.folder_name())).unwrap_or_else(|fault| RobotRun {
-            status: RobotStatus::Failed { fault },
-            record: conversation::empty_record(&self.joints, request.reference.rate_hz()),
-            truth: None,
+        Ok(self.exchange(request, &self.settings.folder.join(request.folder_name())).unwrap_or_else(|fault| {
+            RobotRun::without_samples(RobotStatus::Failed { fault }, &self.joints, request.reference.rate_hz())
         }))
     }
 }

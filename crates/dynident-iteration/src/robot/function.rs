@@ -1,7 +1,8 @@
 //! A robot that is a function of this process.
 
-use super::conversation::{empty_record, joint_major};
 use super::envelope::EnvelopeWatch;
+use super::recorder::{empty_record, joint_major};
+use super::ways::{RunPart, WayRecords};
 use super::{Breach, Envelope, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal, Stopping};
 use dynident_simulation::controllers::{Controller, Measured};
 use dynident_simulation::{Record, Reference, ReferenceSample, SimulationError};
@@ -17,6 +18,9 @@ pub struct ControlledRun {
     stop: Option<StopSignal>,
     target: ReferenceSample,
     tau: Vec<f64>,
+    /// Samples before the motion and of it, where the run has ways.
+    parts: Option<[usize; 2]>,
+    /// Of the whole run, by the robot's clock.
     record: Record,
     /// The newest sample alone: with its velocities that is all that an envelope looks at.
     now: Record,
@@ -35,8 +39,9 @@ enum RunEnd {
 impl ControlledRun {
     fn new(request: &RunRequest<'_>, joints: &[String]) -> Result<Self, SimulationError> {
         request.validate(joints.len())?;
-        let reference = request.reference.clone();
+        let reference = request.whole()?.into_owned();
         Ok(Self {
+            parts: request.ways.map(|ways| [ways.approach.samples() - 1, request.reference.samples()]),
             run: request.run,
             controller: request.controller.build(joints.len(), request.model)?,
             envelope: request.envelope.cloned(),
@@ -61,7 +66,8 @@ impl ControlledRun {
         self.run
     }
 
-    /// The motion to follow; its first sample is where the robot has to stand.
+    /// The motion to follow, with the ways to it and back if the run has some; its first sample is where the robot has
+    /// to stand.
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
@@ -99,10 +105,41 @@ impl ControlledRun {
         self.now.q.copy_from_slice(q);
         self.now.tau.copy_from_slice(&self.tau);
         if let Some(breach) = EnvelopeWatch::new(self.envelope.as_ref(), &self.reference).look(&self.now, Some(dq)) {
-            self.end = Some(RunEnd::Breach(breach));
+            let (part, zero) = self.part_of(sample);
+            let time_s = if zero == 0 { time_s } else { time_s - self.record.times_s[zero] };
+            self.end = Some(RunEnd::Breach(Breach { part, time_s, ..breach }));
             return None;
         }
         Some(&self.tau)
+    }
+
+    /// The part of a sample, and the sample from which times count in it.
+    fn part_of(&self, sample: usize) -> (RunPart, usize) {
+        match self.parts {
+            Some([before, _]) if sample < before => (RunPart::Approach, 0),
+            Some([before, motion]) if sample >= before + motion => (RunPart::Return, before + motion - 1),
+            Some([before, _]) => (RunPart::Motion, before),
+            None => (RunPart::Motion, 0),
+        }
+    }
+
+    /// What was recorded of a part.
+    fn recorded(&self, wanted: RunPart) -> Record {
+        let own = (0..self.record.samples).filter(|&sample| self.part_of(sample).0 == wanted);
+        let (Some(first), joints) = (own.clone().next(), self.record.joints.len()) else {
+            return empty_record(&self.record.joints, self.record.rate_hz);
+        };
+        let range = first..first + own.count();
+        let zero = self.part_of(first).1;
+        let zero_s = if zero == 0 { 0.0 } else { self.record.times_s[zero] };
+        let values = |of: &[f64]| of[range.start * joints..range.end * joints].to_vec();
+        joint_major(Record {
+            samples: range.len(),
+            times_s: self.record.times_s[range.clone()].iter().map(|time_s| time_s - zero_s).collect(),
+            q: values(&self.record.q),
+            tau: values(&self.record.tau),
+            ..empty_record(&self.record.joints, self.record.rate_hz)
+        })
     }
 
     fn look_before(&self, sample: usize, time_s: f64, q: &[f64], dq: &[f64]) -> Result<(), RunEnd> {
@@ -129,15 +166,20 @@ impl ControlledRun {
     fn ended(self, said: Result<(), String>) -> RobotRun {
         let (end_s, duration_s) = (self.record.times_s.last().copied().unwrap_or(0.0), self.reference.duration_s());
         let is_whole = self.record.samples == self.reference.samples();
+        let record = self.recorded(RunPart::Motion);
+        let (part, _) = self.part_of(self.record.samples.saturating_sub(1));
+        let ways = self
+            .parts
+            .map(|_| WayRecords { approach: self.recorded(RunPart::Approach), back: self.recorded(RunPart::Return) });
         let status = match (self.end, said) {
             (Some(RunEnd::Interrupted), _) => RobotStatus::Interrupted { stopping: Stopping::Confirmed },
             (Some(RunEnd::Breach(breach)), _) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed },
             (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault },
             (None, Err(reason)) => RobotStatus::Stopped { reason },
             (None, Ok(())) if is_whole => RobotStatus::Done,
-            (None, Ok(())) => RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s } },
+            (None, Ok(())) => RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s, part } },
         };
-        RobotRun { status, record: joint_major(self.record), truth: None }
+        RobotRun { status, record, truth: None, ways }
     }
 }
 

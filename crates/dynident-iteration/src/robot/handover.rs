@@ -52,7 +52,7 @@ pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) ->
 /// The controller's settings, the joints' order, the envelope that no sample may leave, and the model in numbers:
 /// enough to compute every torque of the controller elsewhere.
 pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
-    json!({
+    let mut file = json!({
         "schema": CONTROLLER_SCHEMA,
         "run": request.run,
         "rate_hz": request.reference.rate_hz(),
@@ -61,7 +61,11 @@ pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
         "controller": request.controller,
         "envelope": request.envelope,
         "model": request.model.map(model_json),
-    })
+    });
+    if let Some(ways) = request.ways {
+        file["home"] = json!({ "approach_s": ways.approach.duration_s(), "return_s": ways.back.duration_s() });
+    }
+    file
 }
 
 fn model_json(model: &ControllerModel) -> Value {
@@ -120,19 +124,31 @@ pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) 
     Ok([trajectory.0, controller.0])
 }
 
-/// The first file in the folder that is there and is another one. Another envelope makes no other run.
+/// Writes `approach.csv` and `return.csv` into a folder, where the request has ways.
+pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Option<[PathBuf; 2]>, RobotFault> {
+    let Some(ways) = request.ways else { return Ok(None) };
+    let paths = ["approach.csv", "return.csv"].map(|name| folder.join(name));
+    for (path, way) in paths.iter().zip([&ways.approach, &ways.back]) {
+        write_whole(path, &trajectory_csv(way, request.model))?;
+    }
+    Ok(Some(paths))
+}
+
+/// The first file in the folder that is there and is another one. Another envelope makes no other run, nor do other
+/// ways.
 pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
-    let same = |there: &str, text: &str| there == text || without_envelope(there) == without_envelope(text);
+    let same = |there: &str, text: &str| there == text || of_the_run(there) == of_the_run(text);
     let differs = |(path, text): &(PathBuf, String)| {
         path.exists() && !std::fs::read_to_string(path).is_ok_and(|there| same(&there, text))
     };
     Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
 }
 
-/// A controller's file but for the envelope; `Err` with the text itself if it is none.
-fn without_envelope(text: &str) -> Result<Value, &str> {
+/// A controller's file but for the envelope and the ways; `Err` with the text itself if it is none.
+fn of_the_run(text: &str) -> Result<Value, &str> {
     let Ok(Value::Object(mut file)) = serde_json::from_str(text) else { return Err(text) };
     file.remove("envelope");
+    file.remove("home");
     Ok(Value::Object(file))
 }
 

@@ -12,10 +12,12 @@ mod process;
 mod process_group;
 mod process_settings;
 mod protocol;
+mod recorder;
 mod simulated;
 mod stop_reason;
 mod stop_signal;
 mod term_description;
+mod ways;
 
 pub use envelope::{Envelope, EnvelopeSettings};
 pub use folder::{FolderRobot, FolderSettings};
@@ -24,10 +26,11 @@ pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_table::{LogTableError, read_log_table};
 pub use process::ProcessRobot;
 pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
-pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost};
+pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost, WayFiles};
 pub use simulated::SimulatedRobot;
 pub use stop_reason::{Breach, EnvelopeQuantity, Stopping};
 pub use stop_signal::StopSignal;
+pub use ways::{RunPart, WayRecords, Ways};
 
 use dynident_simulation::Record;
 use dynident_simulation::Reference;
@@ -35,8 +38,26 @@ use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Run, RunStatus};
 use dynident_simulation::{SimulationError, require_length};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::path::PathBuf;
 use thiserror::Error;
+
+/// What a motion is made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RunPurpose {
+    /// A run.
+    #[default]
+    Run,
+    /// So that the robot is warm: a pass along the motion of the run after it.
+    WarmUp {
+        /// Number of the pass, from 1.
+        pass: usize,
+        /// How many there are.
+        of: usize,
+    },
+    /// Another motion, to judge the model that a run has given: the run's number is that one's.
+    HeldOut,
+}
 
 /// What a robot is asked to do.
 #[derive(Clone, Copy, Debug)]
@@ -55,17 +76,47 @@ pub struct RunRequest<'a> {
     pub stop: Option<&'a StopSignal>,
     /// Share of the trajectory's own speed that the reference has; 1 but for slow runs before the first.
     pub speed: f64,
+    /// What it is made for.
+    pub purpose: RunPurpose,
+    /// The ways to the motion and back: the robot waits where the approach begins, and is left where the return ends.
+    /// Without them it has to stand where the motion begins.
+    pub ways: Option<&'a Ways>,
 }
 
 impl<'a> RunRequest<'a> {
     /// A run without a model, an envelope and anybody who may stop it: set the fields.
     pub fn new(run: usize, reference: &'a Reference, controller: &'a ControllerSettings) -> Self {
-        Self { run, reference, controller, model: None, envelope: None, stop: None, speed: 1.0 }
+        Self {
+            run,
+            reference,
+            controller,
+            model: None,
+            envelope: None,
+            stop: None,
+            speed: 1.0,
+            purpose: RunPurpose::Run,
+            ways: None,
+        }
     }
 
-    /// Name of the folder for its files: a slow run is no other's.
+    /// Name of the folder for its files: a slow run, or one that warms up, is no other's.
     pub fn folder_name(&self) -> String {
-        if self.speed < 1.0 { format!("run_{}_speed_{}", self.run, self.speed) } else { format!("run_{}", self.run) }
+        let run = format!("run_{}", self.run);
+        match self.purpose {
+            RunPurpose::WarmUp { pass, .. } => format!("{run}_warm_up_{pass}"),
+            RunPurpose::HeldOut => format!("{run}_held_out"),
+            RunPurpose::Run if self.speed < 1.0 => format!("{run}_speed_{}", self.speed),
+            RunPurpose::Run => run,
+        }
+    }
+
+    /// What is commanded where one controller runs through all of it: approach, motion and return, or the motion alone.
+    ///
+    /// # Errors
+    /// Ways of another motion.
+    pub fn whole(&self) -> Result<Cow<'a, Reference>, SimulationError> {
+        let whole = self.ways.map(|ways| ways.around(self.reference)).transpose()?;
+        Ok(whole.map_or(Cow::Borrowed(self.reference), Cow::Owned))
     }
 
     /// Whether a stop was asked for.
@@ -80,6 +131,7 @@ impl<'a> RunRequest<'a> {
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         require_length("joints of the reference", joints, self.reference.joints())?;
         self.controller.validate(joints)?;
+        self.ways.map_or(Ok(()), |ways| ways.validate(self.reference))?;
         match self.model {
             Some(model) => model.check_joints(joints),
             None if self.controller.needs_model() => {
@@ -95,13 +147,21 @@ impl<'a> RunRequest<'a> {
 pub struct RobotRun {
     /// How it ended.
     pub status: RobotStatus,
-    /// What was recorded, up to the end or up to what went wrong. Joints in the model's order, all numbers finite.
+    /// What was recorded along the motion, up to the end or up to what went wrong. Joints in the model's order, all
+    /// numbers finite.
     pub record: Record,
-    /// What truly was, if the robot is the simulator.
+    /// What truly was along the motion, if the robot is the simulator.
     pub truth: Option<Run>,
+    /// What was recorded along the ways, where the request had some and they are known.
+    pub ways: Option<WayRecords>,
 }
 
 impl RobotRun {
+    /// A run of which nothing was recorded.
+    pub fn without_samples(status: RobotStatus, joints: &[String], rate_hz: f64) -> Self {
+        Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None }
+    }
+
     /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
     /// reference between its samples by straight lines.
     pub fn max_error(&self, reference: &Reference) -> Vec<f64> {
@@ -291,13 +351,21 @@ pub enum RobotFault {
         fix: String,
     },
     /// The record ends before the trajectory does.
-    #[error("the robot says done, but its record ends at {end_s} s of {duration_s} s")]
+    #[error("the robot says done, but its record of the {} ends at {end_s} s of {duration_s} s", .part.name())]
     Short {
         /// The record's last time.
         end_s: f64,
         /// The trajectory's.
         duration_s: f64,
+        /// The part of the run.
+        #[serde(default, skip_serializing_if = "RunPart::is_motion")]
+        part: RunPart,
     },
+    /// A program that does not know of ways would run the motion from wherever its robot stands.
+    #[error(
+        "the study states a home, and the robot program does not say in its hello that it runs the ways from there and back (\"capabilities\":[\"home\"]): let it run approach.csv before and return.csv after the trajectory, take mode = \"step\", or take home out of [iteration] and bring the robot to its start yourself"
+    )]
+    NoWays,
     /// The controller gave a torque that is not a number.
     #[error("the controller's torque at sample {sample} is not a finite number")]
     Torque {

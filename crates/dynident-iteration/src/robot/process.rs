@@ -2,9 +2,9 @@
 
 use super::client::{Client, Started};
 use super::process_settings::{ProcessMode, ProcessSettings};
+use super::recorder::Recorder;
 use super::stop_reason::Stopping;
 use super::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, conversation};
-use dynident_simulation::Record;
 use dynident_simulation::SimulationError;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -46,7 +46,7 @@ impl ProcessRobot {
         std::path::absolute(&folder).map_err(file(folder))
     }
 
-    fn converse(&mut self, request: &RunRequest<'_>, record: &mut Record) -> Result<RobotStatus, RobotFault> {
+    fn converse(&mut self, request: &RunRequest<'_>, recorder: &mut Recorder<'_>) -> Result<RobotStatus, RobotFault> {
         // Nothing moves yet.
         let not_begun = RobotStatus::Interrupted { stopping: Stopping::Confirmed };
         if request.stop_requested() {
@@ -67,8 +67,8 @@ impl ProcessRobot {
         let limit = self.settings.limits.run_s;
         client.limit_run(limit.map(|limit| (Instant::now() + Duration::from_secs_f64(limit), limit)));
         match folder {
-            Some(folder) => conversation::run(client, request, &self.joints, &folder, record),
-            None => conversation::steps(client, request, record),
+            Some(folder) => conversation::run(client, request, &self.joints, &folder, recorder),
+            None => conversation::steps(client, request, recorder),
         }
     }
 }
@@ -84,8 +84,8 @@ impl Robot for ProcessRobot {
 
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
-        let mut record = conversation::empty_record(&self.joints, request.reference.rate_hz());
-        let status = match self.converse(request, &mut record) {
+        let mut recorder = Recorder::new(request, &self.joints);
+        let status = match self.converse(request, &mut recorder) {
             Ok(status) => {
                 let unanswered = matches!(
                     &status,
@@ -103,6 +103,6 @@ impl Robot for ProcessRobot {
                 RobotStatus::Failed { fault }
             }
         };
-        Ok(RobotRun { status, record: conversation::joint_major(record), truth: None })
+        Ok(recorder.into_run(status))
     }
 }

@@ -2,6 +2,7 @@
 //! page `robot-protocol.md` describes them with examples.
 
 use super::envelope::Envelope;
+use super::ways::RunPart;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the protocol.
@@ -27,8 +28,12 @@ pub enum ToClient {
         /// What no sample may leave, in the order of the client's joints: the client stops by itself where one does.
         #[serde(skip_serializing_if = "Option::is_none")]
         envelope: Option<Envelope>,
+        /// The ways from where the robot waits to the trajectory and back, each a table like it: one controller runs
+        /// all three without a pause. Only to clients that say that they know it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        home: Option<WayFiles>,
     },
-    /// A run in steps begins: go to the start and send the state.
+    /// A run in steps begins: go to the start and send the state. The ways, where there are some, are part of it.
     Begin {
         /// Number of the run.
         run: usize,
@@ -61,6 +66,20 @@ pub enum ToClient {
     Bye {},
 }
 
+/// The ways of a run, as files.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WayFiles {
+    /// Path of the way to the trajectory's first posture.
+    pub approach: String,
+    /// Its length, s; 0 where the robot is there already.
+    pub approach_s: f64,
+    /// Path of the way from its last posture.
+    #[serde(rename = "return")]
+    pub back: String,
+    /// Its length, s.
+    pub return_s: f64,
+}
+
 /// What the client writes to its standard output. Missing numbers (`null`) are read and distinguished from garbage.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
@@ -78,10 +97,16 @@ pub enum ToHost {
         /// What it logs as torque; everything that the drives give, Nm (N), where it does not say.
         #[serde(default)]
         logs: LoggedTorque,
+        /// What it can beyond the first version of the protocol: `home` (the ways of a run). Others are not looked at.
+        #[serde(default)]
+        capabilities: Vec<String>,
     },
     /// One sample of a run.
     Sample {
-        /// Time since the run's begin, s.
+        /// The part of the run that it belongs to; the motion where it does not say.
+        #[serde(default)]
+        part: RunPart,
+        /// Time since the begin of that part, s.
         t_s: Option<f64>,
         /// Positions, rad (m).
         q: Vec<Option<f64>>,

@@ -1,6 +1,7 @@
 //! The built-in simulator as a robot.
 
-use super::{Robot, RobotRun, RobotStatus, RunRequest};
+use super::ways::{WayRecords, cut};
+use super::{Robot, RobotRun, RobotStatus, RunPurpose, RunRequest};
 use dynident_simulation::Plant;
 use dynident_simulation::SimulationError;
 use dynident_simulation::{LoopSettings, closed_loop};
@@ -57,12 +58,30 @@ impl Robot for SimulatedRobot {
         }
         // Any odd number spreads neighbours over the seeds.
         settings.sensors.seed ^= (request.run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let run = closed_loop(&mut self.plant, controller.as_mut(), request.reference, &settings)?;
+        settings.sensors.seed ^= match request.purpose {
+            RunPurpose::Run => 0,
+            RunPurpose::WarmUp { pass, .. } => (pass as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f),
+            RunPurpose::HeldOut => 0x1656_67b1_9e37_79f9,
+        };
+        let run = closed_loop(&mut self.plant, controller.as_mut(), &*request.whole()?, &settings)?;
         let record = settings.sensors.record(self.plant.model(), &run)?;
         let status = match &run.status {
             status if status.is_done() => RobotStatus::Done,
             verdict => RobotStatus::Simulated { verdict: verdict.clone() },
         };
-        Ok(RobotRun { status, record, truth: Some(run) })
+        let Some(ways) = request.ways else { return Ok(RobotRun { status, record, truth: Some(run), ways: None }) };
+        // Half a sample of room for times that are no whole numbers of periods in the last digit.
+        let half_s = 0.5 / request.reference.rate_hz();
+        let begin_s = ways.approach.duration_s();
+        let (from_s, to_s) = (begin_s - half_s, begin_s + request.reference.duration_s() + half_s);
+        let end_s = begin_s + request.reference.duration_s();
+        let first = ways.approach.samples() - 1;
+        let ways = WayRecords {
+            approach: cut(&record, [f64::NEG_INFINITY, from_s], 0.0),
+            back: cut(&record, [to_s, f64::INFINITY], end_s),
+        };
+        let record = cut(&record, [from_s, to_s], begin_s);
+        let truth = run.of_samples(first..first + request.reference.samples());
+        Ok(RobotRun { status, record, truth: Some(truth), ways: Some(ways) })
     }
 }

@@ -1,5 +1,6 @@
 //! Why a run was stopped from here, and what became of the stop.
 
+use super::ways::RunPart;
 use serde::{Deserialize, Serialize};
 
 /// What left its envelope, where and when.
@@ -14,14 +15,18 @@ pub struct Breach {
     pub value: f64,
     /// The limit.
     pub limit: f64,
-    /// When, s from the trajectory's begin.
+    /// When, s from the begin of the part.
     pub time_s: f64,
+    /// The part of the run: the motion, unless it has ways.
+    #[serde(default, skip_serializing_if = "RunPart::is_motion")]
+    pub part: RunPart,
 }
 
 impl core::fmt::Display for Breach {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { joint, quantity, value, limit, time_s } = self;
-        write!(f, "{} of {joint} is {value:.4} at {time_s:.3} s, its limit {limit:.4}", quantity.name())
+        let Self { joint, quantity, value, limit, time_s, part } = self;
+        let of = if part.is_motion() { String::new() } else { format!(" of the {}", part.name()) };
+        write!(f, "{} of {joint} is {value:.4} at {time_s:.3} s{of}, its limit {limit:.4}", quantity.name())
     }
 }
 

@@ -3,6 +3,8 @@
 
 mod differentiators;
 mod function_robots;
+mod held_out;
+mod home;
 mod identification;
 mod iteration;
 mod policy;
@@ -10,6 +12,8 @@ mod pooling;
 mod redesign;
 mod rehearsals;
 mod robots;
+mod run_offsets;
 mod simulated_arm;
 mod stops;
 mod verdict;
+mod warm_up;

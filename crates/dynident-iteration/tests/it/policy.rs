@@ -35,6 +35,7 @@ fn estimate(value: f64, std: f64) -> RunEstimate {
         torque_lags: Vec::new(),
         lag: LagChoice::default(),
         differentiator: None,
+        run_offsets: Vec::new(),
     }
 }
 
@@ -52,9 +53,11 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         accepted,
         reason: None,
         rehearsal: None,
+        warm_up: None,
         estimate: Some(estimate),
         pooled: None,
         evidence: Some(evidence()),
+        held_out: None,
     }
 }
 

@@ -56,7 +56,7 @@ fn envelope() -> Envelope {
 
 fn safety(envelope: Envelope) -> SafetySettings {
     let rehearsal = Some(RehearsalSettings::default());
-    SafetySettings { outside: true, envelope: Some(envelope), rehearsal, speed_steps: Vec::new() }
+    SafetySettings { outside: true, envelope: Some(envelope), rehearsal, ..SafetySettings::default() }
 }
 
 fn refused(robot: ParametricModel, settings: IterationSettings) -> String {

@@ -4,7 +4,7 @@
 use dynident_excitation::Motion;
 use dynident_iteration::robot::{
     Envelope, FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, ToClient, ToHost,
-    controller_json, trajectory_csv,
+    WayFiles, controller_json, trajectory_csv,
 };
 use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
 use dynident_model::terms::{
@@ -201,6 +201,8 @@ fn the_book_tells_the_protocol() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/robot-protocol.md");
     let page = std::fs::read_to_string(page).unwrap();
     let (trajectory, controller) = ("/…/run_1/trajectory.csv".to_owned(), "/…/run_1/controller.json".to_owned());
+    let (approach, back) = ("/…/run_1/approach.csv".to_owned(), "/…/run_1/return.csv".to_owned());
+    let home = WayFiles { approach, approach_s: 4.2, back, return_s: 4.2 };
     let each = |limit: f64| vec![Some(limit), Some(limit)];
     let envelope = Some(Envelope {
         lower: vec![Some(-2.9), None],
@@ -211,7 +213,24 @@ fn the_book_tells_the_protocol() {
         speed_span_s: 0.01,
     });
     let own = [
-        ToClient::Run { run: 1, rate_hz: 1000.0, duration_s: 10.0, trajectory, controller, envelope: envelope.clone() },
+        ToClient::Run {
+            run: 1,
+            rate_hz: 1000.0,
+            duration_s: 10.0,
+            trajectory: trajectory.clone(),
+            controller: controller.clone(),
+            envelope: envelope.clone(),
+            home: None,
+        },
+        ToClient::Run {
+            run: 1,
+            rate_hz: 1000.0,
+            duration_s: 10.0,
+            trajectory,
+            controller,
+            envelope: None,
+            home: Some(home),
+        },
         ToClient::Begin { run: 1, rate_hz: 1000.0, samples: 10_001, q: vec![0.1, 0.2], dq: vec![0.0, 0.0], envelope },
         ToClient::Torque { tau: vec![3.1, 0.4] },
         ToClient::Finish {},

@@ -56,12 +56,17 @@ impl Simulated {
         SimulatedRobot::new(plant, settings).unwrap()
     }
 
-    /// True base parameters, in the columns of the described robot.
-    pub(crate) fn truth(&self, described: &ParametricModel) -> Vec<f64> {
+    /// All true parameters: the bodies', then friction's.
+    pub(crate) fn parameters(&self) -> Vec<f64> {
         let [one, two] = self.coulomb;
         let mut all = arm(1.0, self.tip_kg).parameter_vector();
         all.extend([0.8, one, 0.5, two]);
-        described.base().values(&all)
+        all
+    }
+
+    /// True base parameters, in the columns of the described robot.
+    pub(crate) fn truth(&self, described: &ParametricModel) -> Vec<f64> {
+        described.base().values(&self.parameters())
     }
 }
 

@@ -190,7 +190,7 @@ fn a_sample_outside_of_the_envelope_stops_the_run() {
         let RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed } = &run.status else {
             panic!("{mode:?}: {}", run.status)
         };
-        let Breach { joint, quantity, value, limit, time_s } = breach.clone();
+        let Breach { joint, quantity, value, limit, time_s, .. } = breach.clone();
         assert_eq!((&*joint, quantity, limit), ("joint2", EnvelopeQuantity::TrackingError, 0.01));
         assert!(value.abs() > 0.01 && time_s > 0.0, "{breach}");
         let text = run.status.to_string();

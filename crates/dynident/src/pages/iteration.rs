@@ -15,6 +15,9 @@ const HALF_WIDTH_95: f64 = 1.96;
 /// Curves of one plot: more cannot be distinguished.
 const CURVES: usize = 6;
 
+/// What is told of held-out runs.
+const HELD_OUT: &str = "A motion that is never fitted, run under the controller with the newest model: how much of each joint's torque lies inside the 95 % band of what that model says. The verdict rests on the last.";
+
 /// What is told of forecasts.
 const FORECASTS: &str = "The worst bars: root mean square of the error bars along the ten directions that were known worst before the run, measured by the torque that they leave uncertain wherever the arm may be.";
 
@@ -108,6 +111,26 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     if !points.is_empty() {
         page.add(Heading::new("What the motions were to bring"));
         page.add(Text { paragraphs: vec![FORECASTS.to_owned()], points });
+    }
+    let warmed = file.runs.iter().filter_map(|run| Some((run_name(run), run.warm_up.as_ref()?)));
+    let points: Vec<(Tone, String)> = warmed
+        .map(|(run, warm_up)| (Tone::Plain, format!("before run {run}: {}", warm_up.sentence(&file.joints))))
+        .collect();
+    if !points.is_empty() {
+        page.add(Heading::new("Warm-up"));
+        page.add(Text { paragraphs: Vec::new(), points });
+    }
+    let judged = file.runs.iter().filter_map(|run| Some((run_name(run), run.held_out.as_ref()?)));
+    let points: Vec<(Tone, String)> = judged
+        .map(|(run, held_out)| (Tone::Plain, format!("after run {run}: {}", held_out.sentence(&file.joints))))
+        .collect();
+    if !points.is_empty() {
+        page.add(Heading::new("The held-out motion"));
+        page.add(Text { paragraphs: vec![HELD_OUT.to_owned()], points });
+    }
+    if let Some(sentence) = last_good(file).and_then(|run| run.run_offsets_sentence(&file.joints)) {
+        page.add(Heading::new("Offsets of single runs"));
+        page.add(Text { paragraphs: Vec::new(), points: vec![(Tone::Plain, sentence)] });
     }
     if let Some(shown) = last_shown(file) {
         page.add(Heading::new("What the last log shows"));

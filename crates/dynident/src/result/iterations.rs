@@ -4,7 +4,7 @@ use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
 use dynident_identification::examination::TorqueLag;
-use dynident_iteration::{DifferentiatorChoice, RunEvidence, Shortfall};
+use dynident_iteration::{DifferentiatorChoice, HeldOutRun, RunEvidence, RunOffset, Shortfall, WarmUp};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -181,12 +181,23 @@ pub struct IterationRun {
     pub reason: Option<String>,
     /// For each joint the largest distance from the trajectory, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
+    /// What the warm-up before it has shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<WarmUp>,
+    /// The run of the held-out motion after it, and how well the model that it gave predicts that; none where there was
+    /// none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutRun>,
     /// What it determines by itself.
     pub parameters: Vec<IterationParameter>,
     /// What all good runs up to this one determine together; empty for the first, for those that do not count, and
     /// where runs are not pooled.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pooled: Vec<IterationParameter>,
+    /// Where the good runs up to this one have constant torques of their own, by how much each deviates from their
+    /// mean; empty where they share one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub run_offsets: Vec<RunOffset>,
     /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
@@ -209,6 +220,18 @@ pub struct IterationRun {
 }
 
 impl IterationRun {
+    /// The largest constant torque that a run has of its own, in words, with the joints' names; none where runs share
+    /// theirs.
+    pub fn run_offsets_sentence(&self, joints: &[String]) -> Option<String> {
+        let largest = self.run_offsets.iter().max_by(|a, b| a.deviation.abs().total_cmp(&b.deviation.abs()))?;
+        let RunOffset { run, joint, deviation, std } = largest;
+        let name = joints.get(*joint).map_or("a joint", String::as_str);
+        Some(format!(
+            "runs have constant torques of their own, most run {run} at {name}, {deviation:+.3} +- {:.3} Nm (95 %) off the mean of all: look for zeros of sensors that drift, or a cable that pulls",
+            1.96 * std
+        ))
+    }
+
     /// What is known after it: by all good runs together, or else by it alone.
     pub fn known(&self) -> &[IterationParameter] {
         if self.pooled.is_empty() { &self.parameters } else { &self.pooled }

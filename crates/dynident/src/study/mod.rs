@@ -33,7 +33,8 @@ pub use folders::Folders;
 pub use friction::{FrictionChoice, FrictionTerm};
 pub(crate) use inputs::StudyInput;
 pub use iteration::{
-    Automatic, DifferentiatorKey, IterationSection, LegOrder, LegSection, MotionChoice, PriorChoice, RobotChoice,
+    Automatic, DifferentiatorKey, HeldOutSection, IterationSection, LegOrder, LegSection, MotionChoice, PriorChoice,
+    RobotChoice,
 };
 pub use log::LogSection;
 pub(crate) use log_source::StudyLogSource;

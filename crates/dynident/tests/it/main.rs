@@ -22,6 +22,7 @@ mod factors;
 mod friction_choice;
 mod in_memory;
 mod instruments;
+mod iteration_home;
 mod iteration_legs;
 mod iteration_report;
 mod log_formats;

@@ -15,6 +15,7 @@ mod table;
 pub use check::{check_log, check_trajectory};
 pub(super) use family::{MotionFamily, motion_family};
 pub use outcome::DesignOutcome;
+pub(super) use setup::limits_of;
 pub(super) use table::trajectory as trajectory_table;
 
 use crate::error::{Error, Expected};

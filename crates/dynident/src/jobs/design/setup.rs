@@ -139,6 +139,17 @@ impl DesignSetup {
     }
 }
 
+/// What a study's robot keeps wherever it moves: the description's limits, those assumed, and those of `[design]`,
+/// where there is one.
+///
+/// # Errors
+/// Limits that cannot be.
+pub(in crate::jobs) fn limits_of(study: &Study, robot: &StudyRobot) -> Result<Limits, LimitError> {
+    let section = study.design.clone().unwrap_or_default();
+    section.limits.validate(robot.model())?;
+    Ok(in_force(robot, &section.defaults, &section.limits)?.limits)
+}
+
 /// The limits of a robot: the description's, those assumed, and the study's.
 fn in_force(robot: &StudyRobot, settings: &AssumedLimits, given: &Limits) -> Result<LimitsInForce, LimitError> {
     let with_shapes = settings.floor || (settings.self_collision && given.self_collision.is_none());

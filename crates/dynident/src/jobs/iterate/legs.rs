@@ -8,9 +8,9 @@ use crate::study::{
 };
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
-use dynident_iteration::Leg;
 use dynident_iteration::Robot;
 use dynident_iteration::robot::{FolderRobot, ProcessRobot};
+use dynident_iteration::{HeldOutMotion, Leg};
 use std::path::Path;
 
 /// Spreads the seeds of legs that have an iteration each.
@@ -104,6 +104,12 @@ impl IterationSection {
             legs.push(leg?.with_payload(section.payload.clone()));
         }
         Ok(legs)
+    }
+
+    /// The motion that is never fitted.
+    pub(super) fn held_out_motion(&self, trajectory: &Trajectory) -> Result<HeldOutMotion, StudyError> {
+        let every = self.held_out.as_ref().and_then(|own| own.every);
+        Ok(HeldOutMotion { leg: Leg::whole(trajectory.reference()?)?, every })
     }
 
     /// The robots of one iteration: the simulator for each of its legs, or the one outside; none where the caller

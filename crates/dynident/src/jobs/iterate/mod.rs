@@ -9,7 +9,7 @@ mod trajectory;
 pub(super) use trajectory::Trajectory;
 
 use crate::error::{Error, StudyError};
-use crate::jobs::design::{MotionFamily, motion_family};
+use crate::jobs::design::{MotionFamily, limits_of, motion_family};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::output::write_whole;
@@ -19,6 +19,7 @@ use crate::result::IterationsFile;
 use crate::study::{Folders, IterationSection, PriorChoice, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
+use dynident_excitation::limits::Limits;
 use dynident_iteration::{
     Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, MotionPlanner, NextMotion,
     Redesign, RunRecord, StopSignal, Supervisor, iterate_supervised,
@@ -151,6 +152,10 @@ fn iterated(
     }
     section.check_legs(&robot).map_err(in_section)?;
     section.check_gains(study, &robot).map_err(in_section)?;
+    // Before anything is looked for.
+    section.home_settings(&robot, Limits::default()).map_err(in_section)?;
+    section.check_warm_up().map_err(in_section)?;
+    section.check_held_out(study).map_err(in_section)?;
     section.redesign(study).map_err(in_section)?;
 
     // What an earlier call has left in the folder.
@@ -176,9 +181,16 @@ fn iterated(
         if stop.is_requested() {
             return Err(Error::Interrupted { what: "the search for the trajectory" });
         }
-        Ok(found)
+        let held_out = match section.held_out_study(study) {
+            Some(other) => Some(Trajectory::of_study(&other, study_path, &robot, rate_hz, options, watch.design)?),
+            None => None,
+        };
+        if stop.is_requested() {
+            return Err(Error::Interrupted { what: "the search for the held-out motion" });
+        }
+        Ok(Trajectories { trajectories: found, held_out })
     };
-    let trajectories = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
+    let Trajectories { trajectories, held_out } = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
 
     // What is believed of the robot, what it runs, and what the file says of it.
     let believed = match section.prior {
@@ -190,7 +202,11 @@ fn iterated(
     };
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
     let references: Vec<_> = legs.iter().map(Leg::reference).collect();
-    let settings = section.guarded(settings, study, &robot, &references).map_err(in_section)?;
+    let limits = match section.home {
+        Some(_) => limits_of(study, &robot).map_err(Error::section(study_path, "design.limits"))?,
+        None => Limits::default(),
+    };
+    let settings = section.guarded(settings, (study, limits), &robot, &references).map_err(in_section)?;
     let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {
@@ -204,6 +220,7 @@ fn iterated(
         sensors: &simulation.sensors,
     };
     let planner = planner((study, study_path), &section, &legs, options)?;
+    let held_out = held_out.map(|trajectory| section.held_out_motion(&trajectory)).transpose().map_err(in_section)?;
     let before_runs_s = begin.elapsed().as_secs_f64();
 
     // The stages, each with what those before it have found held.
@@ -221,6 +238,10 @@ fn iterated(
         let iteration = Iteration::new(task, settings.clone()).map_err(|why| in_section(why.into()))?;
         let iteration = match &planner {
             Some(planner) => iteration.with_planner(Arc::clone(planner)),
+            None => iteration,
+        };
+        let iteration = match &held_out {
+            Some(motion) => iteration.with_held_out(motion.clone()).map_err(|why| in_section(why.into()))?,
             None => iteration,
         };
         let mut robots = section.robots((&simulation, &study.coupling), &robot, number, members).map_err(in_section)?;
@@ -355,17 +376,28 @@ fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> S
     format!("{:016x}", hasher.finish())
 }
 
+/// What is run.
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Trajectories {
+    /// Of every leg.
+    trajectories: Vec<Trajectory>,
+    /// What is never fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    held_out: Option<Trajectory>,
+}
+
 /// The trajectories of an earlier call, or new ones, which are kept before anything is run.
 fn kept(
     path: &Path,
     fingerprint: &str,
     resume: bool,
-    make: impl FnOnce() -> Result<Vec<Trajectory>, Error>,
-) -> Result<Vec<Trajectory>, Error> {
+    make: impl FnOnce() -> Result<Trajectories, Error>,
+) -> Result<Trajectories, Error> {
     #[derive(serde::Serialize, serde::Deserialize)]
     struct TrajectoryFile {
         fingerprint: String,
-        trajectories: Vec<Trajectory>,
+        #[serde(flatten)]
+        all: Trajectories,
     }
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     if resume && path.is_file() {
@@ -373,14 +405,14 @@ fn kept(
         let kept: TrajectoryFile = serde_json::from_slice(&text)
             .map_err(|error| wrong(format!("is no trajectory of an iteration ({error}): remove it")))?;
         if kept.fingerprint == fingerprint {
-            return Ok(kept.trajectories);
+            return Ok(kept.all);
         }
         return Err(wrong(
             "belongs to an iteration with other settings: take --fresh, or give another --out".to_owned(),
         ));
     }
-    let kept = TrajectoryFile { fingerprint: fingerprint.to_owned(), trajectories: make()? };
+    let kept = TrajectoryFile { fingerprint: fingerprint.to_owned(), all: make()? };
     let bytes = serde_json::to_vec(&kept).map_err(|error| wrong(error.to_string()))?;
     write_whole(path, &bytes)?;
-    Ok(kept.trajectories)
+    Ok(kept.all)
 }

@@ -8,7 +8,7 @@ use crate::jobs::provenance::{now, provenance, seen_from};
 use crate::output_set::OutputSet;
 use crate::result::{BaseParameterResult, Timings};
 use crate::study::{Study, StudyInput, StudyRobot};
-use dynident_identification::{IdentificationError, IdentificationTask, identify};
+use dynident_identification::{IdentificationError, IdentificationTask, Role, identify};
 use dynident_iteration::robot::{RunRequest, controller_json};
 use dynident_iteration::{Iteration, IterationError, IterationStore, ModelParameters, RunRecord, friction_chosen};
 use std::borrow::Cow;
@@ -80,7 +80,11 @@ pub(super) fn robot_found(
         logs.extend(task.recordings.iter().enumerate().map(|(place, recording)| {
             // Named `run 3, leg 2`.
             let run = recording.name.split([' ', ',']).nth(1).and_then(|run| run.parse().ok()).unwrap_or(1);
-            stage.store.log_path(run, place % legs)
+            // Those that test the robot come last.
+            match recording.role {
+                Role::Identify => stage.store.log_path(run, place % legs),
+                Role::Validate => stage.store.held_out_log_path(run),
+            }
         }));
         match &mut whole {
             Some(whole) => whole.recordings.extend(task.recordings),

@@ -91,8 +91,11 @@ impl IterationReport<'_> {
                 outcome: record.outcome.clone(),
                 reason: record.reason.clone(),
                 max_tracking_error_rad: record.max_tracking_error_rad.clone(),
+                warm_up: record.warm_up.clone(),
+                held_out: record.held_out.clone(),
                 parameters: parameters(record.estimate.as_ref()),
                 pooled: parameters(record.pooled.as_ref()),
+                run_offsets: record.pooled.as_ref().map_or_else(Vec::new, |all| all.run_offsets.clone()),
                 evidence: record.evidence.clone(),
                 differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
                 forecast: record.forecast.as_ref().map(|forecast| {

@@ -19,6 +19,29 @@ pub enum StartPosture {
 }
 
 impl StartPosture {
+    /// The position of every joint that is named under a key of a study.
+    ///
+    /// # Errors
+    /// A joint that the model does not have, another number of positions than joints.
+    pub(in crate::study) fn named(&self, key: &'static str, model: &Model) -> Result<Vec<Option<f64>>, StudyError> {
+        let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
+        match self {
+            Self::List(list) if list.len() != names.len() => {
+                let (found, expected) = (list.len(), names.len());
+                Err(StudyError::Length { key, found, expected })
+            }
+            Self::List(list) => Ok(list.iter().copied().map(Some).collect()),
+            Self::ByJoint(named) => {
+                if let Some(unknown) = named.keys().find(|name| !names.contains(&name.as_str())) {
+                    let known = names.iter().map(|&name| name.to_owned()).collect();
+                    let (what, name) = ("moving joint", unknown.clone());
+                    return Err(StudyError::Unknown { key, what, name, known });
+                }
+                Ok(names.iter().map(|name| named.get(*name).copied()).collect())
+            }
+        }
+    }
+
     /// The position of every joint that is named.
     ///
     /// # Errors
@@ -26,23 +49,9 @@ impl StartPosture {
     /// that the limits do not allow: at rest in a whole posture every limit is asked, in a part of one those of
     /// position.
     pub(crate) fn of_joints(&self, model: &Model, limits: &Limits) -> Result<Vec<Option<f64>>, StudyError> {
-        let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
-        let posture: Vec<Option<f64>> = match self {
-            Self::List(list) if list.len() != names.len() => {
-                let (found, expected) = (list.len(), names.len());
-                return Err(StudyError::Length { key: "start_posture", found, expected });
-            }
-            Self::List(list) => list.iter().copied().map(Some).collect(),
-            Self::ByJoint(named) => {
-                if let Some(unknown) = named.keys().find(|name| !names.contains(&name.as_str())) {
-                    let known = names.iter().map(|&name| name.to_owned()).collect();
-                    let (what, name) = ("moving joint", unknown.clone());
-                    return Err(StudyError::Unknown { key: "start_posture", what, name, known });
-                }
-                names.iter().map(|name| named.get(*name).copied()).collect()
-            }
-        };
-        for (name, start) in names.iter().zip(&posture) {
+        let posture = self.named("start_posture", model)?;
+        let names = model.joints().iter().map(|joint| &*joint.name);
+        for (name, start) in names.zip(&posture) {
             let Some(start) = start else { continue };
             let key = format!("start_posture.{name}");
             Expected::Finite.check(&key, *start)?;

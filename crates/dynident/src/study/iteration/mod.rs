@@ -1,23 +1,27 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
 mod differentiator_key;
+mod held_out;
 mod legs;
 mod motion;
 mod safety;
 
 pub use differentiator_key::{Automatic, DifferentiatorKey};
+pub use held_out::HeldOutSection;
 pub use legs::{LegOrder, LegSection};
 pub use motion::MotionChoice;
 
 use super::FrictionChoice;
+use super::StartPosture;
 use super::Study;
 use super::design::name_or_table::name_or_table;
 use crate::error::StudyError;
-use dynident_identification::IdentificationSettings;
 use dynident_identification::estimators::Estimator;
+use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
-    IterationSettings, RehearsalSettings, RunIdentificationSettings, SafetySettings, Scheme, SettledSettings, StartWith,
+    IterationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings, Scheme,
+    SettledSettings, StartWith,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
@@ -81,6 +85,8 @@ pub struct IterationSection {
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = super::design::name_or_table::schema))]
     pub motion: MotionChoice,
+    /// A motion that is run to judge the newest model and never fitted; none by default.
+    pub held_out: Option<HeldOutSection>,
     /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or
     /// design unless it has its own.
     pub leg: Vec<LegSection>,
@@ -128,6 +134,16 @@ pub struct IterationSection {
     pub rate_hz: Option<f64>,
     /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
     pub speed_steps: Vec<f64>,
+    /// Where the robot waits between runs, rad (m), all joints by name or in the model's order: every run goes from
+    /// there to its motion and back, within the limits of `[design]`. Without it the robot has to stand where the
+    /// motion begins.
+    pub home: Option<StartPosture>,
+    /// Share of the velocity and acceleration limits that the ways from home and back have; 0.2 by default.
+    pub approach_speed: f64,
+    /// How long the motion of a run is made over and over before the first run of a call, s, so that friction is at its
+    /// working temperature; again where the robot has stood longer than this. 0 by default: not at all. Not of a robot
+    /// behind a folder, which a person warms up.
+    pub warm_up_s: f64,
     /// Tracking this many times worse than that of the last good run rejects a run.
     pub worse_factor: f64,
     /// How often a step is halved before the controller without a model comes back.
@@ -158,6 +174,7 @@ impl Default for IterationSection {
         Self {
             trajectory: None,
             motion: MotionChoice::default(),
+            held_out: None,
             leg: Vec::new(),
             order: LegOrder::default(),
             robot: RobotChoice::default(),
@@ -176,6 +193,9 @@ impl Default for IterationSection {
             envelope: EnvelopeSettings::default(),
             rehearsal: RehearsalSettings::default(),
             speed_steps: Vec::new(),
+            home: None,
+            approach_speed: 0.2,
+            warm_up_s: 0.0,
             rate_hz: None,
             worse_factor,
             most_halvings,
@@ -204,7 +224,11 @@ impl IterationSection {
             DifferentiatorKey::Stated(stated) => (stated.clone(), false),
         };
         differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
-        let IdentificationSettings { mut estimation, consistency, mut friction, .. } = identification;
+        let IdentificationSettings { mut estimation, consistency, mut friction, offsets, .. } = identification;
+        let run_offsets = match offsets {
+            OffsetChoice::Shared => RunOffsets::WhereSeen,
+            OffsetChoice::PerLog => RunOffsets::PerRun,
+        };
         // A controller is to have the friction that the study states, unless a key says otherwise.
         friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
@@ -234,6 +258,7 @@ impl IterationSection {
                 friction,
                 consistency: consistency.filter(|_| !self.literal),
                 payloads: study.payloads(),
+                run_offsets,
             },
             start: self.start.unwrap_or_default(),
             first: self.first.clone(),

@@ -3,8 +3,9 @@
 use super::{IterationSection, RobotChoice, Study};
 use crate::error::StudyError;
 use crate::study::StudyRobot;
+use dynident_excitation::limits::Limits;
 use dynident_iteration::robot::{EnvelopeSettings, ProcessLimits, ProcessMode};
-use dynident_iteration::{IterationSettings, SafetySettings, StartWith, derived_controllers};
+use dynident_iteration::{HomeSettings, IterationSettings, SafetySettings, StartWith, derived_controllers};
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Reference};
 
@@ -68,7 +69,7 @@ impl IterationSection {
     pub(crate) fn guarded(
         &self,
         mut settings: IterationSettings,
-        study: &Study,
+        (study, limits): (&Study, Limits),
         robot: &StudyRobot,
         references: &[&Reference],
     ) -> Result<IterationSettings, StudyError> {
@@ -104,13 +105,51 @@ impl IterationSection {
             envelope: (outside || stated).then(|| self.envelope.envelope(model)).transpose()?,
             rehearsal: outside.then(|| self.rehearsal.clone()),
             speed_steps: self.speed_steps.clone(),
+            warm_up_s: self.warm_up_s,
+            home: self.home_settings(robot, limits)?,
         };
-        settings.safety.validate()?;
+        settings.safety.validate(model.dof())?;
         Ok(settings)
     }
 
-    /// The section without what a run does not depend on: who speaks for the robot, how long that may take, and what
-    /// stops it. Runs made before these were corrected are still this iteration's.
+    /// That somebody is there to be asked for passes along the motion.
+    ///
+    /// # Errors
+    /// A folder: a call makes one run there, and its person knows how warm the robot is.
+    pub(crate) fn check_warm_up(&self) -> Result<(), StudyError> {
+        let folder = matches!(self.robot, RobotChoice::Folder(_));
+        if folder && self.warm_up_s != 0.0 {
+            let fix = "behind a folder every run is a call of its own: run trajectory.csv some minutes without a log before you log it, and take the key out";
+            return Err(StudyError::conflict("warm_up_s", fix));
+        }
+        Ok(())
+    }
+
+    /// Where the robot waits, and what the ways from there keep.
+    ///
+    /// # Errors
+    /// A posture that is none; legs that hold joints locked.
+    pub(crate) fn home_settings(&self, robot: &StudyRobot, limits: Limits) -> Result<Option<HomeSettings>, StudyError> {
+        let Some(home) = &self.home else { return Ok(None) };
+        let (named, joints) = (home.named("home", robot.model())?, robot.model().joints());
+        if let Some((joint, _)) = joints.iter().zip(&named).find(|(_, position)| position.is_none()) {
+            let fix = "the robot waits in one posture: give the position of every joint, rad (m)";
+            return Err(StudyError::missing(format!("home.{}", joint.name), fix));
+        }
+        if !self.is_outside() && self.leg.iter().any(|leg| leg.locked && !leg.hold.is_empty()) {
+            let fix = "the simulator locks held joints where a run begins: give the legs locked = false, or no home";
+            return Err(StudyError::conflict("home", fix));
+        }
+        Ok(Some(HomeSettings {
+            posture: named.into_iter().flatten().collect(),
+            speed: self.approach_speed,
+            limits,
+            uncertainty_percent: self.rehearsal.uncertainty_percent,
+        }))
+    }
+
+    /// The section without what a run does not depend on: who speaks for the robot, how long that may take, what stops
+    /// it, and where a robot outside waits. Runs made before these were corrected are still this iteration's.
     pub(crate) fn of_runs(&self) -> Self {
         let mut own = self.clone();
         match &mut own.robot {
@@ -123,6 +162,10 @@ impl IterationSection {
             RobotChoice::Folder(folder) => folder.wait_s = 0.0,
         }
         own.envelope = EnvelopeSettings::default();
+        // A robot outside is moved to another place, or at another speed, or warmed up longer; its motion is the same.
+        if self.is_outside() {
+            (own.home, own.approach_speed, own.warm_up_s) = (None, Self::default().approach_speed, 0.0);
+        }
         own
     }
 }

@@ -1,0 +1,122 @@
+//! A motion is commanded: prepared, allowed, run, and what it came to.
+
+use crate::before_motion::{Commanded, next_motion, rehearsed, ways_of};
+use crate::error::IterationError;
+use crate::home::{FoundWays, HomeError};
+use crate::iteration::Iteration;
+use crate::leg::IterationTask;
+use crate::policy::RunPlan;
+use crate::record::RunRecord;
+use crate::rehearsal::Rehearsal;
+use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
+use crate::status::IterationStatus;
+use crate::supervision::Supervisor;
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
+use std::time::Instant;
+
+/// What a plan is run with, looked at beforehand.
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    pub(crate) controller: ControllerSettings,
+    model: Option<ControllerModel>,
+    /// Of each leg.
+    pub(crate) ways: Vec<Option<FoundWays>>,
+    pub(crate) rehearsal: Option<Rehearsal>,
+}
+
+/// What a motion came to.
+pub(crate) enum Came {
+    /// A run, done or not.
+    Run(RobotRun),
+    /// The iteration ends here.
+    Stopped(IterationStatus),
+    /// A stop was asked for: what was recorded of the motion, if it had begun, and how it ended.
+    Interrupted(Option<RobotRun>, String),
+}
+
+impl Iteration {
+    /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded.
+    pub(crate) fn prepared(
+        &self,
+        task: &IterationTask,
+        plan: &RunPlan,
+        before: &[RunRecord],
+    ) -> Result<Result<Prepared, IterationStatus>, IterationError> {
+        let settings = self.settings();
+        let controller = plan.controller(settings);
+        let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
+        let robot = self.robot(before)?;
+        let refused = |why: &dyn core::fmt::Display| {
+            let reason = format!("run {} is not commanded: {why}", plan.run);
+            Ok(Err(IterationStatus::Refused { reason }))
+        };
+        let ways = match ways_of(task, settings) {
+            Ok(ways) => ways,
+            Err(HomeError::Numbers(error)) => return Err(error.into()),
+            Err(none) => return refused(&none),
+        };
+        let with = (plan, &controller, model.as_ref());
+        match rehearsed(task, settings, &robot, with, &ways, before)? {
+            Ok(rehearsal) => Ok(Ok(Prepared { controller, model, ways, rehearsal })),
+            Err(failure) => refused(&failure),
+        }
+    }
+
+    /// Commands one motion of a plan, if nobody stops it and somebody who is asked allows it.
+    pub(crate) fn commanded(
+        &self,
+        robot: &mut dyn Robot,
+        (task, plan, prepared): (&IterationTask, &RunPlan, &Prepared),
+        motion: &Commanded<'_>,
+        supervisor: &mut dyn Supervisor,
+        last_motion: &mut Option<Instant>,
+    ) -> Result<Came, IterationError> {
+        let Commanded { place, leg, speed, purpose, .. } = *motion;
+        let Prepared { controller, model, ways, rehearsal } = prepared;
+        // Numbers of runs differ from leg to leg: noise and folders go by them.
+        let run = (plan.run - 1) * task.legs.len() + place + 1;
+        let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
+        let reference = slow.as_ref().unwrap_or(leg.reference());
+        let found = ways[place].as_ref();
+        let own = found.map(|found| if speed < 1.0 { found.ways.slowed(speed) } else { Ok(found.ways.clone()) });
+        let own = own.transpose()?;
+        let stop = supervisor.stop().cloned();
+        let stop_requested = || stop.as_ref().is_some_and(StopSignal::is_requested);
+        if stop_requested() {
+            return Ok(Came::Interrupted(None, "between two runs".to_owned()));
+        }
+        let mut shown = next_motion(task, (plan, controller), (motion, reference), own.as_ref().zip(found));
+        shown.rehearsal.clone_from(rehearsal);
+        if !supervisor.allows(&shown) {
+            if stop_requested() {
+                return Ok(Came::Interrupted(None, "before a run".to_owned()));
+            }
+            let reason = format!("run {} was not allowed", plan.run);
+            return Ok(Came::Stopped(IterationStatus::Waiting { reason }));
+        }
+        let came = robot.run(&RunRequest {
+            model: model.as_ref(),
+            envelope: self.settings().safety.envelope.as_ref(),
+            stop: stop.as_ref(),
+            speed,
+            purpose,
+            ways: own.as_ref(),
+            ..RunRequest::new(run, reference, controller)
+        })?;
+        *last_motion = Some(Instant::now());
+        Ok(match &came.status {
+            RobotStatus::Waiting { .. } => Came::Stopped(IterationStatus::Waiting { reason: came.status.to_string() }),
+            RobotStatus::Failed { fault } => {
+                Came::Stopped(IterationStatus::Refused { reason: format!("run {}: {fault}", plan.run) })
+            }
+            RobotStatus::Interrupted { .. } => {
+                let how = came.status.to_string();
+                Came::Interrupted(Some(came), how)
+            }
+            RobotStatus::Done
+            | RobotStatus::Simulated { .. }
+            | RobotStatus::Stopped { .. }
+            | RobotStatus::LeftEnvelope { .. } => Came::Run(came),
+        })
+    }
+}

@@ -1,0 +1,466 @@
+//! Where the robot waits between runs, and the ways from there to a motion and back.
+
+use crate::robot::{Envelope, Ways};
+use dynident_excitation::Motion;
+use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, check_limits};
+use dynident_excitation::limits::{LimitError, LimitKind, LimitSet, Limits};
+use dynident_model::Model;
+use dynident_model::sample::Random;
+use dynident_simulation::{Reference, SimulationError, require, require_length};
+use thiserror::Error;
+
+/// Postures in between that are tried where the straight way is not clear, and pairs of them.
+const POSTURES_TRIED: usize = 500;
+const PAIRS_TRIED: usize = 5000;
+
+/// Seed of these postures: the same ways again whenever an iteration is taken up.
+const SEED: u64 = 1;
+
+/// Places of a straight piece that are looked at before it is checked as a whole.
+const PLACES: usize = 60;
+
+/// A motion begins or ends at rest if its own highest acceleration stops every joint within so many samples: the last
+/// sample of a trajectory need not be its very end.
+const AT_REST: f64 = 2.0;
+
+/// A way is a whole number of so many samples long, so that a log at a lower rate begins with the motion.
+const WHOLE_SAMPLES: f64 = 100.0;
+
+/// Where the robot waits, and how it comes to a motion from there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HomeSettings {
+    /// The posture, rad (m), joint by joint in the model's order.
+    pub posture: Vec<f64>,
+    /// Share of the velocity and acceleration limits that the ways have; see [`ways`](Self::ways). By default 0.2 in
+    /// studies.
+    pub speed: f64,
+    /// What the ways keep: joints, floor, distances of links. Torque is that of the nominal model.
+    pub limits: Limits,
+    /// How much larger than the nominal model's the torque may be, percent: it is kept below its limit by that.
+    pub uncertainty_percent: f64,
+}
+
+/// Why there is no way.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum HomeError {
+    /// Nothing says how fast a joint may move.
+    #[error(
+        "joint {joint} has to be moved from home and has no velocity limit (nor does the motion move it): state one in [design.limits]"
+    )]
+    NoSpeed {
+        /// The joint.
+        joint: String,
+    },
+    /// A motion that is entered or left at speed.
+    #[error(
+        "the motion {} at {speed:.3} rad/s (m/s) of joint {joint}, and ways from and to home are from rest to rest: give a motion that begins and ends at rest",
+        if *.begins { "begins" } else { "ends" }
+    )]
+    NotAtRest {
+        /// The joint.
+        joint: String,
+        /// Its velocity there.
+        speed: f64,
+        /// Whether it is the begin.
+        begins: bool,
+    },
+    /// A posture itself is not clear.
+    #[error("{posture} itself breaks the limit of {kind} of {subject} (ratio {ratio:.3}, 1 is the limit): {fix}")]
+    Posture {
+        /// Which posture.
+        posture: &'static str,
+        /// What is limited.
+        kind: LimitKind,
+        /// Of which joint, point or pair of links.
+        subject: String,
+        /// 1 on the limit.
+        ratio: f64,
+        /// What to do.
+        fix: &'static str,
+    },
+    /// No way was found.
+    #[error(
+        "no clear way between home and {posture} was found: the straight one breaks the limit of {kind} of {subject} {:.0} % on its way (ratio {ratio:.3}, 1 is the limit), and so do those over one or two of {tried} random postures in between; give another home, or a start_posture of [design] that is nearer",
+        100.0 * .share
+    )]
+    NotClear {
+        /// The posture at the other end.
+        posture: &'static str,
+        /// What is limited.
+        kind: LimitKind,
+        /// Of which joint, point or pair of links.
+        subject: String,
+        /// Where on the straight way from home, 0 to 1.
+        share: f64,
+        /// 1 on the limit.
+        ratio: f64,
+        /// Random postures that were tried.
+        tried: usize,
+    },
+    /// Limits that cannot be.
+    #[error(transparent)]
+    Limits(#[from] LimitError),
+    /// Numbers that do not fit.
+    #[error(transparent)]
+    Numbers(#[from] SimulationError),
+}
+
+/// The ways to a motion and back, and over which postures each goes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundWays {
+    /// The ways.
+    pub ways: Ways,
+    /// Postures in between, rad (m), in order from home: none where the way is straight.
+    pub over: [Vec<Vec<f64>>; 2],
+}
+
+impl HomeSettings {
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// A posture of other joints, a speed that is no share.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        require_length("home", joints, self.posture.len())?;
+        for &q in &self.posture {
+            require(q.is_finite(), "home", q, "give finite positions, rad (m)")?;
+        }
+        let speed = self.speed;
+        require(speed > 0.0 && speed <= 1.0, "approach_speed", speed, "give a share of the limits: above 0, at most 1")
+    }
+
+    /// The ways from home to the begin of `motion`, and from its end home. Each is a quintic from rest to rest, without
+    /// acceleration at its ends, straight in the space of joints, in which every joint has at most the share
+    /// [`speed`](Self::speed) of its velocity and acceleration limits (and of the envelope's velocity); where one is
+    /// not limited, of the highest that the motion itself has. Where the straight way breaks a limit it goes over one
+    /// or two postures in between, the first of 500 random ones (with the same seed always) over which it does not, at
+    /// rest in each. All limits are looked at by [`check_limits`]. A robot that is there already has a way of one
+    /// sample.
+    ///
+    /// # Errors
+    /// Why there is no way; nothing has moved then.
+    pub fn ways(&self, model: &Model, motion: &Reference, envelope: Option<&Envelope>) -> Result<FoundWays, HomeError> {
+        self.validate(model.dof())?;
+        require_length("joints of the motion", model.dof(), motion.joints())?;
+        let planner = Planner::new(self, model, motion, envelope)?;
+        let samples = motion.samples();
+        let posture = |sample: usize| -> Vec<f64> {
+            (0..motion.joints()).map(|joint| motion.motion().q[joint * samples + sample]).collect()
+        };
+        planner.at_rest(motion, 0)?;
+        planner.at_rest(motion, samples - 1)?;
+        planner.clear_posture(
+            &self.posture,
+            "home",
+            "give another home, or say in [design] what is in the way (limits; defaults, as floor = false)",
+        )?;
+        let (first, last) = (posture(0), posture(samples - 1));
+        let (there, over_there) = planner.way(&first, "the motion's first posture")?;
+        let (home, over_home) = if last == first {
+            (there.clone(), over_there.clone())
+        } else {
+            planner.way(&last, "the motion's last posture")?
+        };
+        let approach = Reference::new(motion.rate_hz(), there)?;
+        let back = Reference::new(motion.rate_hz(), backwards(&home))?;
+        Ok(FoundWays { ways: Ways { approach, back }, over: [over_there, over_home] })
+    }
+}
+
+/// The same path the other way.
+fn backwards(motion: &Motion) -> Motion {
+    let turned = |values: &[f64], sign: f64| -> Vec<f64> {
+        values
+            .chunks_exact(motion.samples.max(1))
+            .flat_map(|own| own.iter().rev().map(move |value| sign * value))
+            .collect()
+    };
+    Motion {
+        samples: motion.samples,
+        joints: motion.joints,
+        q: turned(&motion.q, 1.0),
+        dq: turned(&motion.dq, -1.0),
+        ddq: turned(&motion.ddq, 1.0),
+        dddq: turned(&motion.dddq, -1.0),
+    }
+}
+
+/// What ways are made with.
+struct Planner<'a> {
+    home: &'a HomeSettings,
+    model: &'a Model,
+    rate_hz: f64,
+    /// Highest velocity and acceleration of each joint on a way; none where nothing says.
+    fastest: Vec<Option<[f64; 2]>>,
+    /// With what the nominal model does not know taken off the torque.
+    limits: Limits,
+    set: LimitSet,
+}
+
+impl<'a> Planner<'a> {
+    fn new(
+        home: &'a HomeSettings,
+        model: &'a Model,
+        motion: &Reference,
+        envelope: Option<&Envelope>,
+    ) -> Result<Self, HomeError> {
+        let mut limits = home.limits.clone();
+        for limit in &mut limits.joints {
+            limit.torque = limit.torque.map(|torque| torque / (1.0 + 0.01 * home.uncertainty_percent));
+        }
+        let own = motion.motion();
+        let highest = |values: &[f64], joint: usize| {
+            values[own.of(joint)].iter().fold(0.0_f64, |most, value| most.max(value.abs()))
+        };
+        let some = |value: f64| Some(value).filter(|value| *value > 0.0);
+        let fastest = model.joints().iter().enumerate().map(|(place, joint)| {
+            let limit = limits.of(&joint.name);
+            let stated = limit.and_then(|limit| limit.speed);
+            let watched = envelope.and_then(|envelope| envelope.speed[place]);
+            let speed = stated.into_iter().chain(watched).reduce(f64::min);
+            let acceleration = limit.and_then(|limit| limit.acceleration);
+            let speed = speed.or_else(|| some(highest(&own.dq, place)))?;
+            // Without either the speed is reached as in a design's default: after 0.2 rad (m) from rest.
+            let acceleration = acceleration.or_else(|| some(highest(&own.ddq, place))).unwrap_or(2.5 * speed * speed);
+            Some([home.speed * speed, home.speed * acceleration])
+        });
+        let fastest = fastest.collect();
+        let set = LimitSet::new(&limits, model)?;
+        Ok(Self { home, model, rate_hz: motion.rate_hz(), fastest, limits, set })
+    }
+
+    /// That the motion stands still at a sample.
+    fn at_rest(&self, motion: &Reference, sample: usize) -> Result<(), HomeError> {
+        let own = motion.motion();
+        for (place, joint) in self.model.joints().iter().enumerate() {
+            let hardest = own.ddq[own.of(place)].iter().fold(0.0_f64, |most, ddq| most.max(ddq.abs()));
+            let speed = own.dq[own.of(place)][sample].abs();
+            if speed > AT_REST * hardest / self.rate_hz {
+                return Err(HomeError::NotAtRest { joint: joint.name.clone(), speed, begins: sample == 0 });
+            }
+        }
+        Ok(())
+    }
+
+    fn clear_posture(&self, q: &[f64], posture: &'static str, fix: &'static str) -> Result<(), HomeError> {
+        let standing = self.piece(q, q)?;
+        if let Some(broken) = self.broken(&standing)? {
+            let LimitReport { kind, joint: subject, worst_ratio: ratio, .. } = broken;
+            return Err(HomeError::Posture { posture, kind, subject, ratio, fix });
+        }
+        Ok(())
+    }
+
+    /// A way from home to a posture, and over which others.
+    fn way(&self, to: &[f64], posture: &'static str) -> Result<(Motion, Vec<Vec<f64>>), HomeError> {
+        let fix = "the motion breaks it, too: give another one, or say in [design] what is in the way (limits; defaults, as floor = false)";
+        self.clear_posture(to, posture, fix)?;
+        let from = &self.home.posture;
+        let straight = self.piece(from, to)?;
+        let Some(broken) = self.broken(&straight)? else { return Ok((straight, Vec::new())) };
+        // Postures that are seen from home, and from the other end: over one of both, or over one of each.
+        let (mut from_home, mut to_end): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+        let mut random = Random::new(SEED);
+        let mut pairs = 0;
+        for tried in 0..POSTURES_TRIED {
+            let middle = self.between(from, to, tried, &mut random);
+            let ends = [self.sees(from, &middle)?, self.sees(&middle, to)?];
+            let mut over = Vec::new();
+            match ends {
+                [true, true] => over.push(vec![middle.clone()]),
+                [true, false] => over.extend(to_end.iter().map(|last| vec![middle.clone(), last.clone()])),
+                [false, true] => over.extend(from_home.iter().map(|first| vec![first.clone(), middle.clone()])),
+                [false, false] => {}
+            }
+            for over in over {
+                if let [first, last] = &over[..] {
+                    pairs += 1;
+                    if pairs > PAIRS_TRIED || !self.sees(first, last)? {
+                        continue;
+                    }
+                }
+                let way = self.over(from, &over, to)?;
+                if self.broken(&way)?.is_none() {
+                    return Ok((way, over));
+                }
+            }
+            if ends[0] {
+                from_home.push(middle);
+            } else if ends[1] {
+                to_end.push(middle);
+            }
+        }
+        let LimitReport { kind, joint: subject, worst_ratio: ratio, at_s, .. } = broken;
+        let share = at_s * self.rate_hz / (straight.samples - 1).max(1) as f64;
+        Err(HomeError::NotClear { posture, kind, subject, share, ratio, tried: POSTURES_TRIED })
+    }
+
+    /// The way from one posture over others, at rest in each.
+    fn over(&self, from: &[f64], over: &[Vec<f64>], to: &[f64]) -> Result<Motion, HomeError> {
+        let mut way = self.piece(from, from)?;
+        let mut last = from;
+        for next in over.iter().map(Vec::as_slice).chain([to]) {
+            way = joined(&way, &self.piece(last, next)?);
+            last = next;
+        }
+        Ok(way)
+    }
+
+    /// Whether the straight way between two postures looks clear.
+    fn sees(&self, from: &[f64], to: &[f64]) -> Result<bool, HomeError> {
+        Ok(self.looks_clear(&self.piece(from, to)?))
+    }
+
+    /// A posture to go over: first about the way itself, then farther and farther from it, within the limits of
+    /// position, or a turn (1 m) to either side.
+    fn between(&self, from: &[f64], to: &[f64], tried: usize, random: &mut Random) -> Vec<f64> {
+        let reach = (tried + 1) as f64 / POSTURES_TRIED as f64;
+        let joints = self.model.joints().iter().enumerate();
+        let one = |(place, joint): (usize, &dynident_model::Joint)| {
+            let free = if joint.turns() { core::f64::consts::PI } else { 1.0 };
+            let position = self.limits.of(&joint.name).and_then(|limit| limit.position);
+            let [low, high] = [from[place].min(to[place]), from[place].max(to[place])];
+            let [lowest, highest] = position.unwrap_or([low - free, high + free]);
+            let (low, high) = (low - reach * (low - lowest).max(0.0), high + reach * (highest - high).max(0.0));
+            random.uniform(low, high)
+        };
+        joints.map(one).collect()
+    }
+
+    /// A quintic from rest to rest; one sample where there is nothing to move.
+    fn piece(&self, from: &[f64], to: &[f64]) -> Result<Motion, HomeError> {
+        let mut duration_s = 0.0_f64;
+        for (place, joint) in self.model.joints().iter().enumerate() {
+            let way = (to[place] - from[place]).abs();
+            if way == 0.0 {
+                continue;
+            }
+            let Some([speed, acceleration]) = self.fastest[place] else {
+                return Err(HomeError::NoSpeed { joint: joint.name.clone() });
+            };
+            duration_s = duration_s.max(FASTEST * way / speed).max((HARDEST * way / acceleration).sqrt());
+            if let Some(jerk) = self.limits.of(&joint.name).and_then(|limit| limit.jerk) {
+                duration_s = duration_s.max((60.0 * way / (self.home.speed * jerk)).cbrt());
+            }
+        }
+        let periods = (duration_s * self.rate_hz / WHOLE_SAMPLES).ceil() * WHOLE_SAMPLES;
+        require(periods < 1e8, "length of the way home, samples", periods, "give a larger approach_speed")?;
+        let periods = periods as usize;
+        let mut motion = Motion::default();
+        motion.reset(from.len(), periods + 1);
+        for joint in 0..from.len() {
+            for sample in 0..=periods {
+                let at = joint * (periods + 1) + sample;
+                let x = sample as f64 / periods.max(1) as f64;
+                let [share, first, second, third] = quintic(x);
+                let (way, per_s) = (to[joint] - from[joint], self.rate_hz / periods.max(1) as f64);
+                // Exactly where it is to be at both ends.
+                motion.q[at] = if sample == periods { to[joint] } else { from[joint] + share * way };
+                motion.dq[at] = first * way * per_s;
+                motion.ddq[at] = second * way * per_s * per_s;
+                motion.dddq[at] = third * way * per_s.powi(3);
+            }
+        }
+        Ok(motion)
+    }
+
+    /// Whether no limit is broken at some places of a piece: quick, and no proof.
+    fn looks_clear(&self, piece: &Motion) -> bool {
+        let mut some = Motion::default();
+        some.reset(piece.joints, PLACES);
+        for joint in 0..piece.joints {
+            for place in 0..PLACES {
+                let sample = place * (piece.samples - 1) / (PLACES - 1);
+                let (to, from) = (joint * PLACES + place, joint * piece.samples + sample);
+                (some.q[to], some.dq[to]) = (piece.q[from], piece.dq[from]);
+                (some.ddq[to], some.dddq[to]) = (piece.ddq[from], piece.dddq[from]);
+            }
+        }
+        let mut values = Vec::new();
+        self.set.values(&mut self.set.workspace(), &some, &mut values);
+        values.iter().all(|value| *value <= 0.0)
+    }
+
+    /// The limit that a way breaks worst, if it breaks one. It is looked at as often as a motion is by the rate of such
+    /// checks: so much more rarely as it is slower, never more rarely than its own samples.
+    fn broken(&self, way: &Motion) -> Result<Option<LimitReport>, HomeError> {
+        let check_hz = self.home.speed * self.model.own_scale().round_hertz(CHECK_RATE_HZ);
+        let rate_hz = check_hz.max(self.rate_hz);
+        // A posture is looked at once.
+        let duration_s = ((way.samples - 1) as f64 / self.rate_hz).max(1.0 / rate_hz);
+        let at = |times: &[f64], out: &mut Motion| {
+            out.reset(way.joints, times.len());
+            for (place, time_s) in times.iter().enumerate() {
+                let sample = (time_s * self.rate_hz).clamp(0.0, (way.samples - 1) as f64);
+                let (from, share) = (sample.floor() as usize, sample.fract());
+                let next = (from + 1).min(way.samples - 1);
+                for joint in 0..way.joints {
+                    let (to, of) = (joint * times.len() + place, joint * way.samples);
+                    let between = |values: &[f64]| values[of + from] + share * (values[of + next] - values[of + from]);
+                    (out.q[to], out.dq[to]) = (between(&way.q), between(&way.dq));
+                    (out.ddq[to], out.dddq[to]) = (between(&way.ddq), between(&way.dddq));
+                }
+            }
+        };
+        let reports = check_limits(&self.limits, self.model, duration_s, rate_hz, at)?;
+        let broken = reports.into_iter().filter(|report| report.violated);
+        Ok(broken.max_by(|a, b| a.worst_ratio.total_cmp(&b.worst_ratio)))
+    }
+}
+
+/// Highest velocity and acceleration of the quintic over the way and over time 1.
+const FASTEST: f64 = 1.875;
+const HARDEST: f64 = 5.773_502_691_896_258;
+
+/// `10 x³ - 15 x⁴ + 6 x⁵` with its first three derivatives: from 0 to 1 without velocity and acceleration at both ends.
+fn quintic(x: f64) -> [f64; 4] {
+    let y = 1.0 - x;
+    [
+        x.powi(3) * (10.0 - 15.0 * x + 6.0 * x * x),
+        30.0 * x * x * y * y,
+        60.0 * x * y * (y - x),
+        60.0 * (1.0 - 6.0 * x + 6.0 * x * x),
+    ]
+}
+
+/// One piece after the other; the posture between them stands there once.
+fn joined(first: &Motion, second: &Motion) -> Motion {
+    let mut both = Motion::default();
+    both.reset(first.joints, first.samples + second.samples - 1);
+    let parts = [
+        (&first.q, &second.q, &mut both.q),
+        (&first.dq, &second.dq, &mut both.dq),
+        (&first.ddq, &second.ddq, &mut both.ddq),
+        (&first.dddq, &second.dddq, &mut both.dddq),
+    ];
+    let samples = both.samples;
+    for (one, two, out) in parts {
+        for joint in 0..first.joints {
+            let own = &mut out[joint * samples..(joint + 1) * samples];
+            own[..first.samples].copy_from_slice(&one[joint * first.samples..(joint + 1) * first.samples]);
+            own[first.samples..].copy_from_slice(&two[joint * second.samples + 1..(joint + 1) * second.samples]);
+        }
+    }
+    both
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The highest velocity is in the middle, the highest acceleration at (3 - √3) / 6; central differences agree.
+    #[test]
+    fn the_quintic_and_its_peaks() {
+        assert_eq!(quintic(0.0)[..3], [0.0; 3]);
+        assert!(quintic(1.0).iter().zip([1.0, 0.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-15));
+        assert!((quintic(0.5)[1] - FASTEST).abs() < 1e-15);
+        assert!((quintic((3.0 - 3.0_f64.sqrt()) / 6.0)[2] - HARDEST).abs() < 1e-12);
+        for k in 1..20 {
+            let (x, h) = (f64::from(k) / 20.0, 1e-5);
+            for order in 0..3 {
+                let slope = (quintic(x + h)[order] - quintic(x - h)[order]) / (2.0 * h);
+                assert!((slope - quintic(x)[order + 1]).abs() < 1e-6, "{x}, {order}");
+            }
+        }
+    }
+}

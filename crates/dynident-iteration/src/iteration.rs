@@ -1,0 +1,193 @@
+//! What an iteration is: a task, its settings, and what follows from the records of its runs.
+
+use crate::convergence::{Names, Shortfall, shortfalls};
+use crate::error::IterationError;
+use crate::estimate::RunEstimate;
+use crate::held_out_motion::HeldOutMotion;
+use crate::leg::{IterationTask, Leg};
+use crate::model_parameters::ModelParameters;
+use crate::parameter_shares::parameter_shares;
+use crate::planner::MotionPlanner;
+use crate::policy::{self, Next};
+use crate::record::RunRecord;
+use crate::run_motion::legs_along;
+use crate::settings::{IterationSettings, RunIdentificationSettings};
+use crate::status::IterationStatus;
+use dynident_dynamics::ParametricModel;
+use dynident_identification::friction::chosen_model;
+use dynident_simulation::SimulationError;
+use dynident_simulation::controllers::ControllerModel;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// A torque this much above a limit is no matter of rounding or of the model's last digits.
+const BEYOND: f64 = 1.001;
+
+/// A task with its settings: what [`iterate()`](crate::iterate()) does.
+#[derive(Clone, Debug)]
+pub struct Iteration {
+    pub(crate) task: IterationTask,
+    pub(crate) settings: IterationSettings,
+    pub(crate) planner: Option<Arc<dyn MotionPlanner>>,
+    pub(crate) held_out: Option<HeldOutMotion>,
+}
+
+impl Iteration {
+    /// The iteration of a task.
+    ///
+    /// # Errors
+    /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
+    pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
+        task.validate()?;
+        settings.validate(task.robot.dof())?;
+        Ok(Self { task, settings, planner: None, held_out: None })
+    }
+
+    /// The same with motions that are planned from what is known, in place of the task's in every run.
+    #[must_use]
+    pub fn with_planner(mut self, planner: Arc<dyn MotionPlanner>) -> Self {
+        self.planner = Some(planner);
+        self
+    }
+
+    /// The task.
+    pub fn task(&self) -> &IterationTask {
+        &self.task
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &IterationSettings {
+        &self.settings
+    }
+
+    /// The legs of a run: the task's, along trajectories of its own where it had some.
+    ///
+    /// # Errors
+    /// A record of another task.
+    pub fn legs_of(&self, record: &RunRecord) -> Result<Cow<'_, [Leg]>, IterationError> {
+        legs_along(&self.task, record.motion.as_ref())
+    }
+
+    /// What comes after these records: it depends on nothing else. Where motions are planned an iteration that has
+    /// converged may still go on for a motion that is worth a run.
+    ///
+    /// # Errors
+    /// Records of another robot.
+    pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
+        let robot = self.robot(records)?;
+        let next = policy::next(records, &self.settings, robot.nominal(), &self.names(&robot, records)?);
+        if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) =
+            next
+            && let Some(reason) = self.beyond_torque(records)?
+        {
+            return Ok(Next::Finished(IterationStatus::Refused { reason }));
+        }
+        Ok(next)
+    }
+
+    /// What is not met after these records; nothing if the iteration has converged.
+    ///
+    /// # Errors
+    /// Records of another robot.
+    pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<Shortfall>, IterationError> {
+        let robot = self.robot(records)?;
+        Ok(shortfalls(records, &self.settings, &self.names(&robot, records)?))
+    }
+
+    /// Names, and how much each parameter counts along the motion of the last run.
+    pub(crate) fn names(&self, robot: &ParametricModel, records: &[RunRecord]) -> Result<Names, IterationError> {
+        let shown = records.last().and_then(|last| Some((last, last.evidence.as_ref()?)));
+        let shares = match shown {
+            Some((last, evidence)) => {
+                let torque_rms: Vec<f64> = evidence.joints.iter().map(|joint| joint.torque_rms).collect();
+                parameter_shares(robot, &self.legs_of(last)?, &torque_rms)
+            }
+            None => Vec::new(),
+        };
+        let most_lag_s = self.settings.settled.most_lag_s(robot.model());
+        Ok(Names {
+            joints: robot.joint_names(),
+            parameters: robot.base().expressions(),
+            shares,
+            most_lag_s,
+            held_out: self.held_out.is_some(),
+        })
+    }
+
+    /// Where the trajectories ask for more torque than the joints have, by the last good model.
+    fn beyond_torque(&self, records: &[RunRecord]) -> Result<Option<String>, IterationError> {
+        let Some(limits) = &self.task.torque_limits else { return Ok(None) };
+        let good = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
+        let Some(parameters) = good.and_then(RunEstimate::for_controller) else { return Ok(None) };
+        let mut model = self.controller_model(records, &parameters)?;
+        let dof = self.task.robot.dof();
+        let mut tau = vec![0.0; dof];
+        let motion = records.last().and_then(|record| record.motion.as_ref());
+        for leg in &*legs_along(&self.task, motion)? {
+            let (motion, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
+            for sample in 0..motion.samples {
+                let at = |values: &[f64]| -> Vec<f64> {
+                    (0..dof).map(|joint| values[joint * motion.samples + sample]).collect()
+                };
+                model.reference_torque(&at(&motion.q), &at(&motion.dq), &at(&motion.ddq), &mut tau);
+                for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
+                    if tau.abs() > limit * BEYOND {
+                        let name = &self.task.robot.model().joints()[joint].name;
+                        return Ok(Some(format!(
+                            "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
+                            tau.abs(),
+                            sample as f64 / rate_hz
+                        )));
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The robot with the friction that a run before chose.
+    ///
+    /// # Errors
+    /// Friction that this robot cannot have: the run is another robot's.
+    pub fn robot(&self, records: &[RunRecord]) -> Result<Cow<'_, ParametricModel>, IterationError> {
+        let choices = records.iter().filter_map(|record| Some((record.run, &record.estimate.as_ref()?.friction)));
+        let Some((run, choice)) = choices.into_iter().find(|(_, choice)| !choice.is_empty()) else {
+            return Ok(Cow::Borrowed(&self.task.robot));
+        };
+        let chosen = chosen_model(&self.task.robot, choice);
+        chosen.map(Cow::Owned).map_err(|source| IterationError::ChosenFriction { run, source })
+    }
+
+    /// The task and how runs are identified, with the friction that a run before chose, if one did.
+    pub(crate) fn in_force(
+        &self,
+        before: &[RunRecord],
+    ) -> Result<(Cow<'_, IterationTask>, Cow<'_, RunIdentificationSettings>), IterationError> {
+        let settings = &self.settings.identification;
+        Ok(match self.robot(before)? {
+            Cow::Borrowed(_) => (Cow::Borrowed(&self.task), Cow::Borrowed(settings)),
+            Cow::Owned(robot) => (
+                Cow::Owned(IterationTask { robot, ..self.task.clone() }),
+                Cow::Owned(RunIdentificationSettings { friction: Vec::new(), ..settings.clone() }),
+            ),
+        })
+    }
+
+    /// The model of a controller with these parameters, after these records.
+    ///
+    /// # Errors
+    /// Parameters of another robot.
+    pub fn controller_model(
+        &self,
+        records: &[RunRecord],
+        parameters: &ModelParameters,
+    ) -> Result<ControllerModel, IterationError> {
+        let robot = self.robot(records)?;
+        Ok(match parameters {
+            ModelParameters::All(values) => ControllerModel::from_parameters(robot.model(), robot.terms(), values)?,
+            ModelParameters::Base(values) => {
+                ControllerModel::from_columns(robot.model(), &robot.base().base_columns(), values)?
+            }
+        })
+    }
+}

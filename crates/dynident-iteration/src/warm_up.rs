@@ -1,0 +1,143 @@
+//! The motion made over and over before a run, so that friction is what it is when the robot works, and what changed
+//! meanwhile.
+
+use crate::home::FoundWays;
+use crate::leg::Leg;
+use crate::safety::SafetySettings;
+use dynident_simulation::{Record, Reference};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// What a warm-up has shown: passes along the run's own motion, of which nothing is fitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct WarmUp {
+    /// How often the motion was made.
+    pub passes: usize,
+    /// Length of all passes together, with the ways from home and back, s.
+    pub duration_s: f64,
+    /// For each pass the mean power that all joints lost, W: `Σ ∫τ q̇ dt` over the time. Of a motion that returns to
+    /// where it began this is what friction takes, whatever the bodies are.
+    pub lost_power_w: Vec<f64>,
+    /// For each pass and joint the mean torque in the direction of motion, Nm (N): `∫τ q̇ dt / ∫|q̇| dt`. What joints
+    /// give each other is in it, in every pass the same: its change is that of friction. Zero for a joint that rests.
+    pub friction_torque: Vec<Vec<f64>>,
+}
+
+impl WarmUp {
+    /// By how much the last pass lost more power than the first, percent of the first; none of a single pass.
+    pub fn change_percent(&self) -> Option<f64> {
+        let [first, .., last] = self.lost_power_w[..] else { return None };
+        (first != 0.0).then(|| 100.0 * (last - first) / first.abs())
+    }
+
+    /// The same of the last pass and the one before: what is still going on.
+    pub fn last_change_percent(&self) -> Option<f64> {
+        let [.., before, last] = self.lost_power_w[..] else { return None };
+        (before != 0.0).then(|| 100.0 * (last - before) / before.abs())
+    }
+
+    /// The joint whose mean friction torque changed most from the first pass to the last, by its place, and by how
+    /// much, Nm (N).
+    pub fn largest_change(&self) -> Option<(usize, f64)> {
+        let [first, .., last] = &self.friction_torque[..] else { return None };
+        let changes = first.iter().zip(last).map(|(first, last)| last - first).enumerate();
+        changes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    /// In words, with the joints' names.
+    pub fn sentence(&self, joints: &[String]) -> String {
+        let Self { passes, duration_s, lost_power_w, .. } = self;
+        let times = if *passes == 1 { "once".to_owned() } else { format!("{passes} times") };
+        let mut text = format!("warmed up with its motion {times}, {duration_s:.0} s");
+        if let (Some(change), Some(last_change)) = (self.change_percent(), self.last_change_percent())
+            && let [first, .., last] = lost_power_w[..]
+        {
+            text += &format!(
+                ": friction took {first:.3} W in the first pass and {last:.3} W in the last ({change:+.1} %; {last_change:+.1} % with the last alone)"
+            );
+        }
+        if let Some((joint, change)) = self.largest_change() {
+            let name = joints.get(joint).map_or_else(|| format!("joint {}", joint + 1), Clone::clone);
+            text += &format!(", most at {name}: {change:+.3} Nm");
+        }
+        text
+    }
+}
+
+/// How often the motion is made before the next run: not at all where the robot has moved within the time that a
+/// warm-up takes, and as often as fills that time otherwise.
+pub(crate) fn passes(
+    safety: &SafetySettings,
+    (legs, ways): (&[Leg], &[Option<FoundWays>]),
+    last_motion: Option<Instant>,
+) -> usize {
+    let wanted_s = safety.warm_up_s;
+    if wanted_s == 0.0 || last_motion.is_some_and(|last| last.elapsed().as_secs_f64() <= wanted_s) {
+        return 0;
+    }
+    (wanted_s / pass_s(legs, ways).max(f64::MIN_POSITIVE)).ceil().max(1.0) as usize
+}
+
+/// Length of one pass, s.
+fn pass_s(legs: &[Leg], ways: &[Option<FoundWays>]) -> f64 {
+    let motions: f64 = legs.iter().map(|leg| leg.reference().duration_s()).sum();
+    let ways = ways.iter().flatten().map(|found| &found.ways);
+    motions + ways.map(|ways| ways.approach.duration_s() + ways.back.duration_s()).sum::<f64>()
+}
+
+/// Work and way of each joint, pass by pass.
+#[derive(Debug)]
+pub(crate) struct WarmUpWatch {
+    pass_s: f64,
+    passes: Vec<Pass>,
+}
+
+#[derive(Debug)]
+struct Pass {
+    work: Vec<f64>,
+    way: Vec<f64>,
+    duration_s: f64,
+}
+
+impl WarmUpWatch {
+    pub(crate) fn new(legs: &[Leg], ways: &[Option<FoundWays>]) -> Self {
+        Self { pass_s: pass_s(legs, ways), passes: Vec::new() }
+    }
+
+    /// Takes the record of a leg in a pass, counted from 1. A torque that is held from sample to sample does the work
+    /// `τ Δq`, whatever the joint does in between; the way is that of the motion itself, which has no noise.
+    pub(crate) fn add(&mut self, pass: usize, reference: &Reference, record: &Record) {
+        let joints = record.joints.len();
+        while self.passes.len() < pass {
+            self.passes.push(Pass { work: vec![0.0; joints], way: vec![0.0; joints], duration_s: 0.0 });
+        }
+        let Some(own) = self.passes.last_mut() else { return };
+        let last = reference.samples() - 1;
+        for sample in 0..record.samples.saturating_sub(1) {
+            let step_s = record.times_s[sample + 1] - record.times_s[sample];
+            let place = ((record.times_s[sample] * reference.rate_hz()).round().max(0.0) as usize).min(last);
+            for joint in 0..joints {
+                let dq = reference.motion().dq[joint * reference.samples() + place];
+                let at = joint * record.samples + sample;
+                own.work[joint] += record.tau[at] * (record.q[at + 1] - record.q[at]);
+                own.way[joint] += dq.abs() * step_s;
+            }
+            own.duration_s += step_s;
+        }
+    }
+
+    /// What it has shown; none where the motion was not made.
+    pub(crate) fn shown(&self) -> Option<WarmUp> {
+        let torque = |pass: &Pass| -> Vec<f64> {
+            pass.work.iter().zip(&pass.way).map(|(work, way)| if *way > 0.0 { work / way } else { 0.0 }).collect()
+        };
+        let power = |pass: &Pass| pass.work.iter().sum::<f64>() / pass.duration_s.max(f64::MIN_POSITIVE);
+        (!self.passes.is_empty()).then(|| WarmUp {
+            passes: self.passes.len(),
+            duration_s: self.passes.len() as f64 * self.pass_s,
+            lost_power_w: self.passes.iter().map(power).collect(),
+            friction_torque: self.passes.iter().map(torque).collect(),
+        })
+    }
+}
