@@ -26,7 +26,7 @@ use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::Training;
 use dynident_estimation::consistent::PhysicalFit;
-use dynident_estimation::{EssentialReport, Estimate, LinearProblem, essential};
+use dynident_estimation::{EssentialReport, Estimate, LinearProblem, essential, left_out_ratios};
 use dynident_model::InertialParameters;
 use dynident_recording::MotionSettings;
 use rayon::prelude::*;
@@ -418,6 +418,10 @@ fn examine_all_training(
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
 }
 
+/// Blocks of time that the training logs are cut into, for how well each is predicted by the fit to the others: large
+/// enough that warmth and other motion tell them apart.
+const LEFT_OUT_BLOCKS: usize = 4;
+
 /// [`examine_held_out`] of every recording to test on, side by side.
 fn examine_all_held_out(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
@@ -427,9 +431,11 @@ fn examine_all_held_out(
 ) -> Result<Vec<HeldOutExamination>, IdentificationError> {
     let columns = &training.columns;
     let held_out = logs.of_role(Role::Validate);
+    let ratios =
+        if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, LEFT_OUT_BLOCKS)? };
     let one = |&index: &usize| -> Result<_, IdentificationError> {
         let theta = columns.base_values(index, &estimate.values);
-        let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance));
+        let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance), &ratios);
         let physical =
             physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
         let tested = ModelUnderTest {

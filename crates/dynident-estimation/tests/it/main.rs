@@ -14,6 +14,7 @@ mod honest;
 mod jackknife;
 mod joint_gains;
 mod known_columns;
+mod left_out_blocks;
 mod maximum_likelihood;
 mod noise_levels;
 mod physical_errors;

@@ -29,7 +29,7 @@ pub struct JointResiduals {
     pub band: Option<TorqueBand>,
 }
 
-/// How well the predicted 95 % band `τ̂ ± t √(w V wᵀ + σ²)` holds the torque of one joint on a held-out log.
+/// How well the predicted 95 % band `τ̂ ± t κ √(w V wᵀ + σ²)` holds the torque of one joint on a held-out log.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {
@@ -48,16 +48,21 @@ pub struct TorqueBand {
 pub struct Uncertainty {
     covariance: DMatrix<f64>,
     joint_sigma: Vec<f64>,
+    /// [`left_out_ratios`](dynident_estimation::left_out_ratios).
+    ratios: Vec<f64>,
     width: f64,
 }
 
 impl Uncertainty {
-    /// Of base parameters with the given covariance.
-    pub fn of(estimate: &Estimate, covariance: DMatrix<f64>) -> Self {
+    /// Of base parameters with the given covariance; `ratios` says by how much more than that and the noise blocks of
+    /// the training logs were missed by the fit to the others ([`left_out_ratios`](dynident_estimation::left_out_ratios);
+    /// ones for none).
+    pub fn of(estimate: &Estimate, covariance: DMatrix<f64>, ratios: &[f64]) -> Self {
         let degrees_of_freedom = estimate.degrees_of_freedom as f64;
         Self {
             covariance,
             joint_sigma: estimate.joint_sigma.clone(),
+            ratios: ratios.to_vec(),
             width: student_half_width(0.95, degrees_of_freedom),
         }
     }
@@ -108,7 +113,10 @@ impl JointWatch {
         );
         Self {
             own,
-            sigma: uncertainty.map(|uncertainty| (uncertainty.joint_sigma[joint], uncertainty.width)),
+            sigma: uncertainty.map(|uncertainty| {
+                let ratio = uncertainty.ratios.get(joint).copied().unwrap_or(1.0);
+                (uncertainty.joint_sigma[joint], uncertainty.width * ratio)
+            }),
             speed,
             usual_speed: model.model().own_scale().velocity(model.model().joints()[joint].turns(), 1.0),
             whiteness: Whiteness::default(),
