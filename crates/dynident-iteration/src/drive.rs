@@ -348,9 +348,8 @@ pub fn iterate_supervised(
         if let Some(held_out) = iteration.held_out_due(&records)? {
             match iteration.held_out_made(held_out, &mut *robots[0], &records, supervisor, &mut last_motion)? {
                 HeldOutCame::Stopped(status) => return outcome(status, records),
-                HeldOutCame::Interrupted(came, how) => {
+                HeldOutCame::Interrupted(runs, how) => {
                     let run = records.len();
-                    let runs: Vec<RobotRun> = came.into_iter().collect();
                     let kept = store.map_or(Ok(None), |store| store.keep_interrupted(run, &runs, &how))?;
                     let kept = kept.map_or_else(String::new, |path| format!("; what was recorded: {}", path.display()));
                     let reason = format!("{how}{kept}. The same command goes on with the held-out run after run {run}");

@@ -24,7 +24,7 @@ use std::time::Instant;
 pub(crate) enum HeldOutCame {
     Run(HeldOutRun, Box<RobotRun>),
     Stopped(IterationStatus),
-    Interrupted(Option<RobotRun>, String),
+    Interrupted(Vec<RobotRun>, String),
 }
 
 impl Iteration {
@@ -85,7 +85,9 @@ impl Iteration {
         let came = match self.commanded(robot, (&task, &plan, &prepared), &motion, supervisor, last_motion)? {
             Came::Run(came) => came,
             Came::Stopped(status) => return Ok(HeldOutCame::Stopped(status)),
-            Came::Interrupted(came, how) => return Ok(HeldOutCame::Interrupted(came, how)),
+            Came::Interrupted(came, how) => {
+                return Ok(HeldOutCame::Interrupted(came.into_iter().collect(), how));
+            }
         };
         let (evidence, reason) = if came.status.is_done() {
             match self.held_out_evidence(held_out, &came, records, known) {

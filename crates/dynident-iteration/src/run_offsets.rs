@@ -1,6 +1,7 @@
 //! Constant torques that single runs have and others have not: zeros of sensors that drift, a cable that pulls.
 
 use crate::run_logs::RunLog;
+use crate::settings::RunOffsets;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::Estimate;
 use dynident_identification::OffsetChoice;
@@ -13,19 +14,6 @@ const CLEAR_BARS: f64 = 5.0;
 
 /// A smaller share of the joint's torque (root mean square) is nothing that a fit of the others would suffer from.
 const MATTERS: f64 = 0.01;
-
-/// Whether runs that are fitted together share the constant torques of their joints.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RunOffsets {
-    /// One offset for each joint.
-    Shared,
-    /// One offset for each joint, unless one of some run clearly deviates from the mean and matters; then as
-    /// [`PerRun`](Self::PerRun).
-    #[default]
-    WhereSeen,
-    /// Each run has its own; base parameters hold their mean.
-    PerRun,
-}
 
 /// By how much an offset of a run deviates from the mean of all runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,6 +1,5 @@
 //! Settings of an iteration.
 
-use crate::run_offsets::RunOffsets;
 use crate::safety::SafetySettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
@@ -24,6 +23,19 @@ pub enum Scheme {
     /// Joint by joint from tip to base, as in the paper (Eqs. 9, 10): the rows of one joint alone, columns that are
     /// known already subtracted.
     StepByStep,
+}
+
+/// Whether runs that are fitted together share the constant torques of their joints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RunOffsets {
+    /// One offset for each joint.
+    Shared,
+    /// One offset for each joint, unless one of some run clearly deviates from the mean and matters; then as
+    /// [`PerRun`](Self::PerRun).
+    #[default]
+    WhereSeen,
+    /// Each run has its own; base parameters hold their mean.
+    PerRun,
 }
 
 /// How one run is identified: the motion as it follows from a record, then all that an identification can be

@@ -4,6 +4,7 @@
 use crate::home::FoundWays;
 use crate::leg::Leg;
 use crate::safety::SafetySettings;
+use core::fmt::Write as _;
 use dynident_simulation::{Record, Reference};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -53,13 +54,15 @@ impl WarmUp {
         if let (Some(change), Some(last_change)) = (self.change_percent(), self.last_change_percent())
             && let [first, .., last] = lost_power_w[..]
         {
-            text += &format!(
+            // Writing to a string cannot fail, here and below.
+            let _ = write!(
+                text,
                 ": friction took {first:.3} W in the first pass and {last:.3} W in the last ({change:+.1} %; {last_change:+.1} % with the last alone)"
             );
         }
         if let Some((joint, change)) = self.largest_change() {
             let name = joints.get(joint).map_or_else(|| format!("joint {}", joint + 1), Clone::clone);
-            text += &format!(", most at {name}: {change:+.3} Nm");
+            let _ = write!(text, ", most at {name}: {change:+.3} Nm");
         }
         text
     }

@@ -107,7 +107,7 @@ impl ControlledRun {
         if let Some(breach) = EnvelopeWatch::new(self.envelope.as_ref(), &self.reference).look(&self.now, Some(dq)) {
             let (part, zero) = self.part_of(sample);
             let time_s = if zero == 0 { time_s } else { time_s - self.record.times_s[zero] };
-            self.end = Some(RunEnd::Breach(Breach { part, time_s, ..breach }));
+            self.end = Some(RunEnd::Breach(Breach { time_s, part, ..breach }));
             return None;
         }
         Some(&self.tau)

@@ -23,7 +23,7 @@ pub(super) fn joint_major(mut record: Record) -> Record {
 /// One part of a run.
 #[derive(Debug)]
 struct Part<'a> {
-    part: RunPart,
+    which: RunPart,
     reference: &'a Reference,
     /// Samples of it by the controller's count: those that it shares with the motion are the motion's.
     samples: usize,
@@ -45,10 +45,10 @@ pub(super) struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     pub(super) fn new(request: &RunRequest<'a>, joints: &[String]) -> Self {
-        let part = |part: RunPart, reference: &'a Reference| Part {
-            part,
+        let part = |which: RunPart, reference: &'a Reference| Part {
+            which,
             reference,
-            samples: reference.samples() - usize::from(part != RunPart::Motion),
+            samples: reference.samples() - usize::from(which != RunPart::Motion),
             record: empty_record(joints, reference.rate_hz()),
             watch: EnvelopeWatch::new(request.envelope, reference),
         };
@@ -81,8 +81,8 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// A part that this run has not, or one before; one of which the end is not there.
     pub(super) fn enter(&mut self, part: RunPart) -> Result<(), RobotFault> {
-        let expected = self.parts[self.at].part;
-        let place = self.parts.iter().position(|own| own.part == part).filter(|place| *place >= self.at);
+        let expected = self.parts[self.at].which;
+        let place = self.parts.iter().position(|own| own.which == part).filter(|place| *place >= self.at);
         let Some(place) = place else {
             return Err(RobotFault::OutOfTurn {
                 found: format!("sample of the {}", part.name()),
@@ -112,11 +112,11 @@ impl<'a> Recorder<'a> {
 
     /// Up to two samples of the slower of the two clocks may be missing, or a hundredth of the part.
     fn require_end(&self) -> Result<(), RobotFault> {
-        let Part { part, reference, record, .. } = &self.parts[self.at];
+        let Part { which, reference, record, .. } = &self.parts[self.at];
         let (end_s, duration_s) = (record.times_s.last().copied().unwrap_or(0.0), reference.duration_s());
-        let none = record.samples == 0 && *part == RunPart::Motion;
+        let none = record.samples == 0 && *which == RunPart::Motion;
         if none || end_s < 0.99 * duration_s - 2.0 / reference.rate_hz() {
-            return Err(RobotFault::Short { end_s, duration_s, part: *part });
+            return Err(RobotFault::Short { end_s, duration_s, part: *which });
         }
         Ok(())
     }
@@ -127,7 +127,7 @@ impl<'a> Recorder<'a> {
         while self.parts[self.at].record.samples >= self.parts[self.at].samples && self.at + 1 < self.parts.len() {
             // The return counts from the last sample of the motion, which it shares.
             let last_s = self.parts[self.at].record.times_s.last().copied();
-            let shared_s = last_s.filter(|_| self.parts[self.at].part == RunPart::Motion);
+            let shared_s = last_s.filter(|_| self.parts[self.at].which == RunPart::Motion);
             self.zero_s = shared_s.map_or(time_s, |shared_s| self.zero_s + shared_s);
             self.at += 1;
         }
@@ -137,15 +137,15 @@ impl<'a> Recorder<'a> {
 
     /// How the newest sample leaves the envelope, if it does; `dq` are measured velocities, where there are any.
     pub(super) fn look(&mut self, dq: Option<&[f64]>) -> Option<Breach> {
-        let Part { part, record, watch, .. } = &mut self.parts[self.at];
-        watch.look(record, dq).map(|breach| Breach { part: *part, ..breach })
+        let Part { which, record, watch, .. } = &mut self.parts[self.at];
+        watch.look(record, dq).map(|breach| Breach { part: *which, ..breach })
     }
 
     /// The run, with what was recorded of it.
     pub(super) fn into_run(self, status: RobotStatus) -> RobotRun {
         let (mut approach, mut motion, mut back) = (None, None, None);
         for own in self.parts {
-            let place = match own.part {
+            let place = match own.which {
                 RunPart::Approach => &mut approach,
                 RunPart::Motion => &mut motion,
                 RunPart::Return => &mut back,
