@@ -25,6 +25,7 @@ mod instruments;
 mod iteration_legs;
 mod iteration_report;
 mod log_formats;
+mod long_logs;
 mod masses;
 mod mjcf;
 mod modules;
