@@ -2,6 +2,9 @@
 //! problems. Prints one line per case.
 //! `cargo bench -p dynident-estimation --bench physical`
 //!
+//! With `-- --intervals` it prints the time of a fit in the intervals of 7 bodies, of which each begins near the one
+//! before.
+//!
 //! With `-- --problems FIRST LAST [--both-routes]` it prints the random problems of the tests as JSON lines instead,
 //! each with the answers found here, for `benchmarks/bench_lmi.py`.
 
@@ -12,7 +15,9 @@
 #[path = "../tests/it/physical_problems/mod.rs"]
 mod physical_problems;
 
-use dynident_estimation::consistent::{PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit};
+use dynident_estimation::consistent::{
+    ConsistentIntervals, IntervalSettings, PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit,
+};
 use physical_problems::{Case, case};
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -22,6 +27,9 @@ const ROUTES: [(PhysicalRoute, &str); 2] =
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
+    if arguments.iter().any(|argument| argument == "--intervals") {
+        return intervals();
+    }
     let Some(place) = arguments.iter().position(|argument| argument == "--problems") else {
         return times();
     };
@@ -74,6 +82,23 @@ fn times() {
                 times[times.len() - 1]
             );
         }
+    }
+}
+
+/// The time of every tenth parameter's interval, and what holds its ends.
+fn intervals() {
+    for seed in 0..4 {
+        let case = case(seed, 7);
+        let physical = PhysicalSettings { prior_weight: 1.0e-5, ..case.settings.clone() };
+        let settings = IntervalSettings { physical, ..IntervalSettings::default() };
+        let clock = Instant::now();
+        let start = seconds(clock);
+        let intervals = ConsistentIntervals::new(&case.problem, None, 1000.0, settings).unwrap();
+        let found: Vec<_> =
+            (0..intervals.best().parameters.len()).step_by(10).map(|index| intervals.of(index).unwrap()).collect();
+        let time = 1.0e3 * (seconds(clock) - start) / found.len() as f64;
+        let ends: Vec<String> = found.iter().map(|one| format!("{:?} {:?}", one.lower, one.upper)).collect();
+        println!("intervals, 7 bodies: {time:.2} ms each; {}", ends.join(", "));
     }
 }
 

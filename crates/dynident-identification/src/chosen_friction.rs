@@ -3,8 +3,8 @@
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator};
 use crate::friction::{
-    CandidateColumn, ConstantsError, FrictionConstants, FrictionSearch, JointFriction, JointScale, candidate_columns,
-    choose_friction as choose_terms, chosen_model, step_columns,
+    CandidateColumn, ConstantsError, ConstantsStep, FrictionConstants, FrictionSearch, JointFriction, JointScale,
+    candidate_columns, choose_friction as choose_terms, chosen_model, step_columns,
 };
 use crate::likelihood::deviance;
 use crate::logs::Logs;
@@ -108,6 +108,66 @@ pub fn choose_friction(
     Ok(ChosenFriction { model, joints, stated: Some((first, plain)), constants_error })
 }
 
+/// Friction that an excerpt of the recordings `training` chose, with constants by all of their rows: one step from
+/// where the excerpt's have settled, for what is left is short, and a step of Gauss and Newton then ends where a second
+/// one would.
+pub(crate) fn constants_of_all_rows(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    chosen: &ChosenFriction,
+    (training, payloads): (&[usize], &[Payload]),
+) -> Result<ChosenFriction, IdentificationError> {
+    let ChosenFriction { model, joints, stated, constants_error } = chosen;
+    let (mut model, mut joints) = (model.clone(), joints.clone());
+    let mut constants_error = constants_error.clone();
+    let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
+    let constants = FrictionConstants::new(&model, &joints);
+    if model.needs_load() || !constants.is_empty() {
+        let measured = passes.constants_pass(&constants, &model)?;
+        let step = measured.step(&passes, (&constants, &model), &[])?;
+        take_intervals(&mut joints, &model, &constants, &step);
+        constants_error = Some(step.error().clone());
+        let terms = constants.moved(&step.steps);
+        model = with_chosen(robot, &mut joints, &terms, (&model, &measured.fit))?;
+    }
+    Ok(ChosenFriction { model, joints, stated: stated.clone(), constants_error })
+}
+
+/// One pass over the recordings for the constants of chosen friction: rows with the columns beside them, and the fit.
+struct ConstantsPass {
+    wide: RegressorModel,
+    factors: Vec<LogFactors>,
+    problem: LinearProblem,
+    fit: Estimate,
+}
+
+impl ConstantsPass {
+    /// The step from here, and how well the constants are known, by the covariance that bars are made of.
+    fn step(
+        &self,
+        passes: &TrainingPasses<'_>,
+        (constants, model): (&FrictionConstants, &RegressorModel),
+        gains: &[usize],
+    ) -> Result<ConstantsStep, IdentificationError> {
+        let wide_problem = passes.free_problem(&self.wide, &self.factors, (model, &self.fit, gains))?;
+        let solve = |problem: &LinearProblem| plain_estimate(&passes.settings.estimation, problem);
+        Ok(constants.step((model, &self.fit), (&self.wide, &wide_problem), solve)?)
+    }
+}
+
+/// What a step says of the constants' intervals, to the joints that have them.
+fn take_intervals(
+    joints: &mut [JointFriction],
+    model: &RegressorModel,
+    constants: &FrictionConstants,
+    step: &ConstantsStep,
+) {
+    for (joint, found) in constants.with_intervals(step) {
+        let name = &model.model().joints()[joint].name;
+        joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.constants.clone_from(&found));
+    }
+}
+
 /// The model with the constants of the terms that its joints chose, and without terms that are not seen with the
 /// constants free; and what the error of the constants adds to the bars. Gains of some joints are unknowns, too.
 fn with_constants(
@@ -116,8 +176,7 @@ fn with_constants(
     joints: &mut [JointFriction],
     (mut model, gains): (RegressorModel, &[usize]),
 ) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
-    let settings = &passes.settings.estimation;
-    let equal_weights = matches!(settings.estimator, Estimator::Ordinary);
+    let equal_weights = matches!(passes.settings.estimation.estimator, Estimator::Ordinary);
     let mut last: Option<LastPass> = None;
     let mut error = None;
     for pass in 1..=MOST_PASSES {
@@ -125,29 +184,20 @@ fn with_constants(
         if !model.needs_load() && constants.is_empty() {
             break;
         }
-        let wide = with_terms(&model, constants.neighbours().into_iter());
-        let factors = passes.read(&wide)?;
-        let own = factors.iter().map(|log| log.clone().of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
-        let problem = passes.stated_problem(&model, &passes.columns(&model)?, &own)?;
-        let fit = plain_estimate(&without_bars(passes.settings), &problem)?;
+        let measured = passes.constants_pass(&constants, &model)?;
+        let fit = &measured.fit;
 
         // A step that made the fit worse was too long.
-        let misfit = misfit(&problem, &fit, equal_weights);
+        let misfit = misfit(&measured.problem, fit, equal_weights);
         if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit) {
             before.steps.iter_mut().for_each(|step| *step *= 0.5);
             let terms = before.constants.moved(&before.steps);
-            model = with_chosen(robot, joints, &terms, (&model, &fit))?;
+            model = with_chosen(robot, joints, &terms, (&model, fit))?;
             continue;
         }
 
-        // The step from here, and how well the constants are known, by the covariance that bars are made of.
-        let wide_problem = passes.free_problem(&wide, &factors, (&model, &fit, gains))?;
-        let solve = |problem: &LinearProblem| plain_estimate(settings, problem);
-        let step = constants.step((&model, &fit), (&wide, &wide_problem), solve)?;
-        for (joint, found) in constants.with_intervals(&step) {
-            let name = &model.model().joints()[joint].name;
-            joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.constants.clone_from(&found));
-        }
+        let step = measured.step(passes, (&constants, &model), gains)?;
+        take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
         let has_settled = step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
         if pass == MOST_PASSES {
@@ -157,7 +207,7 @@ fn with_constants(
         // Terms that are not seen once constants are free: the weakest of every joint, then again.
         let fewer = constants.without_weakest(&model, &step);
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
-            model = with_chosen(robot, joints, &fewer, (&model, &fit))?;
+            model = with_chosen(robot, joints, &fewer, (&model, fit))?;
             last = None;
             continue;
         }
@@ -165,7 +215,7 @@ fn with_constants(
             break;
         }
         let terms = constants.moved(&step.steps);
-        model = with_chosen(robot, joints, &terms, (&model, &fit))?;
+        model = with_chosen(robot, joints, &terms, (&model, fit))?;
         last = Some(LastPass { constants, steps: step.steps, misfit });
     }
     Ok((model, error))
@@ -177,6 +227,20 @@ fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {
 }
 
 impl TrainingPasses<'_> {
+    /// The rows of a model with the columns that its constants ask for beside it.
+    fn constants_pass(
+        &self,
+        constants: &FrictionConstants,
+        model: &RegressorModel,
+    ) -> Result<ConstantsPass, IdentificationError> {
+        let wide = with_terms(model, constants.neighbours().into_iter());
+        let factors = self.read(&wide)?;
+        let own = factors.iter().map(|log| log.clone().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
+        let problem = self.stated_problem(model, &self.columns(model)?, &own)?;
+        let fit = plain_estimate(&without_bars(self.settings), &problem)?;
+        Ok(ConstantsPass { wide, factors, problem, fit })
+    }
+
     /// The rows of `wide`, with the `free` gains of some joints as unknowns about `fit`, whose columns are those of
     /// `model` and what logs add to them.
     fn free_problem(

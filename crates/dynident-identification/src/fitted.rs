@@ -3,19 +3,20 @@
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
-use crate::chosen_friction::{ChosenFriction, choose_friction};
+use crate::chosen_friction::{ChosenFriction, choose_friction, constants_of_all_rows};
 use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
+use crate::excerpt::excerpts;
 use crate::execution::Execution;
-use crate::friction::ConstantsError;
+use crate::friction::{ConstantsError, JointFriction};
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::likelihood::schwarz;
 use crate::logs::Logs;
-use crate::payload::{KnownArm, free_gains};
+use crate::payload::{KnownArm, Payload, free_gains};
 use crate::regressor_model::RegressorModel;
-use crate::settings::IdentificationSettings;
+use crate::settings::{GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_dynamics::ParametricModel;
@@ -80,6 +81,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) drive_inertia: Option<DriveInertiaChoice>,
     /// Rows and fit with friction as stated, where it was chosen.
     pub(crate) stated_friction: Option<(Training, Estimate)>,
+    /// The model with the friction that was chosen, whatever noise made of it afterwards, and how it was chosen.
+    friction: (RegressorModel, Vec<JointFriction>),
     /// What the constants of chosen friction add to the bars.
     constants_error: Option<ConstantsError>,
     pub(crate) lag: LagChoice,
@@ -99,7 +102,10 @@ pub(crate) fn fitted<'a>(
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
     let is_model = job.arm().is_none();
-    let mut found = without_lag(task, chosen, execution, job)?;
+    let mut found = match choices_of_excerpt(task, chosen, execution, job)? {
+        Some(choices) => with_choices(task, &choices, chosen, execution)?,
+        None => without_lag(task, chosen, execution, job)?,
+    };
     if is_model && found.settings.estimation.estimator.reads_filtered_rows() {
         let weighted = found.settings.estimation.weighted();
         let varied = with_variation(&found.training, &weighted, &found.estimation.estimate);
@@ -111,6 +117,74 @@ pub(crate) fn fitted<'a>(
     if let Some(error) = &found.constants_error {
         found.estimation.estimate = error.added_to(found.training.problem.columns(), &found.estimation.estimate);
     }
+    Ok(found)
+}
+
+/// What was chosen: everything that takes more than one pass over the recordings.
+struct Choices {
+    robot: ParametricModel,
+    drive_inertia: Option<DriveInertiaChoice>,
+    cutoff: Option<CutoffByError>,
+    /// The cut-off of the torque's motion band, where the fit has another.
+    motion_hz: Option<f64>,
+    friction: ChosenFriction,
+    lag: LagChoice,
+    /// How long it took.
+    times: StageTimes,
+}
+
+/// What an [excerpt](crate::excerpt) of long recordings chooses; none where they are not long, and where instruments
+/// from outside or an arm that is known leave little to choose.
+fn choices_of_excerpt(
+    task: &IdentificationTask,
+    chosen: &[usize],
+    execution: Execution<'_>,
+    job: &Job<'_, '_>,
+) -> Result<Option<Choices>, IdentificationError> {
+    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    if !job.is_plain() || settings.gains == GainChoice::Unknown {
+        return Ok(None);
+    }
+    let started = Instant::now();
+    let Some(recordings) = excerpts(recordings, settings, chosen)? else { return Ok(None) };
+    let read_s = started.elapsed().as_secs_f64();
+    let (robot, payloads, settings) = (robot.clone(), payloads.clone(), settings.clone());
+    let task = IdentificationTask { robot, recordings, payloads, settings };
+    // What is wrong with recordings, or too little in them, their whole says.
+    let Ok(found) = without_lag(&task, chosen, execution, &mut Job::Model(None)) else { return Ok(None) };
+    let (model, joints) = found.friction;
+    Ok(Some(Choices {
+        robot: found.robot,
+        drive_inertia: found.drive_inertia,
+        motion_hz: found.logs.motion_hz(),
+        cutoff: found.cutoff,
+        friction: ChosenFriction {
+            model,
+            joints,
+            stated: found.stated_friction,
+            constants_error: found.constants_error,
+        },
+        lag: found.lag,
+        times: StageTimes { logs_s: found.times.logs_s + read_s, ..found.times },
+    }))
+}
+
+/// Rows and estimate of all rows with what an excerpt of them chose; of the lag and of the constants of friction what
+/// they show beyond that.
+fn with_choices<'a>(
+    task: &'a IdentificationTask,
+    choices: &Choices,
+    chosen: &[usize],
+    execution: Execution<'a>,
+) -> Result<Fitted<'a>, IdentificationError> {
+    let mut settings = task.settings.clone();
+    let mut rounds = LagRounds::default();
+    if settings.motion.torque_lag_s.is_none() {
+        settings.motion.torque_lag_s = choices.lag.taken_off();
+        rounds = rounds.after(choices.lag.clone());
+    }
+    let mut found = lag_rounds((task, settings, rounds), (chosen, Some(choices)), execution, &mut Job::Model(None))?;
+    found.times = found.times.and(&choices.times);
     Ok(found)
 }
 
@@ -127,19 +201,19 @@ fn without_lag<'a>(
 ) -> Result<Fitted<'a>, IdentificationError> {
     let settings = &task.settings;
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
-    let mut found = lag_rounds((task, settings.clone(), LagRounds::default()), chosen, execution, job)?;
+    let mut found = lag_rounds((task, settings.clone(), LagRounds::default()), (chosen, None), execution, job)?;
     if !is_free || settings.friction.is_empty() || found.lag.kind == LagKind::Common {
         return Ok(found);
     }
     let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-    let mut of_stated = fitted_once(task, &stated, chosen, execution, job)?;
+    let mut of_stated = fitted_once((task, &stated), (chosen, None), execution, job)?;
     let mut first = LagRounds::of(LagCandidates::Common);
     let mut times = found.times.and(&of_stated.times);
     if first.again(free_lag(&of_stated, chosen)?.as_ref(), &mut of_stated.estimation.estimate) {
         let motion = MotionSettings { torque_lag_s: first.torque_lag_s(), ..settings.motion.clone() };
         let settings = IdentificationSettings { motion, ..settings.clone() };
         let rounds = LagRounds::default().after(first.choice());
-        let other = lag_rounds((task, settings, rounds), chosen, execution, job)?;
+        let other = lag_rounds((task, settings, rounds), (chosen, None), execution, job)?;
         times = times.and(&other.times);
         if schwarz(&other.training.problem, &other.estimation.estimate)
             < schwarz(&found.training.problem, &found.estimation.estimate)
@@ -151,17 +225,17 @@ fn without_lag<'a>(
     Ok(found)
 }
 
-/// Fits from these rounds on, until the rows show no lag that moves parameters.
+/// Fits from these rounds on, until the rows show no lag that moves parameters; with choices where they are made.
 fn lag_rounds<'a>(
     (task, mut settings, mut rounds): (&'a IdentificationTask, IdentificationSettings, LagRounds),
-    chosen: &[usize],
+    (chosen, choices): (&[usize], Option<&Choices>),
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
     let is_free = task.settings.motion.torque_lag_s.is_none() && job.is_plain();
     let mut times = StageTimes::default();
     loop {
-        let mut found = fitted_once(task, &settings, chosen, execution, job)?;
+        let mut found = fitted_once((task, &settings), (chosen, choices), execution, job)?;
         times = times.and(&found.times);
         let started = Instant::now();
         let fit = if is_free { free_lag(&found, chosen)? } else { None };
@@ -210,11 +284,10 @@ fn has_free_lag(found: &Fitted<'_>) -> bool {
         && found.settings.estimation.estimator.reads_filtered_rows()
 }
 
-/// One way from logs to an estimate, with the lag of the settings taken off.
+/// One way from logs to an estimate, with the lag of the settings taken off; with choices where they are made.
 fn fitted_once<'a>(
-    task: &'a IdentificationTask,
-    settings: &IdentificationSettings,
-    chosen: &[usize],
+    (task, settings): (&'a IdentificationTask, &IdentificationSettings),
+    (chosen, choices): (&[usize], Option<&Choices>),
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
@@ -224,28 +297,17 @@ fn fitted_once<'a>(
     let logs = Logs::new(robot.model(), recordings, filters, chosen, cutoff_hz, execution)?;
 
     // Drives, filters and friction, by the logs where they are left to them.
-    let (robot, drive_inertia) = match job.arm() {
-        Some(_) => (robot.clone(), None),
-        None => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
-    };
-    let first = RegressorModel::from(robot.clone());
-    let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
     let started = Instant::now();
-    let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let friction = ChosenFriction::as_stated(first);
-        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
-    } else {
-        let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
-        let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
-        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+    let Chosen { robot, drive_inertia, logs, cutoff, friction } = match choices {
+        Some(choices) => chosen_before((logs, settings), choices, (chosen, payloads))?,
+        None => chosen_here((logs, settings), robot, (chosen, payloads), job)?,
     };
     let choice_s = started.elapsed().as_secs_f64();
 
     // Factors, then the estimate. Where noise in the regressor biases least squares, both once more with less of it.
     let refit = job.arm().map(KnownArm::refit);
-    let mut training = training_rows((&logs, settings), friction.model, chosen, payloads, refit)?;
-    training.friction_choice = friction.joints;
+    let mut training = training_rows((&logs, settings), friction.model.clone(), chosen, payloads, refit)?;
+    training.friction_choice.clone_from(&friction.joints);
     let logs_s = training.timings_s[0];
     let before_s = training.timings_s[1] + choice_s;
     let started = Instant::now();
@@ -271,12 +333,61 @@ fn fitted_once<'a>(
         robot,
         drive_inertia,
         stated_friction: friction.stated,
+        friction: (friction.model, friction.joints),
         constants_error: friction.constants_error,
         lag: LagChoice::default(),
         between_logs: None,
         noise_half_width_95: Vec::new(),
         times: StageTimes { logs_s, estimation_s, examination_s: 0.0 },
     })
+}
+
+/// Drives, filters and friction.
+struct Chosen<'a> {
+    robot: ParametricModel,
+    drive_inertia: Option<DriveInertiaChoice>,
+    logs: Logs<'a>,
+    cutoff: Option<CutoffByError>,
+    friction: ChosenFriction,
+}
+
+/// Drives, filters and friction by the logs where they are left to them.
+fn chosen_here<'a>(
+    (logs, settings): (Logs<'a>, &IdentificationSettings),
+    robot: &ParametricModel,
+    (chosen, payloads): (&[usize], &[Payload]),
+    job: &Job<'_, '_>,
+) -> Result<Chosen<'a>, IdentificationError> {
+    let (robot, drive_inertia) = match job.arm() {
+        Some(_) => (robot.clone(), None),
+        None => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
+    };
+    let first = RegressorModel::from(robot.clone());
+    let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
+    let (logs, cutoff, friction) = if settings.friction.is_empty() {
+        let friction = ChosenFriction::as_stated(first);
+        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+    } else {
+        let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
+        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
+        let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
+        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+    };
+    Ok(Chosen { robot, drive_inertia, logs, cutoff, friction })
+}
+
+/// The same as an excerpt chose it, the constants of friction by all rows.
+fn chosen_before<'a>(
+    (logs, settings): (Logs<'a>, &IdentificationSettings),
+    choices: &Choices,
+    (chosen, payloads): (&[usize], &[Payload]),
+) -> Result<Chosen<'a>, IdentificationError> {
+    let Choices { robot, drive_inertia, cutoff, motion_hz, friction, .. } = choices;
+    let logs = with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz));
+    let logs = logs.with_motion_band(*motion_hz);
+    let friction = constants_of_all_rows((&logs, settings), robot, friction, (chosen, payloads))?;
+    let (robot, drive_inertia) = (robot.clone(), drive_inertia.clone());
+    Ok(Chosen { robot, drive_inertia, logs, cutoff: cutoff.clone(), friction })
 }
 
 /// The logs with a cut-off that was chosen.

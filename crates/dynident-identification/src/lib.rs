@@ -128,6 +128,7 @@ mod drive_inertia;
 mod error;
 pub mod estimators;
 pub mod examination;
+mod excerpt;
 mod execution;
 mod fitted;
 pub mod friction;

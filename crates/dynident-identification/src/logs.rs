@@ -76,8 +76,11 @@ impl<'a> Logs<'a> {
         if motion.differentiator.wants_cutoff() {
             for &index in deciding {
                 if let Some(stream) = recordings[index].open(model, settings)? {
-                    let (rate_hz, choice) = (stream.rate_hz(), stream.cutoff().clone());
-                    let position_noise = stream.position_noise().to_vec();
+                    let rate_hz = stream.rate_hz();
+                    let (choice, position_noise) = match &recordings[index].whole {
+                        Some(whole) => (whole.cutoff.clone(), whole.position_noise.clone()),
+                        None => (stream.cutoff().clone(), stream.position_noise().to_vec()),
+                    };
                     spectra.push(LogSpectrum { index, rate_hz, choice, position_noise });
                 }
             }

@@ -1,10 +1,10 @@
 //! From a description to the convex program, and back.
 
-use super::conic::{Block, BlockMap, LocalSquares, Program, Row};
+use super::conic::{Block, BlockMap, Certificate, LocalSquares, Program, Row};
 use super::constraints::{cone_name, linear_constraints};
 use super::coordinates::{Vector10, vector_of};
 use super::description::PhysicalProblem;
-use super::interior_point::interior_point;
+use super::interior_point::interior_point_until;
 use super::priors::PriorBody;
 use super::{PhysicalError, PhysicalSettings};
 use nalgebra::{DMatrix, DVector, Matrix4};
@@ -158,9 +158,13 @@ impl AssembledProgram {
     /// and those with multipliers are at odds (a theorem of the alternative: Boyd and Vandenberghe 5.8).
     fn roomiest(&self, x: &DVector<f64>) -> Result<DVector<f64>, PhysicalError> {
         let phase = RoomProgram::new(&self.program, x);
-        let solved =
-            interior_point(&phase.program, phase.start, ROOM_TOLERANCE, 300).ok_or(PhysicalError::Breakdown)?;
         let count = self.program.variables;
+        // A start need not have all the room that there is: half of it, by the gap to the dual, will do.
+        let enough = |x: &DVector<f64>, now: &Certificate| {
+            x[count] > LEAST_START && x[count] > now.gap * (1.0 + now.objective.abs()) && now.stationarity < 1.0e-3
+        };
+        let solved = interior_point_until(&phase.program, phase.start, (ROOM_TOLERANCE, 300), enough)
+            .ok_or(PhysicalError::Breakdown)?;
         let room = solved.x[count];
         let found = solved.x.rows(0, count).into_owned();
         if room > LEAST_ROOM && self.program.strictly_inside(&found) {
@@ -188,6 +192,8 @@ impl AssembledProgram {
 /// Accuracy to which room is found, and the least that counts: what is narrower has no inside in double precision.
 const ROOM_TOLERANCE: f64 = 1.0e-9;
 const LEAST_ROOM: f64 = 1.0e-8;
+/// Room from which on a start need not have all of it.
+const LEAST_START: f64 = 1.0e-6;
 
 /// A program that maximises the room t of another's constraints, t its last variable.
 pub(super) struct RoomProgram {

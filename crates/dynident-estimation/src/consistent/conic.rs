@@ -143,7 +143,10 @@ impl Program {
 
     /// Gradient of the smooth part (without `−ln det`), and the largest magnitude of the terms that it is a sum of.
     pub(super) fn gradient(&self, x: &Precise) -> (DVector<f64>, f64) {
-        let data = self.data.tr_mul(&-x.rest(&self.data, &self.target));
+        let mut data = DVector::zeros(self.variables);
+        if self.data.nrows() > 0 {
+            data.gemv_tr(-1.0, &self.data, x.data_rest(&self.data, &self.target), 0.0);
+        }
         let x = &x.high;
         let mut largest = data.amax().max(self.linear.amax());
         let mut gradient = data + &self.linear;
@@ -159,7 +162,7 @@ impl Program {
 
     /// The squares and linear terms of f.
     pub(super) fn smooth_objective(&self, x: &Precise) -> f64 {
-        let data = 0.5 * x.rest(&self.data, &self.target).norm_squared();
+        let data = 0.5 * x.data_rest(&self.data, &self.target).norm_squared();
         let x = &x.high;
         let local = |term: &LocalSquares| {
             0.5 * (&term.matrix * x.rows(term.first, term.matrix.ncols()) - &term.target).norm_squared()

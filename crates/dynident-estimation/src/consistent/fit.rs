@@ -5,7 +5,7 @@ use super::cone::least_eigenvalue;
 use super::conic::Program;
 use super::coordinates::pseudo_inertia;
 use super::description::{PhysicalProblem, expect};
-use super::interior_point::{Ending, InteriorPointResult, interior_point};
+use super::interior_point::{Ending, InteriorPointResult, OnTheWay, interior_point, interior_point_on_the_way};
 use super::log_cholesky::log_cholesky;
 use super::{PhysicalError, PhysicalRoute, PhysicalSettings};
 use nalgebra::DVector;
@@ -136,6 +136,32 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
     }
     .ok_or(PhysicalError::Breakdown)?;
     Ok(finished(problem, settings, &assembled, &solved))
+}
+
+/// As [`physical_fit`], from where the fit of a problem with the same bodies, scalars and limits was on its way
+/// (`before`), and what is on the way of this one. The optimum is the same, by the same certificate; where the fit does
+/// not end there from `before`, it begins as any other.
+pub(super) fn physical_fit_near(
+    problem: &PhysicalProblem,
+    settings: &PhysicalSettings,
+    before: Option<&OnTheWay>,
+) -> Result<(PhysicalFit, Option<OnTheWay>), PhysicalError> {
+    if settings.route != PhysicalRoute::InteriorPoint {
+        return Ok((physical_fit(problem, settings)?, None));
+    }
+    let assembled = AssembledProgram::new(problem, settings);
+    let limits = (settings.tolerance, settings.max_iterations);
+    let from = |start| interior_point_on_the_way(&assembled.program, start, limits);
+    let is_solved = |found: &(InteriorPointResult, _)| found.0.ending == Ending::Solved;
+    let mut found = before.and_then(|before| from(Err(before))).filter(is_solved);
+    if found.is_none() {
+        settings.validate()?;
+        found = from(Ok(assembled.interior_start(problem)?)).filter(is_solved);
+    }
+    match found {
+        Some((solved, kept)) => Ok((finished(problem, settings, &assembled, &solved), kept)),
+        None => Ok((physical_fit(problem, settings)?, None)),
+    }
 }
 
 /// The interior point, and where it stalls short of the tolerance (2 of 1,000 problems with a prior against data of a

@@ -2,7 +2,8 @@
 //! inertia, a friction go before the data object, every body and term staying physically consistent?
 
 use super::description::{BaseMap, PhysicalProblem, expect, finite};
-use super::fit::{PhysicalFit, physical_fit};
+use super::fit::{PhysicalFit, physical_fit_near};
+use super::interior_point::OnTheWay;
 use super::{PhysicalError, PhysicalSettings};
 use crate::uncertainty::student_half_width;
 use nalgebra::{DMatrix, DVector};
@@ -99,6 +100,8 @@ pub struct ConsistentIntervals {
     problem: PhysicalProblem,
     settings: IntervalSettings,
     best: PhysicalFit,
+    /// Where the fits of pulled parameters begin; none where the best set's was not found in this way.
+    on_the_way: Option<OnTheWay>,
     quantile: f64,
     information: DMatrix<f64>,
     covariance: Option<DMatrix<f64>>,
@@ -128,7 +131,7 @@ impl ConsistentIntervals {
             expect("columns of the covariance", base, covariance.ncols())?;
             finite("an entry of the covariance", covariance.as_slice())?;
         }
-        let best = physical_fit(problem, &settings.physical)?;
+        let (best, on_the_way) = physical_fit_near(problem, &settings.physical, None)?;
         let information = problem.triangle.transpose() * &problem.triangle;
         let sizes = sizes(problem);
         // What is known of π without constraints, beside the weakest of priors: information in units of the sizes.
@@ -150,6 +153,7 @@ impl ConsistentIntervals {
             covariance: covariance.cloned(),
             settings,
             best,
+            on_the_way,
             information,
             mean_inflation,
             deviations,
@@ -202,8 +206,10 @@ impl ConsistentIntervals {
         let mut above: Option<Point> = None;
         // Where the solver gave up: a pull so strong that doubles cannot determine the cost beside it.
         let mut hopeless = f64::INFINITY;
+        // Each fit begins near the one before, which the same spring pulled less or more.
+        let mut near = self.on_the_way.clone();
         for _ in 0..self.settings.max_fits {
-            let Some((parameter, moved)) = self.pulled(index, 1.0 / softness, value + side * reach)? else {
+            let Some((parameter, moved)) = self.pulled(index, 1.0 / softness, value + side * reach, &mut near)? else {
                 hopeless = reach;
                 if hopeless < 1.2 * below.reach {
                     break;
@@ -247,7 +253,13 @@ impl ConsistentIntervals {
 
     /// The parameter and the shift of the base parameters from the best set, when a spring pulls; none when the solver
     /// did not reach an optimum.
-    fn pulled(&self, index: usize, stiffness: f64, target: f64) -> Result<Option<(f64, DVector<f64>)>, PhysicalError> {
+    fn pulled(
+        &self,
+        index: usize,
+        stiffness: f64,
+        target: f64,
+        near: &mut Option<OnTheWay>,
+    ) -> Result<Option<(f64, DVector<f64>)>, PhysicalError> {
         let Self { problem, best, .. } = self;
         let (base, rows) = (problem.base.matrix(), problem.triangle.nrows());
         let (own, all) = base.shape();
@@ -260,7 +272,8 @@ impl ConsistentIntervals {
         triangle[(rows, own)] = stiffness;
         let rotated = problem.rotated.clone().push(stiffness * target);
         let problem = PhysicalProblem { base: BaseMap::new(matrix)?, triangle, rotated, ..problem.clone() };
-        let fit = physical_fit(&problem, &self.settings.physical)?;
+        let (fit, next) = physical_fit_near(&problem, &self.settings.physical, near.as_ref())?;
+        *near = next.or_else(|| near.take());
         let moved = DVector::from_fn(own, |k, _| fit.base_values[k] - best.base_values[k]);
         Ok((fit.kkt_residual() <= SOLVED).then(|| (fit.parameters[index], moved)))
     }

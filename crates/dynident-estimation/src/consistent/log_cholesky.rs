@@ -181,7 +181,7 @@ impl Point {
         let frames = bodies.iter().zip(&self.factors).map(|((first, _), u)| (*first, jacobian(u))).collect();
         let mut rows = Rows { frames, ..Rows::default() };
         let mut outside = -&program.linear;
-        let (mut local, mut wide) = (Vec::new(), vec![self.x.rest(&program.data, &program.target)]);
+        let (mut local, mut wide) = (Vec::new(), vec![self.x.data_rest(&program.data, &program.target).clone()]);
         rows.wide.push(rows.framed(&program.data));
         for term in &program.local {
             let size = term.matrix.ncols();

@@ -239,8 +239,7 @@ impl StackedSystem {
         let values = y.as_mut_slice();
         for k in (0..self.size).rev() {
             let row = self.row(k);
-            let sum: f64 = row[1..].iter().zip(&values[k + 1..]).map(|(r, u)| r * u).sum();
-            values[k] = (values[k] - sum) / row[0];
+            values[k] = (values[k] - dot(&row[1..], &values[k + 1..])) / row[0];
         }
         y
     }
@@ -248,6 +247,19 @@ impl StackedSystem {
     fn row(&self, k: usize) -> &[f64] {
         &self.triangle[row_start(self.size, k)..row_start(self.size, k + 1)]
     }
+}
+
+/// Sum of products, eight side by side: one after another each would wait for the one before.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a_chunks.remainder().iter().zip(b_chunks.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a_chunks.zip(b_chunks) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 /// The packed triangle of all rows and of `added √squares` on the diagonal.
@@ -288,11 +300,20 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     let mut panel = vec![Chunk::ZERO; size * chunks];
     let mut start = 0;
     let mut place = |first: usize, part: &DMatrix<f64>| {
-        for (k, column) in part.column_iter().enumerate() {
-            let chunks = &mut panel[(first + k) * chunks..(first + k + 1) * chunks];
-            for (row, &value) in column.iter().enumerate() {
-                let at = start + row;
-                chunks[at / CHUNK_ROWS].0[at % CHUNK_ROWS] = value;
+        if part.nrows() == 0 {
+            return;
+        }
+        for (k, column) in part.as_slice().chunks_exact(part.nrows()).enumerate() {
+            let mut chunks = panel[(first + k) * chunks..(first + k + 1) * chunks].iter_mut();
+            // The chunk that the rows before have begun, then whole ones.
+            let begun = start % CHUNK_ROWS;
+            let (head, rest) = column.split_at((CHUNK_ROWS - begun).min(column.len()));
+            let mut chunks = chunks.by_ref().skip(start / CHUNK_ROWS);
+            if let Some(chunk) = chunks.next() {
+                chunk.0[begun..begun + head.len()].copy_from_slice(head);
+            }
+            for (chunk, values) in chunks.zip(rest.chunks(CHUNK_ROWS)) {
+                chunk.0[..values.len()].copy_from_slice(values);
             }
         }
         start += part.nrows();

@@ -113,11 +113,11 @@ fn cut(problem: &LinearProblem, each: usize) -> BTreeMap<(usize, usize), Vec<Blo
             let middle = before + segment.rows() / 2;
             before += segment.rows();
             let blocks = of_time.entry((equation.log, (middle * each / all).min(each - 1))).or_default();
-            match blocks.last_mut().filter(|block| block.joint == equation.joint) {
-                Some(block) => block.factor.absorb_factor(&mut workspace, &segment),
-                None => {
-                    blocks.push(Block { joint: equation.joint, columns: equation.columns.clone(), factor: segment })
-                }
+            if let Some(block) = blocks.last_mut().filter(|block| block.joint == equation.joint) {
+                block.factor.absorb_factor(&mut workspace, &segment);
+            } else {
+                let (joint, columns) = (equation.joint, equation.columns.clone());
+                blocks.push(Block { joint, columns, factor: segment });
             }
         }
     }

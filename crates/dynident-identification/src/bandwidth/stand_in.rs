@@ -139,7 +139,7 @@ impl StandIn {
                 samples += rows;
             }
             used += samples as u64;
-            seen += recording.estimated_rows().unwrap_or(samples as u64).max(samples as u64);
+            seen += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
             for (joint, &place) in places.iter().enumerate() {
                 reference_hz[joint] = reference_hz[joint].max(faded[place].unwrap_or(asked).min(highest_hz));
                 let noise = position_noise.get(place).copied().unwrap_or(0.0);

@@ -54,9 +54,9 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Of base parameters with the given covariance; `ratios` says by how much more than that and the noise blocks of
-    /// the training logs were missed by the fit to the others ([`left_out_ratios`](dynident_estimation::left_out_ratios);
-    /// ones for none).
+    /// Of base parameters with the given covariance; `ratios` says for every joint how much further than that and its
+    /// noise blocks of the training logs were from the fit to all others
+    /// ([`left_out_ratios`](dynident_estimation::left_out_ratios); ones where nothing says so).
     pub fn of(estimate: &Estimate, covariance: DMatrix<f64>, ratios: &[f64]) -> Self {
         let degrees_of_freedom = estimate.degrees_of_freedom as f64;
         Self {

@@ -12,4 +12,4 @@ pub use choice::{FrictionCandidate, FrictionConstant, JointFriction, chosen_mode
 
 pub(crate) use candidates::{CandidateColumn, JointScale, candidate_columns, step_columns};
 pub(crate) use choice::choose_friction;
-pub(crate) use constants_fit::{ConstantsError, FrictionConstants};
+pub(crate) use constants_fit::{ConstantsError, ConstantsStep, FrictionConstants};

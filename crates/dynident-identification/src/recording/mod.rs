@@ -7,6 +7,7 @@ pub use error::LogError;
 pub use motion_record::MotionRecord;
 
 use dynident_model::Model;
+use dynident_recording::filter::CutoffChoice;
 use dynident_recording::log::OneOrMany;
 use dynident_recording::{Log, MotionBlock, MotionSettings, MotionStream, Reference};
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,19 @@ pub struct Recording {
     pub commanded: Option<Arc<Reference>>,
     /// The payload that it was recorded with, by name.
     pub payload: Option<String>,
+    /// What is known of the longer recording that it is an excerpt of; none where it is whole.
+    pub(crate) whole: Option<Whole>,
+}
+
+/// What a recording says that is kept as an [excerpt](crate::excerpt), at the excerpt's rate.
+#[derive(Clone, Debug)]
+pub(crate) struct Whole {
+    /// Rows of the whole.
+    pub(crate) rows: u64,
+    /// The cut-off that the whole's positions suggest.
+    pub(crate) cutoff: CutoffChoice,
+    /// Standard deviation of the noise of one sample, in the log's order of joints.
+    pub(crate) position_noise: Vec<f64>,
 }
 
 impl Recording {
@@ -84,7 +98,7 @@ impl Recording {
     }
 
     fn new(name: String, role: Role, samples: Samples) -> Self {
-        Self { name, role, samples, commanded: None, payload: None }
+        Self { name, role, samples, commanded: None, payload: None, whole: None }
     }
 
     /// What messages about its rows call it: a file's path, or the label of its samples.
@@ -95,7 +109,7 @@ impl Recording {
         }
     }
 
-    /// Rows, about; for progress bars only.
+    /// Rows, about.
     pub(crate) fn estimated_rows(&self) -> Option<u64> {
         match &self.samples {
             Samples::Log(log) => log.source().estimated_rows(),
@@ -113,6 +127,11 @@ impl Recording {
                 Some(Self { samples: Samples::Motion(Box::new(record)), ..self.clone() })
             }
         }
+    }
+
+    /// Rows of what it is an excerpt of, or its own, about.
+    pub(crate) fn rows_of_whole(&self) -> Option<u64> {
+        self.whole.as_ref().map_or_else(|| self.estimated_rows(), |whole| Some(whole.rows))
     }
 
     /// Whether it has the temperatures of the joints.

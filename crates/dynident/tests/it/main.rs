@@ -26,6 +26,7 @@ mod iteration_home;
 mod iteration_legs;
 mod iteration_report;
 mod log_formats;
+mod long_logs;
 mod masses;
 mod mjcf;
 mod modules;

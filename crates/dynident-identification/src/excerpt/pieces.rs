@@ -1,0 +1,134 @@
+//! Pieces of a stream of rows, spread evenly over it, at most so many rows however long it is.
+
+/// A piece has at most this part of the rows that there is room for: few pieces, so that little is lost at their ends.
+const PIECES: usize = 8;
+
+/// Rows that were kept: pieces of equal length, shorter only where the stream was interrupted, every `stride`-th of
+/// them.
+///
+/// While a stream lasts, its length is not known. So all pieces are kept until there is no room for another; then every
+/// other one goes, from then on every other one is not kept, and so on. In the end about half of the rows that there is
+/// room for or more are left, of pieces at equal distances, whatever the stream's length.
+pub(super) struct Pieces {
+    /// Rows that there is room for, and rows of one piece.
+    most: usize,
+    length: usize,
+    stride: usize,
+    /// Pieces that have begun, kept or not.
+    begun: usize,
+    kept: Vec<Piece>,
+    /// Whether the piece that was begun last is kept, and its rows so far.
+    keeping: bool,
+    rows: usize,
+}
+
+/// Some rows: the number of the piece, and row by row its time and its numbers.
+struct Piece {
+    number: usize,
+    time_s: Vec<f64>,
+    values: Vec<f64>,
+    width: usize,
+}
+
+impl Pieces {
+    /// Room for about `most` rows in pieces of at least `least`; for two pieces in any case.
+    pub(super) fn new(most: usize, least: usize) -> Self {
+        let length = (most / PIECES).max(least).max(1);
+        Self { most, length, stride: 1, begun: 0, kept: Vec::new(), keeping: false, rows: length }
+    }
+
+    /// What follows does not go on with what came before.
+    pub(super) fn begin(&mut self) {
+        self.rows = self.length;
+    }
+
+    /// The next row.
+    pub(super) fn push(&mut self, time_s: f64, values: impl Iterator<Item = f64>) {
+        if self.rows >= self.length {
+            self.next();
+        }
+        self.rows += 1;
+        if let (true, Some(piece)) = (self.keeping, self.kept.last_mut()) {
+            piece.time_s.push(time_s);
+            piece.values.extend(values);
+            piece.width = piece.values.len() / piece.time_s.len();
+        }
+    }
+
+    fn next(&mut self) {
+        let number = self.begun;
+        self.begun += 1;
+        self.rows = 0;
+        self.keeping = number.is_multiple_of(self.stride);
+        if !self.keeping {
+            return;
+        }
+        while self.kept.len() > 1 && self.kept_rows() + self.length > self.most {
+            self.stride *= 2;
+            self.kept.retain(|piece| piece.number.is_multiple_of(self.stride));
+            self.keeping = number.is_multiple_of(self.stride);
+        }
+        if self.keeping {
+            self.kept.push(Piece { number, time_s: Vec::new(), values: Vec::new(), width: 0 });
+        }
+    }
+
+    fn kept_rows(&self) -> usize {
+        self.kept.iter().map(|piece| piece.time_s.len()).sum()
+    }
+
+    /// Times, and column by column the numbers of all rows that were kept.
+    pub(super) fn columns(self) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let width = self.kept.iter().map(|piece| piece.width).max().unwrap_or(0);
+        let of_column = |column: usize| -> Vec<f64> {
+            let rows = self.kept.iter().flat_map(|piece| piece.values.chunks_exact(piece.width.max(1)));
+            rows.map(|row| row[column]).collect()
+        };
+        let columns = (0..width).map(of_column).collect();
+        (self.kept.iter().flat_map(|piece| piece.time_s.iter().copied()).collect(), columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_stream_is_kept_whole_and_a_long_one_in_even_pieces() {
+        for (rows, stride) in [(1, 1), (800, 1), (801, 2), (1_600, 2), (50_000, 64)] {
+            let mut pieces = Pieces::new(800, 0);
+            for row in 0..rows {
+                pieces.push(f64::from(row), [f64::from(row), -f64::from(row)].into_iter());
+            }
+            let (time_s, columns) = pieces.columns();
+            let expected: Vec<f64> = (0..rows).filter(|row| (row / 100) % stride == 0).map(f64::from).collect();
+            assert_eq!(time_s, expected, "{rows} rows");
+            assert_eq!(columns[0], expected);
+            assert!(columns[1].iter().zip(&expected).all(|(a, b)| *a == -b));
+            assert!(time_s.len() <= 800);
+            assert!(rows <= 800 || time_s.len() >= 400);
+        }
+    }
+
+    #[test]
+    fn pieces_are_as_long_as_they_have_to_be() {
+        let mut pieces = Pieces::new(800, 500);
+        (0..5_000).for_each(|row| pieces.push(f64::from(row), core::iter::empty()));
+        assert_eq!(pieces.columns().0, (0..500).chain(4_000..4_500).map(f64::from).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_piece_ends_where_the_stream_is_interrupted() {
+        let mut pieces = Pieces::new(80, 0);
+        for row in 0..400 {
+            if row == 5 {
+                pieces.begin();
+            }
+            pieces.push(f64::from(row), core::iter::once(0.0));
+        }
+        // Pieces of 10 rows, but for the first of 5: 41 pieces, of which every eighth is left.
+        let expected: Vec<f64> =
+            (0..400).filter(|row| if *row < 5 { true } else { ((row - 5) / 10 + 1) % 8 == 0 }).map(f64::from).collect();
+        assert_eq!(pieces.columns().0, expected);
+    }
+}
