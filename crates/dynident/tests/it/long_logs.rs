@@ -73,7 +73,7 @@ fn job(folder: &std::path::Path) -> Job {
 fn value(found: &IdentificationOutcome, symbol: &str) -> (f64, f64) {
     let own = found.result.base_parameters.iter().find(|parameter| parameter.symbol == symbol);
     let all = || found.result.base_parameters.iter().map(|own| own.symbol.clone()).collect::<Vec<_>>().join(", ");
-    own.map(|own| (own.value, own.half_width_95)).unwrap_or_else(|| panic!("no {symbol} among {}", all()))
+    own.map_or_else(|| panic!("no {symbol} among {}", all()), |own| (own.value, own.half_width_95))
 }
 
 /// Friction, its constants and the numbers are those that were put in, by every row of the log, for any number of
