@@ -117,7 +117,7 @@ impl ConsistentIntervals {
     ///
     /// # Errors
     /// [`PhysicalError::Setting`], [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`], and those of
-    /// [`physical_fit`].
+    /// [`physical_fit`](super::physical_fit).
     pub fn new(
         problem: &PhysicalProblem,
         covariance: Option<&DMatrix<f64>>,
@@ -170,7 +170,7 @@ impl ConsistentIntervals {
     /// has no width.
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] if there is no such parameter, and those of [`physical_fit`].
+    /// [`PhysicalError::Mismatch`] if there is no such parameter, and those of [`physical_fit`](super::physical_fit).
     pub fn of(&self, index: usize) -> Result<ConsistentInterval, PhysicalError> {
         if index >= self.sizes.len() {
             return Err(PhysicalError::Mismatch {
