@@ -187,7 +187,8 @@ impl Shortfall {
     /// What would help.
     pub fn remedy(&self) -> &'static str {
         match self {
-            Self::TooFewRuns { .. } | Self::NoModel => "allow more runs (max_runs)",
+            Self::TooFewRuns { .. } => "more good runs: mend what refused one, or allow more (max_runs)",
+            Self::NoModel => "allow more runs (max_runs)",
             Self::LastRunRejected { .. } => {
                 "see the reason; a first controller that holds the robot is the commonest cure"
             }

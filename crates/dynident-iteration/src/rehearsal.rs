@@ -9,7 +9,7 @@ use dynident_model::InertialParameters;
 use dynident_model::sample::Random;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{
-    LoopSettings, Plant, Reference, RunLimits, RunStatus, SimulationError, closed_loop, require,
+    LimitedQuantity, LoopSettings, Plant, Reference, RunLimits, RunStatus, SimulationError, closed_loop, require,
 };
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -87,7 +87,8 @@ pub enum RehearsalFailure {
     Torque(Breach),
     /// A robot that may be the true one is not held.
     #[error(
-        "in simulation {robot} is not held: {verdict}; give other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or state rehearsal.uncertainty_percent and [iteration.envelope]"
+        "in simulation {robot} is not held: {verdict}; {}give other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or state rehearsal.uncertainty_percent and [iteration.envelope]",
+        room_words(.verdict)
     )]
     Loop {
         /// Which robot.
@@ -95,6 +96,21 @@ pub enum RehearsalFailure {
         /// How its run ended.
         verdict: RunStatus,
     },
+}
+
+/// A motion that goes right up to a stop leaves no room for any tracking error: no gains mend that.
+fn room_words(verdict: &RunStatus) -> &'static str {
+    match verdict {
+        RunStatus::LimitBroken { quantity: LimitedQuantity::Position, .. } => {
+            "keep the motion further from the limits of position ([design.defaults] stop_margin_percent, or position in [design.limits]), "
+        }
+        RunStatus::LimitBroken { quantity: LimitedQuantity::Speed, .. } => {
+            "keep the motion further below the limits of velocity (speed in [design.limits]), "
+        }
+        RunStatus::LimitBroken { quantity: LimitedQuantity::TrackingError, .. }
+        | RunStatus::Diverged { .. }
+        | RunStatus::Done => "",
+    }
 }
 
 /// What is rehearsed.

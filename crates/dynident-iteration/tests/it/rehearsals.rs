@@ -78,6 +78,20 @@ fn an_arm_that_would_fall_is_not_commanded() {
     assert!(reason.contains("bandwidth_hz"), "{reason}");
 }
 
+/// A motion that goes right up to a stop is passed by the robot that follows it: the words say that the motion needs
+/// room, for no gains hold a robot on a line that it may not cross.
+#[test]
+fn a_motion_up_to_the_stops_is_told_to_keep_off_them() {
+    let motion = reference();
+    let q = &motion.motion().q[..motion.samples()];
+    let highest = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let tight = Envelope { upper: vec![Some(highest + 1e-9), None], ..envelope() };
+    let settings = IterationSettings { model_free: pd(), safety: safety(tight), ..IterationSettings::default() };
+    let reason = refused(robot(), settings);
+    assert!(reason.contains("is not held") && reason.contains("position of joint1"), "{reason}");
+    assert!(reason.contains("stop_margin_percent"), "{reason}");
+}
+
 /// A motion that asks for more torque, or goes where it may not, is not commanded.
 #[test]
 fn a_motion_outside_of_the_envelope_is_not_commanded() {
