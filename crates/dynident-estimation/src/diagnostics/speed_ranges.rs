@@ -2,11 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Below this velocity a joint counts as at rest, rad/s (m/s) of a usual arm.
-const STATIC: f64 = 0.005;
-/// Below this velocity it counts as reversing, rad/s (m/s) of a usual arm: friction's regime.
-const REVERSAL: f64 = 0.1;
-
 /// Sums of squared residuals by the joint's own velocity: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
 /// rad/s on), of an arm of usual length; speeds of other machines are given in their own units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,10 +32,15 @@ pub struct SpeedRangesReport {
 }
 
 impl SpeedRanges {
+    /// Below this velocity a joint counts as at rest, rad/s (m/s) of a usual arm.
+    pub const REST_BELOW: f64 = 0.005;
+    /// Below this velocity it counts as reversing, rad/s (m/s) of a usual arm: friction's regime.
+    pub const REVERSAL_BELOW: f64 = 0.1;
+
     /// A residual at a velocity, rad/s (m/s) as it would be of a usual arm.
     pub fn add(&mut self, speed: f64, residual: f64) {
         let speed = speed.abs();
-        let place = usize::from(speed >= STATIC) + usize::from(speed >= REVERSAL);
+        let place = usize::from(speed >= Self::REST_BELOW) + usize::from(speed >= Self::REVERSAL_BELOW);
         self.sums[place].0 += 1;
         self.sums[place].1 += residual * residual;
     }

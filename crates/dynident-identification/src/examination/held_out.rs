@@ -182,7 +182,7 @@ pub(crate) fn tested_on(
         rows_of: model,
         log: recording.label(),
         theta,
-        watches: (0..joints.len()).map(|joint| JointWatch::new(model, joint, uncertainty)).collect(),
+        watches: (0..joints.len()).map(|joint| JointWatch::new((model, theta), joint, uncertainty)).collect(),
         model: Validation::new(joints.clone()),
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),

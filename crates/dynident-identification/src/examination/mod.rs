@@ -6,6 +6,7 @@ mod held_out;
 mod motion_band;
 mod nominal_agreement;
 mod residuals;
+mod stiction;
 mod torque_sign;
 mod torque_trace;
 mod training;

@@ -1,5 +1,6 @@
 //! Residual diagnostics and the 95 % band of a held-out log, joint by joint, in the pass that validates.
 
+use super::stiction::Stiction;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{
@@ -29,7 +30,9 @@ pub struct JointResiduals {
     pub band: Option<TorqueBand>,
 }
 
-/// How well the predicted 95 % band `τ̂ ± t κ √(w V wᵀ + σ²)` holds the torque of one joint on a held-out log.
+/// How well the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + F)` holds the torque of one joint on a held-out log. F is
+/// what dry friction may hold while the joint rests (|q̇| below 0.005 rad/s of a usual arm), the largest friction that the
+/// model has near rest, and zero in motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {
@@ -73,6 +76,8 @@ pub(crate) struct JointWatch {
     /// The joint's columns among all.
     own: DMatrix<f64>,
     sigma: Option<(f64, f64)>,
+    /// What may hold the joint at rest.
+    stiction: Stiction,
     /// Places among the panel's columns whose sum is the velocity: viscous friction, or its two directions. None where
     /// there are no such columns.
     speed: Vec<usize>,
@@ -87,7 +92,11 @@ pub(crate) struct JointWatch {
 }
 
 impl JointWatch {
-    pub(crate) fn new(model: &RegressorModel, joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
+    pub(crate) fn new(
+        (model, theta): (&RegressorModel, &[f64]),
+        joint: usize,
+        uncertainty: Option<&Uncertainty>,
+    ) -> Self {
         let layout = model.layout();
         let columns = layout.joint_columns(joint);
         let all = layout.columns();
@@ -117,6 +126,7 @@ impl JointWatch {
                 let ratio = uncertainty.ratios.get(joint).copied().unwrap_or(1.0);
                 (uncertainty.joint_sigma[joint], uncertainty.width * ratio)
             }),
+            stiction: Stiction::of(model, joint, theta),
             speed,
             usual_speed: model.model().own_scale().velocity(model.model().joints()[joint].turns(), 1.0),
             whiteness: Whiteness::default(),
@@ -136,15 +146,18 @@ impl JointWatch {
             self.samples += 1;
             self.whiteness.add(residual);
             self.normality.add(residual);
+            let mut rests = false;
             if !self.speed.is_empty() {
                 let speed: f64 = self.speed.iter().map(|column| panel[column * rows + row]).sum();
                 self.regimes.add(speed / self.usual_speed, residual);
+                rests = speed.abs() < SpeedRanges::REST_BELOW * self.usual_speed;
             }
             if let Some((sigma, width)) = self.sigma {
                 let variance: f64 = (0..self.own.nrows())
                     .map(|k| (0..columns).map(|c| self.own[(k, c)] * panel[c * rows + row]).sum::<f64>().powi(2))
                     .sum();
-                let half = width * (variance + sigma * sigma).sqrt();
+                let held = if rests { self.stiction.level((panel, rows), row, predicted[row]) } else { 0.0 };
+                let half = width * (variance + sigma * sigma).sqrt() + held;
                 self.widths += half;
                 self.inside += usize::from(residual.abs() <= half);
             }

@@ -46,5 +46,6 @@ mod simulated_loop;
 mod spoilt_logs;
 mod synthetic_truth;
 mod temperature;
+mod torque_band;
 mod torque_lag;
 mod ur10_example;
