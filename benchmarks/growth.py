@@ -24,6 +24,7 @@ import subprocess
 import sys
 
 import numpy as np
+from common import machine
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PANDA = ROOT / "robots/panda_arm7.urdf"
@@ -220,7 +221,9 @@ def main():
     chains = [n for n in (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 100, 140, 200) if n <= joints]
     robots = {number: chain(scratch / f"chain{number}.urdf", number) for number in chains}
     if "calls" in chosen.only:
-        command = [chosen.benchmark, "--robots", scratch, "--only", ",".join(CALLS), *(f"chain{number}" for number in chains)]
+        simd = machine()["simd"]
+        level = ["--level", simd] if simd in ("AVX2", "AVX-512") else []
+        command = [chosen.benchmark, *level, "--robots", scratch, "--only", ",".join(CALLS), *(f"chain{number}" for number in chains)]
         least = {}
         for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines():
             told = json.loads(line)
