@@ -1,6 +1,7 @@
 #!/bin/sh
 # build_rivals.sh VENV OUT: compiles the C++ and C rivals into OUT, what is already there stays (2 to 4 minutes and 1 to 2 GB
-# for each Pinocchio build). VENV holds the wheels of benchmarks/requirements.txt; Eigen headers: libeigen3-dev, or EIGEN=folder.
+# for each Pinocchio build; PINOCCHIO="native" builds that one alone). VENV holds the wheels of
+# benchmarks/requirements.txt; Eigen headers: libeigen3-dev, or EIGEN=folder.
 #   native  Pinocchio header-only, -O3 -march=native
 #   base    the same without -march (SSE2)
 #   wheel   against the wheel's own compiled templates: what a C++ user of the wheel gets
@@ -19,6 +20,7 @@ define="-DNDEBUG -std=c++17 -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_
 # Compiles under a second name first: a build that was cut short leaves no program behind.
 pinocchio() {
   name=$1; shift
+  case " ${PINOCCHIO:-native base wheel} " in *" $name "*) ;; *) return 0 ;; esac
   [ -x "$out/bench_$name" ] && return
   echo "compiling Pinocchio, $name" >&2
   # shellcheck disable=SC2086  # the defines are several words on purpose

@@ -46,6 +46,11 @@ def emit_timed(job, build, robot, nv, algo, call, repeats, per=1):
         start = time.process_time_ns()
         call()
         ns.append((time.process_time_ns() - start) / per)
+    figure(job, build, robot, nv, algo, ns)
+
+
+def figure(job, build, robot, nv, algo, ns):
+    """Prints median, minimum and maximum of these times in ns."""
     figures = dict(ns=statistics.median(ns), min=min(ns), max=max(ns))
     print(json.dumps(dict(job=job, build=build, robot=robot, nv=nv, algo=algo, **{k: round(v, 1) for k, v in figures.items()})), flush=True)
 

@@ -1,4 +1,5 @@
-"""One markdown table from the JSON lines in a folder (see compare.sh): minimum (median) in ns, rivals beside Dynident.
+"""Markdown tables from the JSON lines in a folder (see compare.sh): minimum (median) in ns, rivals beside Dynident; what the machine
+can do at best; and how much of that each of Dynident's figures is.
 
     table.py FOLDER
 
@@ -21,6 +22,7 @@ NAMES = {
     ("pinocchio_cpp", "base"): "Pinocchio C++ SSE2",
     ("pinocchio_python", "wheel"): "Pinocchio Python",
     ("mujoco", "wheel"): "MuJoCo",
+    ("pandas", "wheel"): "pandas",
 }
 # Dynident's batched kernels have no counterpart in Pinocchio: the same quantity one call at a time stands beside them.
 SAME_QUANTITY = {"regressor_batch": "joint_torque_regressor", "rnea_batch": "rnea", "crba_batch": "crba",
@@ -28,20 +30,34 @@ SAME_QUANTITY = {"regressor_batch": "joint_torque_regressor", "rnea_batch": "rne
 VARIANT = re.compile(r"_(world|local)$")
 
 
-def figures(folder):
-    """{(robot, algo): {column: (minimum, median, rounds)}} in order of first appearance."""
-    runs = {}
+# Rivals of which the last column speaks, the first one that has a figure.
+ANCHORS = ("Pinocchio C++ native", "Pinocchio Python", "MuJoCo", "pandas")
+
+
+PACKAGES = {"Pinocchio": "pin", "MuJoCo": "mujoco", "NumPy": "numpy", "pandas": "pandas"}
+
+
+def lines(folder):
     for path in sorted(Path(folder).glob("*.jsonl")):
         for number, line in enumerate(path.read_text().splitlines(), 1):
             if not line.startswith("{"):
                 continue
             try:
-                d = json.loads(line)
+                yield json.loads(line)
             except ValueError as error:
                 sys.exit(f"{path}:{number}: not a JSON line ({error})")
-            if "algo" in d:
-                column = NAMES.get((d["job"], d["build"]), f"{d['job']} {d['build']}".capitalize())
-                runs.setdefault((d["robot"], d["algo"], column), []).append((d["min"], d["ns"]))
+
+
+def own_column(job, build):
+    return NAMES.get((job, build), f"{job} {build}".capitalize())
+
+
+def figures(folder):
+    """{(robot, algo): {column: (minimum, median, rounds)}} in order of first appearance."""
+    runs = {}
+    for d in lines(folder):
+        if "algo" in d:
+            runs.setdefault((d["robot"], d["algo"], own_column(d["job"], d["build"])), []).append((d["min"], d["ns"]))
     table = {}
     for (robot, algo, column), values in runs.items():
         cell = (min(v[0] for v in values), statistics.median(v[1] for v in values), len(values))
@@ -65,6 +81,56 @@ def compiler(command):
         return f"{command} not found"
 
 
+def comparison(table, ours, rivals):
+    """One table of these rows, with the columns that have a figure."""
+    present = {c for cells in table.values() for c in cells}
+    ours, rivals = ([c for c in columns if c in present] for columns in (ours, rivals))
+    heads = ["robot", "quantity", *ours, *rivals, *(["times as fast"] if ours else [])]
+    print("| " + " | ".join(heads) + " |\n|" + " --- |" * 2 + " ---: |" * (len(heads) - 2))
+    for robot in dict.fromkeys(robot for robot, _ in table):
+        for (r, algo), cells in table.items():
+            if r != robot:
+                continue
+            row = [f"{number(cells[c][0])} ({number(cells[c][1])})" if c in cells else "" for c in [*ours, *rivals]]
+            if ours:
+                best = min((cells[c][0] for c in ours if c in cells), default=None)
+                anchor = next((cells[c][0] for c in ANCHORS if c in cells), None)
+                row.append(f"{anchor / best:.1f}" if best and anchor else "")
+            print("| " + " | ".join([robot, algo.replace("_", " "), *row]) + " |")
+
+
+def limits(folder):
+    """{(limit, column): (most per second, what it is)}"""
+    found = {}
+    for d in lines(folder):
+        if d.get("job") == "limit":
+            key = (d["limit"], own_column("dynident", d["build"]) if d["build"] else "")
+            found[key] = max(found.get(key, (0.0, "")), (d["per_second"], d["what"]))
+    return found
+
+
+def shares(folder, table, limit):
+    """Rows of robot, quantity, work of one call, rate, share of the limit."""
+    rows = []
+    for d in {(d["robot"], d["count_of"]): d for d in lines(folder) if d.get("job") == "operations"}.values():
+        cells = table.get((d["robot"], d["count_of"]), {})
+        own = [(cell[0], column) for column, cell in cells.items() if column.startswith("Dynident")]
+        if not own:
+            continue
+        least, column = min(own)
+        head = [d["robot"], d["count_of"].replace("_", " "), column.removeprefix("Dynident ")]
+        if "flops" in d:
+            rate = d["flops"] / least
+            peak = limit.get(("peak_flops", column))
+            share = f"{100e9 * rate / peak[0]:.0f} % of the peak" if peak else ""
+            rows.append([*head, f"{d['flops']:.0f}", f"{rate:.2f} GFLOP/s", share])
+        else:
+            rate = d["bytes"] / least
+            parts = [f"{100e9 * rate / limit[key, ''][0]:.0f} % of {key}" for key in ("newlines", "floats") if (key, "") in limit]
+            rows.append([*head, f"{d['bytes']:.0f} bytes", f"{rate:.2f} GB/s", ", ".join(parts)])
+    return rows
+
+
 def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
@@ -76,22 +142,31 @@ def main():
     ours = sorted(present - set(rivals))
     m = machine()
     rounds = max(cell[2] for cells in table.values() for cell in cells.values())
-    print(f"{m['date']}, {m['cpu']} ({m['simd']}, {m['cores']} cores; one used), {compiler('g++')}, {compiler('rustc')},")
-    print(f"Pinocchio {version('pin')}, MuJoCo {version('mujoco')}, NumPy {version('numpy')}. ns a call or a sample of one thread's CPU time:")
-    print(f"minimum (median), up to {rounds} runs each, alternating. Last column: best Dynident against native Pinocchio, by minima.\n")
-    heads = ["robot", "quantity", *ours, *rivals, *(["times as fast"] if ours else [])]
-    print("| " + " | ".join(heads) + " |\n|" + " --- |" * 2 + " ---: |" * (len(heads) - 2))
-    robots = list(dict.fromkeys(robot for robot, _ in table))
-    for robot in robots:
-        for (r, algo), cells in table.items():
-            if r != robot:
-                continue
-            row = [f"{number(cells[c][0])} ({number(cells[c][1])})" if c in cells else "" for c in [*ours, *rivals]]
-            if ours:
-                best = min((cells[c][0] for c in ours if c in cells), default=None)
-                anchor = next((cells[c][0] for c in ("Pinocchio C++ native", "Pinocchio Python") if c in cells), None)
-                row.append(f"{anchor / best:.1f}" if best and anchor else "")
-            print("| " + " | ".join([robot, algo.replace("_", " "), *row]) + " |")
+    print(f"{m['date']}, {m['cpu']} ({m['simd']}, {m['cores']} cores; one used; load {m['load']}), {compiler('g++')}, {compiler('rustc')},")
+    packages = ", ".join(f"{name} {version(package)}" for name, package in PACKAGES.items())
+    print(f"{packages}. ns a call, a sample, a row or a command of one thread's CPU time:")
+    print(f"minimum (median), up to {rounds} runs each, alternating. Last column: best Dynident against the first of")
+    print(f"{', '.join(ANCHORS)} that has a figure, by minima.\n")
+    of_pinocchio = {key: cells for key, cells in table.items() if any(c.startswith("Pinocchio") for c in cells)} or table
+    comparison(of_pinocchio, ours, rivals)
+    others = {key: cells for key, cells in table.items() if key not in of_pinocchio}
+    if others:
+        print()
+        comparison(others, ours, rivals)
+    limit = limits(sys.argv[1])
+    if limit:
+        print("\nThe machine at its best, one core, measured in the same run:\n")
+        print("| limit | | a second | what |\n| --- | --- | ---: | --- |")
+        for (name, column), (rate, what) in limit.items():
+            unit = "GFLOP" if name == "peak_flops" else "GB"
+            print(f"| {name.replace('_', ' ')} | {column.removeprefix('Dynident ')} | {rate / 1e9:.3g} {unit} | {what} |")
+    rows = shares(sys.argv[1], table, limit)
+    if rows:
+        print("\nShare of that: operations as counted in the program by scalars that count (a multiply-add is two; plain arithmetic outside of the")
+        print("kernels is not counted), over the least time. The peak is that of all lanes full and nothing but multiply-adds.\n")
+        print("| robot | quantity | | a call | reached | share |\n| --- | --- | --- | ---: | ---: | --- |")
+        for row in rows:
+            print("| " + " | ".join(row) + " |")
 
 
 if __name__ == "__main__":

@@ -241,6 +241,66 @@ def default_picture():
     return "\n".join(out + ["</svg>", ""])
 
 
+GROWTH_PANELS = [
+    ("identify: rows of a Panda arm's log", "s of the processor", 1.0, [("rows", "identify"), ("log", "reading alone")], 3),
+    ("identify: logs of 2,000 rows", "s of the processor", 1.0, [("logs", "identify")], 3),
+    ("peak memory of identify, by rows", "MiB", None, [("rows", "rows of one log")], 5),
+    ("peak memory of identify, by logs", "MiB", None, [("logs", "logs of 2,000 rows")], 5),
+    ("identify: joints of a chain, 4,000 rows", "s of the processor", 1.0, [("identify", "identify")], 3),
+    ("one call: joints of a chain", "µs", 1e6, [("rnea", "rnea"), ("crba", "crba"), ("aba", "aba"), ("rnea_derivatives", "derivatives"), ("joint_torque_regressor", "regressor")], 3),
+    ("a sample of a batch: joints of a chain", "µs", 1e6, [("rnea_batch", "rnea"), ("crba_batch", "crba"), ("rnea_derivatives_batch", "derivatives"), ("regressor_batch", "regressor")], 3),
+]
+LINES = ["#1f4e8c", "#b03030", "#2e7d32", "#8a5a00", "#6a3d9a"]
+
+
+def growth_picture():
+    """Logarithmic panels of benchmarks/growth.py; a thin grey line in each is proportional growth."""
+    cells = [cell for cell in data("growth.csv") if cell["threads"] == "1"]
+    wide, high, left, top = 330, 230, 52, 30
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {2 * wide + 60} {4 * high + 20}" font-family="sans-serif" font-size="11">',
+        f'<rect width="{2 * wide + 60}" height="{4 * high + 20}" fill="white"/>',
+    ]
+    for number, (title, unit, scale, curves, field) in enumerate(GROWTH_PANELS):
+        x0, y0 = (number % 2) * (wide + 30) + left, (number // 2) * high + top
+        width, height = wide - left - 70, high - top - 34
+        name = "memory_mib" if scale is None else "processor_s"
+        lines = {label: [(float(c["number"]), (scale or 1.0) * float(c[name])) for c in cells if c["curve"] == curve] for curve, label in curves}
+        xs, ys = ([point[k] for points in lines.values() for point in points] for k in (0, 1))
+        low_x, high_x = math.floor(math.log10(min(xs)) * 2) / 2, math.ceil(math.log10(max(xs)) * 2) / 2
+        low_y, high_y = math.floor(math.log10(min(ys))), math.ceil(math.log10(max(ys)))
+
+        def place(x, y):
+            across, up = (math.log10(x) - low_x) / (high_x - low_x), (math.log10(y) - low_y) / (high_y - low_y)
+            return f"{x0 + width * across:.1f},{y0 + height * (1 - up):.1f}"
+
+        out.append(f'<text x="{x0 - left + 8}" y="{y0 - 12}" fill="{INK}" font-size="12">{title}, {unit}</text>')
+        for decade in range(math.ceil(low_x), math.floor(high_x) + 1):
+            (x, y), end = place(10.0**decade, 10.0**low_y).split(","), y0
+            out.append(f'<line x1="{x}" y1="{end}" x2="{x}" y2="{y}" stroke="{GRID}"/>')
+            out.append(f'<text x="{x}" y="{float(y) + 15:.1f}" fill="{INK}" text-anchor="middle">{10**decade:,}</text>')
+        for decade in range(low_y, high_y + 1):
+            x, y = place(10.0**low_x, 10.0**decade).split(",")
+            out.append(f'<line x1="{x}" y1="{y}" x2="{x0 + width}" y2="{y}" stroke="{GRID}"/>')
+            out.append(f'<text x="{x0 - 6}" y="{float(y) + 4:.1f}" fill="{INK}" text-anchor="end">{10.0**decade:g}</text>')
+        taken = []
+        for colour, (label, points) in zip(LINES, lines.items()):
+            path = " ".join(place(x, y) for x, y in points)
+            out.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
+            out += [f'<circle cx="{p.split(",")[0]}" cy="{p.split(",")[1]}" r="2" fill="{colour}"/>' for p in path.split()]
+            x, y = map(float, path.split()[-1].split(","))
+            while any(abs(y - other) < 11 for other in taken):
+                y += 3
+            taken.append(y)
+            out.append(f'<text x="{x + 6:.1f}" y="{y + 4:.1f}" fill="{colour}" font-size="10">{label}</text>')
+        # Proportional growth from the least of the first points on, as far as the panel goes.
+        first = min((points[0] for points in lines.values()), key=lambda point: point[1])
+        reach = min(10**high_x / first[0], 10**high_y / first[1])
+        ends = f"{place(*first)} {place(first[0] * reach, first[1] * reach)}"
+        out.append(f'<polyline points="{ends}" fill="none" stroke="#888888" stroke-dasharray="3 3"/>')
+    return "\n".join(out + ["</svg>", ""])
+
+
 ARMS = ["ur10", "panda", "iiwa14"]
 TABLES = {
     "estimators-compared.md": [estimators],
@@ -248,7 +308,7 @@ TABLES = {
     "differentiators.md": [differentiators],
     "designs-compared.md": [lambda: designs(ARMS, ""), lambda: designs(ARMS, ", cell"), lambda: designs(ARMS, ", friction")],
 }
-PICTURES = {"estimators.svg": estimators_picture, "default.svg": default_picture}
+PICTURES = {"estimators.svg": estimators_picture, "default.svg": default_picture, "growth.svg": growth_picture}
 
 wrong = []
 for page, tables in TABLES.items():

@@ -1,6 +1,7 @@
-//! Times Dynident's dynamics, its way from samples to triangular factors, a step of an excitation design and one of the
-//! closed loop, and prints one JSON line a figure: the same lines, states and method as the programs in `benchmarks/`,
-//! which `benchmarks/compare.sh` sets side by side.
+//! Times Dynident's dynamics, its way from samples to triangular factors, a step of an excitation design, one of the
+//! closed loop and reading text, measures what the machine can do at best, counts operations, and prints one JSON line
+//! a figure: the same lines, states and method as the programs in `benchmarks/`, which `benchmarks/compare.sh` sets
+//! side by side.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
 
@@ -26,7 +27,19 @@ struct Options {
     /// cache sets.
     #[arg(long, default_value_t = 72, value_parser = clap::value_parser!(u16).range(1..=512))]
     block: u16,
-    /// Only these quantities.
+    /// Count the operations of each quantity by scalars that count, in place of timing it; needs the feature `counted`.
+    #[arg(long)]
+    count: bool,
+    /// Measure what the machine can do as well: peak of the processor, memory, text.
+    #[arg(long)]
+    limits: bool,
+    /// The text that is read with --limits: a recording of the Panda arm, made where there is none.
+    #[arg(long, default_value = "target/benchmark.csv")]
+    csv: PathBuf,
+    /// Rows of the recording if it is made.
+    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+    csv_rows: u32,
+    /// Only these quantities; with --limits also peak_flops, memory and text.
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
     /// Robots by name.
@@ -34,23 +47,53 @@ struct Options {
     names: Vec<String>,
 }
 
+/// The robot whose recording is read as text.
+const RECORDED: &str = "panda_arm7";
+
+/// The level that counts, for all that looks for the best one too.
+#[cfg(feature = "counted")]
+fn counting() -> Option<Level> {
+    Level::count_everywhere().then(Level::counted)
+}
+
+#[cfg(not(feature = "counted"))]
+fn counting() -> Option<Level> {
+    eprintln!("--count: this program was built without the feature `counted`");
+    None
+}
+
 fn main() -> ExitCode {
     let options = Options::parse();
     let available = Level::available();
-    let levels: Vec<Level> = available
-        .iter()
-        .copied()
-        .filter(|level| options.level.as_ref().is_none_or(|name| name.eq_ignore_ascii_case(level.name())))
-        .collect();
+    let levels: Vec<Level> = if options.count {
+        match counting() {
+            Some(level) => vec![level],
+            None => return ExitCode::from(2),
+        }
+    } else {
+        let asked = |level: &Level| options.level.as_ref().is_none_or(|name| name.eq_ignore_ascii_case(level.name()));
+        available.iter().copied().filter(asked).collect()
+    };
     if levels.is_empty() {
         let names: Vec<&str> = available.iter().map(|level| level.name()).collect();
         eprintln!("--level {}: this processor has {}", options.level.unwrap_or_default(), names.join(", "));
         return ExitCode::from(2);
     }
     println!("{}", speed::environment(&available));
+    let model = |name: &str| load_robot(options.robots.join(format!("{name}.urdf"))).map(|robot| robot.model);
+    if options.limits && !options.count {
+        let measured = model(RECORDED).map_err(|error| error.to_string()).and_then(|model| {
+            let text = (options.csv.as_path(), options.csv_rows as usize);
+            speed::time_machine((RECORDED, &model), &levels, text, &options.only)
+        });
+        if let Err(error) = measured {
+            eprintln!("{error}");
+            return ExitCode::FAILURE;
+        }
+    }
     for name in &options.names {
-        let model = match load_robot(options.robots.join(format!("{name}.urdf"))) {
-            Ok(robot) => robot.model,
+        let model = match model(name) {
+            Ok(model) => model,
             Err(error) => {
                 eprintln!("{error}");
                 return ExitCode::from(2);

@@ -1,5 +1,7 @@
 //! The run-time choice of processor level.
 
+#[cfg(feature = "counted")]
+use crate::counted::Counted;
 use crate::kernel::Kernel;
 use crate::lanes::Wide;
 use crate::portable::Portable;
@@ -15,7 +17,12 @@ enum Instructions {
     Avx2(HasAvx2),
     #[cfg(target_arch = "x86_64")]
     Avx512(HasAvx512),
+    #[cfg(feature = "counted")]
+    Counted,
 }
+
+/// The level of [`Level::detect`].
+static CHOSEN: OnceLock<Level> = OnceLock::new();
 
 /// What this processor can do. A value of this type is the proof that the instructions it names exist: it can only be
 /// had from [`Level::detect`], [`Level::available`] and [`Level::portable`].
@@ -26,7 +33,6 @@ impl Level {
     /// The best level of this processor; a lower one if the environment variable `DYNIDENT_INSTRUCTIONS` (`portable`,
     /// `avx2` or `avx512`) says so, for tests and comparisons. Any other value of the variable counts as none.
     pub fn detect() -> Self {
-        static CHOSEN: OnceLock<Level> = OnceLock::new();
         *CHOSEN.get_or_init(|| {
             let named = std::env::var("DYNIDENT_INSTRUCTIONS").ok();
             let most = named.and_then(|name| ["portable", "avx2", "avx512"].iter().position(|known| *known == name));
@@ -39,6 +45,21 @@ impl Level {
     /// multiply-add.
     pub fn portable() -> Self {
         Self(Instructions::Portable)
+    }
+
+    /// Counts operations in place of being fast, with the numbers of [`portable`](Self::portable): see
+    /// [`counted_operations`](crate::counted_operations). Single samples go one value at a time, so that no half-empty
+    /// bundle counts; batches go four at a time.
+    #[cfg(feature = "counted")]
+    pub fn counted() -> Self {
+        Self(Instructions::Counted)
+    }
+
+    /// Makes [`detect`](Self::detect) give [`counted`](Self::counted) in this process; false if it has given another
+    /// level already.
+    #[cfg(feature = "counted")]
+    pub fn count_everywhere() -> bool {
+        *CHOSEN.get_or_init(Self::counted) == Self::counted()
     }
 
     /// All levels of this processor, from portable to best.
@@ -70,6 +91,8 @@ impl Level {
             Instructions::Avx2(_) => "AVX2",
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512(_) => "AVX-512",
+            #[cfg(feature = "counted")]
+            Instructions::Counted => "counted",
         }
     }
 }
@@ -86,6 +109,8 @@ pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
         Instructions::Avx2(proof) => enter_avx2::<K, Wide<Avx2>>(proof, kernel),
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512(proof) => enter_avx512::<K, Wide<Avx512>>(proof, kernel),
+        #[cfg(feature = "counted")]
+        Instructions::Counted => kernel.run::<Wide<Counted<4>>>(),
     }
 }
 
@@ -99,6 +124,8 @@ pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
         // Measured: inside one sample four lanes beat eight (half-empty registers, slower shuffles).
         Instructions::Avx512(proof) => enter_avx2::<K, Wide<Portable<1, true>, Avx2>>(proof.avx2(), kernel),
+        #[cfg(feature = "counted")]
+        Instructions::Counted => kernel.run::<Wide<Counted<1>>>(),
     }
 }
 

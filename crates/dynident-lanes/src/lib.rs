@@ -12,6 +12,8 @@
 #![deny(unsafe_code)]
 
 mod aligned;
+#[cfg(feature = "counted")]
+mod counted;
 mod dispatch;
 mod dual;
 mod exponential;
@@ -26,6 +28,8 @@ mod sin_cos;
 mod x86;
 
 pub use aligned::AlignedBuffer;
+#[cfg(feature = "counted")]
+pub use counted::{Operations, counted_operations};
 pub use dispatch::{Level, dispatch, dispatch_single};
 pub use dual::Dual;
 pub use kernel::Kernel;

@@ -3,19 +3,19 @@
 use dynident_lanes::Level;
 
 /// Repeats of one figure, and how long each lasts at least: as in `bench_pinocchio.cpp`.
-const REPEATS: usize = 21;
+pub(super) const REPEATS: usize = 21;
 const REPEAT_NS: f64 = 12e6;
 
 /// Time that this thread has had of the processor, in nanoseconds: what others run in between does not count.
 #[cfg(unix)]
-fn now_ns() -> f64 {
+pub(super) fn now_ns() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
 }
 
 /// Time since the first call, in nanoseconds: there is no portable thread clock.
 #[cfg(not(unix))]
-fn now_ns() -> f64 {
+pub(super) fn now_ns() -> f64 {
     use std::{sync::OnceLock, time::Instant};
     static START: OnceLock<Instant> = OnceLock::new();
     START.get_or_init(Instant::now).elapsed().as_nanos() as f64
@@ -31,12 +31,29 @@ pub(crate) struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Times `sweep`, which does the work `per` times, and prints median, minimum and maximum of one time.
+    /// Times `sweep`, which does the work `per` times, and prints median, minimum and maximum of one time; at the level
+    /// that counts, the operations of one time in their place.
     pub(crate) fn time(&self, quantity: &str, per: usize, mut sweep: impl FnMut()) {
         if !self.only.is_empty() && !self.only.iter().any(|only| only == quantity) {
             return;
         }
         sweep();
+        #[cfg(feature = "counted")]
+        if self.level == Level::counted() {
+            dynident_lanes::counted_operations();
+            sweep();
+            let count = dynident_lanes::counted_operations();
+            let each = |operations: u64| operations as f64 / per as f64;
+            println!(
+                r#"{{"job":"operations","robot":"{}","nv":{},"count_of":"{quantity}","flops":{:.1},"fused":{:.1},"divisions":{:.1}}}"#,
+                self.robot,
+                self.dof,
+                each(count.flops()),
+                each(count.fused),
+                each(count.divisions),
+            );
+            return;
+        }
         let start = now_ns();
         sweep();
         let sweeps = (REPEAT_NS / (now_ns() - start).max(1.0)).max(1.0) as usize;

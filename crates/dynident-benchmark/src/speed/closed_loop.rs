@@ -15,6 +15,9 @@ use std::hint::black_box;
 
 /// Samples of a timed run: as in `bench_mujoco.c`.
 const SAMPLES: usize = 5000;
+/// Loops of the batch, and samples of each: as in `bench_rollout.py`.
+const LOOPS: usize = 64;
+const LOOP_SAMPLES: usize = 501;
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
@@ -41,6 +44,20 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
+    // Many loops from different postures: there is no batch of them, they run one after the other.
+    let short = Reference::standing(&zeros, 1000.0, (LOOP_SAMPLES - 1) as f64 / 1000.0)?;
+    let many: Vec<LoopSettings> = (0..LOOPS)
+        .map(|_| {
+            let start = Start::At { q: (0..dof).map(|_| random.uniform(-0.3, 0.3)).collect(), dq: zeros.clone() };
+            LoopSettings { integrator: EULER, start, ..LoopSettings::default() }
+        })
+        .collect();
+    closed_loop(&mut plant, controller.as_mut(), &short, &many[0])?;
+    report.time("pd_step_euler_64_loops", LOOPS * LOOP_SAMPLES, || {
+        for settings in &many {
+            let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &short, settings));
+        }
+    });
     // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some
     // slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };

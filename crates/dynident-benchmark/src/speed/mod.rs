@@ -1,24 +1,49 @@
-//! Times of dynamics, of the way from samples to triangular factors, of a step of an excitation design and of one of
-//! the closed loop, as JSON lines.
+//! Times of dynamics, of the way from samples to triangular factors, of a step of an excitation design, of one of the
+//! closed loop and of reading text, and what the machine can do at best, as JSON lines.
 
 mod batch;
 mod clock;
 mod closed_loop;
 mod excitation;
 mod identification;
+mod limits;
 mod motion;
 mod single;
+mod text;
 
 pub(crate) use clock::environment;
 
 use clock::Report;
 use dynident_lanes::Level;
 use dynident_model::Model;
+use std::path::Path;
 
 /// Robots that are only timed for their dynamics.
 const DYNAMICS_ONLY: &str = "talos_reduced";
 /// The robot whose way to factors is timed.
 const FACTORS_OF: &str = "panda_arm7";
+
+/// Measures what this machine can do, and times reading the text at `path`: `rows` samples of `model`, made where there
+/// are none.
+///
+/// # Errors
+/// In words, if the text cannot be written or read.
+pub(crate) fn time_machine(
+    (name, model): (&str, &Model),
+    levels: &[Level],
+    (path, rows): (&Path, usize),
+    only: &[String],
+) -> Result<(), String> {
+    let words = |problem: &dyn core::fmt::Display| format!("{}: {problem}", path.display());
+    limits::of_processor(levels, only);
+    if only.is_empty() || only.iter().any(|only| only == "text") {
+        text::write(path, model, rows).map_err(|source| words(&source))?;
+        limits::of_text(path).map_err(|source| words(&source))?;
+        let report = Report { robot: name, dof: model.dof(), level: Level::detect(), only: &[] };
+        text::time_reading(path, &report).map_err(|source| words(&source))?;
+    }
+    Ok(())
+}
 
 /// Times everything of one robot on these processor levels, `block` samples in a batch; only quantities of `only`,
 /// unless it is empty.
