@@ -30,9 +30,9 @@ pub struct JointResiduals {
     pub band: Option<TorqueBand>,
 }
 
-/// How well the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + F)` holds the torque of one joint on a held-out log. F is
-/// what dry friction may hold while the joint rests (|q̇| below 0.005 rad/s of a usual arm), the largest friction that the
-/// model has near rest, and zero in motion.
+/// How well the predicted 95 % band `τ̂ ± (t κ √(w V wᵀ + σ²) + F)` holds the torque of one joint on a held-out log. F
+/// is what dry friction may hold while the joint rests (|q̇| below 0.005 rad/s of a usual arm), the largest friction
+/// that the model has near rest, and zero in motion.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {

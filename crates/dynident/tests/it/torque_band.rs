@@ -80,8 +80,8 @@ fn the_band_holds_at_rest() {
         assert!(regimes.at_rest.samples > 3000, "{regimes:?}");
         // 95 % of half the rows and nearly all of the other half, which friction's limit holds.
         assert!(band.coverage_percent > 95.0, "{band:?}");
-        // No wider than needed: in the rows at rest by the friction up to 0.1 rad/s of a usual arm, which is 0.15 rad/s of
-        // this one at most, and by a tenth of chance elsewhere.
+        // No wider than needed: in the rows at rest by the friction up to 0.1 rad/s of a usual arm, which is 0.15 rad/s
+        // of this one at most, and by a tenth of chance elsewhere.
         let [_, viscous, coulomb, _] = truth.drive[usize::from(band.joint == "joint2")];
         let share = regimes.at_rest.samples as f64 / found.result.validation[0].model.samples as f64;
         let widest = share * (coulomb + 0.15 * viscous) + 1.1 * 1.96 * NOISE_NM;
