@@ -310,6 +310,20 @@ def breach(envelope, joints, q, dq, tau, q_d):
     return None
 
 
+def outside(envelope, model, data):
+    """Which point leaves the workspace, in words; bodies stand where the last step began."""
+    if envelope is None or "workspace" not in envelope:
+        return None
+    box = envelope["workspace"]
+    for point in box["points"]:
+        body = model.jnt_bodyid[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, point["joint"])]
+        place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ point["offset_m"]
+        for axis, low, value, high in zip("xyz", box["lower"], place, box["upper"]):
+            if (low is not None and value < low) or (high is not None and value > high):
+                return f"{axis} of {point['link']} is {value:.4f} m, its limits {low} and {high}"
+    return None
+
+
 def read_table(path):
     """The rows of a table that was handed over: t_s, q, dq, ddq, and the model's torques if there is a model."""
     with open(path, newline="", encoding="utf-8") as text:
@@ -335,6 +349,7 @@ class Robot:
         self.model.opt.timestep = step_s = 1.0 / rate_hz / self.steps
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, dq
+        mujoco.mj_kinematics(self.model, self.data)
         line = lambda first, delay_s, of_s: collections.deque([first], maxlen=1 + round(delay_s / of_s))
         # What the encoders and the drives still have before them, step by step; what the log has, sample by sample.
         self.seen = line((self.data.qpos.copy(), self.data.qvel.copy()), self.options.sensor_delay, step_s)
@@ -430,7 +445,7 @@ class Robot:
             if self.messages.stop_asked():
                 self.note(message, largest, truly_left)
                 return send("end", status="stopped", reason="the host asked for it")
-            left = breach(envelope, self.joints, q, dq, tau, target[0][order])
+            left = breach(envelope, self.joints, q, dq, tau, target[0][order]) or outside(envelope, self.model, self.data)
             if left:
                 self.note(message, largest, truly_left)
                 return send("end", status="stopped", reason=f"at {where} {left}")
