@@ -218,7 +218,9 @@ def judged(folder, status):
            "worst": 0.0, "tracking_first": None, "tracking_last": None, "in_envelope": True, "stopped": True, "reason": ""}
     truth_file, file = folder / "truth.json", folder / "result" / "iterations.json"
     truth = json.loads(truth_file.read_text(encoding="utf-8")) if truth_file.exists() else {"runs": []}
-    row["in_envelope"] = not any(run["left_envelope"] for run in truth["runs"])
+    # A motion that truly left its envelope has to be stopped.
+    left = [run for run in truth["runs"] if run["left_envelope"]]
+    row |= {"in_envelope": not left, "stopped": all(run["ended"] == "stopped" for run in left)}
     if not file.exists():
         row["reason"] = (folder / "output.txt").read_text(encoding="utf-8").strip()[-400:]
         return row
@@ -228,9 +230,6 @@ def judged(folder, status):
             "unmet": "; ".join(part.get("text") or part.get("condition", "") for part in iterations["unmet"])}
     if runs:
         row |= {"tracking_first": max(truth["runs"][0]["tracking_error"]), "tracking_last": max(truth["runs"][-1]["tracking_error"])}
-    # A motion that truly left its envelope has to be stopped: it is no run that was done.
-    last = runs[-1] if runs else None
-    row["stopped"] = row["in_envelope"] or (last is not None and last["outcome"] != "done")
     result = folder / "result" / "result.json"
     if result.exists():
         errors = []

@@ -399,10 +399,11 @@ class Robot:
             mujoco.mj_step(self.model, self.data)
             self.seen.append((self.data.qpos.copy(), self.data.qvel.copy()))
 
-    def note(self, message, largest, left):
+    def note(self, message, largest, left, ended):
         """What the robot truly did, beside what it is."""
         if self.options.truth:
-            self.truth["runs"].append({"run": message["run"], "left_envelope": left, **{k: v.tolist() for k, v in largest.items()}})
+            self.truth["runs"].append({"run": message["run"], "left_envelope": left, "ended": ended,
+                                       **{name: values.tolist() for name, values in largest.items()}})
             self.options.truth.write_text(json.dumps(self.truth), encoding="utf-8")
 
     def run(self, message):
@@ -443,14 +444,14 @@ class Robot:
             send("sample", part=part, t_s=row[0], **self.log(q, dq, tau))
             # Whatever ends a run early: the robot stays where it is, and does not go home.
             if self.messages.stop_asked():
-                self.note(message, largest, truly_left)
+                self.note(message, largest, truly_left, "stopped")
                 return send("end", status="stopped", reason="the host asked for it")
             left = breach(envelope, self.joints, q, dq, tau, target[0][order]) or outside(envelope, self.model, self.data)
             if left:
-                self.note(message, largest, truly_left)
+                self.note(message, largest, truly_left, "stopped")
                 return send("end", status="stopped", reason=f"at {where} {left}")
             self.advance(tau)
-        self.note(message, largest, truly_left)
+        self.note(message, largest, truly_left, "done")
         send("end", status="done")
 
     def step(self, message):
