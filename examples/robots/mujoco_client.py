@@ -39,10 +39,12 @@ def load(path, options):
     friction, damping, armature, step_s = options.friction, options.damping, options.armature, options.step
     tree = ElementTree.parse(path)
     # A point mass is no body here: a grain of dust on it is.
-    for inertia in tree.getroot().iter("inertia"):
-        if not any(float(inertia.get(entry)) for entry in ("ixx", "iyy", "izz")):
-            for entry in ("ixx", "iyy", "izz"):
-                inertia.set(entry, "1e-6")
+    for inertial in tree.getroot().iter("inertial"):
+        mass, inertia = inertial.find("mass"), inertial.find("inertia")
+        moments = ("ixx", "iyy", "izz")
+        if float(mass.get("value")) > 0 and not any(float(inertia.get(moment)) for moment in moments):
+            for moment in moments:
+                inertia.set(moment, "1e-6")
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
     ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0",
                            discardvisual="true")
