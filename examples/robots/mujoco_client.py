@@ -9,10 +9,14 @@ torques that it is sent. Where the study states a home it begins there, and runs
 stop message, when its input ends, and when a sample leaves the envelope that a motion comes with: a simulated robot stands at
 once, a real one brakes here. --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction and
 drive inertia (kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the
-drives' torque (Nm). --kp and --kd are the drives' own position loop, for the controller position-loop. Standard output belongs
-to the protocol; messages go to standard error.
+drives' torque (Nm). --kp and --kd are the drives' own position loop, for the controller position-loop. What real robots have on
+top is off unless it is asked for: --stribeck and --load friction, masses that are not the description's, delays, quantised and
+noisy encoders, velocities from differences; and what no model has: a joint that catches (--catch), links of another length
+(--lengths). --truth FILE says what the robot truly is and what it truly did (benchmarks/campaign.py). Standard output belongs to
+the protocol; messages go to standard error.
 """
 import argparse
+import collections
 import csv
 import json
 import queue
@@ -31,8 +35,16 @@ def send(kind, **fields):
     print(json.dumps({"type": kind, **fields}, allow_nan=False), flush=True)
 
 
-def load(path, friction, damping, armature, step_s):
+def load(path, options):
+    friction, damping, armature, step_s = options.friction, options.damping, options.armature, options.step
     tree = ElementTree.parse(path)
+    # A point mass is no body here: a grain of dust on it is.
+    for inertial in tree.getroot().iter("inertial"):
+        mass, inertia = inertial.find("mass"), inertial.find("inertia")
+        moments = ("ixx", "iyy", "izz")
+        if float(mass.get("value")) > 0 and not any(float(inertia.get(moment)) for moment in moments):
+            for moment in moments:
+                inertia.set(moment, "1e-6")
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
     ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0",
                            discardvisual="true")
@@ -43,13 +55,39 @@ def load(path, friction, damping, armature, step_s):
     # Limits of joints are the controller's business, and links may overlap at their joints.
     model.jnt_limited[:] = 0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    if options.gravity is not None:
+        model.opt.gravity[:] = options.gravity
+    off = 1.0 + 0.01 * options.masses * np.random.default_rng(options.seed).uniform(-1.0, 1.0, model.nbody)
+    model.body_mass *= off
+    model.body_inertia *= off[:, None]
+    model.body_pos *= 1.0 + 0.01 * options.lengths
+    mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
+
+
+def bodies(model):
+    """What hangs rigidly on each joint: the ten inertial parameters about its frame, as Dynident has them."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    out = np.zeros((model.njnt, 10))
+    for body in range(1, model.nbody):
+        carrier = body
+        while carrier and model.body_jntnum[carrier] == 0:
+            carrier = model.body_parentid[carrier]
+        if not carrier:
+            continue
+        frame, mass = data.xmat[carrier].reshape(3, 3), model.body_mass[body]
+        com = frame.T @ (data.xipos[body] - data.xpos[carrier])
+        axes = frame.T @ data.ximat[body].reshape(3, 3)
+        inertia = axes @ np.diag(model.body_inertia[body]) @ axes.T + mass * (com @ com * np.eye(3) - np.outer(com, com))
+        out[model.body_jntadr[carrier]] += [mass, *(mass * com), *inertia[0], *inertia[1, 1:], inertia[2, 2]]
+    return out
 
 
 class InverseDynamics:
     """tau = M(q) ddq + h(q, dq) by the recursive Newton-Euler algorithm, and the laws of the drives."""
 
-    def __init__(self, model):
+    def __init__(self, model, period_s):
         joints = model["joints"]
         names = [joint["name"] for joint in joints]
         self.parent = [names.index(joint["parent"]) if joint["parent"] else None for joint in joints]
@@ -61,6 +99,8 @@ class InverseDynamics:
             self.bodies.append((m, np.array([hx, hy, hz]), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])))
         self.gravity = np.array(model["gravity_m_s2"])
         self.laws = [(law, [names.index(name) for name in law["joints"]]) for law in model["laws"]]
+        # How far each elastic element is deflected.
+        self.period_s, self.deflections = period_s, [0.0] * len(self.laws)
 
     def bodies_torque(self, q, dq, ddq):
         n = len(q)
@@ -105,7 +145,7 @@ class InverseDynamics:
         """`friction_speed` is the speed at which friction is taken, or None for no friction."""
         tau = self.bodies_torque(q, dq, ddq)
         load = tau.copy()
-        for law, joints in self.laws:
+        for number, (law, joints) in enumerate(self.laws):
             kind, value, j = law["kind"], law["value"], joints[0]
             if kind == "drive-inertia":
                 tau[j] += value * ddq[j]
@@ -118,6 +158,11 @@ class InverseDynamics:
                 tau[second] += cross * ddq[first]
             elif friction_speed is None:
                 continue
+            elif kind == "maxwell-slip":
+                most = law["yield_displacement"]
+                moved = self.deflections[number] + friction_speed[j] * self.period_s
+                self.deflections[number] = min(max(moved, -most), most)
+                tau[j] += value * self.deflections[number] / most
             elif kind == "coupling":
                 first, second = joints
                 one, other = law["ratios"]
@@ -135,7 +180,7 @@ class InverseDynamics:
 
 # What friction() knows, and what is not friction.
 KNOWN_LAWS = {"viscous", "coulomb", "stribeck", "sigmoid", "power", "directional-viscous", "directional-coulomb", "load",
-              "drive-inertia", "offset", "coupling"}
+              "maxwell-slip", "drive-inertia", "offset", "coupling"}
 
 
 def step(shape, speed):
@@ -176,7 +221,7 @@ class Controller:
 
     def __init__(self, file, own_loop):
         self.settings, n = file["controller"], len(file["joints"])
-        self.model = InverseDynamics(file["model"]) if file["model"] else None
+        self.model = InverseDynamics(file["model"], 1.0 / file["rate_hz"]) if file["model"] else None
         laws = {law["kind"] for law in file["model"]["laws"]} if file["model"] else set()
         if laws - KNOWN_LAWS:
             raise Unknown(f"the laws {', '.join(sorted(laws - KNOWN_LAWS))}")
@@ -267,6 +312,20 @@ def breach(envelope, joints, q, dq, tau, q_d):
     return None
 
 
+def outside(envelope, model, data):
+    """Which point leaves the workspace, in words; bodies stand where the last step began."""
+    if envelope is None or "workspace" not in envelope:
+        return None
+    box = envelope["workspace"]
+    for point in box["points"]:
+        body = model.jnt_bodyid[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, point["joint"])]
+        place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ point["offset_m"]
+        for axis, low, value, high in zip("xyz", box["lower"], place, box["upper"]):
+            if (low is not None and value < low) or (high is not None and value > high):
+                return f"{axis} of {point['link']} is {value:.4f} m, its limits {low} and {high}"
+    return None
+
+
 def read_table(path):
     """The rows of a table that was handed over: t_s, q, dq, ddq, and the model's torques if there is a model."""
     with open(path, newline="", encoding="utf-8") as text:
@@ -274,23 +333,80 @@ def read_table(path):
 
 
 class Robot:
-    def __init__(self, model, messages, most, own_loop, step_s):
-        self.step_s = step_s
-        self.model, self.data, self.messages, self.most = model, mujoco.MjData(model), messages, most
-        self.own_loop = [np.broadcast_to(gains, model.nv) for gains in own_loop]
+    def __init__(self, model, messages, options):
+        self.model, self.data, self.messages, self.options = model, mujoco.MjData(model), messages, options
+        each = lambda values: np.broadcast_to(np.asarray(values, float), model.nv)
+        self.most, self.own_loop = options.torque, [each(options.kp), each(options.kd)]
+        self.dry, self.stribeck, self.load = each(options.friction), each(options.stribeck), each(options.load)
+        self.varies = bool(np.any(self.stribeck) or np.any(self.load) or options.catch is not None)
+        self.random = np.random.default_rng(options.seed)
         self.joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
+        self.truth = {"joints": self.joints, "bodies": bodies(model).tolist(), "drive_inertia": model.dof_armature.tolist(),
+                      "viscous": model.dof_damping.tolist(), "coulomb": self.dry.tolist(), "stribeck": self.stribeck.tolist(),
+                      "load": self.load.tolist(), "runs": []}
 
     def start(self, rate_hz, q, dq):
         # Whole steps from one sample of the controller to the next.
-        self.steps = max(1, int(np.ceil(1.0 / (rate_hz * self.step_s) - 1e-9)))
-        self.model.opt.timestep = 1.0 / rate_hz / self.steps
+        self.steps = max(1, int(np.ceil(1.0 / (rate_hz * self.options.step) - 1e-9)))
+        self.model.opt.timestep = step_s = 1.0 / rate_hz / self.steps
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, dq
+        mujoco.mj_kinematics(self.model, self.data)
+        line = lambda first, delay_s, of_s: collections.deque([first], maxlen=1 + round(delay_s / of_s))
+        # What the encoders and the drives still have before them, step by step; what the log has, sample by sample.
+        self.seen = line((self.data.qpos.copy(), self.data.qvel.copy()), self.options.sensor_delay, step_s)
+        self.given = line(None, self.options.drive_delay, step_s)
+        self.logged = line(None, self.options.log_delay, 1.0 / rate_hz)
+        self.before, self.speed, self.period_s = None, np.array(dq, float), 1.0 / rate_hz
+
+    def measured(self):
+        """Positions and velocities as the controller gets them."""
+        q, dq = self.seen[0]
+        if self.options.position_noise:
+            q = q + self.options.position_noise * self.random.standard_normal(len(q))
+        if self.options.quantum:
+            q = self.options.quantum * np.round(q / self.options.quantum)
+        if self.options.speed_filter:
+            if self.before is not None:
+                share = 1.0 - np.exp(-2.0 * np.pi * self.options.speed_filter * self.period_s)
+                self.speed = self.speed + share * ((q - self.before) / self.period_s - self.speed)
+            self.before, dq = q, self.speed
+        return q.copy(), dq.copy()
+
+    def log(self, q, dq, tau):
+        """The sample as it is logged."""
+        if self.options.torque_noise:
+            tau = tau + self.options.torque_noise * self.random.standard_normal(len(tau))
+        self.logged.append((q, dq))
+        q, dq = self.logged[0] or self.logged[1]
+        return {"q": q.tolist(), "dq": dq.tolist(), "tau": tau.tolist()}
+
+    def friction_now(self):
+        """Dry friction at this speed and under this load: the torque of the bodies, without drives."""
+        q, dq, load = self.data.qpos, self.data.qvel, np.zeros(self.model.nv)
+        mujoco.mj_mulM(self.model, self.data, load, self.data.qacc)
+        load += self.data.qfrc_bias - self.model.dof_armature * self.data.qacc
+        dry = self.dry + self.stribeck * np.exp(-((dq / self.options.stribeck_speed) ** 2)) + self.load * np.abs(load)
+        if self.options.catch is not None:
+            joint, position, width, torque = self.options.catch
+            dry[int(joint)] += torque * (abs(q[int(joint)] - position) < width)
+        return dry
 
     def advance(self, tau):
-        self.data.qfrc_applied[:] = tau
         for _ in range(self.steps):
+            if self.varies:
+                self.model.dof_frictionloss[:] = self.friction_now()
+            self.given.append(tau)
+            self.data.qfrc_applied[:] = self.given[0] if self.given[0] is not None else self.given[1]
             mujoco.mj_step(self.model, self.data)
+            self.seen.append((self.data.qpos.copy(), self.data.qvel.copy()))
+
+    def note(self, message, largest, left, ended):
+        """What the robot truly did, beside what it is."""
+        if self.options.truth:
+            self.truth["runs"].append({"run": message["run"], "left_envelope": left, "ended": ended,
+                                       **{name: values.tolist() for name, values in largest.items()}})
+            self.options.truth.write_text(json.dumps(self.truth), encoding="utf-8")
 
     def run(self, message):
         file = json.loads(Path(message["controller"]).read_text(encoding="utf-8"))
@@ -312,30 +428,40 @@ class Robot:
         rows = [(part, row) for part, table in parts for row in table]
         first = [rows[0][1][1 + k * n: 1 + (k + 1) * n][order] for k in range(2)]
         self.start(message["rate_hz"], *first)
+        largest = {name: np.zeros(n) for name in ("tracking_error", "speed", "torque")}
+        truly_left = None
         for part, row in rows:
             where = f"{row[0]:.3f} s of the {part}"
             target = [row[1 + k * n: 1 + (k + 1) * n] for k in range(3)]
-            q, dq = self.data.qpos.copy(), self.data.qvel.copy()
-            if not np.all(np.isfinite(q)) or np.max(np.abs(dq)) > 100:
+            true_q, true_dq = self.data.qpos.copy(), self.data.qvel.copy()
+            q, dq = self.measured()
+            if not np.all(np.isfinite(true_q)) or np.max(np.abs(true_dq)) > 100:
                 return send("end", status="stopped", reason=f"a joint moves too fast at {where}")
             # A drive gives what it can, and logs what it gives.
             ahead = row[1 + 3 * n:] if len(row) > 1 + 3 * n else None
             tau = np.clip(controller.torque(target, q[back], dq[back], ahead)[order], -self.most, self.most)
-            send("sample", part=part, t_s=row[0], q=q.tolist(), dq=dq.tolist(), tau=tau.tolist())
+            for name, value in (("tracking_error", target[0][order] - true_q), ("speed", true_dq), ("torque", tau)):
+                largest[name] = np.maximum(largest[name], np.abs(value))
+            truly_left = truly_left or breach(envelope, self.joints, true_q, true_dq, tau, target[0][order])
+            send("sample", part=part, t_s=row[0], **self.log(q, dq, tau))
             # Whatever ends a run early: the robot stays where it is, and does not go home.
             if self.messages.stop_asked():
+                self.note(message, largest, truly_left, "stopped")
                 return send("end", status="stopped", reason="the host asked for it")
-            left = breach(envelope, self.joints, q, dq, tau, target[0][order])
+            left = breach(envelope, self.joints, q, dq, tau, target[0][order]) or outside(envelope, self.model, self.data)
             if left:
+                self.note(message, largest, truly_left, "stopped")
                 return send("end", status="stopped", reason=f"at {where} {left}")
             self.advance(tau)
+        self.note(message, largest, truly_left, "done")
         send("end", status="done")
 
     def step(self, message):
         self.start(message["rate_hz"], message["q"], message["dq"])
         for sample in range(message["samples"]):
             time = sample / message["rate_hz"]
-            send("state", t_s=time, q=self.data.qpos.tolist(), dq=self.data.qvel.tolist())
+            q, dq = self.measured()
+            send("state", t_s=time, q=q.tolist(), dq=dq.tolist())
             answer = self.messages.next()
             if answer is None or answer["type"] not in ("torque", "finish"):
                 return send("end", status="stopped", reason="the host asked for it")
@@ -356,10 +482,25 @@ def main():
     parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the drives' own position loop, Nm/rad")
     parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the drives' own position loop, Nm s/rad")
     parser.add_argument("--step", type=float, default=1e-3, help="longest step of the integration, s; a torque seems half of it late")
+    parser.add_argument("--gravity", type=numbers, help="gravity in the world, m/s^2; the default is MuJoCo's, 9.81 down")
+    parser.add_argument("--stribeck", type=numbers, default=0.0, help="dry friction at rest on top, Nm")
+    parser.add_argument("--stribeck-speed", type=float, default=0.05, help="where that has fallen to a third, rad/s")
+    parser.add_argument("--load", type=numbers, default=0.0, help="dry friction for each Nm of the bodies' torque")
+    parser.add_argument("--masses", type=float, default=0.0, help="every link's mass and inertia by up to so many percent off, by --seed")
+    parser.add_argument("--sensor-delay", type=float, default=0.0, help="how late the controller and the log see positions and velocities, s")
+    parser.add_argument("--drive-delay", type=float, default=0.0, help="how late drives give their torque, s")
+    parser.add_argument("--log-delay", type=float, default=0.0, help="how late the log alone has positions and velocities, s")
+    parser.add_argument("--quantum", type=float, default=0.0, help="step of the encoders, rad")
+    parser.add_argument("--position-noise", type=float, default=0.0, help="noise of the encoders, rad")
+    parser.add_argument("--torque-noise", type=float, default=0.0, help="noise of the logged torque, Nm")
+    parser.add_argument("--speed-filter", type=float, default=0.0, help="velocities are differences through a first-order low-pass, Hz")
+    parser.add_argument("--catch", type=numbers, help="JOINT,POSITION,WIDTH,NM: this much more dry friction about a position")
+    parser.add_argument("--lengths", type=float, default=0.0, help="links so many percent longer than the description's")
+    parser.add_argument("--seed", type=int, default=1, help="of masses and noise")
+    parser.add_argument("--truth", type=Path, help="where to write what the robot is and did")
     options = parser.parse_args()
     messages = Messages()
-    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature, options.step), messages, options.torque,
-                  (options.kp, options.kd), options.step)
+    robot = Robot(load(options.urdf, options), messages, options)
     send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
          modes=["run", "step"], capabilities=["home"])
     while (message := messages.next()) is not None:

@@ -205,7 +205,7 @@ fn with_constants(
         }
 
         // Terms that are not seen once constants are free: the weakest of every joint, then again.
-        let fewer = constants.without_weakest(&model, &step);
+        let fewer = constants.without_weakest((&model, &measured.problem.column_norms()), &step);
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
             model = with_chosen(robot, joints, &fewer, (&model, fit))?;
             last = None;

@@ -2,6 +2,7 @@
 
 use crate::estimate::RunEstimate;
 use crate::evidence::Clipping;
+use crate::lengths::OtherLength;
 use crate::record::RunRecord;
 use crate::settings::IterationSettings;
 use dynident_identification::examination::{LagChoice, TorqueLag};
@@ -170,6 +171,19 @@ pub enum Shortfall {
         /// What is allowed.
         allowed_percent: f64,
     },
+    /// Torque that another length of a link explains clearly better than the description's: another arm.
+    #[error(
+        "{}: {:.3} Nm of joint {}'s torque are then left in place of {:.3}", length_words(.0), .0.left_with_nm, .0.explained_joint, .0.left_nm
+    )]
+    Length(OtherLength),
+}
+
+fn length_words(other: &OtherLength) -> String {
+    let OtherLength { joint, factor, .. } = other;
+    match joint {
+        Some(joint) => format!("joint {joint} is {factor:.2} times as far from the one before as described"),
+        None => format!("all lengths are {factor:.2} times as described"),
+    }
 }
 
 fn floor_words(floor_rad: Option<f64>) -> String {
@@ -221,6 +235,9 @@ impl Shortfall {
             }
             Self::Unexplained { .. } => {
                 "other friction terms (friction = \"auto\"), the right lengths and axes in the description, or a larger settled.most_unexplained_percent"
+            }
+            Self::Length(_) => {
+                "the description of this very arm: measure the length; where it is right, what else grows with that distance (elasticity, a tool, axes that are not parallel)"
             }
         }
     }
@@ -303,6 +320,7 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
             found.push(Shortfall::Unexplained { joint: joint(place), percent, allowed_percent });
         }
     }
+    found.extend(evidence.other_length.clone().map(Shortfall::Length));
     if names.held_out {
         held_out(&mut found, last, names);
     }

@@ -10,6 +10,7 @@ use crate::good_log::GoodLog;
 use crate::held_out::HeldOutCame;
 use crate::iteration::Iteration;
 use crate::leg::{IterationTask, Leg};
+use crate::lengths::other_length;
 use crate::planner::PlannedMotion;
 use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
@@ -187,22 +188,24 @@ impl Iteration {
         }
         self.judge(record, before)?;
         let Some(own) = record.estimate.clone().filter(|_| record.accepted) else { return Ok(()) };
-        if self.settings.pool && !earlier.is_empty() {
-            let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
-            let own = RunLog { run: record.run, legs: &legs, records, joint_sigma: &own.joint_sigma, differentiator };
-            let runs: Vec<RunLog<'_>> = earlier.iter().map(GoodLog::as_run).chain([own]).collect();
+        let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
+        let run = RunLog { run: record.run, legs: &legs, records, joint_sigma: &own.joint_sigma, differentiator };
+        let before_it = if self.settings.pool { earlier } else { &[] };
+        let runs: Vec<RunLog<'_>> = before_it.iter().map(GoodLog::as_run).chain([run]).collect();
+        if runs.len() > 1 {
             // Where all together cannot be fitted the newest stands alone.
             record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
         }
         let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
         let (task, _) = self.in_force(&all)?;
-        let task = IterationTask { legs, ..task.into_owned() };
+        let task = IterationTask { legs: legs.clone(), ..task.into_owned() };
         let after = record.pooled.as_ref().unwrap_or(&own);
         let errors = &record.max_tracking_error_rad;
         // The first good run is not judged, whatever it was under.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
             add_tracking_floors(evidence, &task, records, &self.settings, after, errors);
+            evidence.other_length = other_length(&task, &runs, &settings, after)?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! What a run's log shows beside parameters: what the verdict on an iteration rests on.
 
+use crate::lengths::OtherLength;
 use serde::{Deserialize, Serialize};
 
 /// What the log of one run shows of one joint.
@@ -62,4 +63,8 @@ pub struct RunEvidence {
     /// where no delay does, and where tracking is inside the tolerance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback_delay_s: Option<f64>,
+    /// A length that is not the description's, by the torque of all good runs so far; none where no length explains
+    /// clearly more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_length: Option<OtherLength>,
 }

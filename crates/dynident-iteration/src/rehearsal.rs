@@ -96,6 +96,14 @@ pub enum RehearsalFailure {
         /// How its run ended.
         verdict: RunStatus,
     },
+    /// A robot that may be the true one is held, but a link of it leaves the workspace.
+    #[error("in simulation {robot} leaves the envelope: {breach}; keep the motion further inside, or give other gains")]
+    Outside {
+        /// Which robot.
+        robot: String,
+        /// How.
+        breach: Breach,
+    },
 }
 
 /// A motion that goes right up to a stop leaves no room for any tracking error: no gains mend that.
@@ -216,7 +224,8 @@ impl Rehearsed<'_> {
             let run = closed_loop(&mut plant, controller.as_mut(), reference, &looped)?;
             let largest = shown.largest_tracking_error_rad.iter_mut().zip(&run.max_error);
             largest.for_each(|(most, error)| *most = most.max(*error));
-            if !run.status.is_done() {
+            let outside = self.envelope.and_then(|envelope| envelope.outside(&run.q, run.samples, run.rate_hz));
+            if !run.status.is_done() || outside.is_some() {
                 let robot = match number {
                     0 => "the model itself".to_owned(),
                     _ => format!(
@@ -224,7 +233,10 @@ impl Rehearsed<'_> {
                         settings.uncertainty_percent, settings.robots
                     ),
                 };
-                return Ok(Err(RehearsalFailure::Loop { robot, verdict: run.status }));
+                return Ok(Err(match outside.filter(|_| run.status.is_done()) {
+                    Some(breach) => RehearsalFailure::Outside { robot, breach },
+                    None => RehearsalFailure::Loop { robot, verdict: run.status },
+                }));
             }
         }
         Ok(Ok(()))

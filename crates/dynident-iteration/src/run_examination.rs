@@ -70,6 +70,7 @@ pub(crate) fn examined(
         log_rates_hz: records.iter().map(|record| record.rate_hz).collect(),
         joints,
         feedback_delay_s: None,
+        other_length: None,
     })
 }
 

@@ -127,10 +127,11 @@ impl FrictionConstants {
         moved
     }
 
-    /// The joints with a further term that is not seen with the constants free, and their terms without it.
+    /// The joints with a further term that is not seen with the constants free, and their terms without it. `norms` are
+    /// those of the model's columns over all rows.
     pub(crate) fn without_weakest(
         &self,
-        model: &RegressorModel,
+        (model, norms): (&RegressorModel, &[f64]),
         last: &ConstantsStep,
     ) -> Vec<(usize, Vec<TorqueTerm>)> {
         let columns = model.layout().columns();
@@ -143,7 +144,7 @@ impl FrictionConstants {
                 let own = self.axes.iter().enumerate().filter(|(_, axis)| is_own(axis));
                 own.map(|(number, _)| first + number).collect()
             };
-            Some((*joint, without_weakest(terms, columns, &last.estimate, own_constants)?))
+            Some((*joint, without_weakest(terms, (columns, norms), &last.estimate, own_constants)?))
         };
         self.joints.iter().enumerate().filter_map(of_joint).collect()
     }

@@ -4,7 +4,8 @@
 //! together with all parameters, a further term has to stand on its own: its coefficient with the steps of its own
 //! constants, or for friction by direction the difference of its two coefficients, has to be as far from zero as chance
 //! would not take it, with what is unknown of all other parameters and constants in the covariance: Wald's test,
-//! `xᵀ Σ⁻¹ x` against χ².
+//! `xᵀ Σ⁻¹ x` against χ². And the rows have to show it: Stribeck friction that falls off below the slowest velocities
+//! of the rows is seen by its last tail alone, so that its coefficient, the torque at rest, is any number.
 
 use dynident_dynamics::Column;
 use dynident_estimation::Estimate;
@@ -16,12 +17,16 @@ use nalgebra::{DMatrix, DVector};
 /// truth.
 const SEEN: [f64; 3] = [3.84, 5.99, 7.81];
 
+/// The sum of squares of a Stribeck term's column, `Σ e^{-2|q̇/v_s|^δ}`, below which no row shows it: less than one row
+/// at rest would.
+const SHOWN: f64 = 1.0;
+
 /// The terms of a joint without the further one that is seen least; `None` where all of them are seen. `estimate`
-/// begins with the model's `columns`; `own_constants` tells at which of its columns the constants of a term stand, as
-/// steps from where they are.
+/// begins with the model's `columns`, whose norms over all rows are `norms`; `own_constants` tells at which of its
+/// columns the constants of a term stand, as steps from where they are.
 pub(super) fn without_weakest(
     terms: &[TorqueTerm],
-    columns: &[Column],
+    (columns, norms): (&[Column], &[f64]),
     estimate: &Estimate,
     own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
 ) -> Option<Vec<TorqueTerm>> {
@@ -48,8 +53,9 @@ pub(super) fn without_weakest(
             return None;
         }
         let left = without(&[term]);
-        // Friction that drives the joint is none.
-        if term.is_nonnegative() && estimate.values[own] <= 0.0 {
+        // Friction that drives the joint is none, and what no row shows is none that is known.
+        let is_shown = !matches!(term, TorqueTerm::Stribeck(_)) || norms[own] * norms[own] >= SHOWN;
+        if !is_shown || (term.is_nonnegative() && estimate.values[own] <= 0.0) {
             return Some((0.0, left));
         }
         let places: Vec<usize> = core::iter::once(own).chain(own_constants(term)).take(SEEN.len()).collect();
@@ -76,5 +82,50 @@ fn other_direction(term: &TorqueTerm) -> Option<(TorqueTerm, TorqueTerm)> {
             Some((TorqueTerm::DirectionalCoulomb(other), TorqueTerm::Coulomb(of_both)))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_estimation::{
+        LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor, ordinary_least_squares,
+    };
+    use dynident_model::terms::{CoulombShape, Stribeck};
+
+    /// Rows at velocities from 0.05 to 1 rad/s of a joint with 5 Nm of Coulomb and, where that is seen, 2 Nm of
+    /// Stribeck friction, and what an iteration's search made of such rows: a term that has faded to 1e-4 at the
+    /// slowest.
+    fn left_without(speed: f64) -> Option<Vec<TorqueTerm>> {
+        let shape = CoulombShape::Sign { dead_band: 0.0 };
+        let terms = [
+            TorqueTerm::Coulomb(Coulomb { joint: 0, shape }),
+            TorqueTerm::Stribeck(Stribeck { joint: 0, speed, exponent: 2.0, shape }),
+        ];
+        let columns: Vec<Column> = terms.iter().cloned().map(Column::Term).collect();
+        let count = 200;
+        let velocity = |row: usize| 0.05 + 0.95 * row as f64 / count as f64;
+        let faded = |row: usize| (-(velocity(row) / speed).powi(2)).exp();
+        // 2 Nm where a Stribeck velocity of 0.3 shows them; of the narrow one 1.5 Nm in the slowest row, as an outlier
+        // would be; a deterministic ripple is the noise.
+        let size = if speed > 0.1 { 2.0 } else { 1.5 / faded(0) };
+        let torque = |row: usize| 5.0 + size * faded(row) + 0.02 * (row as f64 * 2.4).sin();
+        let values: Vec<f64> =
+            (0..count).map(|_| 1.0).chain((0..count).map(faded)).chain((0..count).map(torque)).collect();
+        let mut factor = SegmentedFactor::new(2, SegmentSettings { max_segments: 20, first_length_rows: 10 }).unwrap();
+        factor.absorb(&values, count).unwrap();
+        let mut problem = LinearProblem::new(vec!["fc1".to_owned(), "fs1".to_owned()], vec!["joint1".to_owned()]);
+        problem.add("log", 0, vec![0, 1], factor).unwrap();
+        let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();
+        // Far beyond its own bar, both times.
+        assert!(estimate.values[1] > 5.0 * estimate.std[1], "{} +- {}", estimate.values[1], estimate.std[1]);
+        without_weakest(&terms, (&columns, &problem.column_norms()), &estimate, |_| Vec::new())
+    }
+
+    /// Its coefficient is thousands of Nm, many bars from zero, and no row has shown a hundredth of it.
+    #[test]
+    fn stribeck_friction_below_the_slowest_rows_is_not_seen() {
+        assert_eq!(left_without(0.3), None);
+        assert_eq!(left_without(0.0165).map(|terms| terms.len()), Some(1));
     }
 }

@@ -2,6 +2,8 @@
 
 use super::stop_reason::{Breach, EnvelopeQuantity};
 use super::ways::RunPart;
+use super::workspace::{WorkspaceBox, WorkspaceSettings};
+use dynident_dynamics::Workspace as Arrays;
 use dynident_model::Model;
 use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError};
 use serde::{Deserialize, Serialize};
@@ -39,6 +41,9 @@ pub struct EnvelopeSettings {
     /// Largest distance from the path, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_error: Option<PerJoint>,
+    /// A box in the base frame that no link's origin may leave; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workspace: Option<WorkspaceSettings>,
 }
 
 impl EnvelopeSettings {
@@ -67,6 +72,7 @@ impl EnvelopeSettings {
             speed: each("speed", &self.speed, true, &|joint| limits(joint).velocity.map(|limit| ROOM * limit))?,
             torque: each("torque", &self.torque, true, &|joint| limits(joint).effort.map(|limit| ROOM * limit))?,
             tracking_error: each("tracking_error", &self.tracking_error, true, &path)?,
+            workspace: self.workspace.as_ref().map(|own| own.of(model)).transpose()?,
             speed_span_s: own.seconds(SPEED_SPAN_S),
         })
     }
@@ -85,6 +91,9 @@ pub struct Envelope {
     pub torque: Vec<Option<f64>>,
     /// Largest distance from the path, rad (m).
     pub tracking_error: Vec<Option<f64>>,
+    /// Where in the cell the robot may be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workspace: Option<WorkspaceBox>,
     /// Speeds that no robot measures come from positions at least this far apart, s.
     #[serde(skip)]
     pub speed_span_s: f64,
@@ -106,6 +115,7 @@ impl Envelope {
             speed: sorted(&self.speed),
             torque: sorted(&self.torque),
             tracking_error: sorted(&self.tracking_error),
+            workspace: self.workspace.clone(),
             speed_span_s: self.speed_span_s,
         }
     }
@@ -117,6 +127,7 @@ impl Envelope {
         let each = |values: &[Option<f64>], none: f64| {
             Some(PerJoint::Each(values.iter().map(|value| value.unwrap_or(none)).collect()))
         };
+        // The workspace is looked at by itself: the simulator knows joints alone.
         let RunLimits { torque, lower, upper, speed, tracking_error } = limits;
         for (limit, own, none) in [
             (torque, &self.torque, f64::MAX),
@@ -134,14 +145,22 @@ impl Envelope {
     /// How a motion itself, followed without error, leaves the envelope, if it does.
     pub fn broken_by(&self, reference: &Reference, names: &[String]) -> Option<Breach> {
         let motion = reference.motion();
-        (0..motion.samples).find_map(|sample| {
+        let outside = self.workspace.as_ref().and_then(|own| own.broken_by(reference));
+        let of_joints = (0..motion.samples).find_map(|sample| {
             let time_s = sample as f64 / reference.rate_hz();
             (0..motion.joints).find_map(|joint| {
                 let at = joint * motion.samples + sample;
                 let place = self.of_position(joint, motion.q[at]);
                 place.or_else(|| self.of_speed(joint, motion.dq[at])).map(|broken| broken.breach(names, time_s))
             })
-        })
+        });
+        of_joints.or_else(|| outside.map(|(sample, own)| own.breach(sample as f64 / reference.rate_hz())))
+    }
+
+    /// How a run, or a record of one, has left the workspace, if it has: the first of its joint-major positions.
+    pub(crate) fn outside(&self, q: &[f64], samples: usize, rate_hz: f64) -> Option<Breach> {
+        let (sample, own) = self.workspace.as_ref()?.first_of(q, samples)?;
+        Some(own.breach(sample as f64 / rate_hz))
     }
 
     /// Whether torques, joint by joint, are inside; the breach if not.
@@ -186,6 +205,22 @@ impl Broken {
     }
 }
 
+/// What leaves an envelope, by its own name.
+#[derive(Debug)]
+pub(super) struct SampleBreach {
+    pub(super) name: String,
+    pub(super) quantity: EnvelopeQuantity,
+    pub(super) value: f64,
+    pub(super) limit: f64,
+}
+
+impl SampleBreach {
+    fn breach(self, time_s: f64) -> Breach {
+        let Self { name, quantity, value, limit } = self;
+        Breach { joint: name, quantity, value, limit, time_s, part: RunPart::Motion }
+    }
+}
+
 /// Where the reference is at a time, rad (m), between its samples by straight lines, at its ends outside.
 pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64 {
     let samples = reference.samples();
@@ -203,11 +238,14 @@ pub(super) struct EnvelopeWatch<'a> {
     reference: &'a Reference,
     /// The sample that speeds are taken from.
     from: usize,
+    /// Room for where the links are.
+    arrays: Option<Arrays>,
 }
 
 impl<'a> EnvelopeWatch<'a> {
     pub(super) fn new(envelope: Option<&'a Envelope>, reference: &'a Reference) -> Self {
-        Self { envelope, reference, from: 0 }
+        let arrays = envelope.and_then(|envelope| envelope.workspace.as_ref()).map(WorkspaceBox::arrays);
+        Self { envelope, reference, from: 0, arrays }
     }
 
     /// How the last sample of a record leaves the envelope, if it does. The record's arrays are sample-major; `dq` are
@@ -236,7 +274,8 @@ impl<'a> EnvelopeWatch<'a> {
                 return Some(broken.breach(&record.joints, time_s));
             }
         }
-        None
+        let (own, arrays) = (envelope.workspace.as_ref()?, self.arrays.as_mut()?);
+        Some(own.breach(arrays, &record.q[last * joints..(last + 1) * joints])?.breach(time_s))
     }
 
     /// The first breach of a whole record, joint-major: for logs that come when the run is over.
@@ -268,6 +307,7 @@ mod tests {
             speed: vec![None, Some(0.5)],
             torque: vec![Some(9.0), None],
             tracking_error: none,
+            workspace: None,
             speed_span_s: SPEED_SPAN_S,
         }
     }

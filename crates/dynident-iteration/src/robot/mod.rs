@@ -18,6 +18,7 @@ mod stop_reason;
 mod stop_signal;
 mod term_description;
 mod ways;
+mod workspace;
 
 pub use envelope::{Envelope, EnvelopeSettings};
 pub use folder::{FolderRobot, FolderSettings};
@@ -31,6 +32,7 @@ pub use simulated::SimulatedRobot;
 pub use stop_reason::{Breach, EnvelopeQuantity, Stopping};
 pub use stop_signal::StopSignal;
 pub use ways::{RunPart, WayRecords, Ways};
+pub use workspace::{WatchedPoint, WorkspaceBox, WorkspaceSettings};
 
 use dynident_simulation::Record;
 use dynident_simulation::Reference;

@@ -1,7 +1,7 @@
 //! The built-in simulator as a robot.
 
 use super::ways::{WayRecords, cut};
-use super::{Robot, RobotRun, RobotStatus, RunPurpose, RunRequest};
+use super::{Robot, RobotRun, RobotStatus, RunPurpose, RunRequest, Stopping};
 use dynident_simulation::Plant;
 use dynident_simulation::SimulationError;
 use dynident_simulation::{LoopSettings, closed_loop};
@@ -65,9 +65,14 @@ impl Robot for SimulatedRobot {
         };
         let run = closed_loop(&mut self.plant, controller.as_mut(), &*request.whole()?, &settings)?;
         let record = settings.sensors.record(self.plant.model(), &run)?;
+        // The simulator does not stop for where links are: it is seen when the run is over.
+        let outside = request.envelope.and_then(|envelope| envelope.outside(&run.q, run.samples, run.rate_hz));
         let status = match &run.status {
-            status if status.is_done() => RobotStatus::Done,
-            verdict => RobotStatus::Simulated { verdict: verdict.clone() },
+            status if status.is_done() && outside.is_none() => RobotStatus::Done,
+            verdict => match outside {
+                Some(breach) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::SeenAfterwards },
+                None => RobotStatus::Simulated { verdict: verdict.clone() },
+            },
         };
         let Some(ways) = request.ways else { return Ok(RobotRun { status, record, truth: Some(run), ways: None }) };
         // Half a sample of room for times that are no whole numbers of periods in the last digit.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Breach {
-    /// The joint.
+    /// The joint, or the link of which a point left the workspace.
     pub joint: String,
     /// What of it.
     pub quantity: EnvelopeQuantity,
@@ -43,6 +43,12 @@ pub enum EnvelopeQuantity {
     Torque,
     /// Distance from the path, rad (m).
     TrackingError,
+    /// The x of a point of the base frame, m.
+    X,
+    /// Its y.
+    Y,
+    /// Its z: its height.
+    Z,
 }
 
 impl EnvelopeQuantity {
@@ -53,6 +59,9 @@ impl EnvelopeQuantity {
             Self::Speed => "speed",
             Self::Torque => "torque",
             Self::TrackingError => "tracking error",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
         }
     }
 }

@@ -81,6 +81,7 @@ fn envelope(tracking_rad: f64) -> Envelope {
         speed: none.clone(),
         torque: none.clone(),
         tracking_error: vec![Some(tracking_rad); 2],
+        workspace: None,
         speed_span_s: 0.01,
     }
 }

@@ -71,7 +71,7 @@ fn evidence() -> RunEvidence {
         prediction: Some(Prediction { rows: 1000, inside: 0.95, rms_error: 0.1, half_width: 0.2 }),
         tracking_floor_rad: None,
     };
-    RunEvidence { log_rates_hz: vec![100.0], joints: vec![joint; 2], feedback_delay_s: None }
+    RunEvidence { log_rates_hz: vec![100.0], joints: vec![joint; 2], feedback_delay_s: None, other_length: None }
 }
 
 fn planned(records: &[RunRecord]) -> RunPlan {

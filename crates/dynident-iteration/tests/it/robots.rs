@@ -210,6 +210,7 @@ fn the_book_tells_the_protocol() {
         speed: each(2.5),
         torque: vec![Some(96.0), Some(30.0)],
         tracking_error: each(0.3),
+        workspace: None,
         speed_span_s: 0.01,
     });
     let own = [

@@ -5,7 +5,7 @@ use super::robots::{client, joints, pd, reference};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::robot::{
     Breach, Envelope, EnvelopeQuantity, FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot,
-    ProcessSettings, Stopping,
+    ProcessSettings, Stopping, WorkspaceSettings,
 };
 use dynident_iteration::{
     Iteration, IterationSettings, IterationStatus, IterationStore, IterationTask, NextMotion, Robot, RobotFault,
@@ -164,6 +164,7 @@ fn envelope() -> Envelope {
         speed: none.clone(),
         torque: none.clone(),
         tracking_error: none,
+        workspace: None,
         speed_span_s: 0.01,
     }
 }
@@ -213,6 +214,73 @@ fn a_sample_outside_of_the_envelope_stops_the_run() {
     for mode in BOTH {
         assert!(watched(mode, &wide, folder.path(), false).status.is_done());
     }
+}
+
+/// The lower one of the planar arm's elbow and tip, and its height by trigonometry: axes along y, links of 0.5 and 0.4
+/// m along x.
+fn lower_point(q: [f64; 2]) -> (&'static str, f64) {
+    let elbow = -0.5 * q[0].sin();
+    let tip = elbow - 0.4 * (q[0] + q[1]).sin();
+    if tip < elbow { ("the tool", tip) } else { ("link2", elbow) }
+}
+
+/// A box of the base frame: the run ends at the first sample at which elbow or tip is outside, in both modes, whether
+/// the program knows of boxes or not (this one does not); the motion itself and its simulation are held against it.
+#[test]
+fn a_link_that_leaves_the_workspace_stops_the_run() {
+    let model = load_robot(urdf()).unwrap().model;
+    let boxed = |lower: f64| {
+        let low = [f64::NEG_INFINITY, f64::NEG_INFINITY, lower];
+        let workspace = WorkspaceSettings { lower: low, tool: Some([0.4, 0.0, 0.0]), ..WorkspaceSettings::default() };
+        Envelope { workspace: Some(workspace.of(&model).unwrap()), ..envelope() }
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let whole = watched(ProcessMode::Run, &boxed(-2.0), folder.path(), false);
+    assert!(whole.status.is_done(), "{}", whole.status);
+    let samples = whole.record.samples;
+    let point = |sample: usize| lower_point([whole.record.q[sample], whole.record.q[samples + sample]]);
+    let height = |sample: usize| point(sample).1;
+    let lowest = (0..samples).map(height).fold(f64::INFINITY, f64::min);
+    // Halfway from where it begins to its lowest point.
+    let limit = 0.5 * (height(0) + lowest);
+    assert!(limit < height(0) - 1e-3, "{} to {lowest}", height(0));
+    let first = (0..samples).find(|&sample| height(sample) < limit).unwrap();
+    for mode in BOTH {
+        let folder = tempfile::tempdir().unwrap();
+        let run = watched(mode, &boxed(limit), folder.path(), false);
+        let RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed } = &run.status else {
+            panic!("{mode:?}: {}", run.status)
+        };
+        assert_eq!((&*breach.joint, breach.quantity, breach.limit), (point(first).0, EnvelopeQuantity::Z, limit));
+        assert!((breach.value - height(first)).abs() < 1e-6, "{breach}: {}", height(first));
+        assert!((breach.time_s - whole.record.times_s[first]).abs() < 1e-9, "{breach}");
+        assert!(run.status.to_string().contains(&format!("z of {} is", point(first).0)), "{}", run.status);
+    }
+    // What is handed over names what is watched.
+    let told = serde_json::to_value(boxed(limit)).unwrap();
+    assert_eq!(told["workspace"]["lower"], serde_json::json!([null, null, limit]));
+    assert_eq!(told["workspace"]["points"][1]["link"], "the tool");
+    // The built-in simulator says it when the run is over.
+    let plant = Plant::new(&model, &[], &[]).unwrap();
+    let mut simulator = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
+    let (reference, controller) = (reference(), pd());
+    let tight = boxed(limit);
+    let request = RunRequest { envelope: Some(&tight), ..RunRequest::new(1, &reference, &controller) };
+    let status = simulator.run(&request).unwrap().status;
+    assert!(
+        matches!(&status, RobotStatus::LeftEnvelope { breach, .. } if breach.quantity == EnvelopeQuantity::Z),
+        "{status}"
+    );
+    // A box that the motion itself leaves; one without room.
+    let motion = reference.motion();
+    let of_path = |sample: usize| lower_point([motion.q[sample], motion.q[motion.samples + sample]]).1;
+    let path_lowest = (0..motion.samples).map(of_path).fold(f64::INFINITY, f64::min);
+    let names = joints();
+    assert_eq!(boxed(path_lowest - 1e-9).broken_by(&reference, &names), None);
+    let broken = boxed(path_lowest + 1e-9).broken_by(&reference, &names).unwrap();
+    assert!((broken.value - path_lowest).abs() < 1e-9 && broken.quantity == EnvelopeQuantity::Z, "{broken}");
+    let none = WorkspaceSettings { upper: [0.0; 3], lower: [0.0; 3], tool: None };
+    assert!(none.of(&model).unwrap_err().to_string().contains("envelope.workspace"));
 }
 
 /// Nobody can stop a person's robot, but a log that leaves the envelope is no good run.
