@@ -1,4 +1,5 @@
-//! Pages of a Parquet column, refused where they are shorter than their own levels: the reader slices them unasked.
+//! Pages of a Parquet column, refused where they are shorter than their own levels, or are coded by a dictionary that
+//! the column has not: the reader takes both for granted.
 
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
@@ -10,25 +11,38 @@ pub(crate) struct CheckedPages {
     inner: Box<dyn PageReader>,
     /// Highest repetition and definition level of the column.
     highest: [i16; 2],
+    /// Whether a dictionary came before.
+    has_dictionary: bool,
 }
 
 impl CheckedPages {
     pub(crate) fn new(inner: Box<dyn PageReader>, column: &ColumnDescriptor) -> Self {
-        Self { inner, highest: [column.max_rep_level(), column.max_def_level()] }
+        Self { inner, highest: [column.max_rep_level(), column.max_def_level()], has_dictionary: false }
     }
 
-    /// Whether the page holds the levels that it says it does.
-    fn check(&self, page: &Page) -> Result<()> {
-        let fits = match page {
-            Page::DataPage { buf, num_values, rep_level_encoding, def_level_encoding, .. } => {
-                self.levels_fit(buf, *num_values, [*rep_level_encoding, *def_level_encoding])
+    /// Whether the page holds the levels that it says it does, and follows the dictionary that it needs.
+    fn check(&mut self, page: &Page) -> Result<()> {
+        let (fits, encoding) = match page {
+            Page::DataPage { buf, num_values, encoding, rep_level_encoding, def_level_encoding, .. } => {
+                (self.levels_fit(buf, *num_values, [*rep_level_encoding, *def_level_encoding]), *encoding)
             }
-            Page::DataPageV2 { buf, rep_levels_byte_len, def_levels_byte_len, .. } => {
-                rep_levels_byte_len.checked_add(*def_levels_byte_len).is_some_and(|levels| levels as usize <= buf.len())
+            Page::DataPageV2 { buf, encoding, rep_levels_byte_len, def_levels_byte_len, .. } => {
+                let levels = rep_levels_byte_len.checked_add(*def_levels_byte_len);
+                (levels.is_some_and(|levels| levels as usize <= buf.len()), *encoding)
             }
-            Page::DictionaryPage { .. } => true,
+            Page::DictionaryPage { .. } => {
+                self.has_dictionary = true;
+                return Ok(());
+            }
         };
-        if fits { Ok(()) } else { Err(ParquetError::EOF("a page ends within its levels".into())) }
+        let needs_dictionary = matches!(encoding, Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
+        if !fits {
+            Err(ParquetError::EOF("a page ends within its levels".into()))
+        } else if needs_dictionary && !self.has_dictionary {
+            Err(ParquetError::General("a page is coded by a dictionary that the column has not".into()))
+        } else {
+            Ok(())
+        }
     }
 
     /// Repetition and then definition levels before the values of a page of the first version: packed bits (an encoding
@@ -69,7 +83,9 @@ impl Iterator for CheckedPages {
 impl PageReader for CheckedPages {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         let page = self.inner.get_next_page()?;
-        page.as_ref().map_or(Ok(()), |page| self.check(page))?;
+        if let Some(page) = &page {
+            self.check(page)?;
+        }
         Ok(page)
     }
 
@@ -78,6 +94,8 @@ impl PageReader for CheckedPages {
     }
 
     fn skip_next_page(&mut self) -> Result<()> {
+        // A dictionary that is passed over is kept by the reader until a page needs it.
+        self.has_dictionary |= self.inner.peek_next_page()?.is_some_and(|page| page.is_dict);
         self.inner.skip_next_page()
     }
 
