@@ -1,6 +1,7 @@
 //! Mistakes that studies make, as readings of the same numbers: what the motion would be if one of them was made.
 
 use super::motion_rows::MotionRows;
+use super::units::is_unit_of_time;
 use dynident_dynamics::ParametricModel;
 use dynident_model::Vec3;
 
@@ -39,19 +40,40 @@ pub enum Mistake {
         /// What to add, rad.
         offset_rad: f64,
     },
-    /// All positions have another unit.
+    /// The positions of these joints have another unit, or are those of the motors' side.
     PositionUnit {
+        /// Which joints.
+        joints: Vec<usize>,
         /// What to multiply positions by.
         factor: f64,
     },
-    /// The time stamps have another unit.
+    /// The torque of one joint has another unit than that of the others.
+    TorqueUnit {
+        /// The joint.
+        joint: usize,
+        /// What to multiply its torque by.
+        factor: f64,
+    },
+    /// The column of a joint turns with another joint as well: it holds `q_joint + sign q_with`, as the motor of a
+    /// parallelogram's arm or of a coupled wrist does; where torque is the motor's, `τ_with` lacks `sign τ_joint`.
+    Coupled {
+        /// The joint.
+        joint: usize,
+        /// The one that its column turns with.
+        with: usize,
+        /// 1 or -1.
+        sign: f64,
+        /// Positions alone, or torques as well.
+        channels: Channels,
+    },
+    /// The time stamps have another unit, or the recorder another rate.
     TimeUnit {
         /// What to multiply times by.
         factor: f64,
     },
-    /// The base is mounted otherwise: gravity in the base frame, m/s².
+    /// Gravity is another: the base is mounted otherwise, or the torque is without gravity (zero).
     Gravity {
-        /// Acceleration in the frame of the base.
+        /// Acceleration in the frame of the base, m/s².
         gravity_m_s2: [f64; 3],
     },
 }
@@ -61,9 +83,36 @@ impl Mistake {
     /// commoner one is named first, and a free number has to earn its place.
     pub(super) fn rarity(&self) -> f64 {
         match self {
+            // A unit of one joint alone is rarer than one of all, or than another rate.
+            Self::PositionUnit { joints, .. } if joints.len() == 1 => 0.15,
             Self::Sign { .. } | Self::TimeUnit { .. } | Self::PositionUnit { .. } => 0.0,
             Self::Order { .. } => 0.05,
-            Self::Offset { .. } | Self::Gravity { .. } => 0.15,
+            Self::Offset { .. } | Self::Gravity { .. } | Self::TorqueUnit { .. } | Self::Coupled { .. } => 0.15,
+        }
+    }
+
+    /// Whether its factor is free and moves torque against motion, as another robot's bodies do.
+    pub(super) fn is_free_factor(&self) -> bool {
+        match self {
+            Self::TorqueUnit { .. } => true,
+            Self::TimeUnit { factor } => !is_unit_of_time(*factor),
+            Self::Sign { .. }
+            | Self::Order { .. }
+            | Self::Offset { .. }
+            | Self::PositionUnit { .. }
+            | Self::Coupled { .. }
+            | Self::Gravity { .. } => false,
+        }
+    }
+
+    /// What a mistake is about, its numbers aside: of several with other numbers one is enough to go on from.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::TorqueUnit { joint: a, .. }, Self::TorqueUnit { joint: b, .. })
+            | (Self::Offset { joint: a, .. }, Self::Offset { joint: b, .. }) => a == b,
+            (Self::PositionUnit { joints: a, .. }, Self::PositionUnit { joints: b, .. }) => a == b,
+            (Self::TimeUnit { .. }, Self::TimeUnit { .. }) | (Self::Gravity { .. }, Self::Gravity { .. }) => true,
+            _ => self == other,
         }
     }
 
@@ -75,6 +124,8 @@ impl Mistake {
             | Self::Sign { .. }
             | Self::Offset { .. }
             | Self::PositionUnit { .. }
+            | Self::TorqueUnit { .. }
+            | Self::Coupled { .. }
             | Self::TimeUnit { .. }
             | Self::Gravity { .. } => joint,
         }
@@ -110,9 +161,26 @@ impl Mistake {
                 }
             }
             Self::Offset { joint, offset_rad } => out.q[*joint].iter_mut().for_each(|q| *q += offset_rad),
-            Self::PositionUnit { factor } => {
-                for values in out.q.iter_mut().chain(&mut out.dq).chain(&mut out.ddq) {
-                    scale(values, *factor);
+            Self::PositionUnit { joints, factor } => {
+                for &joint in joints {
+                    for values in [&mut out.q, &mut out.dq, &mut out.ddq] {
+                        scale(&mut values[joint], *factor);
+                    }
+                }
+            }
+            Self::TorqueUnit { joint, factor } => scale(&mut out.tau[*joint], *factor),
+            Self::Coupled { joint, with, sign, channels } => {
+                let add = |to: &mut [f64], from: &[f64], factor: f64| {
+                    to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
+                };
+                if *channels != Channels::Torque {
+                    let from = [&rows.q, &rows.dq, &rows.ddq];
+                    for (values, from) in [&mut out.q, &mut out.dq, &mut out.ddq].into_iter().zip(from) {
+                        add(&mut values[*joint], &from[*with], -sign);
+                    }
+                }
+                if *channels != Channels::Position {
+                    add(&mut out.tau[*with], &rows.tau[*joint], *sign);
                 }
             }
             Self::TimeUnit { factor } => {
@@ -137,6 +205,8 @@ impl Mistake {
             | Self::Order { .. }
             | Self::Offset { .. }
             | Self::PositionUnit { .. }
+            | Self::TorqueUnit { .. }
+            | Self::Coupled { .. }
             | Self::TimeUnit { .. } => None,
         }
     }

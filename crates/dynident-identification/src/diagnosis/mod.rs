@@ -8,39 +8,47 @@
 //! | file | holds |
 //! | --- | --- |
 //! | `motion_rows` | a recording as a few hundred instants |
-//! | `mistake`, `candidates` | mistakes of studies, and which to try |
+//! | `mistake`, `candidates`, `units` | mistakes of studies, and which to try |
 //! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `reading`, `search` | their sum, and the reading with the best |
 //! | `description_fit`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, payloads |
+//! | `held_out_reading` | mistakes that a held-out log alone has |
+//! | `same_columns` | columns that stand for two joints, torques that lost their signs |
 
 mod candidates;
 mod description_fit;
 mod explanation;
+mod held_out_reading;
 mod mistake;
 mod motion_rows;
 mod nominal;
 mod plausibility;
 mod reading;
+mod same_columns;
 mod search;
+mod units;
 mod unseen_load;
 
 pub use description_fit::DescriptionFit;
+pub use held_out_reading::HeldOutReading;
 pub use mistake::{Channels, Mistake};
 pub use motion_rows::MotionRows;
 pub use plausibility::BeyondLimit;
 pub use reading::Reading;
+pub use same_columns::SameColumn;
 pub use search::Search;
 pub use unseen_load::UnseenLoad;
 
 use crate::logs::Logs;
 use crate::recording::{LogError, Role};
 use crate::settings::IdentificationSettings;
+use candidates::Breadth;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
 use reading::Corrected;
-use search::rough_consistency;
+use search::{CLEARLY_BETTER, rough_consistency};
 use thiserror::Error;
 
 /// Instants that readings are compared on; more make it slower and not surer.
@@ -59,6 +67,12 @@ pub struct Diagnosis {
     pub description_fit: Option<DescriptionFit>,
     /// Loads that held-out logs carry and training logs do not, or the other way round.
     pub unseen_loads: Vec<UnseenLoad>,
+    /// Mistakes that held-out logs alone have.
+    pub held_out: Vec<HeldOutReading>,
+    /// Columns that stand for two joints; while there are any, no reading means much.
+    pub same_columns: Vec<SameColumn>,
+    /// Whether the torques are magnitudes, whose signs are lost.
+    pub lost_signs: bool,
 }
 
 impl Diagnosis {
@@ -139,20 +153,52 @@ fn diagnosed(
     }
     let consistency = rough_consistency(settings.consistency.as_ref());
     let start = Corrected { robot: robot.clone(), rows: rows.clone(), mistakes: Vec::new() };
-    let search = search::search(start, &consistency)?;
-    // Units of torque are judged in the best reading, payloads only where the study is believed.
-    let (mut best_robot, mut best_rows) = (robot.clone(), rows);
-    for mistake in search.best.iter().flat_map(|best| &best.mistakes) {
-        best_rows = mistake.corrected(&best_rows);
-        best_robot = mistake.corrected_robot(&best_robot).unwrap_or(best_robot);
+    let mut search = search::search(start.clone(), &consistency, Breadth::Usual)?;
+    let further = search::search(start, &consistency, Breadth::All)?;
+    // Rarer mistakes count where the usual ones explain clearly less. Where most joints' torques are in another unit
+    // still, the unit of one joint or another rate of the recorder only makes the best of that.
+    let has_free_factor = further.best.as_ref().is_some_and(|best| best.mistakes.iter().any(Mistake::is_free_factor));
+    let makes_the_best = has_free_factor
+        && description_fit_of(robot, &rows, &further).is_some_and(|fit| !fit.joints_in_another_unit().is_empty());
+    search.tried = further.tried;
+    if further.believed().score() < search.believed().score() - CLEARLY_BETTER && !makes_the_best {
+        search = further;
     }
-    let description_fit = description_fit::description_fit(&best_robot, &best_rows, &search.believed().left);
-    let mut unseen_loads = Vec::new();
-    if let (Some(theta), None) = (theta, &search.best) {
+    // Units of torque are judged in the best reading, payloads only where the study is believed.
+    let as_read = rows;
+    let description_fit = description_fit_of(robot, &as_read, &search);
+    let (mut unseen_loads, mut held_out) = (Vec::new(), Vec::new());
+    let is_explained = search.best.is_none() && search.as_written.left_of_all < MOSTLY_NOISE;
+    if let Some(theta) = theta.filter(|_| is_explained) {
         for index in logs.of_role(Role::Validate) {
             let rows = MotionRows::of_recording(logs, &model, index, INSTANTS)?;
-            unseen_loads.extend(unseen_load::unseen_load(robot, &rows, index, theta));
+            let load = unseen_load::unseen_load(robot, &rows, index, theta);
+            let known = (theta, &search.as_written.left[..]);
+            let reading = held_out_reading::held_out_reading(robot, &rows, index, known);
+            // What leaves less explains it: a load has four free numbers, a mistake hardly any.
+            let (with, without) = (load.as_ref().map(|load| load.left_with), reading.as_ref().map(|r| r.left_without));
+            match with.zip(without) {
+                Some((with, without)) if with < without => unseen_loads.extend(load),
+                Some(_) => held_out.extend(reading),
+                None => {
+                    unseen_loads.extend(load);
+                    held_out.extend(reading);
+                }
+            }
         }
     }
-    Ok(Diagnosis { search, description_fit, unseen_loads })
+    let as_written = &search.as_written;
+    let same_columns = same_columns::same_columns(&as_read, &as_written.left);
+    let lost_signs = same_columns::has_lost_signs(&as_read, as_written.left_of_all);
+    Ok(Diagnosis { search, description_fit, unseen_loads, held_out, same_columns, lost_signs })
+}
+
+/// What the description's bodies say in the reading that is believed.
+fn description_fit_of(robot: &ParametricModel, rows: &MotionRows, search: &Search) -> Option<DescriptionFit> {
+    let (mut robot, mut rows) = (robot.clone(), rows.clone());
+    for mistake in search.best.iter().flat_map(|best| &best.mistakes) {
+        rows = mistake.corrected(&rows);
+        robot = mistake.corrected_robot(&robot).unwrap_or(robot);
+    }
+    description_fit::description_fit(&robot, &rows, &search.believed().left)
 }

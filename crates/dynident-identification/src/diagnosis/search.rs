@@ -4,9 +4,10 @@
 //! win is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the
 //! best are named beside it.
 
-use super::candidates::candidates;
+use super::candidates::{Breadth, candidates};
 use super::mistake::{Channels, Mistake};
 use super::reading::{Corrected, Reading};
+use super::units::{is_unit_of_position, is_unit_of_time};
 use crate::consistent::ConsistencySettings;
 use dynident_estimation::EstimationError;
 use rayon::prelude::*;
@@ -22,11 +23,15 @@ const SACRIFICED: f64 = 1.25;
 const LITTLE: f64 = 0.02;
 const SHARE_OF_GAIN: f64 = 0.1;
 /// Readings this close to the best cannot be told from it.
-const ALIKE: f64 = 0.2;
+pub(super) const ALIKE: f64 = 0.2;
 /// By how much a number between those tried must be better than the nearest of these: as much as a mistake.
 const WORTH_REFINING: f64 = CLEARLY_BETTER;
 /// Readings beside the best from which a second mistake is looked for, once there is one.
-const RUNNERS_UP: usize = 3;
+const RUNNERS_UP: usize = 8;
+/// Share of a joint's torque that is left where its columns say nothing.
+const MOSTLY_NOISE: f64 = 0.5;
+/// Times what was left of a joint's torque that its right unit leaves.
+const EXPLAINS: f64 = 0.8;
 /// Mistakes of one study.
 const MOST_MISTAKES: usize = 3;
 /// Other readings that are named.
@@ -58,14 +63,18 @@ pub(super) fn rough_consistency(settings: Option<&ConsistencySettings>) -> Consi
     ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known }
 }
 
-/// Looks for mistakes behind `start`.
-pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Result<Search, EstimationError> {
+/// Looks for mistakes behind `start`, as rare ones as `breadth` says.
+pub(super) fn search(
+    start: Corrected,
+    consistency: &ConsistencySettings,
+    breadth: Breadth,
+) -> Result<Search, EstimationError> {
     let as_written = start.reading(Some(consistency))?;
     let (mut at, mut best) = (start, as_written.clone());
     let (mut alike, mut tried): (Vec<Reading>, usize) = (Vec::new(), 0);
     let mut runners_up: Vec<(Corrected, Reading)> = Vec::new();
     for round in 0..MOST_MISTAKES {
-        let (fitted, count) = one_round(&at, &best, consistency);
+        let (fitted, count) = one_round((&at, &best), consistency, breadth);
         tried += count;
         let Some((first, rest)) = fitted.split_first() else { break };
         // A second mistake is rarer than the first.
@@ -77,14 +86,14 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
         let mut first = first.clone();
         if round == 1 {
             for (start, reading) in &runners_up {
-                let (further, count) = one_round(start, reading, consistency);
+                let (further, count) = one_round((start, reading), consistency, breadth);
                 tried += count;
                 if let Some(pair) = further.into_iter().next().filter(|pair| pair.1.score() < first.1.score()) {
                     first = pair;
                 }
             }
         } else {
-            runners_up = rest.iter().take(RUNNERS_UP).cloned().collect();
+            runners_up = unlike_ones(&first, rest);
         }
         let start = before_last(&first, &at, &runners_up);
         let (corrected, reading) = refined(&start, &first, consistency).unwrap_or_else(|| first.clone());
@@ -100,6 +109,21 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
     Ok(Search { as_written, best: found.then_some(best), alike, tried })
 }
 
+/// The best readings beside `first`, of each kind of mistake and joint one.
+fn unlike_ones(first: &(Corrected, Reading), rest: &[(Corrected, Reading)]) -> Vec<(Corrected, Reading)> {
+    let mut kept: Vec<(Corrected, Reading)> = Vec::new();
+    for other in rest {
+        let is_alike = |one: &(Corrected, Reading)| {
+            let last = one.1.mistakes.last().zip(other.1.mistakes.last());
+            last.is_some_and(|(one, other)| one.is_alike(other))
+        };
+        if kept.len() < RUNNERS_UP && !is_alike(first) && !kept.iter().any(is_alike) {
+            kept.push(other.clone());
+        }
+    }
+    kept
+}
+
 /// Where the last mistake of a reading was corrected from.
 fn before_last(reached: &(Corrected, Reading), at: &Corrected, others: &[(Corrected, Reading)]) -> Corrected {
     let before = &reached.0.mistakes[..reached.0.mistakes.len().saturating_sub(1)];
@@ -108,9 +132,13 @@ fn before_last(reached: &(Corrected, Reading), at: &Corrected, others: &[(Correc
 }
 
 /// The readings with one more mistake corrected that can win, best first, and how many were tried.
-fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) -> (Vec<(Corrected, Reading)>, usize) {
+fn one_round(
+    (at, best): (&Corrected, &Reading),
+    consistency: &ConsistencySettings,
+    breadth: Breadth,
+) -> (Vec<(Corrected, Reading)>, usize) {
     let is_new = |mistake: &Mistake| !at.mistakes.contains(mistake);
-    let all: Vec<Mistake> = candidates(&at.robot, &at.rows).into_iter().filter(is_new).collect();
+    let all: Vec<Mistake> = candidates(&at.robot, &at.rows, breadth).into_iter().filter(is_new).collect();
     let bounded = |mistake: &Mistake| {
         let corrected = at.without(mistake);
         let bound = corrected.reading(None).ok()?.lower_bound();
@@ -132,7 +160,11 @@ fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) 
         least = fitted.iter().map(|(_, reading)| reading.score()).fold(least, f64::min);
     }
     // What explains a weak joint at the cost of the strong ones explains the wrong thing.
-    fitted.retain(|(_, reading)| reading.left_of_all <= NO_WORSE * best.left_of_all && !sacrifices(reading, best));
+    fitted.retain(|(_, reading)| {
+        reading.left_of_all <= NO_WORSE * best.left_of_all
+            && !sacrifices(reading, best)
+            && explains_its_joint(reading, best)
+    });
     fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
     likelier_sign_first(&mut fitted);
     (fitted, all.len())
@@ -154,6 +186,18 @@ fn likelier_sign_first(fitted: &mut [(Corrected, Reading)]) {
     }
 }
 
+/// Whether a reading with another column of one joint explains that joint: a channel that says nothing, dead or noise, is
+/// as good in any unit, and another gain of a torque that was explained before serves other joints' torques.
+fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
+    let joint = match reading.mistakes.last() {
+        Some(Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. }) => *joint,
+        Some(Mistake::PositionUnit { joints, .. }) if joints.len() == 1 => joints[0],
+        _ => return true,
+    };
+    let is_torque = matches!(reading.mistakes.last(), Some(Mistake::TorqueUnit { .. }));
+    reading.left[joint] < MOSTLY_NOISE && (!is_torque || reading.left[joint] < EXPLAINS * from.left[joint])
+}
+
 /// Whether a reading leaves clearly more of some joint's torque than the one it was made from.
 fn sacrifices(reading: &Reading, from: &Reading) -> bool {
     let last = reading.mistakes.last();
@@ -165,50 +209,74 @@ fn sacrifices(reading: &Reading, from: &Reading) -> bool {
     })
 }
 
-/// A zero or a mounting that lies between those tried.
+/// A reading whose number lies between those tried.
 fn refined(
     at: &Corrected,
     first: &(Corrected, Reading),
     consistency: &ConsistencySettings,
 ) -> Option<(Corrected, Reading)> {
+    // By the fit without physical limits: smooth, and cheap.
     let free =
         |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| reading.lower_bound());
-    let mistake = match first.1.mistakes.last()? {
+    let mistake = between_those_tried(first.1.mistakes.last()?, free)?;
+    let corrected = at.without(&mistake);
+    let reading = corrected.reading(Some(consistency)).ok()?;
+    // Free numbers follow the noise: the round one stays unless the exact one is clearly better. Gears and counts have
+    // no round ones.
+    let last = first.1.mistakes.last();
+    let is_round = !matches!(last, Some(Mistake::PositionUnit { factor, .. }) if !is_unit_of_position(*factor));
+    let worth = if is_round { WORTH_REFINING } else { 0.0 };
+    (reading.score() < first.1.score() - worth).then_some((corrected, reading))
+}
+
+/// The mistake of the same kind whose number has the least `value`, near the one of `mistake`; `None` where it has no
+/// number, or a unit's.
+pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Option<Mistake> {
+    // A factor, within e^±reach.
+    let scaled =
+        |reach: f64, with: &dyn Fn(f64) -> Mistake| with(least_in(0.0, reach, |log| value(&with(log.exp()))).exp());
+    match mistake {
         Mistake::Offset { joint, offset_rad } => {
             let at = |offset_rad: f64| Mistake::Offset { joint: *joint, offset_rad };
-            let best = least_in(*offset_rad, 0.5, |offset| free(&at(offset)));
-            at(best)
+            Some(at(least_in(*offset_rad, 0.5, |offset| value(&at(offset)))))
         }
         Mistake::Gravity { gravity_m_s2 } => {
             let mut gravity = *gravity_m_s2;
+            if gravity == [0.0; 3] {
+                return None;
+            }
             // Turned about two axes across it, twice over.
             for round in 0..2 {
                 for axis in across(gravity) {
                     let start = gravity;
                     let reach = if round == 0 { 0.5 } else { 0.1 };
                     let turn = least_in(0.0, reach, |angle| {
-                        free(&Mistake::Gravity { gravity_m_s2: turned(start, axis, angle) })
+                        value(&Mistake::Gravity { gravity_m_s2: turned(start, axis, angle) })
                     });
                     gravity = turned(start, axis, turn);
                 }
             }
-            Mistake::Gravity { gravity_m_s2: gravity }
+            Some(Mistake::Gravity { gravity_m_s2: gravity })
         }
-        Mistake::PositionUnit { factor } => {
+        Mistake::PositionUnit { joints, factor } => {
             // A gear ratio may be near a unit.
-            let scaled = |log: f64| Mistake::PositionUnit { factor: factor * log.exp() };
-            let log = least_in(0.0, 2.0, |log| free(&scaled(log)));
-            if log.abs() < 0.1 {
-                return None;
+            let with = |times: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * times };
+            let found = scaled(2.0, &with);
+            if !is_unit_of_position(*factor) {
+                return Some(found);
             }
-            scaled(log)
+            let is_a_unit =
+                matches!(&found, Mistake::PositionUnit { factor: found, .. } if (found / factor).ln().abs() < 0.1);
+            (!is_a_unit).then_some(found)
         }
-        Mistake::Sign { .. } | Mistake::Order { .. } | Mistake::TimeUnit { .. } => return None,
-    };
-    let corrected = at.without(&mistake);
-    let reading = corrected.reading(Some(consistency)).ok()?;
-    // Free numbers follow the noise: the round one stays unless the exact one is clearly better.
-    (reading.score() < first.1.score() - WORTH_REFINING).then_some((corrected, reading))
+        Mistake::TorqueUnit { joint, factor } => {
+            Some(scaled(1.2, &|times| Mistake::TorqueUnit { joint: *joint, factor: factor * times }))
+        }
+        Mistake::TimeUnit { factor } if !is_unit_of_time(*factor) => {
+            Some(scaled(0.4, &|times| Mistake::TimeUnit { factor: factor * times }))
+        }
+        Mistake::Sign { .. } | Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Coupled { .. } => None,
+    }
 }
 
 /// Where `value` is least within `reach` of `centre`, by thirds, to a hundredth of the reach.

@@ -10,10 +10,10 @@ use dynident_recording::Level;
 const MOST_TIMES_OF_ALL: f64 = 1.5;
 /// The same for a single joint, of which some have little torque to be judged by: 0.6 to 1.7, dead channels at 5.2.
 const MOST_TIMES_OF_JOINT: f64 = 2.5;
+/// Share of the fitted torque, and of a held-out log's, percent, that no model worth writing leaves.
+const MOST_LEFT_PERCENT: f64 = 60.0;
 /// Times what the fit leaves of the joints' torque (root mean square over the joints) that the written model may leave
 /// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds
-/// Share of the fitted torque, percent, that no model worth writing leaves.
-const MOST_LEFT_PERCENT: f64 = 60.0;
 /// has 6.
 const MOST_TIMES_OF_FIT: f64 = 4.0;
 /// Percent of a held-out log's torque below which a model is good, however much better the fit may be.
@@ -104,16 +104,27 @@ impl ResultFile {
         ))
     }
 
-    /// A written model that leaves most of the torque that it was fitted to.
+    /// A written model that leaves most of the torque that it was fitted to, or that it was tested on.
     fn unexplained(&self) -> Option<String> {
         let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
         let percent = physical.unwrap_or(self.training.relative_error_percent)?;
-        (percent > MOST_LEFT_PERCENT).then(|| {
+        let tested = |log: &LogValidation| {
+            let percent = log.physical.as_ref().unwrap_or(&log.model).relative_error_percent?;
+            (percent > MOST_LEFT_PERCENT).then(|| {
+                format!(
+                    "the model leaves {percent:.0} % of the torque of log `{}`: it does not describe this robot, or that log is not of this robot \
+                     and motion; run `dynident check`",
+                    log.log
+                )
+            })
+        };
+        let of_training = (percent > MOST_LEFT_PERCENT).then(|| {
             format!(
                 "the model leaves {percent:.0} % of the torque that it was fitted to: the study does not describe this robot or these logs, or noise of \
                  the positions covers the motion; run `dynident check`, and see `position_noise` of the logs"
             )
-        })
+        });
+        of_training.or_else(|| self.validation.iter().find_map(tested))
     }
 
     /// A held-out log that the written model explains far worse than the logs it was fitted to.

@@ -9,12 +9,12 @@ use dynident_identification::diagnosis::{Channels, Mistake};
 use dynident_recording::LogFormat;
 use dynident_recording::log::{ChannelGroup, ColumnRef, OneOrMany, TimeUnit};
 
-/// Places of a study's first training format: what is written for it.
+/// Places of a log's format in its study: what is written for it.
 pub(super) struct StudyFormat<'a> {
     study: &'a Study,
     robot: &'a StudyRobot,
     format: LogFormat,
-    /// `format`, or that of the first training log.
+    /// `format`, or that of the log itself.
     table: String,
 }
 
@@ -22,9 +22,14 @@ impl<'a> StudyFormat<'a> {
     /// The format of the first training log; none in a study without.
     pub(super) fn new(study: &'a Study, robot: &'a StudyRobot) -> Option<Self> {
         let index = *study.logs_of_role(Role::Identify).first()?;
-        let own = study.log[index].format.is_some();
-        let table = if own { format!("[[log]] {}: format", index + 1) } else { "format".to_owned() };
-        Some(Self { study, robot, format: study.format_of(index), table })
+        let of_log = Self::of_log(study, robot, index);
+        let is_common = study.log[index].format.is_none();
+        Some(if is_common { Self { table: "format".to_owned(), ..of_log } } else { of_log })
+    }
+
+    /// The format of log number `index` alone: what the study's other logs have stays as it is.
+    pub(super) fn of_log(study: &'a Study, robot: &'a StudyRobot, index: usize) -> Self {
+        Self { study, robot, format: study.format_of(index), table: format!("[[log]] {}: format", index + 1) }
     }
 
     /// Place of a model's joint among the log's joints.
@@ -48,7 +53,12 @@ impl<'a> StudyFormat<'a> {
                 Self::groups(*channels).into_iter().filter_map(|torque| self.order(torque, order)).collect()
             }
             Mistake::Offset { joint, offset_rad } => vec![self.offset(*joint, *offset_rad)],
-            Mistake::PositionUnit { factor } => vec![self.position_unit(*factor)],
+            Mistake::PositionUnit { joints, factor } => vec![self.position_unit(joints, *factor)],
+            Mistake::TorqueUnit { joint, factor } => vec![self.one_torque(*joint, *factor)],
+            Mistake::Coupled { joint, with, sign, channels } => {
+                let groups = Self::groups(*channels).into_iter();
+                groups.map(|torque| self.coupled(torque, (*joint, *with), *sign)).collect()
+            }
             Mistake::TimeUnit { factor } => vec![self.time_unit(*factor)],
             Mistake::Gravity { gravity_m_s2 } => {
                 let line = format!("gravity_m_s2 = {}", list(&gravity_m_s2.map(|g| number(g, 4))));
@@ -143,8 +153,42 @@ impl<'a> StudyFormat<'a> {
         StudyChange { table, line: format!("offset = {}", list(&values)) }
     }
 
-    fn position_unit(&self, factor: f64) -> StudyChange {
-        let (_, table) = self.group(false);
+    /// `scale` of one joint's torque column beside those of the others.
+    fn one_torque(&self, joint: usize, factor: f64) -> StudyChange {
+        let (group, table) = self.group(true);
+        StudyChange { table, line: format!("scale = {}", self.scales(group, &[joint], factor)) }
+    }
+
+    /// The scales of all columns, those of `joints` times `factor`.
+    fn scales(&self, group: &ChannelGroup, joints: &[usize], factor: f64) -> String {
+        let places: Vec<usize> = joints.iter().map(|&joint| self.place(joint)).collect();
+        let value = |place: usize| {
+            let own = at(group.scale.as_ref(), place, 1.0);
+            if places.contains(&place) { significant(factor * own) } else { format!("{own:?}") }
+        };
+        list(&(0..self.robot.log_joints.len()).map(value).collect::<Vec<_>>())
+    }
+
+    /// The matrix that takes a neighbour's share out of a joint's position, or adds a joint's torque to a neighbour's.
+    fn coupled(&self, torque: bool, (joint, with): (usize, usize), sign: f64) -> StudyChange {
+        let (group, table) = self.group(torque);
+        let [joint, with] = [joint, with].map(|joint| self.place(joint));
+        if group.matrix.is_some() || group.inverse_matrix.is_some() {
+            let line = format!("# matrix: rows {} and {} are coupled", joint + 1, with + 1);
+            return StudyChange { table, line };
+        }
+        let (row, column, value) = if torque { (with, joint, sign) } else { (joint, with, -sign) };
+        let dof = self.robot.log_joints.len();
+        let entry = |at: (usize, usize)| if at == (row, column) { value } else { f64::from(u8::from(at.0 == at.1)) };
+        let rows = (0..dof).map(|r| list(&(0..dof).map(|c| format!("{:?}", entry((r, c)))).collect::<Vec<_>>()));
+        StudyChange { table, line: format!("matrix = {}", list(&rows.collect::<Vec<_>>())) }
+    }
+
+    fn position_unit(&self, joints: &[usize], factor: f64) -> StudyChange {
+        let (group, table) = self.group(false);
+        if joints.len() < self.robot.model().dof() {
+            return StudyChange { table, line: format!("scale = {}", self.scales(group, joints, factor)) };
+        }
         let is = |value: f64| (factor / value - 1.0).abs() < 1e-6;
         let line = if is(180.0 / PI) || is(TAU.recip()) {
             "unit = \"rad\"".to_owned()
@@ -175,7 +219,9 @@ impl<'a> StudyFormat<'a> {
         let is_wanted = |unit: &TimeUnit| (unit.seconds() / (now * factor) - 1.0).abs() < 1e-6;
         let fitting = units.iter().find(|(unit, _)| is_wanted(unit)).map(|(_, name)| *name);
         let table = format!("{}.time", self.table);
-        let line = fitting.map_or_else(|| format!("scale = {factor}"), |unit| format!("unit = {unit:?}"));
+        let own = self.format.time.as_ref().map_or(1.0, |time| time.scale);
+        let scale = || format!("scale = {}", significant(factor * own));
+        let line = fitting.map_or_else(scale, |unit| format!("unit = {unit:?}"));
         StudyChange { table, line }
     }
 }
@@ -201,10 +247,12 @@ fn number(value: f64, decimals: usize) -> String {
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
-/// Three significant digits.
+/// Three significant digits; nine of a unit's factor, which is known and not found.
 fn significant(value: f64) -> String {
+    let units = [PI / 180.0, 180.0 / PI, TAU, TAU.recip(), PI, PI.recip()];
+    let places = if units.iter().any(|unit| (value / unit - 1.0).abs() < 1e-9) { 8.0 } else { 2.0 };
     let mut text = String::new();
-    let digits = if value == 0.0 { 2 } else { (2.0 - value.abs().log10().floor()).clamp(1.0, 12.0) as usize };
+    let digits = if value == 0.0 { 2 } else { (places - value.abs().log10().floor()).clamp(1.0, 12.0) as usize };
     let _ = write!(text, "{value:.digits$}");
     text
 }
@@ -220,5 +268,6 @@ mod tests {
             ["1.5708", "0.0", "-9.81", "0.0"]
         );
         assert_eq!([significant(13.61234), significant(0.001234), significant(1234.5)], ["13.6", "0.00123", "1234.5"]);
+        assert_eq!(significant(PI / 180.0), "0.0174532925");
     }
 }

@@ -1,17 +1,21 @@
 //! What a diagnosis says to the person who wrote the study.
 
 use super::changes::StudyFormat;
+use super::wording::{alternative, channels_text, evidence, kind, sentence};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
-use core::f64::consts::PI;
-use core::fmt::Write;
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
-    BeyondLimit, Channels, DescriptionFit, Diagnosis, Mistake, Reading, UnseenLoad,
+    BeyondLimit, DescriptionFit, Diagnosis, HeldOutReading, Reading, SameColumn, UnseenLoad,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
+
+/// Share of all torque that a reading may leave to be an explanation; most real sets leave 0.1.
+const MOST_LEFT: f64 = 0.3;
+/// The same as a share of what the study as written leaves, for logs whose noise leaves more.
+const MOST_LEFT_OF_IT: f64 = 0.75;
 
 /// A finding under way: a sentence without its evidence.
 fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
@@ -30,9 +34,15 @@ pub(super) fn study_check(
     let mut findings = Vec::new();
     // Another reading, one finding for each of its mistakes; what cannot be told from it stands with the last.
     // A reading that explains nothing is no advice.
-    let best = search.best.as_ref().filter(|best| !best.is_unexplained());
+    let spoilt = spoilt_columns(diagnosis, &joints);
+    let is_spoilt = !spoilt.is_empty();
+    let most_left = MOST_LEFT.max(MOST_LEFT_OF_IT * search.as_written.left_of_all);
+    let explains = |best: &&Reading| !is_spoilt && !best.is_unexplained() && best.left_of_all < most_left;
+    let best = search.best.as_ref().filter(explains);
     let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
-    if let Some(fit) = foreign {
+    if is_spoilt {
+        findings.extend(spoilt);
+    } else if let Some(fit) = foreign {
         let mut found = another_robot(fit, &joints);
         // Some mistake of the study always makes a little less of it.
         let others = best.iter().flat_map(|best| &best.mistakes);
@@ -56,7 +66,8 @@ pub(super) fn study_check(
         findings.extend(search.as_written.beyond.iter().map(|beyond| behind_limit(beyond, &joints)));
     }
     let is_stated = settings.gains == GainChoice::Stated;
-    if let Some(unit) = diagnosis.description_fit.as_ref().filter(|_| is_stated && foreign.is_none()) {
+    let bodies = diagnosis.description_fit.as_ref();
+    if let Some(unit) = bodies.filter(|_| is_stated && foreign.is_none() && !is_spoilt) {
         let far = unit.joints_in_another_unit();
         if !far.is_empty() {
             let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], unit.scale[joint].unwrap_or(1.0)));
@@ -75,6 +86,7 @@ pub(super) fn study_check(
         }
     }
     findings.extend(diagnosis.unseen_loads.iter().map(|load| unseen_load(study, robot, load)));
+    findings.extend(diagnosis.held_out.iter().map(|reading| of_held_out_log((study, robot), reading, &joints)));
     if findings.is_empty() && diagnosis.is_unexplained() {
         let left = &search.as_written.left;
         let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
@@ -122,109 +134,41 @@ pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSet
     Some(found)
 }
 
-fn kind(mistake: &Mistake) -> &'static str {
-    match mistake {
-        Mistake::Sign { .. } => "sign",
-        Mistake::Order { .. } => "order",
-        Mistake::Offset { .. } => "offset",
-        Mistake::PositionUnit { .. } | Mistake::TimeUnit { .. } => "unit",
-        Mistake::Gravity { .. } => "mounting",
-    }
-}
-
-fn channels_text(channels: Channels) -> &'static str {
-    match channels {
-        Channels::Position => "the position",
-        Channels::Torque => "the torque",
-        Channels::Both => "position and torque",
-    }
-}
-
-fn of_joints(all: &[usize], joints: &[String]) -> String {
-    if all.len() > 1 && all.len() == joints.len() {
-        return "all joints".to_owned();
-    }
-    let names: Vec<String> = all.iter().map(|&joint| format!("joint `{}`", joints[joint])).collect();
-    names.join(", ")
-}
-
-/// A mistake in a sentence that names the joints.
-fn sentence(mistake: &Mistake, joints: &[String]) -> String {
-    match mistake {
-        Mistake::Sign { joints: which, channels } => {
-            let verb = if *channels == Channels::Both { "have" } else { "has" };
-            format!("{} of {} {verb} the opposite sign", channels_text(*channels), of_joints(which, joints))
-        }
-        Mistake::Order { order, channels } => {
-            let moved: Vec<usize> = (0..order.len()).filter(|&joint| order[joint] != joint).collect();
-            if let [a, b] = moved[..] {
-                return format!(
-                    "{} of joints `{}` and `{}` are exchanged",
-                    channels_text(*channels),
-                    joints[a],
-                    joints[b]
-                );
-            }
-            let names: Vec<String> = order.iter().map(|&joint| format!("`{}`", joints[joint])).collect();
-            format!(
-                "the columns of {} stand in another order: where the study has {} they are of {}",
-                channels_text(*channels),
-                joints.join(", "),
-                names.join(", ")
-            )
-        }
-        Mistake::Offset { joint, offset_rad } => format!(
-            "the zero of joint `{}` lies {:.1} degrees away from the description's",
-            joints[*joint],
-            offset_rad * 180.0 / PI
-        ),
-        Mistake::PositionUnit { factor } => {
-            format!("the positions are in another unit or of the motor side: times {factor:.6} they are rad")
-        }
-        Mistake::TimeUnit { factor } => format!("time is in another unit: times {factor:e} it is in seconds"),
-        Mistake::Gravity { gravity_m_s2: [x, y, z] } => {
-            format!("the base is mounted otherwise: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in its frame")
-        }
-    }
-}
-
-/// Another explanation, with what it would have one write.
-fn alternative(mistake: &Mistake, joints: &[String], format: Option<&StudyFormat<'_>>) -> String {
-    let changes = format.map_or_else(Vec::new, |format| format.changes(mistake));
-    let write: Vec<String> = changes.iter().map(|change| format!("[{}] {}", change.table, change.line)).collect();
-    format!("{} ({})", sentence(mistake, joints), write.join(", "))
-}
-
-/// What speaks for a mistake: the joint whose torque it explains most, limits that then hold.
-fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
-    let gain = |joint: &usize| (before.left[*joint].max(1e-6) / after.left[*joint].max(1e-6)).ln();
-    let named: Vec<usize> = match mistake {
-        Mistake::Sign { joints, .. } => joints.clone(),
-        Mistake::Offset { joint, .. } => vec![*joint],
-        _ => (0..joints.len()).collect(),
+/// Columns that cannot be what the study says: no reading of the others means much beside them.
+fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding> {
+    let same = |same: &SameColumn| {
+        let [a, b] = same.joints.map(|joint| &joints[joint]);
+        finding(
+            "order",
+            format!("{} of joints `{a}` and `{b}` is one and the same column", channels_text(same.channels)),
+            "sample by sample one is a multiple of the other, and no robot explains both: compare `columns` with the log's header".to_owned(),
+        )
     };
-    // The named joint's own torque where that tells; else the one that tells most.
-    let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > 0.2);
-    let most = (0..joints.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).unwrap_or(0);
-    let joint = own.unwrap_or(most);
-    let mut text = format!(
-        "the best robot that can exist leaves {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected",
-        100.0 * before.left[joint],
-        joints[joint],
-        100.0 * after.left[joint]
+    let mut found: Vec<CheckFinding> = diagnosis.same_columns.iter().map(same).collect();
+    if found.is_empty() && diagnosis.lost_signs {
+        found.push(finding(
+            "sign",
+            "the torques are magnitudes: their signs are lost".to_owned(),
+            "no joint's torque is ever negative though all joints turn to and fro, and no robot explains them: log currents or torques with their signs".to_owned(),
+        ));
+    }
+    found
+}
+
+/// A mistake that one held-out log has and the training logs have not.
+fn of_held_out_log((study, robot): (&Study, &StudyRobot), reading: &HeldOutReading, joints: &[String]) -> CheckFinding {
+    let format = StudyFormat::of_log(study, robot, reading.log);
+    let mut found = finding(
+        kind(&reading.mistake),
+        format!("in log `{}` {}", study.log_name(reading.log), sentence(&reading.mistake, joints)),
+        format!(
+            "the training logs' parameters leave {:.3} Nm of its torque as the study is written and {:.3} Nm so corrected; the training logs have no such mistake",
+            reading.left_as_written, reading.left_without
+        ),
     );
-    if before.beyond.len() > after.beyond.len() {
-        let worst = &before.beyond[0];
-        let _ = write!(
-            text,
-            "; as written, the {} of `{}` reaches {:.4} where its limit is {:.4}",
-            worst.quantity, joints[worst.joint], worst.value, worst.limit
-        );
-    }
-    if !before.plausible_rate && after.plausible_rate {
-        text += "; as written, no recorder has such a rate";
-    }
-    text
+    found.write = format.changes(&reading.mistake);
+    found.or = reading.alike.iter().map(|other| alternative(other, joints, Some(&format))).collect();
+    found
 }
 
 /// The description's bodies explain no joint, and other bodies do.

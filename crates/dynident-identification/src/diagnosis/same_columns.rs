@@ -1,0 +1,94 @@
+//! Columns that cannot be what the study says: one that stands for two joints, torques without a sign.
+
+use super::mistake::Channels;
+use super::motion_rows::MotionRows;
+
+/// Columns differ by less than this share of their largest value where they are the same numbers: what filters round.
+const SAME: f64 = 1.0e-6;
+/// Share of a joint's torque that has to be left before its columns are doubted: two joints may move alike.
+const UNEXPLAINED: f64 = 0.1;
+/// Share of a joint's largest torque that a filter takes below zero behind a corner.
+const RINGING: f64 = 0.05;
+
+/// Two joints that have the same numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SameColumn {
+    /// Positions or torques.
+    pub channels: Channels,
+    /// Numbers of the two joints.
+    pub joints: [usize; 2],
+}
+
+/// Joints that share a column of numbers, up to a factor, where one robot leaves much of the torque of one of them;
+/// `left` is the share of each joint's torque that it leaves.
+pub(super) fn same_columns(rows: &MotionRows, left: &[f64]) -> Vec<SameColumn> {
+    let mut found = Vec::new();
+    for (channels, columns) in [(Channels::Position, &rows.q), (Channels::Torque, &rows.tau)] {
+        for a in 0..columns.len() {
+            for b in a + 1..columns.len() {
+                if left[a].max(left[b]) > UNEXPLAINED && is_multiple(&columns[a], &columns[b]) {
+                    found.push(SameColumn { channels, joints: [a, b] });
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Whether two columns that change are multiples of one another, offsets aside.
+fn is_multiple(a: &[f64], b: &[f64]) -> bool {
+    let [a, b] = [a, b].map(|values| {
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        values.iter().map(|value| value - mean).collect::<Vec<f64>>()
+    });
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let [aa, ab, bb] = [dot(&a, &a), dot(&a, &b), dot(&b, &b)];
+    // The square of the sine between them.
+    aa > 0.0 && bb > 0.0 && aa * bb - ab * ab < SAME * SAME * aa * bb
+}
+
+/// Whether no joint's torque is ever negative though joints turn to and fro and no robot explains the torque:
+/// magnitudes, whose signs are lost. `left_of_all` is the share of all torque that the best robot leaves.
+pub(super) fn has_lost_signs(rows: &MotionRows, left_of_all: f64) -> bool {
+    let is_to_and_fro = |dq: &[f64]| dq.iter().any(|&dq| dq > 0.0) && dq.iter().any(|&dq| dq < 0.0);
+    let is_positive = |tau: &[f64]| {
+        let largest = tau.iter().fold(0.0_f64, |largest, tau| largest.max(*tau));
+        tau.iter().all(|&tau| tau >= -RINGING * largest)
+    };
+    rows.tau.len() > 1
+        && left_of_all > UNEXPLAINED
+        && rows.dq.iter().all(|dq| is_to_and_fro(dq))
+        && rows.tau.iter().all(|tau| is_positive(tau))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(tau: Vec<Vec<f64>>) -> MotionRows {
+        let motion = |phase: f64| (0..50).map(|k| (0.3 * f64::from(k) + phase).sin()).collect::<Vec<f64>>();
+        let dq = vec![motion(0.0), motion(1.0)];
+        MotionRows { q: dq.clone(), dq: dq.clone(), ddq: dq, tau, rate_hz: 100.0 }
+    }
+
+    #[test]
+    fn one_column_for_two_joints_is_seen_where_no_robot_explains_it() {
+        let torque: Vec<f64> = (0..50).map(|k| (0.2 * f64::from(k)).cos()).collect();
+        let twice: Vec<f64> = torque.iter().map(|tau| 3.0 - 2.0 * tau).collect();
+        let found = same_columns(&rows(vec![torque.clone(), twice.clone()]), &[0.0, 0.5]);
+        assert_eq!(found, [SameColumn { channels: Channels::Torque, joints: [0, 1] }]);
+        assert_eq!(same_columns(&rows(vec![torque.clone(), twice]), &[0.01, 0.02]), []);
+        let other: Vec<f64> = torque.iter().enumerate().map(|(k, tau)| tau + 1e-4 * (k % 2) as f64).collect();
+        assert_eq!(same_columns(&rows(vec![torque, other]), &[0.5, 0.5]), []);
+    }
+
+    #[test]
+    fn magnitudes_have_lost_their_signs() {
+        let torque = |shift: f64| (0..50).map(|k| (0.2 * f64::from(k)).cos() + shift).collect::<Vec<f64>>();
+        let magnitude = |values: Vec<f64>| values.into_iter().map(f64::abs).collect::<Vec<f64>>();
+        assert!(has_lost_signs(&rows(vec![magnitude(torque(0.0)), magnitude(torque(0.1))]), 0.4));
+        assert!(!has_lost_signs(&rows(vec![torque(0.0), magnitude(torque(0.1))]), 0.4));
+        // Gravity may hold a joint on one side all along.
+        assert!(!has_lost_signs(&rows(vec![torque(2.0), torque(1.5)]), 0.01));
+    }
+}

@@ -1,0 +1,147 @@
+//! A mistake in words: its kind, a sentence that names joints, what else it could be, and what speaks for it.
+
+use super::changes::StudyFormat;
+use core::f64::consts::PI;
+use core::fmt::Write;
+use dynident_identification::diagnosis::{Channels, Mistake, Reading};
+
+/// The kind of finding that a mistake is.
+pub(super) fn kind(mistake: &Mistake) -> &'static str {
+    match mistake {
+        Mistake::Sign { .. } => "sign",
+        Mistake::Order { .. } => "order",
+        Mistake::Offset { .. } => "offset",
+        Mistake::PositionUnit { .. } | Mistake::TorqueUnit { .. } | Mistake::TimeUnit { .. } => "unit",
+        Mistake::Coupled { .. } => "coupling",
+        Mistake::Gravity { .. } => "mounting",
+    }
+}
+
+pub(super) fn channels_text(channels: Channels) -> &'static str {
+    match channels {
+        Channels::Position => "the position",
+        Channels::Torque => "the torque",
+        Channels::Both => "position and torque",
+    }
+}
+
+fn of_joints(all: &[usize], joints: &[String]) -> String {
+    if all.len() > 1 && all.len() == joints.len() {
+        return "all joints".to_owned();
+    }
+    let names: Vec<String> = all.iter().map(|&joint| format!("joint `{}`", joints[joint])).collect();
+    names.join(", ")
+}
+
+/// A mistake in a sentence that names the joints.
+pub(super) fn sentence(mistake: &Mistake, joints: &[String]) -> String {
+    match mistake {
+        Mistake::Sign { joints: which, channels } => {
+            let verb = if *channels == Channels::Both { "have" } else { "has" };
+            format!("{} of {} {verb} the opposite sign", channels_text(*channels), of_joints(which, joints))
+        }
+        Mistake::Order { order, channels } => {
+            let moved: Vec<usize> = (0..order.len()).filter(|&joint| order[joint] != joint).collect();
+            if let [a, b] = moved[..] {
+                return format!(
+                    "{} of joints `{}` and `{}` are exchanged",
+                    channels_text(*channels),
+                    joints[a],
+                    joints[b]
+                );
+            }
+            let names: Vec<String> = order.iter().map(|&joint| format!("`{}`", joints[joint])).collect();
+            format!(
+                "the columns of {} stand in another order: where the study has {} they are of {}",
+                channels_text(*channels),
+                joints.join(", "),
+                names.join(", ")
+            )
+        }
+        Mistake::Offset { joint, offset_rad } => format!(
+            "the zero of joint `{}` lies {:.1} degrees away from the description's",
+            joints[*joint],
+            offset_rad * 180.0 / PI
+        ),
+        Mistake::PositionUnit { joints: which, factor } if which.len() == joints.len() => {
+            format!("the positions are in another unit or of the motor side: times {factor:.6} they are rad")
+        }
+        Mistake::PositionUnit { joints: which, factor } => format!(
+            "the position of {} is in another unit than the others, or of the motor side: times {factor:.6} it is rad (m)",
+            of_joints(which, joints)
+        ),
+        Mistake::TorqueUnit { joint, factor } => format!(
+            "the torque of joint `{}` is in another unit than the others, or of the motor side: times {factor:.3} it is Nm (N)",
+            joints[*joint]
+        ),
+        Mistake::Coupled { joint, with, sign, channels } => format!(
+            "{} of joint `{}` {} of a motor that turns with joint `{}` as well: its column is `{}` {} `{}`",
+            channels_text(*channels),
+            joints[*joint],
+            if *channels == Channels::Both { "are those" } else { "is that" },
+            joints[*with],
+            joints[*joint],
+            if *sign > 0.0 { "+" } else { "-" },
+            joints[*with]
+        ),
+        Mistake::TimeUnit { factor } if is_power_of_a_thousand(*factor) => {
+            format!("time is in another unit: times {factor:e} it is in seconds")
+        }
+        Mistake::TimeUnit { factor } => {
+            format!("the recorder had another rate: times {factor:.3} the stamps are seconds")
+        }
+        Mistake::Gravity { gravity_m_s2: [0.0, 0.0, 0.0] } => {
+            "the torque is without gravity: the controller took it off, or nothing pulls at this robot".to_owned()
+        }
+        Mistake::Gravity { gravity_m_s2: [x, y, z] } => {
+            format!("the base is mounted otherwise: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in its frame")
+        }
+    }
+}
+
+/// Another explanation, with what it would have one write.
+pub(super) fn alternative(mistake: &Mistake, joints: &[String], format: Option<&StudyFormat<'_>>) -> String {
+    let changes = format.map_or_else(Vec::new, |format| format.changes(mistake));
+    let write: Vec<String> = changes.iter().map(|change| format!("[{}] {}", change.table, change.line)).collect();
+    format!("{} ({})", sentence(mistake, joints), write.join(", "))
+}
+
+/// What speaks for a mistake: the joint whose torque it explains most, limits that then hold.
+pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
+    let gain = |joint: &usize| (before.left[*joint].max(1e-6) / after.left[*joint].max(1e-6)).ln();
+    let named: Vec<usize> = match mistake {
+        Mistake::Sign { joints, .. } => joints.clone(),
+        Mistake::Offset { joint, .. } | Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. } => {
+            vec![*joint]
+        }
+        Mistake::PositionUnit { joints, .. } => joints.clone(),
+        Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Gravity { .. } => (0..joints.len()).collect(),
+    };
+    // The named joint's own torque where that tells; else the one that tells most.
+    let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > 0.2);
+    let most = (0..joints.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).unwrap_or(0);
+    let joint = own.unwrap_or(most);
+    let mut text = format!(
+        "the best robot that can exist leaves {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected",
+        100.0 * before.left[joint],
+        joints[joint],
+        100.0 * after.left[joint]
+    );
+    if before.beyond.len() > after.beyond.len() {
+        let worst = &before.beyond[0];
+        let _ = write!(
+            text,
+            "; as written, the {} of `{}` reaches {:.4} where its limit is {:.4}",
+            worst.quantity, joints[worst.joint], worst.value, worst.limit
+        );
+    }
+    if !before.plausible_rate && after.plausible_rate {
+        text += "; as written, no recorder has such a rate";
+    }
+    text
+}
+
+fn is_power_of_a_thousand(factor: f64) -> bool {
+    let power = factor.log10() / 3.0;
+    (power - power.round()).abs() < 1e-9
+}

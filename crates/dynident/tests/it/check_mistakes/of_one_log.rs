@@ -1,0 +1,80 @@
+//! Mistakes that the held-out log alone has.
+
+use super::{Case, JOINTS, SAME, checked_in, each, problems};
+use crate::common::{Job, repository};
+
+#[test]
+fn mistakes_of_the_held_out_log_are_named_as_its_own() {
+    let cases = [
+        Case {
+            name: "degrees",
+            rows: |rows| each(rows, |row| row[1..7].iter_mut().for_each(|q| *q = q.to_degrees())),
+            study: SAME,
+            kind: "unit",
+            named: &["[[log]] 2: format.position write `unit = \"deg\"`"],
+        },
+        Case {
+            name: "the lift's torque",
+            rows: |rows| each(rows, |row| row[8] = -row[8]),
+            study: SAME,
+            kind: "sign",
+            named: &["[[log]] 2: format.torque write `sign = [1, -1, 1, 1, 1, 1]`"],
+        },
+        Case {
+            name: "the last wrist's torque",
+            rows: |rows| each(rows, |row| row[12] = -row[12]),
+            study: SAME,
+            kind: "sign",
+            named: &[JOINTS[5]],
+        },
+        Case {
+            name: "the lift's zero",
+            rows: |rows| each(rows, |row| row[2] += 0.5),
+            study: SAME,
+            kind: "offset",
+            // Half a radian within three hundredths.
+            named: &[
+                "offset = [0.0, -0.5, ",
+                "offset = [0.0, -0.49",
+                "offset = [0.0, -0.50",
+                "offset = [0.0, -0.48",
+                "offset = [0.0, -0.51",
+            ],
+        },
+    ];
+    let mut missed = Vec::new();
+    for case in &cases {
+        let found = problems(&checked_in(case, &["test.csv"]));
+        let first = found.first();
+        let is_right = |(kind, text): &(String, String)| {
+            kind == case.kind && text.starts_with("in log `test`") && case.named.iter().any(|name| text.contains(name))
+        };
+        if !first.is_some_and(is_right) {
+            missed.push(format!("{}: {found:?}", case.name));
+        }
+    }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// The torques of two runs of the same length exchanged: no reading explains them, and the model is no model.
+#[test]
+fn torques_of_another_run_make_no_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str| std::fs::read_to_string(repository(&format!("examples/ur10_simulated/{name}"))).unwrap();
+    let texts = [read("train.csv"), read("test.csv")];
+    let exchanged = |one: &str, other: &str| -> String {
+        let half = |line: &str, torque: bool| {
+            let at = line.match_indices(',').nth(6).unwrap().0;
+            if torque { line[at..].to_owned() } else { line[..at].to_owned() }
+        };
+        one.lines().zip(other.lines()).map(|(one, other)| half(one, false) + &half(other, true) + "\n").collect()
+    };
+    std::fs::write(folder.path().join("train.csv"), exchanged(&texts[0], &texts[1])).unwrap();
+    std::fs::write(folder.path().join("test.csv"), exchanged(&texts[1], &texts[0])).unwrap();
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml"))
+        .unwrap()
+        .replace("../robots/", &format!("{}/", repository("robots").display()))
+        .replace("ur10_simulated/", "");
+    let problems = Job::new(folder.path(), &study).identify().result.problems;
+    assert!(!problems.is_empty());
+}
