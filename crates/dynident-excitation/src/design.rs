@@ -169,8 +169,19 @@ pub fn design(
     // keeps them already needs little of it.
     let later = |share: f64| settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > share * limit);
     let inside = AtomicBool::new(false);
-    let late = || later(if inside.load(Ordering::Relaxed) { SEARCH_SHARE_INSIDE } else { SEARCH_SHARE });
     let evaluations = AtomicU64::new(0);
+    // What the way back inside takes is known once some evaluations have been counted.
+    let search_share = || match (settings.time_limit_s, evaluations.load(Ordering::Relaxed)) {
+        _ if inside.load(Ordering::Relaxed) => SEARCH_SHARE_INSIDE,
+        (Some(limit), done) if done > 0 => {
+            let each = begun.elapsed().as_secs_f64() * rayon::current_num_threads() as f64 / done as f64;
+            // On twice the samples.
+            let back = 2.0 * (2 * LAST_EVALUATIONS) as f64 * each;
+            (POLISH_SHARE - back / limit).clamp(SEARCH_SHARE, SEARCH_SHARE_INSIDE)
+        }
+        _ => SEARCH_SHARE,
+    };
+    let late = || later(search_share());
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let coarse = grid(task.family.duration_s(), settings.search_grid(task));
     let effort = Effort::of(task, settings, coarse.len());
@@ -305,7 +316,7 @@ pub fn design(
 }
 
 /// Shares of the time limit after which searches, polishes and the way back inside the limits end; the rest is for the
-/// check.
+/// check. A search whose best lies outside still ends in time for two short polishes, after the first share at least.
 const SEARCH_SHARE: f64 = 0.55;
 const SEARCH_SHARE_INSIDE: f64 = 0.8;
 const POLISH_SHARE: f64 = 0.88;
