@@ -110,11 +110,10 @@ pub(super) fn alternative(mistake: &Mistake, joints: &[String], format: Option<&
 pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
     let gain = |joint: &usize| (before.left[*joint].max(1e-6) / after.left[*joint].max(1e-6)).ln();
     let named: Vec<usize> = match mistake {
-        Mistake::Sign { joints, .. } => joints.clone(),
+        Mistake::Sign { joints, .. } | Mistake::PositionUnit { joints, .. } => joints.clone(),
         Mistake::Offset { joint, .. } | Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. } => {
             vec![*joint]
         }
-        Mistake::PositionUnit { joints, .. } => joints.clone(),
         Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Gravity { .. } => (0..joints.len()).collect(),
     };
     // The named joint's own torque where that tells; else the one that tells most.
