@@ -6,7 +6,7 @@ use super::plausibility::{beyond_limits, is_rate_of_a_recorder};
 use super::units::{
     OTHER_RATES, UNITS_OF_ONE_LENGTH, UNITS_OF_ONE_POSITION, UNITS_OF_ONE_TORQUE, UNITS_OF_POSITIONS, UNITS_OF_TIME,
 };
-use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
+use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI, TAU};
 use dynident_dynamics::ParametricModel;
 use dynident_model::Model;
 
@@ -14,6 +14,9 @@ use dynident_model::Model;
 const EARTH_M_S2: f64 = 9.81;
 /// Share by which gravity differs over the earth, and with how many digits people write it.
 const NEAR_EARTH: f64 = 0.03;
+
+/// Times its range that a joint travels where its unit is far too small.
+const FAR: f64 = 2.0;
 
 /// How far the search goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +33,7 @@ pub(super) fn candidates(robot: &ParametricModel, rows: &MotionRows, breadth: Br
     let mut all =
         [units(model, rows), signs(model.dof()), orders(model.dof()), zeros(model), mountings(model)].concat();
     if breadth == Breadth::All {
-        all.extend([units_of_one(model), other_rates(model, rows), couplings(model), gravities(model)].concat());
+        all.extend([units_of_one(model, rows), other_rates(model, rows), couplings(model), gravities(model)].concat());
     }
     all
 }
@@ -63,11 +66,19 @@ fn times(model: &Model, rows: &MotionRows, factors: &[f64]) -> Vec<Mistake> {
 }
 
 /// Units of the position or the torque of one joint.
-fn units_of_one(model: &Model) -> Vec<Mistake> {
+fn units_of_one(model: &Model, rows: &MotionRows) -> Vec<Mistake> {
     let dof = if model.dof() > 1 { model.dof() } else { 0 };
     let position = |joint: usize| {
-        let units: &[f64] = if model.joints()[joint].turns() { &UNITS_OF_ONE_POSITION } else { &UNITS_OF_ONE_LENGTH };
-        units.iter().map(move |&factor| Mistake::PositionUnit { joints: vec![joint], factor })
+        let description = &model.joints()[joint];
+        let units: &[f64] = if description.turns() { &UNITS_OF_ONE_POSITION } else { &UNITS_OF_ONE_LENGTH };
+        // A unit that is far too small shows: the joint would travel far more than it can.
+        let range = description.limits.lower.zip(description.limits.upper).map_or(0.0, |(lower, upper)| upper - lower);
+        let range = if range > 0.0 || !description.turns() { range } else { 2.0 * TAU };
+        let travel = rows.q[joint].iter().fold(f64::NEG_INFINITY, |most, q| most.max(*q))
+            - rows.q[joint].iter().fold(f64::INFINITY, |least, q| least.min(*q));
+        let travels_far = travel > FAR * range;
+        let is_possible = move |factor: &&f64| **factor >= FAR.recip() || travels_far;
+        units.iter().filter(is_possible).map(move |&factor| Mistake::PositionUnit { joints: vec![joint], factor })
     };
     let torque = |joint: usize| UNITS_OF_ONE_TORQUE.map(|factor| Mistake::TorqueUnit { joint, factor });
     (0..dof).flat_map(position).chain((0..dof).flat_map(torque)).collect()
