@@ -248,7 +248,9 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
         let chunks = mine().map(|part| part.matrix.nrows()).sum::<usize>().div_ceil(CHUNK_ROWS);
         if chunks > 0 {
             let mut panel = Panel::new(width, chunks, &mut own);
-            mine().for_each(|part| panel.place(0, &part.matrix));
+            for part in mine() {
+                panel.place(0, &part.matrix);
+            }
             panel.absorbed(&mut small[..row_start(width, width)], &mut filled);
         }
         for k in 0..width {
@@ -266,8 +268,12 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
         return triangle;
     }
     let mut panel = Panel::new(size, chunks, &mut own);
-    rows.wide.iter().for_each(|part| panel.place(0, part));
-    others.iter().for_each(|part| panel.place(part.first, &part.matrix));
+    for part in &rows.wide {
+        panel.place(0, part);
+    }
+    for part in others {
+        panel.place(part.first, &part.matrix);
+    }
     panel.absorbed(&mut triangle, &mut filled);
     triangle
 }
@@ -276,7 +282,7 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
 struct Panel<'a> {
     size: usize,
     chunks: usize,
-    panel: &'a mut [Chunk],
+    values: &'a mut [Chunk],
     /// Rows so far.
     rows: usize,
 }
@@ -286,7 +292,7 @@ impl<'a> Panel<'a> {
     fn new(size: usize, chunks: usize, memory: &'a mut Vec<Chunk>) -> Self {
         memory.clear();
         memory.resize(size * chunks, Chunk::ZERO);
-        Self { size, chunks, panel: memory, rows: 0 }
+        Self { size, chunks, values: memory, rows: 0 }
     }
 
     /// Adds rows whose columns begin at `first`.
@@ -295,7 +301,7 @@ impl<'a> Panel<'a> {
             return;
         }
         for (k, column) in part.as_slice().chunks_exact(part.nrows()).enumerate() {
-            let mut chunks = self.panel[(first + k) * self.chunks..(first + k + 1) * self.chunks].iter_mut();
+            let mut chunks = self.values[(first + k) * self.chunks..(first + k + 1) * self.chunks].iter_mut();
             // The chunk that the rows before have begun, then whole ones.
             let begun = self.rows % CHUNK_ROWS;
             let (head, rest) = column.split_at((CHUNK_ROWS - begun).min(column.len()));
@@ -312,7 +318,7 @@ impl<'a> Panel<'a> {
 
     /// Reflects all rows into a packed triangle; `filled` is memory that is used again.
     fn absorbed(self, triangle: &mut [f64], filled: &mut Vec<usize>) {
-        let Self { size, chunks, panel, .. } = self;
+        let Self { size, chunks, values: panel, .. } = self;
         heights(panel, chunks, filled);
         dispatch(Level::detect(), TriangleOnPanel { triangle, size, panel, chunks, heights: filled });
     }
