@@ -7,7 +7,7 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     if steps.len() < 20 {
         return None;
     }
-    steps.sort_by(f64::total_cmp);
+    steps.sort_unstable_by(f64::total_cmp);
     // Not the smallest as such: the rounding of the printed text makes far smaller ones.
     let least = 0.02 * steps[steps.len() / 20];
     let mut candidate = *steps.iter().find(|step| **step >= least)?;

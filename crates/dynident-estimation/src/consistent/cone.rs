@@ -118,9 +118,91 @@ pub(super) fn congruence(v: &Matrix4<f64>) -> Matrix10 {
     Matrix10::from_columns(&columns)
 }
 
-/// The smallest eigenvalue of a symmetric matrix; NaN for one that is not finite.
+/// The smallest eigenvalue of a symmetric matrix, to rounding beside the largest one; NaN for one that is not finite.
+///
+/// Of the tridiagonal matrix that two reflections leave the least root of the characteristic polynomial, by Laguerre's
+/// iteration from a bound below: where all roots are real it climbs without passing the first one, and its steps shrink
+/// with the third power (Wilkinson, The Algebraic Eigenvalue Problem (1965), 7.8). A step ends several iterations of a
+/// method for all four, and nothing else is wanted of them.
 pub(super) fn least_eigenvalue(matrix: &Matrix4<f64>) -> f64 {
-    if matrix.iter().all(|value| value.is_finite()) { matrix.symmetric_eigenvalues().min() } else { f64::NAN }
+    let size = matrix.amax();
+    if !size.is_finite() || matrix.iter().any(|value| value.is_nan()) {
+        return f64::NAN;
+    }
+    if size == 0.0 {
+        return 0.0;
+    }
+    let (a, b) = tridiagonal(&(matrix / size));
+    // Gershgorin's bound, a little lower, so that rounding does not put it behind the root.
+    let radius = [b[0].abs(), b[0].abs() + b[1].abs(), b[1].abs() + b[2].abs(), b[2].abs()];
+    let mut x = a.iter().zip(&radius).map(|(a, radius)| a - radius).fold(f64::INFINITY, f64::min) - 4.0 * f64::EPSILON;
+    for _ in 0..MOST_STEPS {
+        // The polynomial and its first two derivatives by its three-term recurrence.
+        let (mut p, mut d, mut s) = ([1.0, a[0] - x], [0.0, -1.0], [0.0, 0.0]);
+        for k in 1..4 {
+            let (e, square) = (a[k] - x, b[k - 1] * b[k - 1]);
+            p = [p[1], e * p[1] - square * p[0]];
+            s = [s[1], e * s[1] - 2.0 * d[1] - square * s[0]];
+            d = [d[1], e * d[1] - p[0] - square * d[0]];
+        }
+        if p[1] <= 0.0 {
+            // At the root, or behind it by rounding.
+            return x * size;
+        }
+        let (g, curvature) = (d[1] / p[1], s[1] / p[1]);
+        let h = g * g - curvature;
+        let step = 4.0 / (-g + (3.0 * (4.0 * h - g * g)).max(0.0).sqrt());
+        if step.is_nan() || step <= 4.0 * f64::EPSILON * x.abs().max(1.0) {
+            return (if step.is_nan() { x } else { x + step }) * size;
+        }
+        x += step;
+    }
+    matrix.symmetric_eigenvalues().min()
+}
+
+/// Most steps to an eigenvalue: three to six are usual, and clustered ones take more.
+const MOST_STEPS: usize = 40;
+
+/// Diagonal and subdiagonal of a tridiagonal matrix with the eigenvalues of a symmetric one (Golub and Van Loan,
+/// 8.3.1).
+fn tridiagonal(matrix: &Matrix4<f64>) -> ([f64; 4], [f64; 3]) {
+    let mut m = *matrix;
+    let mut b = [0.0; 3];
+    for k in 0..2 {
+        let below: f64 = (k + 2..4).map(|i| m[(i, k)] * m[(i, k)]).sum();
+        b[k] = m[(k + 1, k)];
+        if below == 0.0 {
+            continue;
+        }
+        let first = m[(k + 1, k)];
+        let norm = (first * first + below).sqrt();
+        let head = first + norm.copysign(first);
+        // I - β v vᵀ with v = (head, the rest of the column).
+        let mut v = [0.0; 4];
+        v[k + 1] = head;
+        for i in k + 2..4 {
+            v[i] = m[(i, k)];
+        }
+        let beta = 2.0 / (head * head + below);
+        b[k] = -norm.copysign(first);
+        let mut w = [0.0; 4];
+        for i in k + 1..4 {
+            for j in k + 1..4 {
+                w[i] += beta * m[(i, j)] * v[j];
+            }
+        }
+        let half = 0.5 * beta * (k + 1..4).map(|i| v[i] * w[i]).sum::<f64>();
+        for i in k + 1..4 {
+            w[i] -= half * v[i];
+        }
+        for i in k + 1..4 {
+            for j in k + 1..4 {
+                m[(i, j)] -= v[i] * w[j] + w[i] * v[j];
+            }
+        }
+    }
+    b[2] = m[(3, 2)];
+    ([m[(0, 0)], m[(1, 1)], m[(2, 2)], m[(3, 3)]], b)
 }
 
 /// `ln det` of a positive definite matrix, or none.
@@ -160,8 +242,9 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64
                 }
                 turned = true;
                 let zeta = (beta - alpha) / (2.0 * gamma);
-                let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
+                // A ζ whose square overflows is a turn by nothing; t is at most one.
+                let t = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
+                let c = 1.0 / (t * t + 1.0).sqrt();
                 let s = c * t;
                 for revolute in [&mut b, &mut v] {
                     for row in 0..4 {
@@ -220,6 +303,33 @@ mod tests {
         let step = scaling.largest_step(&scaling.scaled_primal(&d));
         assert!(least_eigenvalue(&(s + d * step)).abs() < 1e-10);
         assert_eq!(scaling.largest_step(&scaling.scaled_primal(&Matrix4::identity())), f64::INFINITY);
+    }
+
+    #[test]
+    fn the_least_eigenvalue_is_that_of_all_four() {
+        let turned = |values: [f64; 4], seed: f64| {
+            let q = definite(seed, 0.7).qr().q();
+            q * Matrix4::from_diagonal(&Vector4::from(values)) * q.transpose()
+        };
+        let mut tried = vec![Matrix4::zeros(), Matrix4::identity(), Matrix4::identity() * -3.0];
+        tried.push(Matrix4::from_diagonal(&Vector4::new(2.0, -1.0, 5.0, -1.0)));
+        for seed in 0..40 {
+            let seed = f64::from(seed);
+            tried.push(definite(seed, 1e-3) - Matrix4::identity() * (0.3 * seed));
+            // Alike, nearly alike, and far apart.
+            tried.push(turned([-2.0, -2.0, 1.0, 1.0], seed));
+            tried.push(turned([0.5, 0.5 + 1e-9, 0.5 + 2e-9, 3.0], seed));
+            tried.push(turned([1e-14, 1e-7, 1.0, 1e7], seed));
+            tried.push(turned([-1e150, 1.0, 1.0, 1e150], seed));
+        }
+        for matrix in tried {
+            let (own, all) = (least_eigenvalue(&matrix), matrix.symmetric_eigenvalues().min());
+            // Both to a few roundings of the largest entry; where several are alike the polynomial is flat, and the
+            // climb stops where its value is rounding.
+            assert!((own - all).abs() <= 1e-13 * matrix.amax(), "{own} {all}");
+        }
+        assert!(least_eigenvalue(&Matrix4::from_element(f64::NAN)).is_nan());
+        assert!(least_eigenvalue(&Matrix4::from_element(f64::INFINITY)).is_nan());
     }
 
     #[test]

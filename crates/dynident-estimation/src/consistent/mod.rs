@@ -22,6 +22,7 @@ mod intervals;
 mod log_cholesky;
 mod precise;
 mod priors;
+mod products;
 mod settings;
 mod stacked;
 

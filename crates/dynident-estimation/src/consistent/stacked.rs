@@ -11,6 +11,7 @@
 //! Algebra Appl. 88 (1987) 31).
 
 use super::coordinates::Matrix10;
+use super::products::{add_transposed, solve_lower, solve_upper, subtract_product};
 use crate::factor::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -54,8 +55,6 @@ impl Singles {
 #[derive(Clone, Debug)]
 pub(super) struct StackedSystem {
     rows: Rows,
-    size: usize,
-    /// Packed by rows.
     triangle: Vec<f64>,
 }
 
@@ -136,11 +135,11 @@ impl Rows {
     pub(super) fn transposed(&self, right: &RightSide) -> DVector<f64> {
         let mut sum = right.direct.clone();
         for (rows, h) in self.local.iter().zip(&right.local) {
-            let mut place = sum.rows_mut(rows.first, rows.matrix.ncols());
-            place.gemv_tr(1.0, &rows.matrix, h, 1.0);
+            let place = &mut sum.as_mut_slice()[rows.first..rows.first + rows.matrix.ncols()];
+            add_transposed(&rows.matrix, h.as_slice(), place);
         }
-        for (rows, h) in self.wide.iter().zip(&right.wide).filter(|(rows, _)| rows.nrows() > 0) {
-            sum.gemv_tr(1.0, rows, h, 1.0);
+        for (rows, h) in self.wide.iter().zip(&right.wide) {
+            add_transposed(rows, h.as_slice(), sum.as_mut_slice());
         }
         sum
     }
@@ -149,10 +148,11 @@ impl Rows {
     fn rest(&self, right: &RightSide, u: &DVector<f64>) -> RightSide {
         let mut rest = right.clone();
         for (rows, h) in self.local.iter().zip(&mut rest.local) {
-            h.gemv(-1.0, &rows.matrix, &u.rows(rows.first, rows.matrix.ncols()), 1.0);
+            let own = &u.as_slice()[rows.first..rows.first + rows.matrix.ncols()];
+            subtract_product(&rows.matrix, own, h.as_mut_slice());
         }
-        for (rows, h) in self.wide.iter().zip(&mut rest.wide).filter(|(rows, _)| rows.nrows() > 0) {
-            h.gemv(-1.0, rows, u, 1.0);
+        for (rows, h) in self.wide.iter().zip(&mut rest.wide) {
+            subtract_product(rows, u.as_slice(), h.as_mut_slice());
         }
         rest
     }
@@ -184,7 +184,7 @@ impl StackedSystem {
             let triangle = reduced(size, &rows, &squares, added);
             let usable = (0..size).all(|k| triangle[row_start(size, k)] > LEAST_PIVOT * squares[k].sqrt());
             if usable {
-                return Some(Self { rows, size, triangle });
+                return Some(Self { rows, triangle });
             }
             added = if added == 0.0 { 1.0e-13 } else { 100.0 * added };
             if added > 1.0e-6 {
@@ -220,72 +220,42 @@ impl StackedSystem {
         self.solve_upper(self.solve_lower(right))
     }
 
-    /// y with `Rᵀ y = b`.
     fn solve_lower(&self, mut b: DVector<f64>) -> DVector<f64> {
-        let values = b.as_mut_slice();
-        for k in 0..self.size {
-            let row = self.row(k);
-            let y = values[k] / row[0];
-            values[k] = y;
-            for (value, r) in values[k + 1..].iter_mut().zip(&row[1..]) {
-                *value -= r * y;
-            }
-        }
+        solve_lower(&self.triangle, b.as_mut_slice());
         b
     }
 
-    /// u with `R u = y`.
     fn solve_upper(&self, mut y: DVector<f64>) -> DVector<f64> {
-        let values = y.as_mut_slice();
-        for k in (0..self.size).rev() {
-            let row = self.row(k);
-            values[k] = (values[k] - dot(&row[1..], &values[k + 1..])) / row[0];
-        }
+        solve_upper(&self.triangle, y.as_mut_slice());
         y
     }
-
-    fn row(&self, k: usize) -> &[f64] {
-        &self.triangle[row_start(self.size, k)..row_start(self.size, k + 1)]
-    }
-}
-
-/// Sum of products, eight side by side: one after another each would wait for the one before.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_chunks.remainder().iter().zip(b_chunks.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a_chunks.zip(b_chunks) {
-        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += a * b;
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 /// The packed triangle of all rows and of `added √squares` on the diagonal.
 fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     let mut triangle = vec![0.0; row_start(size, size)];
+    // Those of one body.
+    let mut small = [0.0; row_start(10, 10)];
+    let (mut own, mut filled) = (Vec::new(), Vec::new());
     let mut at = 0;
     while at < size {
         let (_, width) = rows.group_of(at);
         let mine = || rows.local.iter().filter(|part| part.first == at && part.matrix.ncols() <= width);
-        let height = mine().map(|part| part.matrix.nrows()).sum::<usize>() + width;
-        let mut stack = DMatrix::zeros(height, width);
-        let mut row = 0;
-        for part in mine() {
-            stack.view_mut((row, 0), part.matrix.shape()).copy_from(&part.matrix);
-            row += part.matrix.nrows();
+        small.fill(0.0);
+        for k in 0..width {
+            small[row_start(width, k)] = added * squares[at + k].sqrt();
+        }
+        let chunks = mine().map(|part| part.matrix.nrows()).sum::<usize>().div_ceil(CHUNK_ROWS);
+        if chunks > 0 {
+            let mut panel = Panel::new(width, chunks, &mut own);
+            for part in mine() {
+                panel.place(0, &part.matrix);
+            }
+            panel.absorbed(&mut small[..row_start(width, width)], &mut filled);
         }
         for k in 0..width {
-            stack[(row + k, k)] = added * squares[at + k].sqrt();
-        }
-        let small = stack.qr().r();
-        for i in 0..width {
-            // Either sign of a row is the same square.
-            let sign = if small[(i, i)] < 0.0 { -1.0 } else { 1.0 };
-            for j in i..width {
-                triangle[row_start(size, at + i) + j - i] = sign * small[(i, j)];
-            }
+            let (from, to) = (row_start(width, k), row_start(size, at + k));
+            triangle[to..to + width - k].copy_from_slice(&small[from..from + width - k]);
         }
         at += width;
     }
@@ -297,18 +267,45 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     if chunks == 0 {
         return triangle;
     }
-    let mut panel = vec![Chunk::ZERO; size * chunks];
-    let mut start = 0;
-    let mut place = |first: usize, part: &DMatrix<f64>| {
+    let mut panel = Panel::new(size, chunks, &mut own);
+    for part in &rows.wide {
+        panel.place(0, part);
+    }
+    for part in others {
+        panel.place(part.first, &part.matrix);
+    }
+    panel.absorbed(&mut triangle, &mut filled);
+    triangle
+}
+
+/// Rows on the way into a triangle.
+struct Panel<'a> {
+    size: usize,
+    chunks: usize,
+    values: &'a mut [Chunk],
+    /// Rows so far.
+    rows: usize,
+}
+
+impl<'a> Panel<'a> {
+    /// Room for rows over `size` columns, in memory that is used again.
+    fn new(size: usize, chunks: usize, memory: &'a mut Vec<Chunk>) -> Self {
+        memory.clear();
+        memory.resize(size * chunks, Chunk::ZERO);
+        Self { size, chunks, values: memory, rows: 0 }
+    }
+
+    /// Adds rows whose columns begin at `first`.
+    fn place(&mut self, first: usize, part: &DMatrix<f64>) {
         if part.nrows() == 0 {
             return;
         }
         for (k, column) in part.as_slice().chunks_exact(part.nrows()).enumerate() {
-            let mut chunks = panel[(first + k) * chunks..(first + k + 1) * chunks].iter_mut();
+            let mut chunks = self.values[(first + k) * self.chunks..(first + k + 1) * self.chunks].iter_mut();
             // The chunk that the rows before have begun, then whole ones.
-            let begun = start % CHUNK_ROWS;
+            let begun = self.rows % CHUNK_ROWS;
             let (head, rest) = column.split_at((CHUNK_ROWS - begun).min(column.len()));
-            let mut chunks = chunks.by_ref().skip(start / CHUNK_ROWS);
+            let mut chunks = chunks.by_ref().skip(self.rows / CHUNK_ROWS);
             if let Some(chunk) = chunks.next() {
                 chunk.0[begun..begun + head.len()].copy_from_slice(head);
             }
@@ -316,19 +313,15 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
                 chunk.0[..values.len()].copy_from_slice(values);
             }
         }
-        start += part.nrows();
-    };
-    for part in &rows.wide {
-        place(0, part);
+        self.rows += part.nrows();
     }
-    for part in others {
-        place(part.first, &part.matrix);
+
+    /// Reflects all rows into a packed triangle; `filled` is memory that is used again.
+    fn absorbed(self, triangle: &mut [f64], filled: &mut Vec<usize>) {
+        let Self { size, chunks, values: panel, .. } = self;
+        heights(panel, chunks, filled);
+        dispatch(Level::detect(), TriangleOnPanel { triangle, size, panel, chunks, heights: filled });
     }
-    let mut filled = Vec::new();
-    heights(&panel, chunks, &mut filled);
-    let (panel, heights) = (&mut panel[..], &mut filled[..]);
-    dispatch(Level::detect(), TriangleOnPanel { triangle: &mut triangle, size, panel, chunks, heights });
-    triangle
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@
 
 use super::nonnegative::nonnegative_least_squares;
 use crate::error::{EstimationError, require};
-use crate::factor::{FactorWorkspace, JointRows, LinearProblem, TriangularFactor};
+use crate::factor::{FactorWorkspace, LinearProblem, TriangularFactor};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -29,9 +29,19 @@ const DEPENDENT: f64 = 1.0e-8;
 #[derive(Debug)]
 pub struct CrossValidation<'a> {
     problem: &'a LinearProblem,
-    /// For each equation, what each block holds, and what all others hold.
-    parts: Vec<[Vec<TriangularFactor>; 2]>,
+    parts: Vec<Part>,
     folds: usize,
+}
+
+/// The rows of equations that are [alike](LinearProblem::alike).
+#[derive(Debug)]
+struct Part {
+    /// The first of these equations.
+    first: usize,
+    /// What each block holds.
+    own: Vec<TriangularFactor>,
+    /// What all others hold, and (last) what all hold.
+    others: Vec<TriangularFactor>,
 }
 
 /// One joint's candidates with one block left out at a time.
@@ -104,22 +114,25 @@ impl<'a> CrossValidation<'a> {
             return Err(EstimationError::Empty);
         }
         let mut segments = vec![0; problem.joints().len()];
-        let mut equations = Vec::with_capacity(problem.equations().len());
+        let mut before = Vec::with_capacity(problem.equations().len());
         for equation in problem.equations() {
-            equations.push((equation, segments[equation.joint]));
+            before.push(segments[equation.joint]);
             segments[equation.joint] += equation.factor.segment_rows().len();
         }
-        let part = |(equation, before): (&JointRows, usize)| {
-            let columns = equation.factor.columns();
+        // Logs whose rows see the same columns are one stack of rows from here on.
+        let part = |alike: Vec<usize>| {
+            let columns = problem.equations()[alike[0]].factor.columns();
             let mut own = vec![TriangularFactor::new(columns); folds];
             let mut workspace = FactorWorkspace::default();
-            for (number, segment) in equation.factor.segment_factors().iter().enumerate() {
-                own[(before + number) % folds].absorb_factor(&mut workspace, segment);
+            for &equation in &alike {
+                for (number, segment) in problem.equations()[equation].factor.segment_factors().iter().enumerate() {
+                    own[(before[equation] + number) % folds].absorb_factor(&mut workspace, segment);
+                }
             }
             let others = all_but_one(&own, columns);
-            [own, others]
+            Part { first: alike[0], own, others }
         };
-        let parts = equations.into_par_iter().map(part).collect();
+        let parts = problem.alike().into_par_iter().map(part).collect();
         let fewest = segments.into_iter().filter(|&count| count > 0).min().unwrap_or(0);
         if fewest < folds {
             return Err(EstimationError::TooFewSegments { clusters: fewest });
@@ -158,7 +171,8 @@ impl<'a> CrossValidation<'a> {
             let mut triangle = TriangularFactor::new(order.len());
             let mut rows = TriangularFactor::new(order.len());
             let mut workspace = FactorWorkspace::default();
-            for (equation, [own, others]) in self.problem.equations().iter().zip(&self.parts) {
+            for Part { first, own, others } in &self.parts {
+                let equation = &self.problem.equations()[*first];
                 let mut place = vec![None; size];
                 for (local, &column) in equation.columns.iter().enumerate() {
                     place[column] = Some(local);

@@ -8,7 +8,7 @@ use crate::rows::predicted_torque;
 use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
 use dynident_estimation::{EstimationError, LinearProblem, SegmentSettings, SegmentedFactor};
 use dynident_model::terms::JointMotion;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Rounds of weighting; the third changes scores by less than a hundredth.
 const ROUNDS: usize = 3;
@@ -89,20 +89,39 @@ fn score(left: &[f64], torque: &[f64]) -> f64 {
 fn solved(problem: &LinearProblem) -> Result<Vec<f64>, EstimationError> {
     let torque = residuals(problem, &vec![0.0; problem.columns().len()], &[])?;
     let mut sigma = torque.clone();
-    let mut theta = DVector::zeros(problem.columns().len());
+    let count = problem.columns().len();
+    let mut theta = DVector::zeros(count);
+    // What stands in the normal equations of each joint: weighted anew in every round, where triangles would have to be
+    // merged anew. The ridge is far above their rounding.
+    let squares = |equation: &dynident_estimation::JointRows| {
+        let total = equation.factor.total();
+        let triangle = total.regressor_triangle();
+        (triangle.tr_mul(&triangle), triangle.tr_mul(&total.rotated_torque()))
+    };
+    let squares: Vec<_> = problem.equations().iter().map(squares).collect();
     for _ in 0..ROUNDS {
-        let weights: Vec<f64> = sigma.iter().map(|sigma| if *sigma > 0.0 { sigma.recip() } else { 0.0 }).collect();
-        let factor = problem.combined(&weights)?;
-        let norms: Vec<f64> = factor.column_norms().iter().map(|norm| norm.max(f64::MIN_POSITIVE)).collect();
-        let mut triangle = factor.regressor_triangle();
-        for (mut column, norm) in triangle.column_iter_mut().zip(&norms) {
-            column /= *norm;
+        let (mut gram, mut right) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
+        for (equation, (own_gram, own_right)) in problem.equations().iter().zip(&squares) {
+            let sigma = sigma[equation.joint];
+            let weight = if sigma > 0.0 { sigma.recip().powi(2) } else { 0.0 };
+            for (k, &column) in equation.columns.iter().enumerate() {
+                right[column] += weight * own_right[k];
+                for (l, &row) in equation.columns.iter().enumerate() {
+                    gram[(row, column)] += weight * own_gram[(l, k)];
+                }
+            }
         }
-        let mut gram = triangle.tr_mul(&triangle);
+        let norms: Vec<f64> = (0..count).map(|k| gram[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
+        for k in 0..count {
+            right[k] /= norms[k];
+            for l in 0..count {
+                // One by one: the product of two that are not excited would be zero.
+                gram[(l, k)] = gram[(l, k)] / norms[l] / norms[k];
+            }
+        }
         for k in 0..gram.nrows() {
             gram[(k, k)] += RIDGE;
         }
-        let right = triangle.tr_mul(&factor.rotated_torque());
         let Some(cholesky) = gram.cholesky() else { break };
         theta = cholesky.solve(&right);
         for (value, norm) in theta.iter_mut().zip(&norms) {
@@ -149,6 +168,8 @@ fn problem(robot: &ParametricModel, rows: &MotionRows) -> Result<(LinearProblem,
             SegmentSettings { max_segments: 2, first_length_rows: samples.max(1) },
         )?;
         factor.absorb(panels.joint(joint), samples)?;
+        // What follows asks for its triangle again and again.
+        let factor = factor.as_one_segment();
         let total = factor.total();
         alone.push(total.entry(columns.len(), columns.len()).abs() / (samples.max(1) as f64).sqrt());
         problem.add("rows", joint, columns, factor)?;

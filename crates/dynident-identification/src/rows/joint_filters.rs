@@ -20,8 +20,9 @@ impl JointFilters {
         rate_hz: f64,
         filter: Option<&DecimationSettings>,
     ) -> Result<Self, FilterError> {
-        let of = |settings| columns.iter().map(move |columns| Decimator::new(settings, rate_hz, *columns));
-        let decimators = filter.map(|settings| of(settings).collect::<Result<_, _>>()).transpose()?;
+        // One filter for all.
+        let filter_of_all = filter.map(|settings| Decimator::new(settings, rate_hz, 0)).transpose()?;
+        let decimators = filter_of_all.map(|all| columns.iter().map(|columns| all.with_columns(*columns)).collect());
         let coverage = Coverage::new(columns.len(), rate_hz, filter)?;
         Ok(Self { decimators, coverage, out: Vec::new() })
     }

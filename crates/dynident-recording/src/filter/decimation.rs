@@ -4,6 +4,7 @@ use crate::error::{FilterError, require};
 use core::f64::consts::PI;
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Settings of a [`Decimator`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -119,27 +120,44 @@ fn bessel_i0(x: f64) -> f64 {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Decimator {
-    /// Coefficients, padded with zeros to a multiple of [`BLOCK`].
-    taps: Vec<f64>,
-    length: usize,
-    factor: usize,
+    filter: Arc<Filter>,
     columns: usize,
     level: Level,
-    /// The last rows of each column, column-major with stride `stride`: from `begin` to `end`.
-    recent: Vec<f64>,
-    stride: usize,
-    begin: usize,
-    end: usize,
-    /// Rows still to pass over, from `begin`, before the next output's support begins.
-    skip: usize,
-    outputs: u64,
+    /// Sums of the outputs whose support has begun and not ended, those of one output side by side; output `k` has
+    /// place `k` modulo their number.
+    begun: Vec<Block>,
+    /// Some rows of the columns at work.
+    signal: Vec<Block>,
+    /// Rows and outputs of this signal so far.
+    rows: usize,
+    outputs: usize,
 }
 
-/// Coefficients are summed in blocks of this many, whatever the processor's lane count.
+/// Rows are summed in blocks of this many, counted from the signal's first row, whatever the processor's lane count and
+/// however the input is cut: row `i` always goes to sum `i` modulo this.
 const BLOCK: usize = 8;
 
-/// Recent rows have room for so many lengths of the filter before they are moved.
-const ROOM: usize = 4;
+/// Rows that are looked at together: with eight columns they stay in the first-level cache beside the coefficients.
+const PIECE: usize = 512;
+
+/// As many numbers as stand in a line of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Block([f64; BLOCK]);
+
+impl Block {
+    const ZERO: Self = Self([0.0; BLOCK]);
+}
+
+/// What all decimators of the same settings share.
+#[derive(Debug)]
+struct Filter {
+    /// The coefficients with 0, 1, .. zeros before them, filled up with zeros: for outputs whose support begins so many
+    /// rows behind a block's first.
+    phases: [Vec<Block>; BLOCK],
+    length: usize,
+    factor: usize,
+}
 
 impl Decimator {
     /// A decimator for panels of `columns` columns sampled at `rate_hz`.
@@ -147,37 +165,43 @@ impl Decimator {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn new(settings: &DecimationSettings, rate_hz: f64, columns: usize) -> Result<Self, FilterError> {
-        let mut taps = settings.taps(rate_hz)?;
-        let length = taps.len();
-        taps.resize(length.next_multiple_of(BLOCK), 0.0);
-        Ok(Self {
-            length,
-            factor: settings.factor,
-            columns,
-            level: Level::detect(),
-            recent: Vec::new(),
-            stride: 0,
-            begin: 0,
-            end: 0,
-            skip: 0,
-            outputs: 0,
-            taps,
-        })
+        let taps = settings.taps(rate_hz)?;
+        let blocks = (taps.len() + BLOCK - 1).div_ceil(BLOCK);
+        let phases = core::array::from_fn(|phase| {
+            let mut shifted = vec![Block::ZERO; blocks];
+            for (k, tap) in taps.iter().enumerate() {
+                shifted[(phase + k) / BLOCK].0[(phase + k) % BLOCK] = *tap;
+            }
+            shifted
+        });
+        let filter = Arc::new(Filter { phases, length: taps.len(), factor: settings.factor });
+        Ok(Self::of_filter(filter, columns))
+    }
+
+    /// The same filter for panels of another number of columns, at the start of a signal.
+    #[must_use]
+    pub fn with_columns(&self, columns: usize) -> Self {
+        Self::of_filter(Arc::clone(&self.filter), columns)
+    }
+
+    fn of_filter(filter: Arc<Filter>, columns: usize) -> Self {
+        let begun = vec![Block::ZERO; filter.length.div_ceil(filter.factor) * columns];
+        Self { filter, columns, level: Level::detect(), begun, signal: Vec::new(), rows: 0, outputs: 0 }
     }
 
     /// Rows on either side of an output row that enter it: the first output belongs to this input row.
     pub fn half_length(&self) -> usize {
-        self.length / 2
+        self.filter.length / 2
     }
 
     /// Number of coefficients.
     pub fn length(&self) -> usize {
-        self.length
+        self.filter.length
     }
 
     /// Input row (since the start or the last [`finish`](Self::finish)) to which output row `index` belongs.
     pub fn input_row(&self, index: u64) -> u64 {
-        index * self.factor as u64 + self.half_length() as u64
+        index * self.filter.factor as u64 + self.half_length() as u64
     }
 
     /// Takes the next `rows` rows of the column-major `panel` (`panel[column * rows + row]`) and replaces the contents
@@ -187,111 +211,147 @@ impl Decimator {
     /// If `panel` has not `rows` times the number of columns entries.
     pub fn push(&mut self, panel: &[f64], rows: usize, out: &mut Vec<f64>) -> usize {
         assert_eq!(panel.len(), rows * self.columns, "panel of {rows} rows and {} columns", self.columns);
-        self.make_room(rows);
-        let available = self.end - self.begin + rows;
-        let produced = if available >= self.skip + self.length {
-            (available - self.skip - self.length) / self.factor + 1
-        } else {
-            0
-        };
+        let Filter { length, factor, .. } = *self.filter;
+        let end = self.rows + rows;
+        let complete = if end >= length { (end - length) / factor + 1 } else { 0 };
+        let (before, produced) = (self.outputs, complete - self.outputs);
+        // Every place is written.
         out.resize(produced * self.columns, 0.0);
-        for column in 0..self.columns {
-            let recent = &mut self.recent[column * self.stride..(column + 1) * self.stride];
-            recent[self.end..self.end + rows].copy_from_slice(&panel[column * rows..(column + 1) * rows]);
+        for from in (0..rows).step_by(PIECE) {
+            let taken = PIECE.min(rows - from);
             dispatch(
                 self.level,
                 Convolution {
-                    taps: &self.taps,
-                    signal: &recent[self.begin..self.end + rows + BLOCK],
-                    first: self.skip,
-                    factor: self.factor,
-                    out: &mut out[column * produced..(column + 1) * produced],
+                    filter: &self.filter,
+                    columns: self.columns,
+                    panel,
+                    stride: rows,
+                    piece: from..from + taken,
+                    first_row: self.rows,
+                    outputs: self.outputs,
+                    begun: &mut self.begun,
+                    signal: &mut self.signal,
+                    out: Complete { values: out, stride: produced, before },
                 },
             );
+            self.rows += taken;
+            self.outputs = if self.rows >= length { (self.rows - length) / factor + 1 } else { 0 };
         }
-        // Where the next output's support begins, in the rows from `begin` on.
-        let next = self.skip + produced * self.factor;
-        let kept = available.saturating_sub(next).min(self.length - 1);
-        self.end += rows;
-        self.begin = self.end - kept;
-        self.skip = next.saturating_sub(available - kept);
-        self.outputs += produced as u64;
         produced
-    }
-
-    /// Room for further rows behind the recent ones: these move to the front of their columns only when it is used up,
-    /// for a long filter has many of them.
-    fn make_room(&mut self, rows: usize) {
-        if self.end + rows + BLOCK <= self.stride {
-            return;
-        }
-        let kept = self.end - self.begin;
-        let needed = kept + rows + BLOCK;
-        if needed > self.stride {
-            let stride = (ROOM * self.length + rows + BLOCK).max(needed);
-            let mut wider = vec![0.0; self.columns * stride];
-            for column in 0..self.columns {
-                let from = &self.recent[column * self.stride..][self.begin..self.end];
-                wider[column * stride..][..kept].copy_from_slice(from);
-            }
-            (self.recent, self.stride) = (wider, stride);
-        } else {
-            for recent in self.recent.chunks_exact_mut(self.stride) {
-                recent.copy_within(self.begin..self.end, 0);
-            }
-        }
-        (self.begin, self.end) = (0, kept);
     }
 
     /// Ends the signal: forgets its last rows, so that the next [`push`](Self::push) starts a new one. Returns the
     /// output rows produced since the start.
     pub fn finish(&mut self) -> u64 {
-        (self.begin, self.end, self.skip) = (0, 0, 0);
-        core::mem::take(&mut self.outputs)
+        self.rows = 0;
+        core::mem::take(&mut self.outputs) as u64
     }
 }
 
+/// Where complete outputs go: column by column, those from number `before` on.
+struct Complete<'a> {
+    values: &'a mut [f64],
+    stride: usize,
+    before: usize,
+}
+
+/// Adds some rows to all outputs that they enter. Rows are read once, while they are in the cache; nothing of them is
+/// kept but these sums.
 struct Convolution<'a> {
-    taps: &'a [f64],
-    signal: &'a [f64],
-    first: usize,
-    factor: usize,
-    out: &'a mut [f64],
+    filter: &'a Filter,
+    columns: usize,
+    panel: &'a [f64],
+    /// Rows of the panel, of which these are at work, and the signal's row that the first of them is.
+    stride: usize,
+    piece: core::ops::Range<usize>,
+    first_row: usize,
+    /// Outputs that were complete before.
+    outputs: usize,
+    begun: &'a mut [Block],
+    signal: &'a mut Vec<Block>,
+    out: Complete<'a>,
 }
 
 impl Kernel for Convolution<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<T: Lane>(self) {
-        let taps = self.taps;
-        // Four outputs at a time: each load of coefficients serves four, and four sums hide the latency.
-        let mut chunks = self.out.chunks_exact_mut(4);
-        let mut from = self.first;
-        for out in &mut chunks {
-            let row = |i: usize| self.signal[from + i * self.factor..][..taps.len()].chunks_exact(T::LANES);
-            let mut sums = [T::ZERO; 4];
-            for ((((tap, a), b), c), d) in taps.chunks_exact(T::LANES).zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3)) {
-                let tap = T::load(tap);
-                sums[0] = T::load(a).mul_add(tap, sums[0]);
-                sums[1] = T::load(b).mul_add(tap, sums[1]);
-                sums[2] = T::load(c).mul_add(tap, sums[2]);
-                sums[3] = T::load(d).mul_add(tap, sums[3]);
-            }
-            for i in 0..4 {
-                out[i] = sums[i].sum();
-            }
-            from += 4 * self.factor;
+    fn run<T: Lane>(mut self) {
+        let mut column = 0;
+        while column < self.columns {
+            // Each load of coefficients serves all columns of a group, and their sums hide the latency.
+            column += match self.columns - column {
+                8.. => self.group::<T, 8>(column),
+                4.. => self.group::<T, 4>(column),
+                2.. => self.group::<T, 2>(column),
+                _ => self.group::<T, 1>(column),
+            };
         }
-        for out in chunks.into_remainder() {
-            let row = self.signal[from..][..taps.len()].chunks_exact(T::LANES);
-            let mut sum = T::ZERO;
-            for (tap, value) in taps.chunks_exact(T::LANES).zip(row) {
-                sum = T::load(value).mul_add(T::load(tap), sum);
+    }
+}
+
+impl Convolution<'_> {
+    /// Columns `column .. column + N`; returns their number.
+    #[inline(always)]
+    fn group<T: Lane, const N: usize>(&mut self, column: usize) -> usize {
+        let Filter { length, factor, .. } = *self.filter;
+        let (begin, end) = (self.first_row, self.first_row + self.piece.len());
+        let first_block = begin / BLOCK;
+        // Rows of the first and the last block that are not in this piece are zero, and add nothing.
+        let blocks = end.div_ceil(BLOCK) - first_block;
+        self.signal.resize(blocks * N, Block::ZERO);
+        for n in 0..N {
+            let rows = &self.panel[(column + n) * self.stride..][self.piece.clone()];
+            self.signal[n] = Block::ZERO;
+            self.signal[(blocks - 1) * N + n] = Block::ZERO;
+            let (head, rest) = rows.split_at((BLOCK - begin % BLOCK).min(rows.len()));
+            self.signal[n].0[begin % BLOCK..][..head.len()].copy_from_slice(head);
+            let (whole, last) = rest.as_chunks::<BLOCK>();
+            for (to, from) in self.signal.iter_mut().skip(N + n).step_by(N).zip(whole) {
+                to.0 = *from;
             }
-            *out = sum.sum();
-            from += self.factor;
+            if !last.is_empty() {
+                self.signal[(blocks - 1) * N + n].0[..last.len()].copy_from_slice(last);
+            }
         }
+        let places = self.begun.len() / self.columns;
+        // All outputs whose support has begun.
+        for output in self.outputs..end.div_ceil(factor) {
+            let support = output * factor;
+            let (phase, base) = (support % BLOCK, support / BLOCK);
+            let taps = &self.filter.phases[phase][..];
+            let from = base.max(first_block);
+            let to = (base + taps.len()).min(first_block + blocks);
+            let taps = &taps[from - base..to.max(from) - base];
+            let signal = &self.signal[(from - first_block) * N..];
+            let sums = &mut self.begun[(output % places) * self.columns + column..][..N];
+            if support >= begin {
+                sums.fill(Block::ZERO);
+            }
+            for part in 0..BLOCK / T::LANES {
+                let at = part * T::LANES;
+                let mut sum = [T::ZERO; N];
+                for n in 0..N {
+                    sum[n] = T::load(&sums[n].0[at..]);
+                }
+                for (tap, rows) in taps.iter().zip(signal.chunks_exact(N)) {
+                    let tap = T::load(&tap.0[at..]);
+                    for n in 0..N {
+                        sum[n] = T::load(&rows[n].0[at..]).mul_add(tap, sum[n]);
+                    }
+                }
+                for n in 0..N {
+                    sum[n].store(&mut sums[n].0[at..]);
+                }
+            }
+            if support + length <= end {
+                for (n, sum) in sums.iter().enumerate() {
+                    let Complete { values, stride, before } = &mut self.out;
+                    values[(column + n) * *stride + output - *before] = sum.0.iter().sum();
+                }
+            }
+        }
+        N
     }
 }
 
@@ -313,6 +373,7 @@ mod tests {
             .take_while(|from| from + taps.len() <= n)
             .map(|from| taps.iter().enumerate().map(|(j, tap)| tap * wave(from + j)).sum())
             .collect();
+        let mut bits: Option<Vec<u64>> = None;
         for cut in [1_usize, 3, 64, 100, 1203] {
             let mut decimator = Decimator::new(&settings, 1000.0, 2).unwrap();
             let (mut first, mut second, mut out) = (Vec::new(), Vec::new(), Vec::new());
@@ -331,6 +392,48 @@ mod tests {
             for ((a, b), plain) in first.iter().zip(&second).zip(&plain) {
                 // Sums of about 70 products of order one: rounding below 1e-14.
                 assert!((a - plain).abs() < 1e-13 && (b - 2.0 * plain).abs() < 2e-13, "cut {cut}");
+            }
+            // The same to the last bit.
+            let own: Vec<u64> = first.iter().map(|value| value.to_bits()).collect();
+            assert_eq!(*bits.get_or_insert_with(|| own.clone()), own, "cut {cut}");
+        }
+    }
+
+    #[test]
+    fn columns_and_signals_do_not_mix_whatever_the_factor() {
+        // Factors around the block of eight, one beyond the filter's length, one of which every row is an output; as
+        // many columns as make groups of every width.
+        for (factor, settings) in [1, 4, 8, 9, 40].into_iter().flat_map(|factor| {
+            let narrow = DecimationSettings { factor, cutoff_hz: Some(100.0), ..DecimationSettings::default() };
+            let wide = DecimationSettings { transition_hz: Some(200.0), ..narrow.clone() };
+            [(factor, narrow), (factor, wide)]
+        }) {
+            let (taps, columns, rows) = (settings.taps(1000.0).unwrap(), 15, 700);
+            let value = |column: usize, row: usize| (column + 1) as f64 * wave(row + 17 * column);
+            let mut decimator = Decimator::new(&settings, 1000.0, 1).unwrap().with_columns(columns);
+            let mut out = Vec::new();
+            // A signal that is broken off leaves nothing behind.
+            decimator.push(&vec![1e6; 13 * columns], 13, &mut out);
+            decimator.finish();
+            let mut found = vec![Vec::new(); columns];
+            for range in [0..333, 333..rows] {
+                let panel: Vec<f64> = (0..columns).flat_map(|c| range.clone().map(move |row| value(c, row))).collect();
+                let produced = decimator.push(&panel, range.len(), &mut out);
+                for (found, column) in found.iter_mut().zip(out.chunks(produced.max(1))) {
+                    found.extend_from_slice(&column[..produced]);
+                }
+            }
+            for (column, found) in found.iter().enumerate() {
+                let plain: Vec<f64> = (0..rows)
+                    .step_by(factor)
+                    .take_while(|from| from + taps.len() <= rows)
+                    .map(|from| taps.iter().enumerate().map(|(j, tap)| tap * value(column, from + j)).sum())
+                    .collect();
+                assert_eq!(found.len(), plain.len());
+                for (found, plain) in found.iter().zip(&plain) {
+                    // Sums of at most some hundred products of order 15.
+                    assert!((found - plain).abs() < 1e-11, "factor {factor}, column {column}");
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The columns of one table that a log's description asks for, found by name or index.
 
 use super::format::ColumnRef;
+use super::row_count::RowCount;
 use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;
@@ -34,14 +35,16 @@ impl ColumnSelection {
     }
 
     /// Data rows of the table's source: one pass without a look at the numbers. Which rows there are may hang on
-    /// what is asked for.
-    pub(super) fn count_rows(&self, source: &dyn LogSource) -> Result<u64, RecordingError> {
-        let (mut table, mut rows) = (source.open()?, 0);
-        table.select(&self.fields);
-        while table.skip_row()? {
-            rows += 1;
-        }
-        Ok(rows)
+    /// what is asked for. A pass that was made for `known` is not made again.
+    pub(super) fn count_rows(&self, source: &dyn LogSource, known: &RowCount) -> Result<u64, RecordingError> {
+        known.of(&self.fields, source.path(), || {
+            let (mut table, mut rows) = (source.open()?, 0);
+            table.select(&self.fields);
+            while table.skip_row()? {
+                rows += 1;
+            }
+            Ok(rows)
+        })
     }
 
     /// Ends the asking.

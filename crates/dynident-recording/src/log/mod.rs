@@ -15,6 +15,7 @@ mod lines;
 mod mapping;
 mod memory;
 mod reader;
+mod row_count;
 mod row_rules;
 mod source;
 mod text;
@@ -30,6 +31,7 @@ pub use row_rules::RowRule;
 pub use source::{LogGroup, LogSource, LogTable};
 pub use units::{Quantity, si_factor, unit_names};
 
+use row_count::RowCount;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -47,6 +49,8 @@ pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, crate::RecordingErr
 #[derive(Clone, Debug)]
 pub struct Log {
     source: Arc<dyn LogSource>,
+    /// For a format that asks for a fraction of them.
+    row_count: Arc<RowCount>,
     /// What the columns mean, and which part of the log is asked for.
     pub format: LogFormat,
     /// Names of the joints, in the order of the format's columns.
@@ -61,7 +65,7 @@ impl Log {
 
     /// As [`new`](Self::new), for a source that others hold as well.
     pub fn shared(source: Arc<dyn LogSource>, format: LogFormat, joints: &[String]) -> Self {
-        Self { source, format, joints: joints.to_vec() }
+        Self { source, row_count: Arc::default(), format, joints: joints.to_vec() }
     }
 
     /// The log whose main file is at `path`; the `file` keys of channel groups are relative to its folder.

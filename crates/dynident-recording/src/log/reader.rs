@@ -138,7 +138,7 @@ impl LogReader {
             }
             (None, Some([from, to])) => {
                 selection.push(format!("fraction = [{from}, {to}]"));
-                let count = tables[0].count_rows(main)? as f64;
+                let count = tables[0].count_rows(main, &log.row_count)? as f64;
                 [(from * count).round() as u64, (to * count).round() as u64]
             }
             (None, None) => [0, u64::MAX],

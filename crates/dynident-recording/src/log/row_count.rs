@@ -1,0 +1,59 @@
+//! How many rows a source has, counted once for all passes over it.
+
+use crate::error::RecordingError;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// The last count of a log's rows, and what it was a count of.
+#[derive(Debug, Default)]
+pub(super) struct RowCount(Mutex<Option<(Counted, u64)>>);
+
+/// What a count holds for: which rows there are may hang on the columns, and a file may have been written anew.
+#[derive(Debug, PartialEq)]
+struct Counted {
+    fields: Vec<usize>,
+    file: Option<(u64, Option<SystemTime>)>,
+}
+
+impl RowCount {
+    /// What `count` says of these columns of the source, which is the file at `path` if it is one; not asked again
+    /// while neither changes.
+    pub(super) fn of(
+        &self,
+        fields: &[usize],
+        path: Option<&Path>,
+        count: impl FnOnce() -> Result<u64, RecordingError>,
+    ) -> Result<u64, RecordingError> {
+        let file = path.and_then(|path| path.metadata().ok()).map(|data| (data.len(), data.modified().ok()));
+        let now = Counted { fields: fields.to_vec(), file };
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, rows)) = known.as_ref().filter(|(counted, _)| *counted == now) {
+            return Ok(*rows);
+        }
+        let rows = count()?;
+        *known = Some((now, rows));
+        Ok(rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_holds_for_its_columns_and_its_file() {
+        let path = std::env::temp_dir().join(format!("dynident_row_count_{}", std::process::id()));
+        let count = RowCount::default();
+        let of = |fields: &[usize], rows| count.of(fields, Some(&path), || Ok(rows)).unwrap();
+        std::fs::write(&path, "one").unwrap();
+        assert_eq!([of(&[0, 1], 5), of(&[0, 1], 6), of(&[2], 7), of(&[2], 8)], [5, 5, 7, 7]);
+        std::fs::write(&path, "one and two").unwrap();
+        assert_eq!([of(&[2], 9), of(&[2], 10)], [9, 9]);
+        std::fs::remove_file(&path).unwrap();
+        // What could not be counted is asked again.
+        let fails = count.of(&[3], None, || Err(RecordingError::NoFolder { log: "log".into(), key: "torque" }));
+        assert!(fails.is_err());
+        assert_eq!(count.of(&[3], None, || Ok(4)).unwrap(), 4);
+    }
+}
