@@ -61,6 +61,31 @@ pub fn choose_friction(
     robot: &ParametricModel,
     (training, payloads): (&[usize], &[Payload]),
 ) -> Result<ChosenFriction, IdentificationError> {
+    friction_of_logs((logs, logs), settings, robot, (training, payloads))
+}
+
+/// The same with other filters for the constants: terms from the rows of `logs`, constants from those of
+/// `of_constants`. Where the first are too few to choose from, terms come from the second as well.
+pub(crate) fn friction_of_logs(
+    (logs, of_constants): (&Logs<'_>, &Logs<'_>),
+    settings: &IdentificationSettings,
+    robot: &ParametricModel,
+    (training, payloads): (&[usize], &[Payload]),
+) -> Result<ChosenFriction, IdentificationError> {
+    let found = friction_by_terms((logs, of_constants), settings, robot, (training, payloads))?;
+    let is_nothing = |one: &JointFriction| one.terms.is_none();
+    if core::ptr::eq(logs, of_constants) || found.joints.is_empty() || !found.joints.iter().all(is_nothing) {
+        return Ok(found);
+    }
+    friction_by_terms((of_constants, of_constants), settings, robot, (training, payloads))
+}
+
+fn friction_by_terms(
+    (logs, of_constants): (&Logs<'_>, &Logs<'_>),
+    settings: &IdentificationSettings,
+    robot: &ParametricModel,
+    (training, payloads): (&[usize], &[Payload]),
+) -> Result<ChosenFriction, IdentificationError> {
     let stated = RegressorModel::from(robot.clone());
     let searches: Vec<(usize, &FrictionSearch)> = settings
         .friction
@@ -102,6 +127,7 @@ pub fn choose_friction(
     let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
     let mut joints = chosen_among(&candidates)?;
     let model = with_friction_of(robot, &joints, (&first.model, &plain))?;
+    let passes = TrainingPasses { logs: of_constants, ..passes };
     let (mut model, constants_error) = with_constants(&passes, robot, &mut joints, (model, &gains))?;
     // What follows finds the gains with the friction that was chosen.
     model.torque_gains.clear();

@@ -3,7 +3,7 @@
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
-use crate::chosen_friction::{ChosenFriction, choose_friction, constants_of_all_rows};
+use crate::chosen_friction::{ChosenFriction, constants_of_all_rows, friction_of_logs};
 use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
@@ -369,7 +369,8 @@ fn chosen_here<'a>(
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
         let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
+        let of_constants = logs.with_torque_beyond_motion();
+        let friction = friction_of_logs((&logs, &of_constants), settings, &robot, (chosen, payloads))?;
         let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
@@ -385,7 +386,8 @@ fn chosen_before<'a>(
     let Choices { robot, drive_inertia, cutoff, motion_hz, friction, .. } = choices;
     let logs = with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz));
     let logs = logs.with_motion_band(*motion_hz);
-    let friction = constants_of_all_rows((&logs, settings), robot, friction, (chosen, payloads))?;
+    let of_constants = logs.with_torque_beyond_motion();
+    let friction = constants_of_all_rows((&of_constants, settings), robot, friction, (chosen, payloads))?;
     let (robot, drive_inertia) = (robot.clone(), drive_inertia.clone());
     Ok(Chosen { robot, drive_inertia, logs, cutoff: cutoff.clone(), friction })
 }

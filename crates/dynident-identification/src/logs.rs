@@ -7,10 +7,15 @@ use crate::rows::{KeptLog, LogPass, ParallelFilterSettings, motion_band_hz};
 use dynident_model::Model;
 use dynident_recording::filter::CutoffChoice;
 use dynident_recording::{FilterError, MotionSettings};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Longest lag that can be stated, seconds of a usual arm.
 const LONGEST_STATED_LAG_S: f64 = 0.5;
+
+/// Rows of a joint that are kept above the motion's band, at most, all recordings together; ...
+const MOST_BEYOND_MOTION: f64 = 20_000.0;
+/// ... and where the rate of the recordings was not asked for so many times those within it.
+const BEYOND_MOTION: f64 = 8.0;
 
 /// What the positions of one log say about its noise.
 #[derive(Clone, Debug)]
@@ -27,7 +32,7 @@ pub(crate) struct LogSpectrum {
 
 /// The recordings of a task and the filters in force. A log that fits into memory is read and
 /// differentiated once, however many passes there are.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Logs<'a> {
     /// All recordings, whatever their role.
     pub recordings: &'a [Recording],
@@ -38,11 +43,13 @@ pub struct Logs<'a> {
     /// How the job runs.
     pub execution: Execution<'a>,
     /// Empty where nothing is kept between passes.
-    kept: Vec<OnceLock<KeptLog>>,
+    kept: Arc<Vec<OnceLock<KeptLog>>>,
     /// What the spectra of the deciding logs say, where the cut-off was left to them.
     spectra: Vec<LogSpectrum>,
     /// The cut-off of the torque's motion band, where the fit has another.
     motion_hz: Option<f64>,
+    /// The cut-off that the parallel filter follows, where it is not the motion's.
+    torque_hz: Option<f64>,
 }
 
 impl<'a> Logs<'a> {
@@ -89,8 +96,8 @@ impl<'a> Logs<'a> {
                 motion.differentiator = motion.differentiator.with_cutoff(highest);
             }
         }
-        let kept = recordings.iter().map(|_| OnceLock::new()).collect();
-        Ok(Self { recordings, motion, filter, execution, kept, spectra, motion_hz: None })
+        let kept = unread(recordings);
+        Ok(Self { recordings, motion, filter, execution, kept, spectra, motion_hz: None, torque_hz: None })
     }
 
     /// The same with the cut-off `cutoff_hz` where it was left to the data; held-out figures stay those of the motion's
@@ -103,14 +110,14 @@ impl<'a> Logs<'a> {
         }
         self.motion_hz = motion_hz.filter(|motion_hz| *motion_hz != cutoff_hz);
         self.motion.differentiator = settings.differentiator.clone().with_cutoff(cutoff_hz);
-        self.kept = self.recordings.iter().map(|_| OnceLock::new()).collect();
+        self.kept = unread(self.recordings);
         self
     }
 
     /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
     #[must_use]
     pub(crate) fn without_keeping(mut self) -> Self {
-        self.kept.clear();
+        self.kept = Arc::default();
         self
     }
 
@@ -120,6 +127,21 @@ impl<'a> Logs<'a> {
     pub fn with_motion_band(mut self, motion_hz: Option<f64>) -> Self {
         self.motion_hz = motion_hz;
         self
+    }
+
+    /// The same motion with rows of the torque above its band: as many as a pass takes in fractions of a second. The
+    /// parallel filter follows the motion's cut-off, and a step that friction passes within milliseconds has most of
+    /// what it says about its width above that.
+    #[must_use]
+    pub(crate) fn with_torque_beyond_motion(&self) -> Self {
+        let Some(motion_hz) = motion_band_hz(&self.motion) else { return self.clone() };
+        let kept = |log: &LogSpectrum| -> f64 {
+            let rows = self.recordings[log.index].estimated_rows().unwrap_or(u64::MAX) as f64;
+            rows * (ParallelFilterSettings::rows_per_s(motion_hz) / log.rate_hz).min(1.0)
+        };
+        let rows: f64 = self.spectra.iter().map(kept).sum();
+        let times = if rows > 0.0 { (MOST_BEYOND_MOTION / rows).max(1.0) } else { BEYOND_MOTION };
+        Self { torque_hz: Some(times * motion_hz), ..self.clone() }
     }
 
     /// What the spectra alone ask for; none where the fit has that cut-off too.
@@ -144,6 +166,7 @@ impl<'a> Logs<'a> {
             model,
             motion: &self.motion,
             filter: self.filter,
+            torque_hz: self.torque_hz,
             reader_thread: false,
             most_samples: None,
             progress: self.execution.progress,
@@ -161,6 +184,11 @@ impl<'a> Logs<'a> {
     pub(crate) fn end(&self) {
         self.execution.progress.end();
     }
+}
+
+/// A place for the motion of every recording.
+fn unread(recordings: &[Recording]) -> Arc<Vec<OnceLock<KeptLog>>> {
+    Arc::new(recordings.iter().map(|_| OnceLock::new()).collect())
 }
 
 /// Places of the recordings with this role.

@@ -40,8 +40,9 @@ fn the_default_is_that_of_a_study_of_files_and_columns_alone() -> Result<(), Box
 }
 
 /// The cheapest case, a planar arm. An expert who knows the truth cannot be much worse than the default (chance of two
-/// recordings aside). A lag that is looked for does not make a fit worse than plain least squares; constants of
-/// friction that are chosen do, as the book says.
+/// recordings aside). A lag that is looked for does not make a fit worse than plain least squares. The step of friction
+/// is passed within two samples: behind a low-pass that follows the motion the rows did not tell its width, and the
+/// default had fifteen times the error of the true law; two recordings make a factor of two by chance.
 #[test]
 fn figures_do_not_depend_on_threads_and_are_in_order() -> Result<(), Box<dyn Error>> {
     let case = &DEFAULT_CASES[0];
@@ -52,7 +53,8 @@ fn figures_do_not_depend_on_threads_and_are_in_order() -> Result<(), Box<dyn Err
     let header = TABLE_HEADER.lines().next().ok_or("no header")?;
     assert_eq!(table_line(case, &one).split('|').count(), header.split('|').count());
     assert!(one.over_best() > 0.9 && one.laws_stated_over_best() > 0.9, "{one:?}");
-    assert!(one.of_plain.is_some_and(|plain| one.of_laws_stated < plain), "{one:?}");
+    assert!(one.of_plain.is_some_and(|plain| one.of_laws_stated < plain && one.of_default < plain), "{one:?}");
+    assert!(one.of_default < 2.0 * one.of_laws_stated, "{one:?}");
     assert!(one.lag_found_s.is_some_and(|lag_s| lag_s.abs() < 1e-3), "{one:?}");
     assert_eq!((one.told, one.tellable, one.bodies.all), (4, 4, 12));
     // What is missed is said.

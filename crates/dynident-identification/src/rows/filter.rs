@@ -61,17 +61,22 @@ impl ParallelFilterSettings {
         Ok(())
     }
 
+    /// Rows a second that are left by default of a motion below this cut-off: the motion's cut-off is twice its highest
+    /// frequency; with seven eighths of it per Nyquist band the filter's gain of one half lies at 0.7 of the cut-off,
+    /// above all motion.
+    pub(crate) fn rows_per_s(motion_cutoff_hz: f64) -> f64 {
+        1.75 * motion_cutoff_hz
+    }
+
     /// The filter in force at this rate for a motion that lies below `motion_cutoff_hz`; `None` where every sample
     /// counts.
     pub fn decimation(&self, rate_hz: f64, motion_cutoff_hz: Option<f64>) -> Option<DecimationSettings> {
         if !self.enabled {
             return None;
         }
-        // The motion's cut-off is twice the motion's highest frequency; with seven eighths of it per Nyquist band the
-        // filter's gain of one half lies at 0.7 of the cut-off, above all motion. It takes the same from torque and
-        // regressor, so it costs no bias.
-        let automatic =
-            motion_cutoff_hz.map_or(1, |cutoff| (rate_hz / (1.75 * cutoff)).floor().clamp(1.0, 1000.0) as usize);
+        // It takes the same from torque and regressor, so it costs no bias.
+        let automatic = motion_cutoff_hz
+            .map_or(1, |cutoff| (rate_hz / Self::rows_per_s(cutoff)).floor().clamp(1.0, 1000.0) as usize);
         let factor = self.factor.unwrap_or(automatic);
         (factor > 1 || self.cutoff_hz.is_some()).then_some(DecimationSettings {
             factor,

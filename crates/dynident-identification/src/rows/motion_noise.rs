@@ -51,7 +51,7 @@ pub(crate) fn noise_factors(
         return Ok(Some(factors));
     }
     let (rate_hz, in_filter) = (report.rate_hz, |source| LogError::Filter { log: name.clone(), source });
-    let filter = pass.filter.decimation(rate_hz, motion_band_hz(pass.motion));
+    let filter = pass.filter.decimation(rate_hz, pass.torque_hz.or_else(|| motion_band_hz(pass.motion)));
     let places = pass.recording.places(model.model())?;
     let mut builder = RowBuilder::new(model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
     let (pieces, read) = pass.some_pieces(SAMPLES, (SAMPLES / 4).max(4 * builder.needed()))?;

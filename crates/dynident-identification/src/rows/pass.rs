@@ -52,6 +52,8 @@ pub struct LogPass<'a> {
     pub motion: &'a MotionSettings,
     /// The parallel filter.
     pub filter: &'a ParallelFilterSettings,
+    /// The cut-off that the parallel filter follows, where it is not the motion's.
+    pub torque_hz: Option<f64>,
     /// Whether a second thread reads.
     pub reader_thread: bool,
     /// Stop after about so many samples.
@@ -106,7 +108,7 @@ impl LogPass<'_> {
             Motion::Stream(stream) => stream.rate_hz(),
             Motion::Record(record) => record.motion.rate_hz,
         };
-        let filter = self.filter.decimation(rate_hz, motion_band_hz(self.motion));
+        let filter = self.filter.decimation(rate_hz, self.torque_hz.or_else(|| motion_band_hz(self.motion)));
         let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let mut builder = RowBuilder::new(self.model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
         let factor = filter.as_ref().map_or(1, |settings| settings.factor);
