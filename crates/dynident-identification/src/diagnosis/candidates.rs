@@ -23,7 +23,7 @@ const FAR: f64 = 2.0;
 pub(super) enum Breadth {
     /// Mistakes that people often make, without free numbers but those of zeros and mountings.
     Usual,
-    /// Rarer ones too: units of single joints, other rates, columns that turn with a neighbour, gravity of another size.
+    /// Rarer ones too: units of single joints, other rates, columns that turn with a neighbour, gravity's size.
     All,
 }
 

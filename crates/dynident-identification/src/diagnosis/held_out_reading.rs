@@ -1,5 +1,5 @@
-//! Mistakes of a held-out log alone: a format of its own, another day's cables. The training logs' parameters are known,
-//! so that every reading of it is asked for nothing but its residual.
+//! Mistakes of a held-out log alone: a format of its own, another day's cables. The training logs' parameters are
+//! known, so that every reading of it is asked for nothing but its residual.
 
 use super::candidates::{Breadth, candidates};
 use super::explanation::predicted;

@@ -186,8 +186,8 @@ fn likelier_sign_first(fitted: &mut [(Corrected, Reading)]) {
     }
 }
 
-/// Whether a reading with another column of one joint explains that joint: a channel that says nothing, dead or noise, is
-/// as good in any unit, and another gain of a torque that was explained before serves other joints' torques.
+/// Whether a reading with another column of one joint explains that joint: a channel that says nothing, dead or noise,
+/// is as good in any unit, and another gain of a torque that was explained before serves other joints' torques.
 fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
     let joint = match reading.mistakes.last() {
         Some(Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. }) => *joint,
