@@ -16,7 +16,7 @@ const EARTH_M_S2: f64 = 9.81;
 const NEAR_EARTH: f64 = 0.03;
 
 /// Times its range that a joint travels where its unit is far too small.
-const FAR: f64 = 2.0;
+pub(super) const FAR: f64 = 2.0;
 
 /// How far the search goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -46,6 +46,11 @@ impl Reading {
         self.consistent_score + self.beside_fit()
     }
 
+    /// The evidence of torque alone, without limits and rates.
+    pub(super) fn torque_score(&self) -> f64 {
+        self.score() - self.broken()
+    }
+
     /// Whether it leaves far more than parameters of each joint's own do: then it is no explanation either.
     pub fn is_unexplained(&self) -> bool {
         self.consistent_score - self.alone_score > UNEXPLAINED * self.left.len() as f64
@@ -57,9 +62,13 @@ impl Reading {
     }
 
     fn beside_fit(&self) -> f64 {
-        let broken = self.beyond.len() + usize::from(!self.plausible_rate);
         let rarity: f64 = self.mistakes.iter().map(Mistake::rarity).sum();
-        NOMINAL_WEIGHT * self.nominal_score + LIMIT_COST * broken as f64 + rarity
+        NOMINAL_WEIGHT * self.nominal_score + self.broken() + rarity
+    }
+
+    /// What its broken limits cost.
+    fn broken(&self) -> f64 {
+        LIMIT_COST * (self.beyond.len() + usize::from(!self.plausible_rate)) as f64
     }
 }
 

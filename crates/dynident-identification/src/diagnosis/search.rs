@@ -4,7 +4,7 @@
 //! win is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the
 //! best are named beside it.
 
-use super::candidates::{Breadth, candidates};
+use super::candidates::{Breadth, FAR, candidates};
 use super::mistake::{Channels, Mistake};
 use super::reading::{Corrected, Reading};
 use super::units::{is_unit_of_position, is_unit_of_time};
@@ -189,13 +189,15 @@ fn likelier_sign_first(fitted: &mut [(Corrected, Reading)]) {
 /// Whether a reading with another column of one joint explains that joint: a channel that says nothing, dead or noise,
 /// is as good in any unit, and another gain of a torque that was explained before serves other joints' torques.
 fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
-    let joint = match reading.mistakes.last() {
-        Some(Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. }) => *joint,
-        Some(Mistake::PositionUnit { joints, .. }) if joints.len() == 1 => joints[0],
+    let (joint, has_to_gain) = match reading.mistakes.last() {
+        Some(Mistake::TorqueUnit { joint, .. }) => (*joint, true),
+        Some(Mistake::Coupled { joint, .. }) => (*joint, false),
+        // A unit that is far too small shows by how far the joint travels.
+        Some(Mistake::PositionUnit { joints, factor }) if joints.len() == 1 => (joints[0], *factor >= FAR.recip()),
         _ => return true,
     };
-    let is_torque = matches!(reading.mistakes.last(), Some(Mistake::TorqueUnit { .. }));
-    reading.left[joint] < MOSTLY_NOISE && (!is_torque || reading.left[joint] < EXPLAINS * from.left[joint])
+    let left = reading.left[joint];
+    left < MOSTLY_NOISE && (!has_to_gain || left < EXPLAINS * from.left[joint])
 }
 
 /// Whether a reading leaves clearly more of some joint's torque than the one it was made from.
