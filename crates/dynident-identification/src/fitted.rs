@@ -369,7 +369,7 @@ fn chosen_here<'a>(
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
         let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let of_constants = logs.with_torque_beyond_motion();
+        let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
         let friction = friction_of_logs((&logs, &of_constants), settings, &robot, (chosen, payloads))?;
         let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
@@ -386,7 +386,7 @@ fn chosen_before<'a>(
     let Choices { robot, drive_inertia, cutoff, motion_hz, friction, .. } = choices;
     let logs = with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz));
     let logs = logs.with_motion_band(*motion_hz);
-    let of_constants = logs.with_torque_beyond_motion();
+    let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
     let friction = constants_of_all_rows((&of_constants, settings), robot, friction, (chosen, payloads))?;
     let (robot, drive_inertia) = (robot.clone(), drive_inertia.clone());
     Ok(Chosen { robot, drive_inertia, logs, cutoff: cutoff.clone(), friction })

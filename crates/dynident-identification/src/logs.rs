@@ -12,6 +12,8 @@ use std::sync::{Arc, OnceLock};
 /// Longest lag that can be stated, seconds of a usual arm.
 const LONGEST_STATED_LAG_S: f64 = 0.5;
 
+/// Rows of a log that is not counted before it is needed.
+const LONG_LOG_ROWS: u64 = 200_000;
 /// Rows of a joint that are kept above the motion's band, at most, all recordings together; ...
 const MOST_BEYOND_MOTION: f64 = 20_000.0;
 /// ... and where the rate of the recordings was not asked for so many times those within it.
@@ -132,16 +134,34 @@ impl<'a> Logs<'a> {
     /// The same motion with rows of the torque above its band: as many as a pass takes in fractions of a second. The
     /// parallel filter follows the motion's cut-off, and a step that friction passes within milliseconds has most of
     /// what it says about its width above that.
-    #[must_use]
-    pub(crate) fn with_torque_beyond_motion(&self) -> Self {
-        let Some(motion_hz) = motion_band_hz(&self.motion) else { return self.clone() };
-        let kept = |log: &LogSpectrum| -> f64 {
-            let rows = self.recordings[log.index].estimated_rows().unwrap_or(u64::MAX) as f64;
-            rows * (ParallelFilterSettings::rows_per_s(motion_hz) / log.rate_hz).min(1.0)
-        };
-        let rows: f64 = self.spectra.iter().map(kept).sum();
+    ///
+    /// # Errors
+    /// A recording that cannot be read.
+    pub(crate) fn with_torque_beyond_motion(&self, model: &RegressorModel) -> Result<Self, LogError> {
+        let Some(motion_hz) = motion_band_hz(&self.motion) else { return Ok(self.clone()) };
+        let mut rows = 0.0;
+        for log in &self.spectra {
+            let share = (ParallelFilterSettings::rows_per_s(motion_hz) / log.rate_hz).min(1.0);
+            rows += self.rows_of(model, log.index)? * share;
+        }
         let times = if rows > 0.0 { (MOST_BEYOND_MOTION / rows).max(1.0) } else { BEYOND_MOTION };
-        Self { torque_hz: Some(times * motion_hz), ..self.clone() }
+        // By factors of two: the rows of a long text file are only estimated.
+        let times = times.log2().floor().exp2();
+        Ok(Self { torque_hz: Some(times * motion_hz), ..self.clone() })
+    }
+
+    /// Rows of a recording: counted, which keeps its motion for the next pass, or of a long one estimated.
+    fn rows_of(&self, model: &RegressorModel, index: usize) -> Result<f64, LogError> {
+        let estimated = self.recordings[index].estimated_rows();
+        if let Some(estimated) = estimated.filter(|rows| *rows > LONG_LOG_ROWS) {
+            return Ok(estimated as f64);
+        }
+        let mut rows = 0;
+        self.pass(model, index).each_block(&mut |block| {
+            rows += block.rows;
+            Ok(())
+        })?;
+        Ok(rows as f64)
     }
 
     /// What the spectra alone ask for; none where the fit has that cut-off too.

@@ -156,14 +156,15 @@ fn diagnosed(
     let mut search = search::search(start.clone(), &consistency, Breadth::Usual)?;
     let further = search::search(start, &consistency, Breadth::All)?;
     // Rarer mistakes count where the usual ones explain clearly less of the torque: a joint that is held smaller breaks
-    // fewer limits, whatever the description's are worth. Where most joints' torques are in another unit
-    // still, the unit of one joint or another rate of the recorder only makes the best of that.
+    // fewer limits, whatever the description's are worth, unless it travels far beyond all it can. Where most joints'
+    // torques are in another unit still, the unit of one joint or another rate only makes the best of that.
     let has_free_factor = further.best.as_ref().is_some_and(|best| best.mistakes.iter().any(Mistake::is_free_factor));
     let makes_the_best = has_free_factor
         && description_fit_of(robot, &rows, &further).is_some_and(|fit| !fit.joints_in_another_unit().is_empty());
     search.tried = further.tried;
     let gains = |of: fn(&Reading) -> f64| of(further.believed()) < of(search.believed()) - CLEARLY_BETTER;
-    if gains(Reading::score) && gains(Reading::torque_score) && !makes_the_best {
+    let is_shown_by_torque = gains(Reading::torque_score) || further.believed().is_shown_by_travel();
+    if gains(Reading::score) && is_shown_by_torque && !makes_the_best {
         search = further;
     }
     // Units of torque are judged in the best reading, payloads only where the study is believed.

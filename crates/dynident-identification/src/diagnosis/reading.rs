@@ -1,5 +1,6 @@
 //! One reading of the samples and what speaks for and against it.
 
+use super::candidates::FAR;
 use super::explanation::Explanation;
 use super::mistake::Mistake;
 use super::motion_rows::MotionRows;
@@ -49,6 +50,12 @@ impl Reading {
     /// The evidence of torque alone, without limits and rates.
     pub(super) fn torque_score(&self) -> f64 {
         self.score() - self.broken()
+    }
+
+    /// Whether a mistake is among those corrected that is only looked for where a joint travels far more than it can.
+    pub(super) fn is_shown_by_travel(&self) -> bool {
+        let is_far = |mistake: &Mistake| matches!(mistake, Mistake::PositionUnit { joints, factor } if joints.len() == 1 && *factor < FAR.recip());
+        self.mistakes.iter().any(is_far)
     }
 
     /// Whether it leaves far more than parameters of each joint's own do: then it is no explanation either.
