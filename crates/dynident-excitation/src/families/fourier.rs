@@ -5,8 +5,6 @@ use super::linear::{Basis, LinearFamily};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "fourier";
-/// Parts of the duration that velocities are counted by: in a motion of ten seconds the free numbers are rad/s (m/s).
-const PARTS: f64 = 10.0;
 
 /// What a [`Fourier`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,8 +44,7 @@ impl FourierSettings {
 /// q(t) = q0 + Σ_k a_k/(kω) sin kωt + b_k/(kω) cos kωt, k = 1..H, ω = 2π · periods / duration,
 ///
 /// so that a_k, b_k are amplitudes of velocity in rad/s (m/s). Eq. 24 of the paper is the same series with its
-/// coefficients in rad: a_k/(kω), b_k/(kω) here. The free numbers are a_k and b_k per tenth of the duration, rad (m): a
-/// slower robot has the same ones, so that a search takes the same steps.
+/// coefficients in rad: a_k/(kω), b_k/(kω) here.
 ///
 /// At rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0; both are solved beforehand by an
 /// orthonormal basis of their null spaces, so no constraint is left and 2 H - 1 numbers a joint are free: q0, then H -
@@ -66,8 +63,6 @@ pub type Fourier = LinearFamily<FourierBasis>;
 pub struct FourierBasis {
     harmonics: usize,
     omega: f64,
-    /// What the free numbers count velocities by, s.
-    unit_s: f64,
     /// Rows: free numbers for a (then b); columns: harmonics. `None` if periodic.
     rest: Option<[Vec<Vec<f64>>; 2]>,
 }
@@ -85,8 +80,7 @@ impl Fourier {
             [null_space(&vec![1.0; harmonics]), null_space(&(1..=harmonics).map(|k| k as f64).collect::<Vec<_>>())]
         });
         let omega = core::f64::consts::TAU * settings.periods as f64 / duration_s;
-        let basis = FourierBasis { harmonics, omega, unit_s: duration_s / PARTS, rest };
-        Ok(Self::of(basis, joints, duration_s))
+        Ok(Self::of(FourierBasis { harmonics, omega, rest }, joints, duration_s))
     }
 
     /// The coefficients of one joint, `[a_k, b_k]` in rad/s (m/s) for k = 1..H, of the given parameters of all joints.
@@ -97,12 +91,15 @@ impl Fourier {
         let basis = self.basis();
         let own = &parameters[joint * basis.columns()..(joint + 1) * basis.columns()];
         let (sine, cosine) = own[1..].split_at((own.len() - 1) / 2);
-        let of_harmonic = |k: usize| match &basis.rest {
-            None => [sine[k], cosine[k]],
-            Some(spaces) => [(&spaces[0], sine), (&spaces[1], cosine)]
-                .map(|(space, free)| space.iter().zip(free).map(|(row, weight)| row[k] * weight).sum::<f64>()),
-        };
-        (0..basis.harmonics).map(|k| of_harmonic(k).map(|number| number / basis.unit_s)).collect()
+        match &basis.rest {
+            None => sine.iter().zip(cosine).map(|(a, b)| [*a, *b]).collect(),
+            Some(spaces) => (0..basis.harmonics)
+                .map(|k| {
+                    [(&spaces[0], sine), (&spaces[1], cosine)]
+                        .map(|(space, free)| space.iter().zip(free).map(|(row, weight)| row[k] * weight).sum())
+                })
+                .collect(),
+        }
     }
 }
 
@@ -121,8 +118,8 @@ impl Basis for FourierBasis {
             // Reduced first: both ends give the same angle, so that rest there is exact.
             let turns = (time_s * speed / core::f64::consts::TAU).fract();
             let (sin, cos) = (turns * core::f64::consts::TAU).sin_cos();
-            let sine = [sin / speed, cos, -speed * sin, -speed * speed * cos].map(|value| value / self.unit_s);
-            let cosine = [cos / speed, -sin, -speed * cos, speed * speed * sin].map(|value| value / self.unit_s);
+            let sine = [sin / speed, cos, -speed * sin, -speed * speed * cos];
+            let cosine = [cos / speed, -sin, -speed * cos, speed * speed * sin];
             match &self.rest {
                 None => (out[k], out[half + k]) = (sine, cosine),
                 Some([for_a, for_b]) => {

@@ -112,6 +112,13 @@ fn binary_scales() -> Vec<Scale> {
     scales_by(THOUSANDTH, THOUSAND)
 }
 
+/// The same with the motion's own time.
+fn binary_sizes() -> Vec<Scale> {
+    let mass = [THOUSANDTH, THOUSAND].map(|mass| Scale { mass, ..AS_IT_IS });
+    let length = [THOUSANDTH, THOUSAND].map(|length| Scale { length, ..AS_IT_IS });
+    mass.into_iter().chain(length).collect()
+}
+
 const THOUSAND: f64 = 1024.0;
 const THOUSANDTH: f64 = 1.0 / THOUSAND;
 
