@@ -226,12 +226,15 @@ fn with_constants(
         take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
         let has_settled = step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
-        if pass == MOST_PASSES {
-            break;
-        }
 
         // Terms that are not seen once constants are free: the weakest of every joint, then again.
         let fewer = constants.without_weakest((&model, &measured.problem.column_norms()), &step);
+        if pass == MOST_PASSES {
+            if !fewer.is_empty() {
+                model = with_chosen(robot, joints, &fewer, (&model, fit))?;
+            }
+            break;
+        }
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
             model = with_chosen(robot, joints, &fewer, (&model, fit))?;
             last = None;

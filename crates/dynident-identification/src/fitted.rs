@@ -178,7 +178,7 @@ fn with_choices<'a>(
     execution: Execution<'a>,
 ) -> Result<Fitted<'a>, IdentificationError> {
     let mut settings = task.settings.clone();
-    let mut rounds = LagRounds::default();
+    let mut rounds = LagRounds::of(settings.lags);
     if settings.motion.torque_lag_s.is_none() {
         settings.motion.torque_lag_s = choices.lag.taken_off();
         rounds = rounds.after(choices.lag.clone());
@@ -201,7 +201,7 @@ fn without_lag<'a>(
 ) -> Result<Fitted<'a>, IdentificationError> {
     let settings = &task.settings;
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
-    let mut found = lag_rounds((task, settings.clone(), LagRounds::default()), (chosen, None), execution, job)?;
+    let mut found = lag_rounds((task, settings.clone(), LagRounds::of(settings.lags)), (chosen, None), execution, job)?;
     if !is_free || settings.friction.is_empty() || found.lag.kind == LagKind::Common {
         return Ok(found);
     }
@@ -212,7 +212,7 @@ fn without_lag<'a>(
     if first.again(free_lag(&of_stated, chosen)?.as_ref(), &mut of_stated.estimation.estimate) {
         let motion = MotionSettings { torque_lag_s: first.torque_lag_s(), ..settings.motion.clone() };
         let settings = IdentificationSettings { motion, ..settings.clone() };
-        let rounds = LagRounds::default().after(first.choice());
+        let rounds = LagRounds::of(settings.lags).after(first.choice());
         let other = lag_rounds((task, settings, rounds), (chosen, None), execution, job)?;
         times = times.and(&other.times);
         if schwarz(&other.training.problem, &other.estimation.estimate)
@@ -264,7 +264,7 @@ fn free_lag(found: &Fitted<'_>, chosen: &[usize]) -> Result<Option<LagFit>, Iden
     let Fitted { logs, training, estimation, settings, .. } = found;
     let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
     let found = (&training.columns, &estimation.estimate.values[..], gains);
-    Ok(lag_fit((logs, &settings.estimation), &training.model, found, chosen)?)
+    Ok(lag_fit((logs, settings), &training.model, found, chosen)?)
 }
 
 /// A lag that the study states.

@@ -164,6 +164,7 @@ pub use identify::{
     ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify, identify_payload,
     identify_with_instruments,
 };
+pub use likelihood::schwarz;
 pub use log_noise::LogNoise;
 pub use logs::Logs;
 pub use progress::{Progress, Silent};

@@ -10,7 +10,7 @@ pub(crate) fn deviance(problem: &LinearProblem, fit: &Estimate) -> f64 {
 
 /// Schwarz's criterion of a fit with k free parameters and n rows: the [`deviance`] and `k ln n`; the less the better.
 /// Source: Annals of Statistics 6 (1978) 461.
-pub(crate) fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
+pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
     let rows = problem.joint_rows().into_iter().sum::<usize>().max(1) as f64;
     let free = (fit.values.len() - fit.rank.fixed.len()) as f64;
     deviance(problem, fit) + free * rows.ln()

@@ -3,6 +3,7 @@
 use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::FrictionSearch;
+use crate::lag::LagCandidates;
 use crate::log_noise::LogNoise;
 use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
@@ -72,6 +73,9 @@ pub struct IdentificationSettings {
     pub offsets: OffsetChoice,
     /// Whether training logs share the noise of their joints; by default they do.
     pub log_noise: LogNoise,
+    /// Which lags of the torque may be taken off the rows where none is stated; by default one for all joints, or
+    /// joints with one of their own.
+    pub lags: LagCandidates,
     /// Whether torque is in newton metres; by default it is.
     pub gains: GainChoice,
     /// Standard deviation of stated gains as a share of each, independent from joint to joint: it goes into the error
@@ -94,6 +98,7 @@ impl Default for IdentificationSettings {
             friction: Vec::new(),
             offsets: OffsetChoice::default(),
             log_noise: LogNoise::default(),
+            lags: LagCandidates::default(),
             gains: GainChoice::default(),
             gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),

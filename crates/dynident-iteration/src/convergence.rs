@@ -313,7 +313,11 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
                 half_width_nm: prediction.half_width,
             });
         }
-        let sigma = own.map_or(0.0, |estimate| estimate.joint_sigma[place]);
+        let sigma = own.map_or(0.0, |estimate| {
+            let (sigma, near_rest) = (estimate.joint_sigma[place], estimate.near_rest.get(place));
+            // What is left near rest is the friction's that holds the joint, up to what that can be.
+            near_rest.and_then(|found| found.as_ref()?.unexplained_nm(sigma)).unwrap_or(sigma)
+        });
         let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
         let (percent, allowed_percent) = (100.0 * beyond_noise / shown.torque_rms, limits.most_unexplained_percent);
         if shown.torque_rms > 0.0 && percent > allowed_percent {

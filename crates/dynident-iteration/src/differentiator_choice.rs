@@ -95,7 +95,8 @@ pub(crate) fn choose_differentiator(
     let mut last_error = None;
     for (name, way) in candidates() {
         let own = settings.with_differentiator(&way);
-        let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None };
+        let log =
+            RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None, rest_margins: &[] };
         let mut candidate =
             DifferentiatorCandidate { name: name.to_owned(), samples: 0, residual_ratio: None, problem: None };
         let motions = recordings(task, &[log], &own).unwrap_or_else(|error| {

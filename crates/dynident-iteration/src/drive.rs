@@ -4,7 +4,7 @@ use crate::before_motion::motions;
 use crate::commanding::Came;
 use crate::convergence::Shortfall;
 use crate::error::IterationError;
-use crate::estimate::{identify_run, identify_runs};
+use crate::estimate::{RunEstimate, identify_run, identify_runs};
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
 use crate::held_out::HeldOutCame;
@@ -181,7 +181,8 @@ impl Iteration {
         let chosen = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
         let of_run =
             chosen.map_or(Cow::Borrowed(&*settings), |way| Cow::Owned(settings.with_differentiator(&way.taken)));
-        match examined(&task, records, &of_run, known) {
+        let rest_margins = record.estimate.as_ref().map(RunEstimate::rest_margins).unwrap_or_default();
+        match examined(&task, records, &of_run, (known, &rest_margins)) {
             Ok(evidence) => record.evidence = Some(evidence),
             Err(error) if fatal(&error) => return Err(error),
             Err(error) => record.reason = record.reason.take().or_else(|| Some(error.to_string())),
@@ -189,7 +190,14 @@ impl Iteration {
         self.judge(record, before)?;
         let Some(own) = record.estimate.clone().filter(|_| record.accepted) else { return Ok(()) };
         let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
-        let run = RunLog { run: record.run, legs: &legs, records, joint_sigma: &own.joint_sigma, differentiator };
+        let run = RunLog {
+            run: record.run,
+            legs: &legs,
+            records,
+            joint_sigma: &own.joint_sigma,
+            differentiator,
+            rest_margins: &own.rest_margins(),
+        };
         let before_it = if self.settings.pool { earlier } else { &[] };
         let runs: Vec<RunLog<'_>> = before_it.iter().map(GoodLog::as_run).chain([run]).collect();
         if runs.len() > 1 {

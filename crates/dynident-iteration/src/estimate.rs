@@ -4,6 +4,8 @@ use crate::differentiator_choice::{DifferentiatorChoice, choose_differentiator};
 use crate::error::IterationError;
 use crate::leg::IterationTask;
 use crate::model_parameters::ModelParameters;
+use crate::near_rest::{NearRest, without_near_rest};
+use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::run_offsets::{RunOffset, choices, deviations, seen};
 use crate::settings::{RunIdentificationSettings, Scheme};
@@ -12,12 +14,11 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
 use dynident_identification::estimators::estimate;
-use dynident_identification::examination::{
-    LagCandidates, LagChoice, LagRounds, TorqueLag, lag_fit, lags_of_recordings,
-};
+use dynident_identification::examination::{LagChoice, LagKind, LagRounds, TorqueLag, lag_fit, lags_of_recordings};
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{
-    Execution, IdentificationSettings, Logs, OffsetChoice, Training, choose_friction, consistent_stage, training_rows,
+    Execution, IdentificationSettings, Logs, OffsetChoice, Recording, Training, choose_friction, consistent_stage,
+    schwarz, training_rows,
 };
 use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
@@ -56,6 +57,10 @@ pub struct RunEstimate {
     /// The differentiator that the run chose; none where it was stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
+    /// The joints with dry friction whose torque near rest does not count, joint by joint: where rows near rest made the
+    /// fit leave more of it. Empty where they did at none, and of runs together, each of which has its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub near_rest: Vec<Option<NearRest>>,
     /// Where runs that were fitted together have constant torques of their own: by how much each deviates from the
     /// mean, which the base parameters hold. Empty where they share one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -73,6 +78,12 @@ impl RunEstimate {
         }
     }
 
+    /// How far from rest the torque of each joint has to be to count; empty where only rests are set aside.
+    pub fn rest_margins(&self) -> Vec<RestMargin> {
+        let margin = |near_rest: &Option<NearRest>| near_rest.as_ref().map(|found| found.margin).unwrap_or_default();
+        self.near_rest.iter().map(margin).collect()
+    }
+
     /// How many times wider its error bars are than another's: the geometric mean over the parameters that both
     /// determine; 1 where there is none.
     pub(crate) fn wider_than(&self, other: &Self) -> f64 {
@@ -85,7 +96,8 @@ impl RunEstimate {
 
 /// Base parameters from the records of one run, one record for each leg of the task: the same identification as of any
 /// log ([`dynident_identification`]), on records in memory. Rows count within the windows; joints without rows are left
-/// out; known columns are held. The differentiator is chosen where the settings leave it to the run.
+/// out; known columns are held. The differentiator is chosen where the settings leave it to the run, and rows near rest
+/// count where friction explains them ([`NearRest`]).
 ///
 /// # Errors
 /// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate.
@@ -95,12 +107,11 @@ pub fn identify_run(
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
-    let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None };
     if !settings.choose_differentiator {
-        return identify_runs(task, &[log], settings);
+        return without_near_rest(task, records, settings);
     }
     let choice = choose_differentiator(task, records, settings)?;
-    let found = identify_runs(task, &[log], &settings.with_differentiator(&choice.taken))?;
+    let found = without_near_rest(task, records, &settings.with_differentiator(&choice.taken))?;
     Ok(RunEstimate { differentiator: Some(choice), ..found })
 }
 
@@ -129,6 +140,10 @@ pub fn identify_runs(
 }
 
 /// The fit with one offset of a joint for all runs, or one for each.
+///
+/// Friction that is chosen with a lag in the rows can make up for it, at each joint for another part, so that no common
+/// lag is seen beyond its bar any more. So where friction is chosen and none was taken off, that of the stated friction
+/// is, whatever its bar, and the fit counts that says most of the rows with the fewest parameters ([`schwarz`]).
 fn fitted(
     task: &IterationTask,
     runs: &[RunLog<'_>],
@@ -136,30 +151,76 @@ fn fitted(
     offsets: OffsetChoice,
 ) -> Result<RunEstimate, IterationError> {
     let recordings = recordings(task, runs, settings)?;
-    let all: Vec<usize> = (0..recordings.len()).collect();
     let mut identification = identification_settings(task, settings, runs.len());
     identification.offsets = offsets;
-    let (robot, execution) = (&task.robot, Execution::default());
-    let mut rounds = LagRounds::of(LagCandidates::Common);
-    loop {
-        let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
-        let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
-        let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
-        training.friction_choice = chosen.joints;
-        if training.problem.joint_rows().iter().sum::<usize>() == 0 {
-            let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
-            return Err(IterationError::Record { joints: robot.joint_names(), problem });
+    let fit = RunsFit { task, runs, settings, recordings: &recordings };
+    let found = fit.rounds(&identification, LagRounds::of(identification.lags))?;
+    let is_free = settings.scheme == Scheme::AllJoints && !identification.friction.is_empty();
+    if !is_free || found.estimate.lag.kind == LagKind::Common {
+        return Ok(found.estimate);
+    }
+    let mut stated = identification.clone();
+    stated.friction.clear();
+    let of_stated = fit.rounds(&stated, LagRounds::of(identification.lags))?.estimate.lag;
+    let common_s = if of_stated.kind == LagKind::Common { of_stated.lag_s.first().copied() } else { None };
+    let Some(lag_s) = common_s.or_else(|| of_stated.common.map(|common| common.lag_s)) else {
+        return Ok(found.estimate);
+    };
+    let first = LagChoice { kind: LagKind::Common, lag_s: vec![lag_s; task.robot.dof()], ..LagChoice::default() };
+    // Where the rows cannot be fitted so, they are as they were.
+    let other = fit.rounds(&identification, LagRounds::of(identification.lags).after(first));
+    Ok(other.ok().filter(|other| other.schwarz < found.schwarz).unwrap_or(found).estimate)
+}
+
+/// A fit and how much it says of its rows.
+struct RunsEstimate {
+    estimate: RunEstimate,
+    schwarz: f64,
+}
+
+/// Runs that are fitted together.
+struct RunsFit<'a> {
+    task: &'a IterationTask,
+    runs: &'a [RunLog<'a>],
+    settings: &'a RunIdentificationSettings,
+    recordings: &'a [Recording],
+}
+
+impl RunsFit<'_> {
+    /// Fits from these rounds on, until the rows show no lag that moves parameters.
+    fn rounds(
+        &self,
+        identification: &IdentificationSettings,
+        mut rounds: LagRounds,
+    ) -> Result<RunsEstimate, IterationError> {
+        let Self { task, runs, settings, recordings } = self;
+        let all: Vec<usize> = (0..recordings.len()).collect();
+        let (robot, execution) = (&task.robot, Execution::default());
+        let mut identification = identification.clone();
+        loop {
+            identification.motion.torque_lag_s = rounds.torque_lag_s();
+            let logs = Logs::new(robot.model(), recordings, identification.filters(), &all, None, execution)?;
+            let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
+            let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
+            training.friction_choice = chosen.joints;
+            if training.problem.joint_rows().iter().sum::<usize>() == 0 {
+                let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
+                return Err(IterationError::Record { joints: robot.joint_names(), problem });
+            }
+            if settings.scheme == Scheme::StepByStep {
+                let estimate = joint_by_joint(task, &logs, &training, (settings, &run_weights(task, runs)))?;
+                return Ok(RunsEstimate { estimate, schwarz: 0.0 });
+            }
+            let mut found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
+            let fit =
+                lag_fit((&logs, &identification), &training.model, (&training.columns, &found.values, &[]), &all)?;
+            if !rounds.again(fit.as_ref(), &mut found) {
+                let schwarz = schwarz(&training.problem, &found);
+                let with = (&all[..], found, rounds.choice());
+                let estimate = all_joints((&logs, &identification), training, with, runs)?;
+                return Ok(RunsEstimate { estimate, schwarz });
+            }
         }
-        if settings.scheme == Scheme::StepByStep {
-            return joint_by_joint(task, &logs, &training, (settings, &run_weights(task, runs)));
-        }
-        let mut found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
-        let with = (&logs, &identification.estimation);
-        let fit = lag_fit(with, &training.model, (&training.columns, &found.values, &[]), &all)?;
-        if !rounds.again(fit.as_ref(), &mut found) {
-            return all_joints((&logs, &identification), training, (&all, found, rounds.choice()), runs);
-        }
-        identification.motion.torque_lag_s = rounds.torque_lag_s();
     }
 }
 
@@ -200,6 +261,7 @@ fn all_joints(
         torque_lags,
         lag,
         differentiator: None,
+        near_rest: Vec::new(),
         run_offsets,
         values: arm.values,
     })
@@ -236,6 +298,7 @@ fn joint_by_joint(
         torque_lags: Vec::new(),
         lag: LagChoice::default(),
         differentiator: None,
+        near_rest: Vec::new(),
         run_offsets: Vec::new(),
     })
 }

@@ -1,6 +1,7 @@
 //! The robot that all good runs tell: a task for the whole identification.
 
 use crate::error::IterationError;
+use crate::estimate::RunEstimate;
 use crate::good_log::GoodLog;
 use crate::held_out::held_out_settings;
 use crate::iteration::Iteration;
@@ -50,7 +51,9 @@ impl Iteration {
                 let rate_hz = evidence.log_rates_hz.first().copied().unwrap_or(held_out.leg.reference().rate_hz());
                 let log = [store.held_out_log(record.run, &joints, rate_hz)?];
                 let legs = core::slice::from_ref(&held_out.leg);
-                let run = RunLog { run: record.run, legs, records: &log, joint_sigma: &[], differentiator: None };
+                let own = record.estimate.as_ref().map(RunEstimate::rest_margins).unwrap_or_default();
+                let (run, records, joint_sigma, rest_margins) = (record.run, &log[..], &[][..], &own[..]);
+                let run = RunLog { run, legs, records, joint_sigma, differentiator: None, rest_margins };
                 for mut recording in recordings_of(&task, &[run], &settings)? {
                     recording.role = Role::Validate;
                     recording.name = format!("run {}, held out", record.run);

@@ -206,6 +206,7 @@ mod tests {
             torque_lags: Vec::new(),
             lag: LagChoice::default(),
             differentiator: None,
+            near_rest: Vec::new(),
             run_offsets: Vec::new(),
         }
     }

@@ -1,7 +1,9 @@
 //! The logs of good runs, which further runs are identified together with.
 
+use crate::estimate::RunEstimate;
 use crate::leg::Leg;
 use crate::record::RunRecord;
+use crate::rests::RestMargin;
 use crate::run_logs::RunLog;
 use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
@@ -14,6 +16,7 @@ pub(crate) struct GoodLog {
     records: Vec<Record>,
     joint_sigma: Vec<f64>,
     differentiator: Option<DifferentiatorSettings>,
+    rest_margins: Vec<RestMargin>,
 }
 
 impl GoodLog {
@@ -22,7 +25,8 @@ impl GoodLog {
         let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
         let way = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
         let differentiator = way.map(|way| way.taken.clone());
-        Self { run: record.run, legs, records, joint_sigma, differentiator }
+        let rest_margins = record.estimate.as_ref().map(RunEstimate::rest_margins).unwrap_or_default();
+        Self { run: record.run, legs, records, joint_sigma, differentiator, rest_margins }
     }
 
     pub(crate) fn as_run(&self) -> RunLog<'_> {
@@ -33,6 +37,7 @@ impl GoodLog {
             records: &self.records,
             joint_sigma: &self.joint_sigma,
             differentiator,
+            rest_margins: &self.rest_margins,
         }
     }
 }

@@ -122,7 +122,9 @@ impl Iteration {
         let (task, settings) = self.in_force(records)?;
         let task = IterationTask { legs: vec![held_out.leg.clone()], ..task.into_owned() };
         let settings = held_out_settings(&settings, records);
-        examined(&task, core::slice::from_ref(&came.record), &settings, Some(known))
+        let own = records.last().and_then(|record| record.estimate.as_ref());
+        let rest_margins = own.map(RunEstimate::rest_margins).unwrap_or_default();
+        examined(&task, core::slice::from_ref(&came.record), &settings, (Some(known), &rest_margins))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::IterationError;
 use crate::leg::Leg;
-use crate::rests::rests;
+use crate::rests::RestMargin;
 use crate::settings::RunIdentificationSettings;
 use core::ops::Range;
 use dynident_identification::MotionRecord;
@@ -17,8 +17,8 @@ const UNIFORM: f64 = 1e-6;
 /// Differentiates a record along `leg`. Where the record's times are not uniform, positions and torques are taken
 /// between samples by straight lines. Torques held from a sample to the next count at a sample's instant as the mean of
 /// the values before and after, less a twelfth of its second difference (the acceleration jumps there, and positions
-/// see both steps). Torques of joints with `dry` friction are set aside while the joint rests, slower than 2 % of its
-/// highest speed: friction there is whatever holds it.
+/// see both steps). Torques of joints with dry friction, for which `margins` has one, are set aside while the joint is
+/// nearer to rest than that: friction there is whatever holds it.
 ///
 /// # Errors
 /// A record of other joints or of too few samples, a differentiator that does not exist at its rate or lacks what it
@@ -27,7 +27,7 @@ pub fn measured_motion(
     record: &Record,
     leg: &Leg,
     settings: &RunIdentificationSettings,
-    dry: &[bool],
+    margins: &[Option<RestMargin>],
 ) -> Result<MotionRecord, IterationError> {
     let joints = record.joints.len();
     let wrong = |problem: String| IterationError::Record { joints: record.joints.clone(), problem };
@@ -95,8 +95,8 @@ pub fn measured_motion(
                 to[sample] = held_torque(from, sample);
             }
         }
-        if dry.get(joint).is_some_and(|dry| *dry) {
-            for rest in rests(&motion.dq[own.clone()], smoothing) {
+        if let Some(margin) = margins.get(joint).copied().flatten() {
+            for rest in margin.samples(&motion.dq[own.clone()], smoothing) {
                 motion.set_aside.resize(joints * samples, false);
                 motion.set_aside[own.start + rest.start..own.start + rest.end].fill(true);
             }

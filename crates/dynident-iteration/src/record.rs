@@ -115,6 +115,9 @@ impl RunRecord {
                     "names base parameter {column} as fixed where this robot has {columns}: remove its folder"
                 ));
             }
+            if !estimate.near_rest.is_empty() {
+                length(&format!("{name}.near_rest"), estimate.near_rest.len(), joints)?;
+            }
             if !estimate.torque_lags.is_empty() {
                 length(&format!("{name}.torque_lags"), estimate.torque_lags.len(), joints)?;
             }

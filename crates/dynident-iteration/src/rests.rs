@@ -1,13 +1,58 @@
-//! Samples at which a joint rests: its dry friction there is whatever holds it, and no model of its velocity tells it.
+//! Samples at which a joint rests, or is near it: its dry friction there is whatever holds it, and no model of its
+//! velocity tells it.
 
 use core::ops::Range;
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::FrictionSearch;
 use dynident_model::terms::{CoulombShape, TermAction, TorqueTerm};
 use dynident_simulation::Reference;
+use serde::{Deserialize, Serialize};
 
 /// A joint moves faster than this share of its highest speed, or it rests.
 pub(crate) const MOVING: f64 = 0.02;
+
+/// How far from rest a joint has to be for its torque to count.
+///
+/// A joint with dry friction sticks, breaks loose and jumps; its smoothed velocity does not. What torque and model
+/// differ by lasts as long as the smoothing reaches: samples at which the joint is slower than `speed_share` of its
+/// highest speed are set aside, and `smoothing_periods` periods of the smoother's cut-off before and after them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RestMargin {
+    /// Share of the joint's highest speed in the run.
+    pub speed_share: f64,
+    /// Periods of the smoother's cut-off on either side.
+    pub smoothing_periods: f64,
+}
+
+impl RestMargin {
+    /// Rests alone: slower than 2 % of the highest speed; half a period about those that last longer than one.
+    pub const REST: Self = Self { speed_share: MOVING, smoothing_periods: 0.0 };
+
+    /// The samples at which a joint with these velocities `dq` is nearer to rest than this, where the smoother's period
+    /// is `smoothing` samples.
+    pub(crate) fn samples(&self, dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
+        if *self == Self::REST {
+            return rests(dq, smoothing);
+        }
+        let wide = (self.smoothing_periods * smoothing as f64).round() as usize;
+        let mut found: Vec<Range<usize>> = Vec::new();
+        for slow in slower(dq, self.speed_share) {
+            let (from, to) = (slow.start.saturating_sub(wide), (slow.end + wide).min(dq.len()));
+            match found.last_mut() {
+                Some(last) if last.end >= from => last.end = to,
+                _ => found.push(from..to),
+            }
+        }
+        found
+    }
+}
+
+impl Default for RestMargin {
+    fn default() -> Self {
+        Self::REST
+    }
+}
 
 /// Whether each joint has friction that is not known at rest: in the model, or among what may be chosen.
 pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSearch]) -> Vec<bool> {
@@ -24,18 +69,26 @@ pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSear
 /// The samples at which a joint with these velocities `dq` rests: slower than [`MOVING`] of its highest speed. Around a
 /// rest that lasts longer than the differentiator's smoothing, `smoothing` samples, half of that does not count
 /// either: the joint breaks loose and stops at once, and the smoothed motion does not.
-pub(crate) fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
-    let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
-    let mut found: Vec<Range<usize>> = Vec::new();
-    for (sample, _) in dq.iter().enumerate().filter(|(_, dq)| dq.abs() <= MOVING * fastest) {
-        match found.last_mut() {
-            Some(last) if last.end == sample => last.end += 1,
-            _ => found.push(sample..sample + 1),
-        }
-    }
+fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
+    let mut found = slower(dq, MOVING);
     for rest in &mut found {
         if rest.len() > smoothing {
             *rest = rest.start.saturating_sub(smoothing / 2)..(rest.end + smoothing / 2).min(dq.len());
+        }
+    }
+    found
+}
+
+/// The samples of velocities `dq` that are at most this share of the highest, and those between which one changes its
+/// sign.
+fn slower(dq: &[f64], share: f64) -> Vec<Range<usize>> {
+    let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
+    let turns = |sample: usize| share > MOVING && dq.get(sample + 1).is_some_and(|next| next * dq[sample] < 0.0);
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for (sample, _) in dq.iter().enumerate().filter(|(sample, dq)| dq.abs() <= share * fastest || turns(*sample)) {
+        match found.last_mut() {
+            Some(last) if last.end == sample => last.end += 1,
+            _ => found.push(sample..sample + 1),
         }
     }
     found
@@ -79,6 +132,22 @@ mod tests {
         // |1 - k/25| ≤ 0.02 · 1.36 at k = 25 alone.
         assert_eq!(found, [25..26, 55..100]);
         assert_eq!(rests(&[0.0; 4], 10).len(), 1);
+    }
+
+    #[test]
+    fn what_is_near_rest_is_left_as_wide_as_smoothing_reaches() {
+        // From 1 to -1 rad/s in 100 steps: within a tenth from sample 45 to 55, and half a period of ten more.
+        let dq: Vec<f64> = (0..=100).map(|k| 1.0 - f64::from(k) / 50.0).collect();
+        let margin = |speed_share, smoothing_periods| RestMargin { speed_share, smoothing_periods };
+        assert_eq!(margin(0.1, 0.5).samples(&dq, 10), [40..61]);
+        assert_eq!(margin(0.1, 0.0).samples(&dq, 10), [45..56]);
+        assert_eq!(RestMargin::REST.samples(&dq, 10), rests(&dq, 10));
+        // A joint that turns between two samples is at rest in between, however fast it is at both.
+        let turned: Vec<f64> = (0..20).map(|k| if k < 10 { 1.0 } else { -1.0 }).collect();
+        assert_eq!(margin(0.1, 0.5).samples(&turned, 4), [7..12]);
+        // Neighbours whose surroundings meet are one.
+        let two = [1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        assert_eq!(margin(0.1, 1.0).samples(&two, 1), [0..6]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::estimate::RunEstimate;
 use crate::evidence::{JointEvidence, RunEvidence};
 use crate::leg::{IterationTask, Leg};
 use crate::prediction::{Known, predictions};
+use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::tracking_floor::{KnownLoop, tracking_floor};
@@ -33,8 +34,8 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
     (0..dof).map(|joint| (0.5 * range(joint)).clamp(FOLLOWING[0], FOLLOWING[1])).collect()
 }
 
-/// What the records of a run show, with the prediction by `known`, what was known before it; `task` with the friction
-/// in force.
+/// What the records of a run show, with the prediction by `known`, what was known before it, of the torque that counts
+/// with these margins about rests; `task` with the friction in force.
 ///
 /// # Errors
 /// Records that do not belong to the task.
@@ -42,7 +43,7 @@ pub(crate) fn examined(
     task: &IterationTask,
     records: &[Record],
     settings: &RunIdentificationSettings,
-    known: Option<&RunEstimate>,
+    (known, rest_margins): (Option<&RunEstimate>, &[RestMargin]),
 ) -> Result<RunEvidence, IterationError> {
     let dof = task.robot.dof();
     let noise = torque_noise(records, dof);
@@ -64,7 +65,7 @@ pub(crate) fn examined(
         });
     }
     if let Some(known) = known.filter(|known| known.values.len() == task.robot.layout().columns().len()) {
-        predict(&mut joints, task, records, (settings, known))?;
+        predict(&mut joints, task, records, (settings, known, rest_margins))?;
     }
     Ok(RunEvidence {
         log_rates_hz: records.iter().map(|record| record.rate_hz).collect(),
@@ -100,9 +101,9 @@ fn predict(
     joints: &mut [JointEvidence],
     task: &IterationTask,
     records: &[Record],
-    (settings, known): (&RunIdentificationSettings, &RunEstimate),
+    (settings, known, rest_margins): (&RunIdentificationSettings, &RunEstimate, &[RestMargin]),
 ) -> Result<(), IterationError> {
-    let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None };
+    let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None, rest_margins };
     let recordings = recordings(task, &[log], settings)?;
     let mut identification = identification_settings(task, settings, 1);
     // The rows that the model was fitted to were without it.

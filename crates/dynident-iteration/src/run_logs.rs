@@ -3,8 +3,9 @@
 use crate::error::IterationError;
 use crate::leg::{IterationTask, Leg};
 use crate::motion::measured_motion;
-use crate::rests::has_dry_friction;
+use crate::rests::{RestMargin, has_dry_friction};
 use crate::settings::RunIdentificationSettings;
+use dynident_identification::examination::LagCandidates;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_identification::{IdentificationSettings, LogNoise, Recording};
 use dynident_recording::DifferentiatorSettings;
@@ -25,6 +26,9 @@ pub struct RunLog<'a> {
     pub joint_sigma: &'a [f64],
     /// The differentiator that the run chose for itself; none for that of the settings.
     pub differentiator: Option<&'a DifferentiatorSettings>,
+    /// How far from rest the torque of each joint with dry friction has to be to count, as the run chose it; rests
+    /// alone are set aside of joints for which there is none.
+    pub rest_margins: &'a [RestMargin],
 }
 
 /// The records as recordings of motions that are made already, leg after leg of run after run.
@@ -41,7 +45,10 @@ pub(crate) fn recordings(
         let own = log.differentiator.map(|differentiator| settings.with_differentiator(differentiator));
         let settings = own.as_ref().unwrap_or(settings);
         for (number, (leg, record)) in log.legs.iter().zip(log.records).enumerate() {
-            let motion = measured_motion(record, leg, settings, &dry)?;
+            let margin = |joint: usize| log.rest_margins.get(joint).copied().unwrap_or_default();
+            let margins: Vec<Option<RestMargin>> =
+                (0..dry.len()).map(|joint| dry[joint].then(|| margin(joint))).collect();
+            let motion = measured_motion(record, leg, settings, &margins)?;
             let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };
             let mut recording = Recording::of_motion(format!("run {}{of_leg}", log.run), motion);
             recording.commanded = Some(Arc::clone(leg.commanded()));
@@ -65,6 +72,8 @@ pub(crate) fn identification_settings(
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
     identification.friction.clone_from(&settings.friction);
+    // Of runs under one controller friction leaves another lag at each joint, and not the same in every run.
+    identification.lags = LagCandidates::Common;
     identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
     identification
 }

@@ -55,6 +55,9 @@ pub struct RunIdentificationSettings {
     /// Whether recorded torques are held from one sample to the next, as digital drives do: at a sample's instant the
     /// mean of the values before and after is in force. Default true.
     pub held_torque: bool,
+    /// Whether rows near rest do not count where a joint's dry friction is not explained there
+    /// ([`NearRest`](crate::NearRest)); default true. Rests themselves never count.
+    pub set_aside_near_rest: bool,
     /// The estimator, what counts as excited, where error bars come from. Default weighted least squares. Step by step
     /// takes ordinary or weighted least squares.
     pub estimation: EstimationSettings,
@@ -81,6 +84,7 @@ impl Default for RunIdentificationSettings {
             choose_differentiator: false,
             parallel_filter: None,
             held_torque: true,
+            set_aside_near_rest: true,
             estimation: EstimationSettings::default(),
             friction: Vec::new(),
             consistency: Some(ConsistencySettings::default()),

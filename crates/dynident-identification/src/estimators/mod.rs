@@ -134,7 +134,7 @@ impl Estimator {
 impl Estimator {
     /// Whether it is made from rows of the measured motion, filtered as the torque is, so that a lag measured on these
     /// rows is the one that it suffers.
-    pub(crate) fn reads_filtered_rows(&self) -> bool {
+    pub fn reads_filtered_rows(&self) -> bool {
         match self {
             Self::Ordinary
             | Self::Weighted

@@ -19,6 +19,7 @@ pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
+pub use stiction::Stiction;
 pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;

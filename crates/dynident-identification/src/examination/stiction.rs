@@ -18,7 +18,7 @@ const SPEEDS: usize = 8;
 /// each Nm of load. A joint at rest is held by any torque within ±F (de Wit, Olsson, Åström and Lischinsky, IEEE Trans.
 /// Automatic Control 40 (1995) 419): what it is follows from how the joint came to rest, which positions do not tell.
 #[derive(Clone, Debug)]
-pub(crate) struct Stiction {
+pub struct Stiction {
     /// Friction without load and for each Nm (N) of it, at every velocity.
     levels: Vec<[f64; 2]>,
     /// Places of friction among the joint's columns, and their values.
@@ -28,7 +28,7 @@ pub(crate) struct Stiction {
 impl Stiction {
     /// Of a joint of a model with the values `theta` of all columns of its layout. Terms that need a temperature count
     /// as none.
-    pub(crate) fn of(model: &RegressorModel, joint: usize, theta: &[f64]) -> Self {
+    pub fn of(model: &RegressorModel, joint: usize, theta: &[f64]) -> Self {
         let layout = model.layout();
         let own = layout.joint_columns(joint).iter().enumerate();
         let terms: Vec<(usize, f64, &TorqueTerm)> = own
@@ -53,12 +53,16 @@ impl Stiction {
         Self { levels: levels.collect(), friction: terms.iter().map(|&(place, value, _)| (place, value)).collect() }
     }
 
+    /// F under this load, Nm (N).
+    pub fn under(&self, load: f64) -> f64 {
+        self.levels.iter().map(|[bare, loaded]| (bare + load.abs() * loaded).abs()).fold(0.0, f64::max)
+    }
+
     /// F in one row of the joint's panel of `rows` rows, whose model predicts the torque `predicted`, Nm (N): the load
     /// is what of that is not friction.
     pub(crate) fn level(&self, (panel, rows): (&[f64], usize), row: usize, predicted: f64) -> f64 {
         let friction: f64 = self.friction.iter().map(|(place, value)| value * panel[place * rows + row]).sum();
-        let load = (predicted - friction).abs();
-        self.levels.iter().map(|[bare, loaded]| (bare + load * loaded).abs()).fold(0.0, f64::max)
+        self.under(predicted - friction)
     }
 }
 

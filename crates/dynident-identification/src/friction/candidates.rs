@@ -122,6 +122,19 @@ impl FrictionKind {
         self.constants() > 0
     }
 
+    /// True for what is told from other friction by rows near rest alone.
+    fn is_of_rest(self) -> bool {
+        match self {
+            Self::Sigmoid | Self::Stribeck | Self::CubeRoot | Self::MaxwellSlip => true,
+            Self::Viscous
+            | Self::AsymmetricViscous
+            | Self::Coulomb
+            | Self::AsymmetricCoulomb
+            | Self::Quadratic
+            | Self::Load => false,
+        }
+    }
+
     /// True for the step at rest, whose width is found anew with every further term.
     pub(crate) fn is_step(self) -> bool {
         matches!(self, Self::Coulomb | Self::AsymmetricCoulomb)
@@ -137,7 +150,8 @@ impl FrictionKind {
             of_kind.into_iter().partition(|&place| columns[place].grid.is_none());
         let steps: Vec<&[usize]> = of_grid.chunk_by(|&a, &b| columns[a].grid == columns[b].grid).collect();
         let pairs = steps.windows(2).map(<[&[usize]]>::concat);
-        alone.into_iter().map(|place| vec![place]).chain(pairs).collect()
+        let only = steps.first().filter(|_| steps.len() == 1).map(|only| only.to_vec());
+        alone.into_iter().map(|place| vec![place]).chain(pairs).chain(only).collect()
     }
 }
 
@@ -164,12 +178,16 @@ pub struct FrictionSearch {
     /// Width of the step of load-dependent friction where the logs show no smooth step and none is stated, rad/s or
     /// m/s. By default [`CoulombShape::USUAL_WIDTH`] of a usual arm.
     pub width: Option<f64>,
+    /// Whether rows near rest count. Where they do not the step is as wide as stated or usual, and what differs from
+    /// other friction near rest alone (Stribeck, sigmoid, cube root, elements with hysteresis) is no candidate. True by
+    /// default.
+    pub rows_near_rest: bool,
 }
 
 impl FrictionSearch {
     /// The search for a joint's friction with the defaults.
     pub fn of(joint: impl Into<String>) -> Self {
-        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: None }
+        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: None, rows_near_rest: true }
     }
 }
 
@@ -223,6 +241,13 @@ pub(crate) fn candidate_columns(
         (Some(width), _) | (None, Some(CoulombShape::Smooth { width })) => width,
         _ => search.width.unwrap_or(CoulombShape::USUAL_WIDTH * velocity),
     };
+    if !search.rows_near_rest {
+        (widths, alone) = match search.coulomb {
+            Some(CoulombShape::Smooth { width }) => (vec![width], Vec::new()),
+            Some(stated @ CoulombShape::Sign { .. }) => (vec![load_width], vec![stated]),
+            None => (vec![load_width], Vec::new()),
+        };
+    }
     let mut columns = Vec::new();
     let mut add = |terms: Vec<TorqueTerm>, grid: Option<usize>| {
         let column = |term: &TorqueTerm| {
@@ -263,5 +288,36 @@ pub(crate) fn candidate_columns(
     for yield_displacement in YIELDS.map(|displacement| displacement * position) {
         add(vec![TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement })], None);
     }
+    columns.retain(|column: &CandidateColumn| search.rows_near_rest || !column.kind.is_of_rest());
     columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without rows near rest: one step, as wide as stated, and no friction that is told by them alone.
+    #[test]
+    fn what_rows_near_rest_alone_show_is_no_candidate_without_them() {
+        let scale = JointScale::usual(0);
+        let kinds = |search: &FrictionSearch| -> Vec<FrictionKind> {
+            let mut kinds: Vec<_> = candidate_columns(search, scale, None).iter().map(|column| column.kind).collect();
+            kinds.sort();
+            kinds.dedup();
+            kinds
+        };
+        let all = FrictionSearch::of("joint1");
+        let coulomb = Some(CoulombShape::Smooth { width: 0.03 });
+        let far = FrictionSearch { rows_near_rest: false, coulomb, ..all.clone() };
+        assert_eq!(kinds(&all).len(), 10);
+        use FrictionKind::{AsymmetricCoulomb, AsymmetricViscous, Coulomb, Load, Quadratic, Viscous};
+        assert_eq!(kinds(&far), [Viscous, AsymmetricViscous, Coulomb, AsymmetricCoulomb, Quadratic, Load]);
+        // The one step is a choice of its own, though it has no neighbour on a grid.
+        let columns = candidate_columns(&far, scale, None);
+        let options = Coulomb.options(&columns);
+        assert_eq!(options.len(), 1, "{options:?}");
+        let step = CoulombShape::Smooth { width: 0.03 };
+        let stated = TorqueTerm::Coulomb(dynident_model::terms::Coulomb { joint: 0, shape: step });
+        assert_eq!(columns[options[0][0]].term, stated);
+    }
 }

@@ -120,7 +120,7 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     let total = |rest: &dyn Fn(usize) -> f64| (0..dof).map(|joint| before(joint) + rest(joint)).collect::<Vec<f64>>();
     let as_before = LagChoice { lag_s: taken_off.to_vec(), ..LagChoice::default() };
     let all = telling_joints(fit);
-    let Some(Mean { lag, scatter }) = common(fit, &all) else { return as_before };
+    let Some(Mean { lag, scatter, .. }) = common(fit, &all) else { return as_before };
     let matters = |rest: &[f64]| {
         let moved = fit.answers() * DVector::from_column_slice(rest);
         moved.iter().take(fit.parameters).zip(&estimate.std).any(|(moved, std)| moved.abs() > MATTERS * std)
@@ -156,8 +156,9 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
 
 /// What is unknown of the lags, as it is in parameters and unknown gains: `S Σ_δ^½` with `S = ∂θ/∂δ`, of a lag for all
 /// joints, or of joints of their own. Where no lag was taken off, what is known of lags beforehand bounds it. None for
-/// a lag that the study states.
-fn lag_error(fit: &LagFit, choice: &LagChoice) -> Option<DMatrix<f64>> {
+/// a lag that the study states. Where joints may have no lag of their own (`candidates`) what they differ by stays in
+/// the rows, and is unknown of each.
+fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Option<DMatrix<f64>> {
     let answers = fit.answers();
     let usual = |std_s: f64| (std_s.powi(-2) + fit.usual_lag_s.powi(-2)).powf(-0.5);
     Some(match choice.kind {
@@ -169,17 +170,31 @@ fn lag_error(fit: &LagFit, choice: &LagChoice) -> Option<DMatrix<f64>> {
             answers * DMatrix::from_diagonal(&stds)
         }
         LagKind::None | LagKind::Common => {
-            let common = choice.common?;
-            let std_s = if choice.kind == LagKind::None { usual(common.std_s) } else { common.std_s };
+            let shared = choice.common?;
+            let std_s = if choice.kind == LagKind::None { usual(shared.std_s) } else { shared.std_s };
             let of_all = answers.column_sum() * std_s;
-            DMatrix::from_column_slice(of_all.len(), 1, of_all.as_slice())
+            let of_all = DMatrix::from_column_slice(of_all.len(), 1, of_all.as_slice());
+            let telling = telling_joints(fit);
+            let spread_s = match candidates {
+                LagCandidates::CommonOrJoints => 0.0,
+                LagCandidates::Common => common(fit, &telling).map_or(0.0, |mean| mean.spread_s),
+            };
+            let own = answers.select_columns(&telling) * spread_s;
+            DMatrix::from_fn(own.nrows(), own.ncols() + 1, |row, column| match column.checked_sub(1) {
+                None => of_all[(row, 0)],
+                Some(joint) => own[(row, joint)],
+            })
         }
     })
 }
 
 /// The estimate with the error of the lags in its covariance, `Σ + S Σ_δ Sᵀ`.
-pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estimate) -> Estimate {
-    let Some(half) = lag_error(fit, choice) else { return estimate.clone() };
+pub(super) fn with_lag_error(
+    fit: &LagFit,
+    (choice, candidates): (&LagChoice, LagCandidates),
+    estimate: &Estimate,
+) -> Estimate {
+    let Some(half) = lag_error(fit, choice, candidates) else { return estimate.clone() };
     let half = half.rows(0, fit.parameters);
     let mut further = half * half.transpose();
     for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.parameters) {
@@ -191,7 +206,9 @@ pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estima
 
 /// Standard deviations that the error of the lags makes in the gains that are unknown, as shares of them.
 pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
-    let Some(half) = lag_error(fit, choice) else { return vec![0.0; fit.first - fit.parameters] };
+    let Some(half) = lag_error(fit, choice, LagCandidates::CommonOrJoints) else {
+        return vec![0.0; fit.first - fit.parameters];
+    };
     (fit.parameters..fit.first).map(|row| half.row(row).norm()).collect()
 }
 
@@ -212,6 +229,8 @@ fn is_beyond_its_bar(lag: &TorqueLag) -> bool {
 struct Mean {
     lag: TorqueLag,
     scatter: Option<f64>,
+    /// Standard deviation of the joints' lags about it beyond their own errors, seconds.
+    spread_s: f64,
 }
 
 /// The lag that some joints share: the generalised mean with a spread τ between the joints beside their own errors,
@@ -245,8 +264,11 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
     let (lag_s, half_width_95_s) = (shared.mean, quantile * std_s.hypot(spread));
     let matters = lag_s.abs() > half_width_95_s && lags.iter().any(|lag| lag.matters);
     let scatter = (freedoms > 0.0).then(|| alone.chi_square / freedoms);
-    (std_s.is_finite() && lag_s.is_finite())
-        .then_some(Mean { lag: TorqueLag { lag_s, std_s, half_width_95_s, matters, taken_off_s: 0.0 }, scatter })
+    (std_s.is_finite() && lag_s.is_finite()).then_some(Mean {
+        lag: TorqueLag { lag_s, std_s, half_width_95_s, matters, taken_off_s: 0.0 },
+        scatter,
+        spread_s: spread,
+    })
 }
 
 /// The generalised mean for one spread between the joints.

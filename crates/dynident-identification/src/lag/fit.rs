@@ -12,6 +12,7 @@ use super::rows::{DelayRows, NODES, lagrange};
 use super::samples::DelayCheck;
 use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
+use crate::log_noise::{LogNoise, weighted_by_log};
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
@@ -91,13 +92,14 @@ struct Samples<'a> {
     lag_s: Vec<f64>,
 }
 
-/// Fits the lags of the joints, the same in all logs. `None` for logs too short to fit to.
+/// Fits the lags of the joints, the same in all logs, which share their noise or have their own. `None` for logs too
+/// short to fit to.
 pub(crate) fn fit_lags(
     checks: &[DelayCheck<'_>],
-    unknowns: Unknowns<'_>,
+    (unknowns, noise): (Unknowns<'_>, LogNoise),
     with: (&Logs<'_>, &EstimationSettings),
 ) -> Option<LagFit> {
-    fitted(checks.first()?.model(), (checks, unknowns), with).ok()
+    fitted(checks.first()?.model(), (checks, unknowns, noise), with).ok()
 }
 
 /// The lags of one log alone with what was taken off before it was read, by joint; `None` where it does not determine
@@ -107,14 +109,15 @@ pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSe
     let taken_off = &with.0.motion.torque_lag_s;
     let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
     let unknowns = Unknowns::of_log(check.theta());
-    let rest = fit_lags(&[check], unknowns, with).map_or_else(|| vec![None; joints], |fit| fit.joints);
+    let rest =
+        fit_lags(&[check], (unknowns, LogNoise::Shared), with).map_or_else(|| vec![None; joints], |fit| fit.joints);
     let total = |(joint, rest): (usize, Option<TorqueLag>)| rest.map(|rest| rest.after(before(joint)));
     rest.into_iter().enumerate().map(total).collect()
 }
 
 fn fitted(
     model: &RegressorModel,
-    (checks, unknowns): (&[DelayCheck<'_>], Unknowns<'_>),
+    (checks, unknowns, noise): (&[DelayCheck<'_>], Unknowns<'_>, LogNoise),
     with: (&Logs<'_>, &EstimationSettings),
 ) -> Result<LagFit, EstimationError> {
     let (logs, settings) = with;
@@ -126,13 +129,18 @@ fn fitted(
         let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, longest_s)? / check.rate_hz());
         checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-longest_s, longest_s)
     };
+    // A log that shows the model worse than another says less of the lag, too.
+    let weighted = |problem: LinearProblem| match noise {
+        LogNoise::Shared => Ok(problem),
+        LogNoise::Own => weighted_by_log(settings, problem),
+    };
     let mut samples = Samples::new((checks, unknowns), with, (0..dof).into_par_iter().map(start).collect())?;
     let quick =
         WeightedSettings { rank: settings.rank, covariance: CovarianceMethod::White, ..WeightedSettings::default() };
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
     for _ in 0..MOST_STEPS {
-        let step = weighted_least_squares(&samples.problem(|rows| &rows.merged)?, &quick)?;
+        let step = weighted_least_squares(&weighted(samples.problem(|rows| &rows.merged)?)?, &quick)?;
         let mut has_settled = true;
         for joint in 0..dof {
             let (rest, std) = (step.values[first + joint], step.std[first + joint]);
@@ -145,7 +153,7 @@ fn fitted(
         }
     }
     let last_step = WeightedSettings { covariance: settings.covariance, ..quick };
-    let last = weighted_least_squares(&samples.problem(|rows| &rows.factor)?, &last_step)?;
+    let last = weighted_least_squares(&weighted(samples.problem(|rows| &rows.factor)?)?, &last_step)?;
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();

@@ -11,6 +11,7 @@ use crate::progress::Silent;
 use crate::recording::{LogError, Recording, Samples};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
+use crate::settings::IdentificationSettings;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -28,13 +29,14 @@ impl RowConsumer for DelayCheck<'_> {
 
 /// The lags of the joints by all recordings `chosen` together, beyond what the settings of `logs` take off. `values`
 /// are what a fit to them found over the `columns`: base parameters of the model, payloads, offsets of single logs. Of
-/// the `gains` that were found with them, those that the logs determine are unknowns beside the lags. None where the
-/// recordings are too short, and where rows inside of a motion are left out.
+/// the `gains` that were found with them, those that the logs determine are unknowns beside the lags. Recordings have
+/// noise of their own where the settings say so. None where the recordings are too short, and where rows inside of a
+/// motion are left out.
 ///
 /// # Errors
 /// What reading them can give.
 pub fn lag_fit(
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     model: &RegressorModel,
     (columns, values, gains): (&LoadColumns, &[f64], &[DriveGain]),
     chosen: &[usize],
@@ -44,7 +46,8 @@ pub fn lag_fit(
     let checks = checks(logs, model, chosen, &of)?;
     let values = &values[..columns.count()];
     let unknowns = Unknowns { values, loads: Some((columns, chosen)), gains: &free_gains(gains) };
-    Ok(checks.and_then(|checks| fit_lags(&checks, unknowns, (logs, settings))))
+    let with = (logs, &settings.estimation);
+    Ok(checks.and_then(|checks| fit_lags(&checks, (unknowns, settings.log_noise), with)))
 }
 
 /// The whole lag of each joint by the recordings `chosen`, each with the base parameters that `theta` gives for it:

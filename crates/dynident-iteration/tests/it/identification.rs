@@ -16,7 +16,7 @@ use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm, Viscous};
 use dynident_model::{InertialParameters, Model};
 use dynident_simulation::controllers::{ComputedTorqueSettings, JointPdSettings};
 use dynident_simulation::{
-    ControllerSettings, FrictionCompensation, LoopSettings, Plant, Record, Reference, SensorSettings,
+    ControllerSettings, FrictionCompensation, Integrator, LoopSettings, Plant, Record, Reference, SensorSettings,
 };
 
 const RATE_HZ: f64 = 500.0;
@@ -54,7 +54,9 @@ fn reference() -> Reference {
 
 fn robot(model: &Model, shape: CoulombShape, sensors: SensorSettings) -> SimulatedRobot {
     let plant = Plant::new(model, &friction(shape), &[0.8, 1.5, 0.5, 1.0]).unwrap();
-    SimulatedRobot::new(plant, LoopSettings { sensors, ..LoopSettings::default() }).unwrap()
+    // A semi-implicit Euler step moves the arm as if its torque came half a sample later: a lag of a millisecond here.
+    let integrator = Integrator::Rk4 { steps_per_sample: 4 };
+    SimulatedRobot::new(plant, LoopSettings { integrator, sensors, ..LoopSettings::default() }).unwrap()
 }
 
 fn pd() -> ControllerSettings {

@@ -35,6 +35,7 @@ fn estimate(value: f64, std: f64) -> RunEstimate {
         torque_lags: Vec::new(),
         lag: LagChoice::default(),
         differentiator: None,
+        near_rest: Vec::new(),
         run_offsets: Vec::new(),
     }
 }

@@ -39,6 +39,7 @@ fn identified(records: &[Record], run_offsets: RunOffsets) -> RunEstimate {
             records: core::slice::from_ref(record),
             joint_sigma: &[],
             differentiator: None,
+            rest_margins: &[],
         })
         .collect();
     identify_runs(&task, &runs, &identification).unwrap()

@@ -33,7 +33,7 @@ impl Default for Simulated {
     }
 }
 
-fn arm(length_m: f64, tip_kg: f64) -> Model {
+pub(crate) fn arm(length_m: f64, tip_kg: f64) -> Model {
     let rod = InertialParameters([1.0, 1.0, 0.0, 0.0, 0.1, 0.0, 0.0, 1.2, 0.0, 1.2]);
     planar_2r(length_m, rod, InertialParameters(rod.0.map(|value| tip_kg * value)))
 }

@@ -254,6 +254,7 @@ impl IterationSection {
                 choose_differentiator,
                 parallel_filter: self.parallel_filter.clone(),
                 held_torque: self.held_torque,
+                set_aside_near_rest: !self.literal,
                 estimation,
                 friction,
                 consistency: consistency.filter(|_| !self.literal),
