@@ -41,7 +41,7 @@ pub struct StudyCheck {
 pub struct CheckFinding {
     /// How much it matters.
     pub level: Level,
-    /// What kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `mounting`, `payload`, `description`,
+    /// What kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`, `description`, `torque`,
     /// `limits`, `samples`, `rows` or `log`.
     pub kind: String,
     /// What, in a sentence that names joints.
