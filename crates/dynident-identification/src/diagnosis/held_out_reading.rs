@@ -114,8 +114,8 @@ pub(super) fn held_out_reading(
     Some(HeldOutReading { log, mistake, alike, left_as_written, left_without })
 }
 
-/// Whether a reading goes half of the way to what the training logs leave, or explains every joint that was not: else it
-/// is something else.
+/// Whether a reading goes half of the way to what the training logs leave, or explains every joint that was not: else
+/// it is something else.
 fn explains((score, reading): (f64, &Residual), as_written: &Residual) -> bool {
     let explained: f64 = as_written.explained.iter().map(|left| left.ln()).sum();
     let is_explained =

@@ -129,8 +129,8 @@ impl MotionSamples {
     }
 
     /// At most `most` of the instants that have samples up to `reach_s` before and after them, each with the torque (or
-    /// the motion, by `channels`) of `lag_s` later, joint by joint (a straight line between rows, which stand four times
-    /// as close as the motion asks); the same instants for all lags.
+    /// the motion, by `channels`) of `lag_s` later, joint by joint (a straight line between rows, which stand four
+    /// times as close as the motion asks); the same instants for all lags.
     pub(super) fn shifted(&self, channels: Channels, lag_s: &[f64], reach_s: f64, most: usize) -> MotionRows {
         let reach = (reach_s / self.spacing_s).ceil() as usize + 1;
         let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);

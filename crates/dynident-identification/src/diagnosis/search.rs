@@ -9,6 +9,7 @@ use super::mistake::{Channels, Mistake};
 use super::reading::{Corrected, Reading};
 use super::units::{is_unit_of_position, is_unit_of_time, is_unit_of_torque};
 use crate::consistent::ConsistencySettings;
+use core::f64::consts::FRAC_PI_2;
 use rayon::prelude::*;
 
 /// By how much a reading must score better before the study is doubted: as if one joint had less than 0.55 of what was
@@ -238,6 +239,8 @@ fn refined(
     let is_round = match last {
         Some(Mistake::PositionUnit { factor, .. }) => is_unit_of_position(*factor),
         Some(Mistake::TorqueUnit { factor, .. }) => is_unit_of_torque(*factor),
+        // Zeros are mistaken by quarters of a turn, or by anything.
+        Some(Mistake::Offset { offset_rad, .. }) => (offset_rad / FRAC_PI_2).fract() == 0.0,
         _ => true,
     };
     let worth = if is_round { WORTH_REFINING } else { 0.0 };

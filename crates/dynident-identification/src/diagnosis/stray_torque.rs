@@ -1,5 +1,5 @@
-//! Torques that do not belong to one robot and motion with the others: noise, another channel, a clock or a gain of their
-//! own that no reading mends.
+//! Torques that do not belong to one robot and motion with the others: noise, another channel, a clock or a gain of
+//! their own that no reading mends.
 
 use super::reading::Reading;
 

@@ -1,5 +1,5 @@
-//! Is the torque of another moment than the motion? Two recorders that were started by hand, a buffer, a network: shifts
-//! of tenths of seconds, which the lag that a fit takes off by itself does not reach.
+//! Is the torque of another moment than the motion? Two recorders that were started by hand, a buffer, a network:
+//! shifts of tenths of seconds, which the lag that a fit takes off by itself does not reach.
 
 use super::explanation::Explanation;
 use super::mistake::{Channels, Mistake};
@@ -20,8 +20,8 @@ const REACH_ALONE_S: f64 = 0.5;
 const SHARE_OF_PIECE: f64 = 1.0 / 6.0;
 /// Instants that shifts are compared on.
 const INSTANTS: usize = 150;
-/// Times what parameters of its own leave of a joint's torque that one robot leaves, from which its torque is shifted by
-/// itself.
+/// Times what parameters of its own leave of a joint's torque that one robot leaves, from which its torque is shifted
+/// by itself.
 const DOUBTFUL: f64 = 1.5;
 /// Share of all torque below which nothing is left that a shift would explain.
 const EXPLAINED: f64 = 0.02;

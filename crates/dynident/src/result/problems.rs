@@ -143,8 +143,8 @@ impl ResultFile {
         ))
     }
 
-    /// A torque that one robot explains badly beside the others, where a held-out log is explained badly as well: either
-    /// may have its reasons, both together are no model.
+    /// A torque that one robot explains badly beside the others, where a held-out log is explained badly as well:
+    /// either may have its reasons, both together are no model.
     fn stray_torques(&self) -> impl Iterator<Item = String> + '_ {
         let worst = self.validation.iter().filter_map(|log| self.times_of_fit(log)).fold(0.0, f64::max);
         let findings = self.check.iter().flat_map(|check| &check.findings);
