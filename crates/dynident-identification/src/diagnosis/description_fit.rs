@@ -17,6 +17,20 @@ const TELLING: f64 = 0.4;
 /// described bodies the least has 0.90; descriptions of other arms with as many joints reach 0.45.
 const OWN_ROBOT: f64 = 0.65;
 
+/// Units of torque that are taken for Nm, and their factors.
+const UNITS_OF_TORQUE: [(&str, f64); 7] = [
+    ("mNm", 1e-3),
+    ("Ncm", 1e-2),
+    ("kgf m", 9.80665),
+    ("kgf cm", 0.0980665),
+    ("lbf in", 0.112_984_83),
+    ("ozf in", 7.061_552e-3),
+    ("kNm", 1e3),
+];
+/// Share by which the middle joint's factor may differ from a unit's, and by which those that agree with it may.
+const UNIT_SHARE: f64 = 0.15;
+const UNIT_SPREAD: f64 = 0.8;
+
 /// Each joint's torque by the description's bodies times a factor of the joint's own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DescriptionFit {
@@ -36,6 +50,19 @@ impl DescriptionFit {
         let far: Vec<usize> = (0..self.scale.len()).filter(|&joint| self.scale[joint].is_some_and(is_far)).collect();
         let telling = self.scale.iter().flatten().count();
         if 2 * far.len() > telling { far } else { Vec::new() }
+    }
+
+    /// The unit that most joints which say anything agree on, within what descriptions err by, and a factor of it to
+    /// Nm (N); none where each has a factor of its own, as currents have.
+    pub fn common_unit(&self) -> Option<(&'static str, f64)> {
+        let mut telling: Vec<f64> = self.scale.iter().flatten().copied().collect();
+        telling.sort_by(f64::total_cmp);
+        let middle = *telling.get(telling.len() / 2)?;
+        let near = |factor: f64, unit: f64, share: f64| (factor / unit).ln().abs() < share.ln_1p();
+        let agree = |unit: f64| telling.iter().filter(|factor| near(**factor, unit, UNIT_SPREAD)).count();
+        let is_common =
+            |(_, unit): &&(&str, f64)| near(middle, *unit, UNIT_SHARE) && 3 * agree(*unit) >= 2 * telling.len();
+        UNITS_OF_TORQUE.iter().find(is_common).copied()
     }
 
     /// The joint that the bodies explain best, and the share that they explain of it; none where no joint tells.
@@ -82,4 +109,21 @@ fn joint_fit(rows: &MotionRows, joint: usize, (predicted, best_left): (&Vec<f64>
     let share = if gain > 0.0 { share } else { 0.0 };
     let is_telling = best_left.powi(2) * tau.norm_squared() < TELLING.powi(2) * without;
     ((share > EXPLAINED && gain.is_finite()).then(|| gain.recip()), is_telling.then_some(share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_common_where_joints_agree_and_constants_of_motors_are_none() {
+        let unit = |scale: &[f64]| {
+            let scale: Vec<Option<f64>> = scale.iter().copied().map(Some).collect();
+            DescriptionFit { explained: vec![None; scale.len()], scale }.common_unit().map(|(name, _)| name)
+        };
+        assert_eq!(unit(&[0.0114, 0.00992, 0.0111, 0.0174, 0.0154]), Some("Ncm"));
+        assert_eq!(unit(&[9.7, 11.2, 10.8, 17.0, 15.1]), Some("kgf m"));
+        assert_eq!(unit(&[13.6, 13.6, 8.7, 8.7, 29.2, 20.6]), None);
+        assert_eq!(unit(&[]), None);
+    }
 }

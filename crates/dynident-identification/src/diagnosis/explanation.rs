@@ -25,6 +25,8 @@ pub(super) struct Explanation {
     pub(super) torque: Vec<f64>,
     /// By parameters of each joint's own, which no other joint shares.
     pub(super) alone: Vec<f64>,
+    /// Times that by which parameters of each joint's own follow the noise, `√(1 − p/n)`.
+    followed: Vec<f64>,
     /// By one set of base parameters, consistent or not.
     pub(super) free: Vec<f64>,
     /// By the best physically consistent set; empty where there is none.
@@ -53,9 +55,15 @@ impl Explanation {
             None => Vec::new(),
         };
         let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
+        let rows_of_all = rows.len().max(1) as f64;
+        let follows = |joint: usize| {
+            let parameters = robot.layout().joint_columns(joint).len() as f64;
+            (1.0 - parameters / rows_of_all).max(0.1).sqrt()
+        };
+        let followed = (0..robot.dof()).map(follows).collect();
         let nominal = left_by_nominal(robot, rows).unwrap_or_default();
         let nominal = nominal.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
-        Ok(Self { torque, alone, free, consistent, nominal })
+        Ok(Self { torque, alone, followed, free, consistent, nominal })
     }
 
     /// Sum over all joints of the logarithm of what is left beside the torque, by one set of base parameters.
@@ -71,6 +79,11 @@ impl Explanation {
     /// The same by the description's own bodies; zero where it has none.
     pub(super) fn nominal_score(&self) -> f64 {
         score(&self.nominal, &self.torque)
+    }
+
+    /// What parameters of each joint's own would leave if they did not follow its noise.
+    pub(super) fn alone_of_noise_free(&self) -> Vec<f64> {
+        self.alone.iter().zip(&self.followed).map(|(left, followed)| left / followed).collect()
     }
 
     /// The same by parameters of each joint's own.

@@ -3,10 +3,11 @@
 
 use super::candidates::{Breadth, candidates};
 use super::explanation::predicted;
-use super::mistake::Mistake;
+use super::mistake::{Channels, Mistake};
 use super::motion_rows::MotionRows;
 use super::plausibility::beyond_limits;
 use super::search::{ALIKE, CLEARLY_BETTER, between_those_tried};
+use super::torque_clock::TorqueClock;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
@@ -19,6 +20,12 @@ const FLOOR: f64 = 1.0e-2;
 const WORTH_REFINING: f64 = 0.05;
 /// What a joint beyond its limits costs, as in readings of training logs.
 const LIMIT_COST: f64 = 1.0;
+/// A gain of a torque that differs from one by less is a drive's own.
+const LEAST_GAIN: f64 = 1.15;
+/// Zeros beside those that studies have wrong: with the parameters known small ones tell as well.
+const ZEROS_RAD: [f64; 6] = [-0.3, -0.15, -0.07, 0.07, 0.15, 0.3];
+/// Instants that are read with the torque of another moment.
+const INSTANTS: usize = 300;
 
 /// A reading of a held-out log that the training logs' parameters explain, where they do not explain the log as it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,30 +56,51 @@ struct Residual {
 
 /// Looks for one mistake in recording number `log`, whose instants are `rows`, that explains why base parameters
 /// `theta` leave clearly more of its torque than the shares `trained` of each joint's torque in the training logs.
+/// `clock` has its torque at other moments, where it is long enough.
 pub(super) fn held_out_reading(
     robot: &ParametricModel,
-    rows: &MotionRows,
+    (rows, clock): (&MotionRows, Option<&TorqueClock<'_>>),
     log: usize,
     (theta, trained): (&[f64], &[f64]),
 ) -> Option<HeldOutReading> {
     let as_written = residual(robot, rows, theta, trained);
-    let explained: f64 = as_written.explained.iter().map(|left| left.ln()).sum();
     let is_explained = |(left, explained): (&f64, &f64)| *left < NOT_EXPLAINED * explained;
     if as_written.left.iter().zip(&as_written.explained).all(is_explained) {
         return None;
     }
     // All logs are of one robot at one place.
     let is_of_log = |mistake: &Mistake| !matches!(mistake, Mistake::Gravity { .. });
-    let all: Vec<Mistake> = candidates(robot, rows, Breadth::All).into_iter().filter(is_of_log).collect();
+    let mut all: Vec<Mistake> = candidates(robot, rows, Breadth::All).into_iter().filter(is_of_log).collect();
+    all.extend(gains(robot, rows, theta));
+    let turning = (0..robot.dof()).filter(|&joint| robot.model().joints()[joint].turns());
+    all.extend(turning.flat_map(|joint| ZEROS_RAD.map(|offset_rad| Mistake::Offset { joint, offset_rad })));
     let read = |mistake: &Mistake| residual(robot, &mistake.corrected(rows), theta, trained);
     let mut readings: Vec<(Mistake, f64)> =
         all.par_iter().map(|mistake| (mistake.clone(), read(mistake).score + mistake.rarity())).collect();
     readings.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let joints: Vec<usize> = (0..robot.dof()).collect();
+    let late = |clock: &TorqueClock<'_>, lag_s: f64| {
+        residual(robot, &clock.rows((&joints, Channels::Torque), lag_s, INSTANTS), theta, trained)
+    };
+    if let Some((lag_s, clock)) = clock.and_then(|clock| {
+        let tried: Vec<f64> = clock.lags_s().collect();
+        let scores: Vec<f64> = tried.par_iter().map(|&lag_s| late(clock, lag_s).score).collect();
+        let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
+        Some((clock.least_near(tried[best], |lag_s| late(clock, lag_s).score), clock))
+    }) {
+        let without = late(clock, lag_s);
+        let mistake = clock.mistake((&joints, Channels::Torque), lag_s);
+        let least = readings.first().map_or(f64::INFINITY, |first| first.1);
+        let score = mistake.as_ref().map_or(f64::INFINITY, |mistake| without.score + mistake.rarity());
+        if let Some(mistake) = mistake.filter(|_| score < least && explains((score, &without), &as_written)) {
+            let alike = readings.iter().filter(|other| other.1 < score + ALIKE).map(|other| other.0.clone()).collect();
+            let (left_as_written, left_without) = (as_written.rms, without.rms);
+            return Some(HeldOutReading { log, mistake, alike, left_as_written, left_without });
+        }
+    }
     let (first, score) = readings.first()?.clone();
-    // Half of the way to what the training logs leave, at least: else it is something else.
     let without = read(&first);
-    let is_better = score < 0.5 * (as_written.score + explained) && without.rms < as_written.rms;
-    if !is_better || score > as_written.score - CLEARLY_BETTER {
+    if !explains((score, &without), &as_written) {
         return None;
     }
     let alike = readings[1..].iter().filter(|other| other.1 < score + ALIKE).map(|other| other.0.clone()).collect();
@@ -84,6 +112,29 @@ pub(super) fn held_out_reading(
     };
     let (left_as_written, left_without) = (as_written.rms, without.rms);
     Some(HeldOutReading { log, mistake, alike, left_as_written, left_without })
+}
+
+/// Whether a reading goes half of the way to what the training logs leave, or explains every joint that was not: else
+/// it is something else.
+fn explains((score, reading): (f64, &Residual), as_written: &Residual) -> bool {
+    let explained: f64 = as_written.explained.iter().map(|left| left.ln()).sum();
+    let is_explained =
+        |residual: &Residual, joint: usize| residual.left[joint] < NOT_EXPLAINED * residual.explained[joint];
+    let all_are = (0..reading.left.len()).all(|joint| is_explained(reading, joint));
+    (score < 0.5 * (as_written.score + explained) || all_are)
+        && score <= as_written.score - CLEARLY_BETTER
+        && reading.rms < as_written.rms
+}
+
+/// The gain of each joint's torque that suits the parameters best, where it is not that of a drive.
+fn gains(robot: &ParametricModel, rows: &MotionRows, theta: &[f64]) -> Vec<Mistake> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let gain = |(joint, explained): (usize, Vec<f64>)| {
+        let factor = dot(&explained, &rows.tau[joint]) / dot(&rows.tau[joint], &rows.tau[joint]);
+        let is_clear = factor > 0.0 && factor.ln().abs() > LEAST_GAIN.ln();
+        is_clear.then_some(Mistake::TorqueUnit { joint, factor })
+    };
+    predicted(robot, rows, theta).into_iter().enumerate().filter_map(gain).collect()
 }
 
 fn residual(robot: &ParametricModel, rows: &MotionRows, theta: &[f64], trained: &[f64]) -> Residual {

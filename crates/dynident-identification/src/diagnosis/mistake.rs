@@ -71,6 +71,16 @@ pub enum Mistake {
         /// What to multiply times by.
         factor: f64,
     },
+    /// The torques of these joints, or a joint's position, were logged later (earlier, if negative) than all else, by
+    /// more than the lag of the torque that a fit takes off by itself.
+    Lag {
+        /// Which joints.
+        joints: Vec<usize>,
+        /// Torques or positions; never both, which would be another recorder's clock.
+        channels: Channels,
+        /// The whole lag, of torques with what the study states or a fit took off, seconds.
+        lag_s: f64,
+    },
     /// Gravity is another: the base is mounted otherwise, or the torque is without gravity (zero).
     Gravity {
         /// Acceleration in the frame of the base, m/s².
@@ -87,7 +97,11 @@ impl Mistake {
             Self::PositionUnit { joints, .. } if joints.len() == 1 => 0.15,
             Self::Sign { .. } | Self::TimeUnit { .. } | Self::PositionUnit { .. } => 0.0,
             Self::Order { .. } => 0.05,
-            Self::Offset { .. } | Self::Gravity { .. } | Self::TorqueUnit { .. } | Self::Coupled { .. } => 0.15,
+            Self::Offset { .. }
+            | Self::Gravity { .. }
+            | Self::TorqueUnit { .. }
+            | Self::Coupled { .. }
+            | Self::Lag { .. } => 0.15,
         }
     }
 
@@ -101,6 +115,7 @@ impl Mistake {
             | Self::Offset { .. }
             | Self::PositionUnit { .. }
             | Self::Coupled { .. }
+            | Self::Lag { .. }
             | Self::Gravity { .. } => false,
         }
     }
@@ -127,11 +142,13 @@ impl Mistake {
             | Self::TorqueUnit { .. }
             | Self::Coupled { .. }
             | Self::TimeUnit { .. }
+            | Self::Lag { .. }
             | Self::Gravity { .. } => joint,
         }
     }
 
-    /// The motion as it was if this mistake was made.
+    /// The motion as it was if this mistake was made. What the torque was at another moment is not among the instants:
+    /// of a lag they are chosen anew.
     pub fn corrected(&self, rows: &MotionRows) -> MotionRows {
         let mut out = rows.clone();
         let scale = |values: &mut [f64], factor: f64| values.iter_mut().for_each(|value| *value *= factor);
@@ -188,7 +205,7 @@ impl Mistake {
                 out.ddq.iter_mut().for_each(|values| scale(values, (factor * factor).recip()));
                 out.rate_hz /= factor;
             }
-            Self::Gravity { .. } => {}
+            Self::Lag { .. } | Self::Gravity { .. } => {}
         }
         out
     }
@@ -207,6 +224,7 @@ impl Mistake {
             | Self::PositionUnit { .. }
             | Self::TorqueUnit { .. }
             | Self::Coupled { .. }
+            | Self::Lag { .. }
             | Self::TimeUnit { .. } => None,
         }
     }

@@ -11,9 +11,11 @@
 //! | `mistake`, `candidates`, `units` | mistakes of studies, and which to try |
 //! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `reading`, `search` | their sum, and the reading with the best |
+//! | `torque_clock` | torque of another moment |
 //! | `description_fit`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, payloads |
 //! | `held_out_reading` | mistakes that a held-out log alone has |
 //! | `same_columns` | columns that stand for two joints, torques that lost their signs |
+//! | `stray_torque` | torques that do not belong to one robot with the others |
 
 mod candidates;
 mod description_fit;
@@ -26,6 +28,8 @@ mod plausibility;
 mod reading;
 mod same_columns;
 mod search;
+mod stray_torque;
+mod torque_clock;
 mod units;
 mod unseen_load;
 
@@ -37,6 +41,7 @@ pub use plausibility::BeyondLimit;
 pub use reading::Reading;
 pub use same_columns::SameColumn;
 pub use search::Search;
+pub use stray_torque::StrayTorque;
 pub use unseen_load::UnseenLoad;
 
 use crate::logs::Logs;
@@ -47,9 +52,11 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
+use motion_rows::MotionSamples;
 use reading::Corrected;
 use search::{CLEARLY_BETTER, rough_consistency};
 use thiserror::Error;
+use torque_clock::TorqueClock;
 
 /// Instants that readings are compared on; more make it slower and not surer.
 const INSTANTS: usize = 300;
@@ -73,6 +80,8 @@ pub struct Diagnosis {
     pub same_columns: Vec<SameColumn>,
     /// Whether the torques are magnitudes, whose signs are lost.
     pub lost_signs: bool,
+    /// Torques that do not belong to one robot with the others, in the reading that is believed.
+    pub stray_torques: Vec<StrayTorque>,
 }
 
 impl Diagnosis {
@@ -147,14 +156,42 @@ fn diagnosed(
     theta: Option<&[f64]>,
 ) -> Result<Diagnosis, DiagnosisError> {
     let model = robot.clone().into();
+    let of_recording = |&index: &usize| MotionSamples::of_recording(logs, &model, index);
+    let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
     let mut rows = MotionRows::empty(robot.dof());
-    for &index in training {
-        rows.append(&MotionRows::of_recording(logs, &model, index, INSTANTS / training.len().max(1))?);
+    for samples in &samples {
+        rows.append(&samples.instants(INSTANTS / training.len().max(1)));
     }
     let consistency = rough_consistency(settings.consistency.as_ref());
-    let start = Corrected { robot: robot.clone(), rows: rows.clone(), mistakes: Vec::new() };
-    let mut search = search::search(start.clone(), &consistency, Breadth::Usual)?;
-    let further = search::search(start, &consistency, Breadth::All)?;
+    let as_written = Corrected::new(robot.clone(), rows.clone(), Vec::new());
+    let as_read = as_written.reading(Some(&consistency))?;
+    let taken_off_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
+    let taken_off_s: Vec<f64> = (0..robot.dof()).map(taken_off_s).collect();
+    let searches = |as_written: &Reading, start: (Corrected, Reading)| {
+        let usual = search::search(as_written.clone(), start.clone(), &consistency, Breadth::Usual);
+        (usual, search::search(as_written.clone(), start, &consistency, Breadth::All))
+    };
+    // A torque of another moment hides every other mistake, and another mistake may look like one.
+    let clock = TorqueClock::new(robot, &samples, taken_off_s.clone());
+    let shifted = clock.and_then(|clock| clock.reading(robot, &as_read, &consistency, INSTANTS));
+    let (mut search, further) = match shifted {
+        // A fit takes it off by itself.
+        Some(late) if late.0.mistakes.is_empty() => {
+            rows.clone_from(&late.0.rows);
+            searches(&late.1.clone(), late)
+        }
+        Some(late) => {
+            let in_time = searches(&as_read, (as_written, as_read.clone()));
+            let is_later = late.1.score() < in_time.1.believed().score() - CLEARLY_BETTER;
+            if is_later {
+                rows.clone_from(&late.0.rows);
+                searches(&as_read, late)
+            } else {
+                in_time
+            }
+        }
+        None => searches(&as_read, (as_written, as_read.clone())),
+    };
     // Rarer mistakes count where the usual ones explain clearly less of the torque: a joint that is held smaller breaks
     // fewer limits, whatever the description's are worth, unless it travels far beyond all it can. Where most joints'
     // torques are in another unit still, the unit of one joint or another rate only makes the best of that.
@@ -174,10 +211,12 @@ fn diagnosed(
     let is_explained = search.best.is_none() && search.as_written.left_of_all < MOSTLY_NOISE;
     if let Some(theta) = theta.filter(|_| is_explained) {
         for index in logs.of_role(Role::Validate) {
-            let rows = MotionRows::of_recording(logs, &model, index, INSTANTS)?;
+            let samples = [MotionSamples::of_recording(logs, &model, index)?];
+            let rows = samples[0].instants(INSTANTS);
             let load = unseen_load::unseen_load(robot, &rows, index, theta);
             let known = (theta, &search.as_written.left[..]);
-            let reading = held_out_reading::held_out_reading(robot, &rows, index, known);
+            let clock = TorqueClock::new(robot, &samples, taken_off_s.clone());
+            let reading = held_out_reading::held_out_reading(robot, (&rows, clock.as_ref()), index, known);
             // What leaves less explains it: a load has four free numbers, a mistake hardly any.
             let (with, without) = (load.as_ref().map(|load| load.left_with), reading.as_ref().map(|r| r.left_without));
             match with.zip(without) {
@@ -193,7 +232,8 @@ fn diagnosed(
     let as_written = &search.as_written;
     let same_columns = same_columns::same_columns(&as_read, &as_written.left);
     let lost_signs = same_columns::has_lost_signs(&as_read, as_written.left_of_all);
-    Ok(Diagnosis { search, description_fit, unseen_loads, held_out, same_columns, lost_signs })
+    let stray_torques = stray_torque::stray_torques(search.believed());
+    Ok(Diagnosis { search, description_fit, unseen_loads, held_out, same_columns, lost_signs, stray_torques })
 }
 
 /// What the description's bodies say in the reading that is believed.

@@ -1,9 +1,11 @@
 //! A recording as a few hundred instants of its motion: small enough to ask what it would be under another reading.
 
+use super::mistake::Channels;
 use crate::logs::Logs;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
+use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 
 /// Instants of a motion with its torques, all in SI and in the model's order of joints.
@@ -21,34 +23,54 @@ pub struct MotionRows {
     pub rate_hz: f64,
 }
 
-impl MotionRows {
-    /// Recording number `index`: its motion and torque through the parallel filter alike, decimated, and thinned evenly
-    /// to at most `most` instants.
+/// A recording's motion and torque, filtered alike and decimated: what instants are taken from, each with its own
+/// torque or with that of another moment.
+#[derive(Clone, Debug)]
+pub(super) struct MotionSamples {
+    rows: MotionRows,
+    /// The first row of each uninterrupted piece.
+    pieces: Vec<usize>,
+    /// From row to row, seconds.
+    spacing_s: f64,
+    /// For each row the largest share of a joint's torque behind it that does not count (held, saturated, outliers);
+    /// empty where every sample counts.
+    invented: Vec<f64>,
+}
+
+/// Share of a row's torque that may be made of its neighbours.
+const INVENTED: f64 = 0.3;
+
+impl MotionSamples {
+    /// Recording number `index`.
     ///
     /// # Errors
     /// A recording that cannot be read.
-    pub fn of_recording(logs: &Logs<'_>, model: &RegressorModel, index: usize, most: usize) -> Result<Self, LogError> {
+    pub(super) fn of_recording(logs: &Logs<'_>, model: &RegressorModel, index: usize) -> Result<Self, LogError> {
         let recording = &logs.recordings[index];
         let places = recording.places(model.model())?;
         let joints = places.len();
-        let mut rows = Self::empty(joints);
+        let mut rows = MotionRows::empty(joints);
+        let (mut pieces, mut spacing_s, mut invented) = (vec![0], 0.0, Vec::new());
         // Of a log at one rate: made with the first block; none where every sample counts.
         let mut decimator: Option<Decimator> = None;
         let (mut segment, mut panel, mut out) = (0, Vec::new(), Vec::new());
         let mut take = |block: &MotionBlock| {
             if rows.rate_hz == 0.0 {
                 rows.rate_hz = block.rate_hz;
+                spacing_s = block.rate_hz.recip();
                 let settings = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
                 // Four times as many rows as a fit takes: short logs would have too few to tell readings apart.
                 let settings = settings.map(|s| DecimationSettings { factor: s.factor / 4, ..s });
+                let settings = settings.filter(|settings| settings.factor > 1);
+                spacing_s *= settings.as_ref().map_or(1.0, |settings| settings.factor as f64);
                 decimator = settings
-                    .filter(|settings| settings.factor > 1)
-                    .map(|settings| Decimator::new(&settings, block.rate_hz, 4 * joints))
+                    .map(|settings| Decimator::new(&settings, block.rate_hz, 5 * joints))
                     .transpose()
                     .map_err(|source| LogError::Filter { log: recording.name.clone(), source })?;
             }
             if block.segment != segment {
                 segment = block.segment;
+                pieces.push(rows.len());
                 if let Some(decimator) = &mut decimator {
                     decimator.finish();
                 }
@@ -57,11 +79,21 @@ impl MotionRows {
             let [begin, behind] = block.unsettled;
             let settled = begin..block.rows.saturating_sub(behind).max(begin);
             panel.clear();
-            for values in [&block.q, &block.dq, &block.ddq, &block.tau] {
+            for values in [&block.q, &block.dq, &block.ddq] {
                 for &place in &places {
                     panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
                 }
             }
+            // What does not count of the torque stands on the line between what does, and is marked.
+            let mut marks = Vec::with_capacity(places.len() * settled.len());
+            for &place in &places {
+                let tau = &block.joint(&block.tau, place)[settled.clone()];
+                let marked = block.set_aside.get(place * block.rows..(place + 1) * block.rows).unwrap_or_default();
+                let marked = marked.get(settled.clone()).unwrap_or_default();
+                panel.extend(bridged(tau, marked));
+                marks.extend((0..tau.len()).map(|row| f64::from(u8::from(marked.get(row).copied().unwrap_or(false)))));
+            }
+            panel.extend_from_slice(&marks);
             let (count, filtered) = match &mut decimator {
                 Some(decimator) => {
                     let count = decimator.push(&panel, settled.len(), &mut out);
@@ -69,6 +101,9 @@ impl MotionRows {
                 }
                 None => (settled.len(), &panel),
             };
+            let share =
+                |row: usize| (0..joints).map(|joint| filtered[(4 * joints + joint) * count + row]).fold(0.0, f64::max);
+            invented.extend((0..count).map(share));
             for (quantity, to) in rows.quantities_mut().into_iter().enumerate() {
                 for (joint, to) in to.iter_mut().enumerate() {
                     to.extend_from_slice(&filtered[(quantity * joints + joint) * count..][..count]);
@@ -77,9 +112,85 @@ impl MotionRows {
             Ok(())
         };
         logs.pass(model, index).each_block(&mut take)?;
-        Ok(rows.thinned(most))
+        Ok(Self { rows, pieces, spacing_s, invented })
     }
 
+    /// At most `most` of its instants, evenly chosen.
+    pub(super) fn instants(&self, most: usize) -> MotionRows {
+        let all: Vec<usize> = (0..self.rows.len()).filter(|&row| !self.is_invented(row)).collect();
+        let count = all.len();
+        let chosen: Vec<usize> = if count > most { (0..most).map(|k| all[k * count / most]).collect() } else { all };
+        self.rows.some(&chosen)
+    }
+
+    /// The longest of its pieces, seconds.
+    pub(super) fn longest_s(&self) -> f64 {
+        self.each_piece().map(|piece| piece.len()).max().unwrap_or(0) as f64 * self.spacing_s
+    }
+
+    /// At most `most` of the instants that have samples up to `reach_s` before and after them, each with the torque (or
+    /// the motion, by `channels`) of `lag_s` later, joint by joint (a straight line between rows, which stand four
+    /// times as close as the motion asks); the same instants for all lags.
+    pub(super) fn shifted(&self, channels: Channels, lag_s: &[f64], reach_s: f64, most: usize) -> MotionRows {
+        let reach = (reach_s / self.spacing_s).ceil() as usize + 1;
+        let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);
+        let all: Vec<usize> = self.each_piece().flat_map(inside).filter(|&row| !self.is_invented(row)).collect();
+        let chosen: Vec<usize> = (0..most.min(all.len())).map(|k| all[k * all.len() / most.min(all.len())]).collect();
+        let mut rows = self.rows.some(&chosen);
+        let shift = |to: &mut [Vec<f64>], from: &[Vec<f64>]| {
+            for ((to, from), lag_s) in to.iter_mut().zip(from).zip(lag_s).filter(|(_, lag_s)| **lag_s != 0.0) {
+                let shift = lag_s / self.spacing_s;
+                let (whole, share) = (shift.floor() as isize, shift - shift.floor());
+                for (to, &row) in to.iter_mut().zip(&chosen) {
+                    let at = row.saturating_add_signed(whole).min(from.len() - 1);
+                    let next = (at + 1).min(from.len() - 1);
+                    *to = from[at] + share * (from[next] - from[at]);
+                }
+            }
+        };
+        if channels == Channels::Torque {
+            shift(&mut rows.tau, &self.rows.tau);
+        } else {
+            shift(&mut rows.q, &self.rows.q);
+            shift(&mut rows.dq, &self.rows.dq);
+            shift(&mut rows.ddq, &self.rows.ddq);
+        }
+        rows
+    }
+
+    /// Whether a large part of some joint's torque behind a row was not measured.
+    fn is_invented(&self, row: usize) -> bool {
+        self.invented.get(row).is_some_and(|share| *share > INVENTED)
+    }
+
+    fn each_piece(&self) -> impl Iterator<Item = Range<usize>> {
+        let ends = self.pieces.iter().skip(1).copied().chain([self.rows.len()]);
+        self.pieces.iter().copied().zip(ends).map(|(from, to)| from..to)
+    }
+}
+
+/// A torque with what is `marked` in it on the straight line between what is not.
+fn bridged(tau: &[f64], marked: &[bool]) -> Vec<f64> {
+    let mut out = tau.to_vec();
+    let is_marked = |row: usize| marked.get(row).copied().unwrap_or(false);
+    let mut row = 0;
+    while row < tau.len() {
+        if !is_marked(row) {
+            row += 1;
+            continue;
+        }
+        let to = (row..tau.len()).find(|&row| !is_marked(row)).unwrap_or(tau.len());
+        let before = row.checked_sub(1).map(|at| tau[at]).or(tau.get(to).copied()).unwrap_or(0.0);
+        let after = tau.get(to).copied().unwrap_or(before);
+        for at in row..to {
+            out[at] = before + (after - before) * (at + 1 - row) as f64 / (to + 1 - row) as f64;
+        }
+        row = to;
+    }
+    out
+}
+
+impl MotionRows {
     /// No instants of `joints` joints.
     pub fn empty(joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
@@ -101,15 +212,11 @@ impl MotionRows {
         self.len() == 0
     }
 
-    /// At most `most` instants, evenly chosen.
-    fn thinned(mut self, most: usize) -> Self {
-        let count = self.len();
-        if count > most {
-            for values in self.quantities_mut().into_iter().flatten() {
-                *values = (0..most).map(|k| values[k * count / most]).collect();
-            }
-        }
-        self
+    /// The instants with these numbers.
+    fn some(&self, chosen: &[usize]) -> Self {
+        let take = |of: &[Vec<f64>]| of.iter().map(|values| chosen.iter().map(|&row| values[row]).collect()).collect();
+        let Self { q, dq, ddq, tau, rate_hz } = self;
+        Self { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz }
     }
 
     /// Adds the instants of `other`.
@@ -125,5 +232,41 @@ impl MotionRows {
 
     fn quantities_mut(&mut self) -> [&mut Vec<Vec<f64>>; 4] {
         [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_count_stands_on_the_line_between_what_does() {
+        let tau = [9.0, 1.0, 50.0, 50.0, 4.0, 5.0, 80.0];
+        let marked = [true, false, true, true, false, false, true];
+        assert_eq!(bridged(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
+        assert_eq!(bridged(&tau, &[]), tau);
+    }
+
+    #[test]
+    fn a_torque_of_another_moment_is_that_of_another_row_of_the_same_piece() {
+        let line = |from: f64| (0..40).map(|row| from + f64::from(row)).collect::<Vec<f64>>();
+        let rows = MotionRows {
+            q: vec![line(0.0)],
+            dq: vec![line(100.0)],
+            ddq: vec![line(200.0)],
+            tau: vec![line(300.0)],
+            rate_hz: 10.0,
+        };
+        let samples = MotionSamples { rows, pieces: vec![0, 20], spacing_s: 0.1, invented: Vec::new() };
+        assert!((samples.longest_s() - 2.0).abs() < 1e-12);
+        let late = samples.shifted(Channels::Torque, &[0.25], 0.3, 100);
+        // Four rows from each end of both pieces.
+        assert_eq!(late.len(), 2 * 12);
+        for row in 0..late.len() {
+            assert!((late.tau[0][row] - late.q[0][row] - 302.5).abs() < 1e-9);
+            assert!((late.dq[0][row] - late.q[0][row] - 100.0).abs() < 1e-9);
+        }
+        let late = samples.shifted(Channels::Position, &[-0.1], 0.3, 100);
+        assert!((0..late.len()).all(|row| (late.tau[0][row] - late.q[0][row] - 301.0).abs() < 1e-9));
     }
 }

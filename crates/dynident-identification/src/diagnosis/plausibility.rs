@@ -68,7 +68,11 @@ pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
 /// Whether a log has jumps that no motion makes: readings of it would mean nothing.
 pub(super) fn has_jumps(report: &ImportReport) -> bool {
     let is_measured = |channel: &&ChannelReport| matches!(channel.channel, Quantity::Position | Quantity::Torque);
-    report.channels.iter().filter(is_measured).any(|channel| channel.turns > 0 || channel.lone_samples > 0)
+    report
+        .channels
+        .iter()
+        .filter(is_measured)
+        .any(|channel| channel.turns > 0 || channel.lone_samples > 0 || channel.jumps > 0)
 }
 
 /// Whether a recorder of such a robot has this rate.

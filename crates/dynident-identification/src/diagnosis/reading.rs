@@ -24,7 +24,11 @@ pub struct Reading {
     pub mistakes: Vec<Mistake>,
     /// Share of each joint's torque that no physically consistent robot explains, 0 to 1 (root mean squares).
     pub left: Vec<f64>,
-    /// The same of all joints' torque together, unweighted.
+    /// The same by one set of base parameters, consistent or not.
+    pub free: Vec<f64>,
+    /// The same by parameters of each joint's own, freed of what these follow of the noise.
+    pub alone: Vec<f64>,
+    /// The share of all joints' torque together that no consistent robot explains, unweighted.
     pub left_of_all: f64,
     /// Joints beyond their limits.
     pub beyond: Vec<BeyondLimit>,
@@ -38,6 +42,8 @@ pub struct Reading {
     pub alone_score: f64,
     /// The same by the description's own bodies; zero where it has none.
     pub nominal_score: f64,
+    /// Logarithm of how much larger the torques became that columns were added to: shares of these fall by themselves.
+    pub torque_growth: f64,
 }
 
 impl Reading {
@@ -70,7 +76,7 @@ impl Reading {
 
     fn beside_fit(&self) -> f64 {
         let rarity: f64 = self.mistakes.iter().map(Mistake::rarity).sum();
-        NOMINAL_WEIGHT * self.nominal_score + self.broken() + rarity
+        NOMINAL_WEIGHT * self.nominal_score + (1.0 + NOMINAL_WEIGHT) * self.torque_growth + self.broken() + rarity
     }
 
     /// What its broken limits cost.
@@ -85,26 +91,44 @@ pub(super) struct Corrected {
     pub(super) robot: ParametricModel,
     pub(super) rows: MotionRows,
     pub(super) mistakes: Vec<Mistake>,
+    pub(super) torque_growth: f64,
 }
 
 impl Corrected {
+    /// A robot and rows with these mistakes corrected.
+    pub(super) fn new(robot: ParametricModel, rows: MotionRows, mistakes: Vec<Mistake>) -> Self {
+        Self { robot, rows, mistakes, torque_growth: 0.0 }
+    }
+
     /// With one more mistake corrected.
     pub(super) fn without(&self, mistake: &Mistake) -> Self {
         let robot = mistake.corrected_robot(&self.robot).unwrap_or_else(|| self.robot.clone());
         let mistakes = self.mistakes.iter().chain([mistake]).cloned().collect();
-        Self { robot, rows: mistake.corrected(&self.rows), mistakes }
+        let rows = mistake.corrected(&self.rows);
+        let growth = match mistake {
+            Mistake::Coupled { with, .. } => {
+                let [before, after] = [&self.rows, &rows].map(|rows| norm(&rows.tau[*with]));
+                if before > 0.0 && after > before { (after / before).ln() } else { 0.0 }
+            }
+            _ => 0.0,
+        };
+        Self { robot, rows, mistakes, torque_growth: self.torque_growth + growth }
     }
 
     /// What speaks for it and against it; without a consistent robot where `consistency` is not given.
     pub(super) fn reading(&self, consistency: Option<&ConsistencySettings>) -> Result<Reading, EstimationError> {
         let explained = Explanation::new(&self.robot, &self.rows, consistency)?;
         let best = if explained.consistent.is_empty() { &explained.torque } else { &explained.consistent };
-        let share = |(left, torque): (&f64, &f64)| if *torque > 0.0 { left / torque } else { 0.0 };
-        let norm = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let shares = |left: &[f64]| -> Vec<f64> {
+            let share = |(left, torque): (&f64, &f64)| if *torque > 0.0 { left / torque } else { 0.0 };
+            left.iter().zip(&explained.torque).map(share).collect()
+        };
         let (left_of_all, all) = (norm(best), norm(&explained.torque));
         Ok(Reading {
             mistakes: self.mistakes.clone(),
-            left: best.iter().zip(&explained.torque).map(share).collect(),
+            left: shares(best),
+            free: shares(&explained.free),
+            alone: shares(&explained.alone_of_noise_free()),
             left_of_all: if all > 0.0 { left_of_all / all } else { 0.0 },
             beyond: beyond_limits(self.robot.model(), &self.rows),
             plausible_rate: is_rate_of_a_recorder(self.robot.model(), self.rows.rate_hz),
@@ -112,6 +136,11 @@ impl Corrected {
             free_score: explained.free_score(),
             alone_score: explained.alone_score(),
             nominal_score: explained.nominal_score(),
+            torque_growth: self.torque_growth,
         })
     }
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }

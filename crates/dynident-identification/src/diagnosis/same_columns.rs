@@ -5,6 +5,8 @@ use super::motion_rows::MotionRows;
 
 /// Columns differ by less than this share of their largest value where they are the same numbers: what filters round.
 const SAME: f64 = 1.0e-6;
+/// The same for a position and a torque, which are smoothed by filters of their own.
+const SAME_OF_OTHER_FILTERS: f64 = 1.0e-2;
 /// Share of a joint's torque that has to be left before its columns are doubted: two joints may move alike.
 const UNEXPLAINED: f64 = 0.1;
 /// Share of a joint's largest torque that a filter takes below zero behind a corner.
@@ -13,22 +15,29 @@ const RINGING: f64 = 0.05;
 /// Two joints that have the same numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SameColumn {
-    /// Positions or torques.
+    /// Positions or torques; both where the position of the first joint is the torque of the second.
     pub channels: Channels,
     /// Numbers of the two joints.
     pub joints: [usize; 2],
 }
 
 /// Joints that share a column of numbers, up to a factor, where one robot leaves much of the torque of one of them;
-/// `left` is the share of each joint's torque that it leaves.
+/// `left` is the share of each joint's torque that it leaves. A position and a torque may also be one column.
 pub(super) fn same_columns(rows: &MotionRows, left: &[f64]) -> Vec<SameColumn> {
     let mut found = Vec::new();
     for (channels, columns) in [(Channels::Position, &rows.q), (Channels::Torque, &rows.tau)] {
         for a in 0..columns.len() {
             for b in a + 1..columns.len() {
-                if left[a].max(left[b]) > UNEXPLAINED && is_multiple(&columns[a], &columns[b]) {
+                if left[a].max(left[b]) > UNEXPLAINED && is_multiple(&columns[a], &columns[b], SAME) {
                     found.push(SameColumn { channels, joints: [a, b] });
                 }
+            }
+        }
+    }
+    for (a, q) in rows.q.iter().enumerate() {
+        for (b, tau) in rows.tau.iter().enumerate() {
+            if left[a].max(left[b]) > UNEXPLAINED && is_multiple(q, tau, SAME_OF_OTHER_FILTERS) {
+                found.push(SameColumn { channels: Channels::Both, joints: [a, b] });
             }
         }
     }
@@ -36,7 +45,7 @@ pub(super) fn same_columns(rows: &MotionRows, left: &[f64]) -> Vec<SameColumn> {
 }
 
 /// Whether two columns that change are multiples of one another, offsets aside.
-fn is_multiple(a: &[f64], b: &[f64]) -> bool {
+fn is_multiple(a: &[f64], b: &[f64], same: f64) -> bool {
     let [a, b] = [a, b].map(|values| {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         values.iter().map(|value| value - mean).collect::<Vec<f64>>()
@@ -44,7 +53,7 @@ fn is_multiple(a: &[f64], b: &[f64]) -> bool {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let [aa, ab, bb] = [dot(&a, &a), dot(&a, &b), dot(&b, &b)];
     // The square of the sine between them.
-    aa > 0.0 && bb > 0.0 && aa * bb - ab * ab < SAME * SAME * aa * bb
+    aa > 0.0 && bb > 0.0 && aa * bb - ab * ab < same * same * aa * bb
 }
 
 /// Whether no joint's torque is ever negative though joints turn to and fro and no robot explains the torque:
@@ -79,7 +88,11 @@ mod tests {
         assert_eq!(found, [SameColumn { channels: Channels::Torque, joints: [0, 1] }]);
         assert_eq!(same_columns(&rows(vec![torque.clone(), twice]), &[0.01, 0.02]), []);
         let other: Vec<f64> = torque.iter().enumerate().map(|(k, tau)| tau + 1e-4 * (k % 2) as f64).collect();
-        assert_eq!(same_columns(&rows(vec![torque, other]), &[0.5, 0.5]), []);
+        assert_eq!(same_columns(&rows(vec![torque.clone(), other]), &[0.5, 0.5]), []);
+        let mut spoilt = rows(vec![torque.clone(), torque.iter().map(|tau| tau * tau).collect()]);
+        spoilt.q[1] = torque.iter().map(|tau| 0.1 * tau - 2.0).collect();
+        let found = same_columns(&spoilt, &[0.5, 0.5]);
+        assert_eq!(found, [SameColumn { channels: Channels::Both, joints: [1, 0] }]);
     }
 
     #[test]

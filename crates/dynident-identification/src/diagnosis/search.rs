@@ -7,9 +7,9 @@
 use super::candidates::{Breadth, FAR, candidates};
 use super::mistake::{Channels, Mistake};
 use super::reading::{Corrected, Reading};
-use super::units::{is_unit_of_position, is_unit_of_time};
+use super::units::{is_unit_of_position, is_unit_of_time, is_unit_of_torque};
 use crate::consistent::ConsistencySettings;
-use dynident_estimation::EstimationError;
+use core::f64::consts::FRAC_PI_2;
 use rayon::prelude::*;
 
 /// By how much a reading must score better before the study is doubted: as if one joint had less than 0.55 of what was
@@ -32,6 +32,8 @@ const RUNNERS_UP: usize = 8;
 const MOSTLY_NOISE: f64 = 0.5;
 /// Times what was left of a joint's torque that its right unit leaves.
 const EXPLAINS: f64 = 0.8;
+/// Times what parameters of its own leave of a joint's torque that one robot leaves where it is another's.
+const STRAY: f64 = 1.8;
 /// Mistakes of one study.
 const MOST_MISTAKES: usize = 3;
 /// Other readings that are named.
@@ -63,14 +65,15 @@ pub(super) fn rough_consistency(settings: Option<&ConsistencySettings>) -> Consi
     ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known }
 }
 
-/// Looks for mistakes behind `start`, as rare ones as `breadth` says.
+/// Looks for mistakes behind the reading `start` of a study that reads `as_written`, as rare ones as `breadth` says.
 pub(super) fn search(
-    start: Corrected,
+    as_written: Reading,
+    start: (Corrected, Reading),
     consistency: &ConsistencySettings,
     breadth: Breadth,
-) -> Result<Search, EstimationError> {
-    let as_written = start.reading(Some(consistency))?;
-    let (mut at, mut best) = (start, as_written.clone());
+) -> Search {
+    let made = start.0.mistakes.len();
+    let (mut at, mut best) = start;
     let (mut alike, mut tried): (Vec<Reading>, usize) = (Vec::new(), 0);
     let mut runners_up: Vec<(Corrected, Reading)> = Vec::new();
     for round in 0..MOST_MISTAKES {
@@ -78,7 +81,7 @@ pub(super) fn search(
         tried += count;
         let Some((first, rest)) = fitted.split_first() else { break };
         // A second mistake is rarer than the first.
-        if first.1.score() > best.score() - CLEARLY_BETTER * (round + 1) as f64 {
+        if first.1.score() > best.score() - CLEARLY_BETTER * (made + round + 1) as f64 {
             break;
         }
         // What a second mistake is found behind, others may be found behind as well: the pair that explains most
@@ -106,7 +109,7 @@ pub(super) fn search(
         (at, best) = (corrected, reading);
     }
     let found = !best.mistakes.is_empty();
-    Ok(Search { as_written, best: found.then_some(best), alike, tried })
+    Search { as_written, best: found.then_some(best), alike, tried }
 }
 
 /// The best readings beside `first`, of each kind of mistake and joint one.
@@ -187,7 +190,9 @@ fn likelier_sign_first(fitted: &mut [(Corrected, Reading)]) {
 }
 
 /// Whether a reading with another column of one joint explains that joint: a channel that says nothing, dead or noise,
-/// is as good in any unit, and another gain of a torque that was explained before serves other joints' torques.
+/// is as good in any unit, and another gain of a torque that was explained before serves other joints' torques. Only
+/// where some joint's torque did not belong to one robot with the others (the wrong gain of a strong joint spoils its
+/// neighbours') and then does, is it the gain.
 fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
     let (joint, has_to_gain) = match reading.mistakes.last() {
         Some(Mistake::TorqueUnit { joint, .. }) => (*joint, true),
@@ -197,7 +202,12 @@ fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
         _ => return true,
     };
     let left = reading.left[joint];
-    left < MOSTLY_NOISE && (!has_to_gain || left < EXPLAINS * from.left[joint])
+    let finds_its_robot = |joint: usize| {
+        let is_stray = |reading: &Reading| reading.free[joint] > STRAY * reading.alone[joint];
+        is_stray(from) && !is_stray(reading) && reading.free[joint] < EXPLAINS * from.free[joint]
+    };
+    let gains = left < EXPLAINS * from.left[joint] || (0..from.left.len()).any(finds_its_robot);
+    left < MOSTLY_NOISE && (!has_to_gain || gains)
 }
 
 /// Whether a reading leaves clearly more of some joint's torque than the one it was made from.
@@ -226,7 +236,13 @@ fn refined(
     // Free numbers follow the noise: the round one stays unless the exact one is clearly better. Gears and counts have
     // no round ones.
     let last = first.1.mistakes.last();
-    let is_round = !matches!(last, Some(Mistake::PositionUnit { factor, .. }) if !is_unit_of_position(*factor));
+    let is_round = match last {
+        Some(Mistake::PositionUnit { factor, .. }) => is_unit_of_position(*factor),
+        Some(Mistake::TorqueUnit { factor, .. }) => is_unit_of_torque(*factor),
+        // Zeros are mistaken by quarters of a turn, or by anything.
+        Some(Mistake::Offset { offset_rad, .. }) => (offset_rad / FRAC_PI_2).fract() == 0.0,
+        _ => true,
+    };
     let worth = if is_round { WORTH_REFINING } else { 0.0 };
     (reading.score() < first.1.score() - worth).then_some((corrected, reading))
 }
@@ -277,12 +293,16 @@ pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) ->
         Mistake::TimeUnit { factor } if !is_unit_of_time(*factor) => {
             Some(scaled(0.4, &|times| Mistake::TimeUnit { factor: factor * times }))
         }
-        Mistake::Sign { .. } | Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Coupled { .. } => None,
+        Mistake::Sign { .. }
+        | Mistake::Order { .. }
+        | Mistake::TimeUnit { .. }
+        | Mistake::Coupled { .. }
+        | Mistake::Lag { .. } => None,
     }
 }
 
 /// Where `value` is least within `reach` of `centre`, by thirds, to a hundredth of the reach.
-fn least_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn least_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (centre - reach, centre + reach);
     while high - low > 0.02 * reach {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);

@@ -14,8 +14,9 @@ pub(super) const UNITS_OF_ONE_POSITION: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI,
 /// The same of one joint that slides.
 pub(super) const UNITS_OF_ONE_LENGTH: [f64; 4] = [1e-3, 1e3, 0.5, 2.0];
 /// What the torque of one joint may be short of: the other units of a table, a gear, a motor of two. What lies between
-/// is found from these; gains of drives that differ by less are no mistake of a study.
-pub(super) const UNITS_OF_ONE_TORQUE: [f64; 10] = [0.5, 2.0, 0.2, 5.0, 0.03, 30.0, 0.01, 100.0, 1e-3, 1e3];
+/// is found from these: a motor constant of another drive.
+pub(super) const UNITS_OF_ONE_TORQUE: [f64; 14] =
+    [0.77, 1.3, 0.6, 1.6, 0.5, 2.0, 0.2, 5.0, 0.03, 30.0, 0.01, 100.0, 1e-3, 1e3];
 
 /// Whether a factor of time is that of a unit, and not of another rate.
 pub(super) fn is_unit_of_time(factor: f64) -> bool {
@@ -25,4 +26,9 @@ pub(super) fn is_unit_of_time(factor: f64) -> bool {
 /// Whether a factor of positions is that of a unit, and not of a gear or of an encoder's counts.
 pub(super) fn is_unit_of_position(factor: f64) -> bool {
     [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 0.5, 2.0, 1e-3].contains(&factor)
+}
+
+/// Whether a factor of one torque is that of a unit or of a pair of motors, and not of a gear or a motor constant.
+pub(super) fn is_unit_of_torque(factor: f64) -> bool {
+    [0.5, 2.0, 0.01, 100.0, 1e-3, 1e3].contains(&factor)
 }

@@ -23,7 +23,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Longest lag looked for, seconds of a usual arm: drives and buses stay below.
-const LONGEST_DELAY_S: f64 = 0.1;
+pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 /// Steps at most; two to four are usual.
 const MOST_STEPS: usize = 12;
 /// The steps end when no lag moves by more than this share of its standard deviation, or by so many samples.

@@ -80,7 +80,11 @@ fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2]) -> bool {
     let step = quantisation_step(&tau[run.from.saturating_sub(around)..(run.to + around).min(tau.len())]);
     let changes_enough = step.is_none_or(|step| middle(&mut changes) > QUANTA * step);
     let moved = q[run.from..run.to].windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
-    let net = (q[run.to - 1] - q[run.from]).abs();
+    // To and fro: how far apart its ends are says nothing.
+    let [low, high] = q[run.from..run.to]
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &q| [low.min(q), high.max(q)]);
+    let net = high - low;
     let expected = path * length as f64 / samples.max(1) as f64;
     samples >= 2 * SHORTEST
         && values >= VALUES_NEARBY
@@ -122,6 +126,19 @@ mod tests {
             // The samples beside it may happen to have its value.
             assert!(found[0].from.abs_diff(1500) <= 2 && found[0].to.abs_diff(1700) <= 2, "{step}: {found:?}");
         }
+    }
+
+    /// The joint is back where it was when the torque goes on.
+    #[test]
+    fn a_torque_that_drops_out_while_the_joint_goes_to_and_fro_is_held() {
+        let noise = normal(13, 6000);
+        let t = |i: usize| i as f64 * 0.01;
+        let mut tau: Vec<f64> = (0..6000).map(|i| 20.0 * (1.5 * t(i)).sin() + 0.05 * noise[i]).collect();
+        let q: Vec<f64> = (0..6000).map(|i| (1.5 * t(i)).cos()).collect();
+        // A period of the motion.
+        tau[2000..2419].fill(0.0);
+        let found = held_runs(&tau, &q, [-20.5, 20.5]);
+        assert_eq!(found, [Run { from: 2000, to: 2419, saturated: false }]);
     }
 
     #[test]

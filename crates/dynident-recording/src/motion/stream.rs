@@ -328,13 +328,22 @@ impl MotionStream {
             let Self { rows_in, rows, time_check, checks, .. } = self;
             let mut read = |raw: &RawBlock| {
                 *rows += raw.rows() as u64;
-                for (row, time_s) in raw.row.iter().zip(&raw.time_s) {
-                    time_check.see(*row, *time_s);
+                let mut gaps = Vec::new();
+                for (place, (row, time_s)) in raw.row.iter().zip(&raw.time_s).enumerate() {
+                    if time_check.see(*row, *time_s) {
+                        gaps.push(place);
+                    }
                 }
                 // In the order of LogFormat::groups.
                 let logged = raw.q.iter().chain(&raw.dq).chain(&raw.ddq).chain(&raw.tau).chain(&raw.temperature_c);
                 for (check, values) in checks.iter_mut().zip(logged) {
-                    check.see(values);
+                    let mut from = 0;
+                    for &gap in &gaps {
+                        check.see(&values[from..gap]);
+                        check.begin_piece();
+                        from = gap;
+                    }
+                    check.see(&values[from..]);
                 }
             };
             let next = rows_in.next_block(&mut read)?;

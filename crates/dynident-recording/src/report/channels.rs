@@ -1,6 +1,6 @@
 //! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
 
-use super::jumps::{JumpCheck, LoneSample};
+use super::jumps::{Jump, JumpCheck, LoneSample};
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,13 @@ pub struct ChannelReport {
     /// The one that stands off farthest.
     #[serde(default)]
     pub worst_lone_sample: Option<LoneSample>,
+    /// Steps far larger than all others, to a place where the channel stays (positions): rows that are missing, an
+    /// encoder that stood still.
+    #[serde(default)]
+    pub jumps: u64,
+    /// The largest of them.
+    #[serde(default)]
+    pub worst_jump: Option<Jump>,
 }
 
 impl ChannelReport {
@@ -111,8 +118,15 @@ impl ChannelCheck {
         self.samples += values.len() as u64;
     }
 
+    /// The next sample comes after a gap of the stamps.
+    pub(crate) fn begin_piece(&mut self) {
+        self.jumps.begin_piece();
+    }
+
     pub(crate) fn report(&self) -> ChannelReport {
         let (lone_samples, worst_lone_sample) = self.jumps.lone();
+        // Torques and derivatives may step.
+        let (jumps, worst_jump) = if self.quantity == Quantity::Position { self.jumps.jumps() } else { (0, None) };
         ChannelReport {
             channel: self.quantity,
             joint: self.joint.clone(),
@@ -129,6 +143,8 @@ impl ChannelCheck {
             turns: self.jumps.wraps(),
             lone_samples,
             worst_lone_sample,
+            jumps,
+            worst_jump,
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Samples that no motion makes: angles that wrap after a turn, and single values far from their neighbours.
+//! Samples that no motion makes: angles that wrap after a turn, single values far from their neighbours, and steps to
+//! another place.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,12 @@ const MEMORY: f64 = 0.99;
 const SHARE_OF_RANGE: f64 = 0.25;
 /// Steps to learn from before a sample can stand out.
 const LEARN: u64 = 20;
+/// The largest steps that are kept: more jumps than one less are the nature of the signal.
+const LARGEST: usize = 8;
+/// Times the largest step that a motion makes that a jump is at least.
+const TIMES_OTHERS: f64 = 5.0;
+/// A jump goes by this share of the channel's range at least: encoders flicker at rest.
+const JUMP_SHARE_OF_RANGE: f64 = 0.01;
 
 /// A sample that stands alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,11 +33,27 @@ pub struct LoneSample {
     pub before: f64,
 }
 
+/// A step that no motion makes, to a place where the channel stays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Jump {
+    /// Number of the sample after it among the rows used, from 0.
+    pub row: u64,
+    /// The value before (SI).
+    pub before: f64,
+    /// The value after (SI).
+    pub after: f64,
+    /// The largest step that is no jump (SI).
+    pub largest_other: f64,
+}
+
 /// What was seen of one channel's steps.
 #[derive(Clone, Debug)]
 pub(super) struct JumpCheck {
     turn: Option<f64>,
     samples: u64,
+    /// Samples since the stamps had a gap.
+    since_gap: u64,
     last: [f64; 2],
     nearby: f64,
     low: f64,
@@ -39,6 +62,8 @@ pub(super) struct JumpCheck {
     alone: u64,
     worst: Option<LoneSample>,
     worst_by: f64,
+    /// The largest steps, largest first: size, row after it, values before and after.
+    largest: Vec<(f64, u64, [f64; 2])>,
 }
 
 impl JumpCheck {
@@ -47,6 +72,7 @@ impl JumpCheck {
         Self {
             turn,
             samples: 0,
+            since_gap: 0,
             last: [0.0; 2],
             nearby: 0.0,
             low: f64::INFINITY,
@@ -55,13 +81,19 @@ impl JumpCheck {
             alone: 0,
             worst: None,
             worst_by: 0.0,
+            largest: Vec::new(),
         }
+    }
+
+    /// The next sample comes after a gap of the stamps: what happened meanwhile is no jump.
+    pub(super) fn begin_piece(&mut self) {
+        self.since_gap = 0;
     }
 
     #[inline]
     pub(super) fn see(&mut self, value: f64) {
         let [before, middle] = self.last;
-        if self.samples >= 2 {
+        if self.since_gap >= 2 {
             let (to, from) = (middle - before, value - middle);
             let least = to.abs().min(from.abs());
             // A lone sample is known for one once its successor is back.
@@ -74,6 +106,7 @@ impl JumpCheck {
                 // As if it had not been there.
                 self.last = [before, value];
                 self.samples += 1;
+                self.since_gap += 1;
                 return;
             }
             if let Some(turn) = self.turn
@@ -83,12 +116,37 @@ impl JumpCheck {
                 self.wraps += 1;
             } else {
                 self.nearby = (MEMORY * self.nearby).max(to.abs());
+                self.keep(to.abs(), [before, middle]);
             }
             self.low = self.low.min(middle);
             self.high = self.high.max(middle);
         }
         self.last = [middle, value];
         self.samples += 1;
+        self.since_gap += 1;
+    }
+
+    #[inline]
+    fn keep(&mut self, size: f64, values: [f64; 2]) {
+        if self.largest.len() == LARGEST && self.largest[LARGEST - 1].0 >= size {
+            return;
+        }
+        let place = self.largest.partition_point(|kept| kept.0 >= size);
+        self.largest.insert(place, (size, self.samples - 1, values));
+        self.largest.truncate(LARGEST);
+    }
+
+    /// Steps far larger than all others, and the largest of them.
+    pub(super) fn jumps(&self) -> (u64, Option<Jump>) {
+        let range = self.high - self.low;
+        let is_apart = |pair: &[(f64, u64, [f64; 2])]| {
+            let [larger, smaller] = [pair[0].0, pair[1].0];
+            smaller > 0.0 && larger > TIMES_OTHERS * smaller && larger > JUMP_SHARE_OF_RANGE * range
+        };
+        let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == LARGEST);
+        let Some(last) = apart else { return (0, None) };
+        let (_, row, [before, after]) = self.largest[0];
+        (last as u64 + 1, Some(Jump { row, before, after, largest_other: self.largest[last + 1].0 }))
     }
 
     /// Steps of a whole turn.
@@ -127,6 +185,29 @@ mod tests {
         let one = seen(None, (0..2000).map(|i| if i == 1234 { 1e9 } else { clean(i) }));
         let (count, worst) = one.lone();
         assert_eq!((count, worst.map(|worst| (worst.row, worst.value))), (1, Some((1234, 1e9))));
+    }
+
+    #[test]
+    fn a_step_to_another_place_is_a_jump_and_one_over_a_gap_is_none() {
+        let angle = |i: usize| 1.5 * (i as f64 * 0.01).sin() + 1e-4 * noise(i);
+        assert_eq!(seen(None, (0..2000).map(angle)).jumps(), (0, None));
+        // Two hundred rows are missing.
+        let cut = |i: usize| angle(if i < 700 { i } else { i + 200 });
+        let (count, jump) = seen(None, (0..1500).map(cut)).jumps();
+        let jump = jump.unwrap();
+        assert_eq!((count, jump.row, jump.before, jump.after), (1, 700, angle(699), angle(900)));
+        let mut paused = JumpCheck::new(None);
+        (0..700).for_each(|i| paused.see(angle(i)));
+        paused.begin_piece();
+        (900..2000).for_each(|i| paused.see(angle(i)));
+        assert_eq!(paused.jumps(), (0, None));
+        // An encoder that stands still for a while.
+        let frozen = |i: usize| angle(if (700..900).contains(&i) { 700 } else { i });
+        assert_eq!(seen(None, (0..2000).map(frozen)).jumps().0, 1);
+        // Repeated samples, an encoder's counts, rest.
+        assert_eq!(seen(None, (0..2000).map(|i| angle(i / 6 * 6))).jumps().0, 0);
+        assert_eq!(seen(None, (0..2000).map(|i| (angle(i) / 0.01).round() * 0.01)).jumps().0, 0);
+        assert_eq!(seen(None, (0..2000).map(|i| angle(i.clamp(600, 1400)))).jumps().0, 0);
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub(crate) mod steps;
 
 pub use channels::ChannelReport;
 pub use comparison::DerivativeComparison;
-pub use jumps::LoneSample;
+pub use jumps::{Jump, LoneSample};
 pub use lag::{Lag, best_lag};
 
 use crate::cleaning::{Reason, SetAside};
@@ -132,6 +132,28 @@ pub struct ImportReport {
 }
 
 impl ImportReport {
+    /// The joints whose positions jump, and what to do about it.
+    fn position_jumps(&self) -> Option<(String, String)> {
+        let jumping = |channel: &ChannelReport| Some((channel.joint.clone(), channel.jumps, channel.worst_jump?));
+        let all: Vec<(String, u64, Jump)> = self.channels.iter().filter_map(jumping).collect();
+        let (_, most, worst) = all.iter().max_by(|a, b| {
+            let times = |jump: &Jump| (jump.after - jump.before).abs() / jump.largest_other;
+            times(&a.2).total_cmp(&times(&b.2))
+        })?;
+        let joints = all.iter().map(|(joint, ..)| &joint[..]).collect::<Vec<_>>().join(", ");
+        let cause = if all.iter().filter(|(.., jump)| jump.row == worst.row).count() > 1 {
+            "rows are missing there without a gap of the stamps, or the log is put together from pieces"
+        } else {
+            "the encoder stood still or lost counts, or rows are missing there"
+        };
+        let message = format!(
+            "jumps {most} times, the farthest from {:.6} to {:.6} at row {} of those used, where no other step is larger \
+             than {:.2e}: {cause}; read what lies before and after as logs of their own (`rows`)",
+            worst.before, worst.after, worst.row, worst.largest_other
+        );
+        Some((joints, message))
+    }
+
     /// Writes the findings that follow from the other fields.
     pub(crate) fn find(&mut self) {
         let mut findings = Vec::new();
@@ -243,6 +265,9 @@ impl ImportReport {
             {
                 add(Level::Info, &name, format!("quantised in steps of {step:.3e}"));
             }
+        }
+        if let Some((joints, message)) = self.position_jumps() {
+            add(Level::Problem, &format!("position {joints}"), message);
         }
         // Logged derivatives beside those of the position.
         for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {

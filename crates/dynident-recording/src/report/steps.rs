@@ -25,12 +25,15 @@ impl TimeCheck {
         Self { median_s, min: f64::INFINITY, max: f64::NEG_INFINITY, ..Self::default() }
     }
 
-    pub(crate) fn see(&mut self, row: u64, time_s: f64) {
+    /// Takes the next row; whether there is a gap before it.
+    pub(crate) fn see(&mut self, row: u64, time_s: f64) -> bool {
+        let mut is_gap = false;
         if let Some((before, last_s)) = self.last {
             let step = time_s - last_s;
             self.duplicates += u64::from(step == 0.0);
             self.backward += u64::from(step < 0.0);
-            if step > 3.0 * self.median_s {
+            is_gap = step > 3.0 * self.median_s;
+            if is_gap {
                 self.gap_count += 1;
                 if self.gaps.len() < LISTED_GAPS {
                     self.gaps.push(Gap { row: before, time_s: last_s, length_s: step });
@@ -45,6 +48,7 @@ impl TimeCheck {
             self.square += difference * (step - self.mean);
         }
         self.last = Some((row, time_s));
+        is_gap
     }
 
     pub(crate) fn steps(&self) -> Steps {

@@ -41,8 +41,8 @@ pub struct StudyCheck {
 pub struct CheckFinding {
     /// How much it matters.
     pub level: Level,
-    /// What kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `mounting`, `payload`, `description`,
-    /// `limits`, `samples`, `rows` or `log`.
+    /// What kind of mistake: `sign`, `order`, `offset`, `unit`, `coupling`, `lag`, `mounting`, `payload`,
+    /// `description`, `torque`, `limits`, `samples`, `rows` or `log`.
     pub kind: String,
     /// What, in a sentence that names joints.
     pub what: String,

@@ -1,6 +1,6 @@
 //! What speaks against loading a result's model into a robot.
 
-use super::{ResultFile, StudyCheck};
+use super::{CheckFinding, ResultFile, StudyCheck};
 use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
@@ -16,6 +16,8 @@ const MOST_LEFT_PERCENT: f64 = 60.0;
 /// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds
 /// has 6.
 const MOST_TIMES_OF_FIT: f64 = 4.0;
+/// The same where a joint's torque did not belong to one robot with the others before.
+const MOST_TIMES_OF_DOUBTED_FIT: f64 = 2.0;
 /// Percent of a held-out log's torque below which a model is good, however much better the fit may be.
 const GOOD_PERCENT: f64 = 1.0;
 /// A joint's torque that errors count against, as a share of the largest joint's: below it, friction alone is left.
@@ -57,6 +59,7 @@ impl ResultFile {
             worse_when_consistent(&format!("log `{}`", log.log), &free, &written)
         });
         problems.extend(tested);
+        problems.extend(self.stray_torques());
         problems.extend(self.validation.iter().filter_map(|log| self.overfit(log)));
         // On the rows that it was fitted to the estimate is the better by itself: only what is more than chance counts.
         let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
@@ -129,6 +132,31 @@ impl ResultFile {
 
     /// A held-out log that the written model explains far worse than the logs it was fitted to.
     fn overfit(&self, log: &LogValidation) -> Option<String> {
+        let times = self.times_of_fit(log)?;
+        if times <= MOST_TIMES_OF_FIT {
+            return None;
+        }
+        Some(format!(
+            "log `{}`: what the model leaves of the joints' torque is {times:.1} times what is left of the logs it was fitted to: the fit follows \
+             their noise, or the logs differ (payload, temperature, motion); record training logs for longer, with a motion that `design` makes",
+            log.log
+        ))
+    }
+
+    /// A torque that one robot explains badly beside the others, where a held-out log is explained badly as well:
+    /// either may have its reasons, both together are no model.
+    fn stray_torques(&self) -> impl Iterator<Item = String> + '_ {
+        let worst = self.validation.iter().filter_map(|log| self.times_of_fit(log)).fold(0.0, f64::max);
+        let findings = self.check.iter().flat_map(|check| &check.findings);
+        let is_doubted = |finding: &&CheckFinding| finding.kind == "torque" && finding.level == Level::Warning;
+        findings
+            .filter(move |finding| worst > MOST_TIMES_OF_DOUBTED_FIT && is_doubted(finding))
+            .map(CheckFinding::sentence)
+    }
+
+    /// Times what the fit leaves of the joints' torque that the written model leaves of a held-out log's; none where
+    /// that is little of it.
+    fn times_of_fit(&self, log: &LogValidation) -> Option<f64> {
         // In one band: where figures are for the motion's own, the fit's is at hand for the unconstrained estimate.
         let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
         let (fitted, held_out) = match &log.in_fit_band {
@@ -139,13 +167,7 @@ impl ResultFile {
         let squares: Vec<f64> = pairs.map(|(fitted, held)| (held.rmse_nm / fitted.rmse_nm).powi(2)).collect();
         let times = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
         let is_good = held_out.relative_error_percent.is_none_or(|percent| percent < GOOD_PERCENT);
-        (times > MOST_TIMES_OF_FIT && !is_good).then(|| {
-            format!(
-                "log `{}`: what the model leaves of the joints' torque is {times:.1} times what is left of the logs it was fitted to: the fit follows \
-                 their noise, or the logs differ (payload, temperature, motion); record training logs for longer, with a motion that `design` makes",
-                log.log
-            )
-        })
+        (!is_good).then_some(times)
     }
 }
 

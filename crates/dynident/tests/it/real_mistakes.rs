@@ -94,6 +94,18 @@ impl Real {
                 "sign",
                 "sign = ",
             ),
+            (
+                "gain of joint 2",
+                self.study(["", &format!("{sign}, scale = {}", self.only(1, "0.7", "1.0"))], [s, s], same),
+                "unit",
+                "scale = [1.0, ",
+            ),
+            (
+                "lag",
+                self.study(["", &sign], [s, s], ["[format]", "[motion]\ntorque_lag_s = -0.5\n\n[format]"]),
+                "lag",
+                "torque_lag_s = ",
+            ),
             ("time", self.study(["", &sign], [s, s], time), "unit", ""),
         ]
     }

@@ -60,6 +60,11 @@ impl<'a> StudyFormat<'a> {
                 groups.map(|torque| self.coupled(torque, (*joint, *with), *sign)).collect()
             }
             Mistake::TimeUnit { factor } => vec![self.time_unit(*factor)],
+            // The key is that of all logs, and positions have none.
+            Mistake::Lag { joints, channels: Channels::Torque, lag_s } if self.table == "format" => {
+                vec![self.lag(joints, *lag_s)]
+            }
+            Mistake::Lag { .. } => Vec::new(),
             Mistake::Gravity { gravity_m_s2 } => {
                 let line = format!("gravity_m_s2 = {}", list(&gravity_m_s2.map(|g| number(g, 4))));
                 let mut changes = vec![StudyChange { table: "robot".to_owned(), line }];
@@ -182,6 +187,19 @@ impl<'a> StudyFormat<'a> {
         let entry = |at: (usize, usize)| if at == (row, column) { value } else { f64::from(u8::from(at.0 == at.1)) };
         let rows = (0..dof).map(|r| list(&(0..dof).map(|c| format!("{:?}", entry((r, c)))).collect::<Vec<_>>()));
         StudyChange { table, line: format!("matrix = {}", list(&rows.collect::<Vec<_>>())) }
+    }
+
+    /// The whole lag of the torque, of all joints or of some.
+    fn lag(&self, joints: &[usize], lag_s: f64) -> StudyChange {
+        let dof = self.robot.model().dof();
+        let stated = self.study.motion.torque_lag_s.as_ref();
+        let lag = |joint: usize| if joints.contains(&joint) { lag_s } else { at(stated, joint, 0.0) };
+        let line = if joints.len() == dof {
+            format!("torque_lag_s = {}", number(lag_s, 3))
+        } else {
+            format!("torque_lag_s = {}", list(&(0..dof).map(|joint| number(lag(joint), 3)).collect::<Vec<_>>()))
+        };
+        StudyChange { table: "motion".to_owned(), line }
     }
 
     fn position_unit(&self, joints: &[usize], factor: f64) -> StudyChange {

@@ -6,9 +6,10 @@ use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
-    BeyondLimit, DescriptionFit, Diagnosis, HeldOutReading, Reading, SameColumn, UnseenLoad,
+    BeyondLimit, Channels, DescriptionFit, Diagnosis, HeldOutReading, Reading, SameColumn, StrayTorque, UnseenLoad,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
+use dynident_model::{Model, audit::audit};
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
 
@@ -70,23 +71,14 @@ pub(super) fn study_check(
     if let Some(unit) = bodies.filter(|_| is_stated && foreign.is_none() && !is_spoilt) {
         let far = unit.joints_in_another_unit();
         if !far.is_empty() {
-            let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], unit.scale[joint].unwrap_or(1.0)));
-            let factors: Vec<String> = factors.collect();
-            let mut found = finding(
-                "unit",
-                "the torque is not in Nm (N)".to_owned(),
-                format!(
-                    "by the description's bodies, friction aside, a unit of it is worth this many Nm (N): {}; for currents that is motor constant times gear ratio, \
-                     which the maker's data say better, or write `gains = \"unknown\"` under [estimator] and add a log with a known payload",
-                    factors.join(", ")
-                ),
-            );
-            found.write = format.as_ref().map(|format| format.torque_scale(&unit.scale)).into_iter().collect();
-            findings.push(found);
+            findings.push(torque_unit(unit, &far, robot.model(), (&joints, format.as_ref())));
         }
     }
     findings.extend(diagnosis.unseen_loads.iter().map(|load| unseen_load(study, robot, load)));
     findings.extend(diagnosis.held_out.iter().map(|reading| of_held_out_log((study, robot), reading, &joints)));
+    if findings.is_empty() {
+        findings.extend(diagnosis.stray_torques.iter().map(|torque| stray_torque(torque, &joints)));
+    }
     if findings.is_empty() && diagnosis.is_unexplained() {
         let left = &search.as_written.left;
         let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
@@ -109,6 +101,49 @@ pub(super) fn study_check(
         joints,
         tried: search.tried,
     }
+}
+
+/// Torques of another size than the description's bodies make: another unit of theirs, or of the masses.
+fn torque_unit(
+    fit: &DescriptionFit,
+    far: &[usize],
+    model: &Model,
+    (joints, format): (&[String], Option<&StudyFormat<'_>>),
+) -> CheckFinding {
+    let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
+    let factors = factors.collect::<Vec<_>>().join(", ");
+    let common = fit.common_unit();
+    // Where the description is absurd by itself it is not the torques' unit.
+    let absurd = audit(model).into_iter().find(|found| ["mass-absurd", "length-unit"].contains(&found.check));
+    if let Some(absurd) = absurd {
+        return finding(
+            "description",
+            format!("the description is in other units: {} {}", absurd.place, absurd.message),
+            format!(
+                "its bodies would need other torques than the log has, times {factors}: `dynident inspect` says more; where the \
+                 description is right the torque is not in Nm (N)"
+            ),
+        );
+    }
+    let mut found = finding(
+        "unit",
+        common.map_or_else(|| "the torque is not in Nm (N)".to_owned(), |(name, _)| format!("the torque is in {name}")),
+        format!(
+            "by the description's bodies, friction aside, a unit of it is worth this many Nm (N): {factors}; for currents that is \
+             motor constant times gear ratio, which the maker's data say better, or write `gains = \"unknown\"` under [estimator] and \
+             add a log with a known payload"
+        ),
+    );
+    let of_joints = |scale: &[Option<f64>]| format.map(|format| format.torque_scale(scale));
+    match common {
+        Some((_, unit)) => {
+            found.write.extend(of_joints(&vec![Some(unit); joints.len()]));
+            let other = of_joints(&fit.scale).map(|change| format!("currents ({} {})", change.place(), change.line));
+            found.or.extend(other);
+        }
+        None => found.write.extend(of_joints(&fit.scale)),
+    }
+    found
 }
 
 /// What the study alone says of units.
@@ -138,9 +173,15 @@ pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSet
 fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding> {
     let same = |same: &SameColumn| {
         let [a, b] = same.joints.map(|joint| &joints[joint]);
+        let what = match same.channels {
+            Channels::Both => format!("the position of joint `{a}` and the torque of joint `{b}` are"),
+            Channels::Position | Channels::Torque => {
+                format!("{} of joints `{a}` and `{b}` is", channels_text(same.channels))
+            }
+        };
         finding(
             "order",
-            format!("{} of joints `{a}` and `{b}` is one and the same column", channels_text(same.channels)),
+            format!("{what} one and the same column"),
             "sample by sample one is a multiple of the other, and no robot explains both: compare `columns` with the log's header".to_owned(),
         )
     };
@@ -184,6 +225,35 @@ fn another_robot(fit: &DescriptionFit, joints: &[String]) -> CheckFinding {
              compare `file` under [robot] with the robot; where nobody knows a body, leave its <inertial> element out"
         ),
     )
+}
+
+/// A torque that the robot which explains the others does not explain.
+fn stray_torque(torque: &StrayTorque, joints: &[String]) -> CheckFinding {
+    let name = &joints[torque.joint];
+    if torque.is_motionless() {
+        return finding(
+            "torque",
+            format!("the torque of joint `{name}` has nothing to do with its motion"),
+            format!(
+                "parameters of its own leave {:.0} % of it, and where the other joints' bodies should be felt it says nothing: \
+                 compare `columns` under torque with the log's header, and whether the channel lives",
+                100.0 * torque.alone
+            ),
+        );
+    }
+    let found = finding(
+        "torque",
+        format!("the torque of joint `{name}` does not belong to one robot with that of the others"),
+        format!(
+            "one robot for all joints leaves {:.1} % of it, parameters of its own {:.1} %: {:.1} times as much, where logs that fit \
+             together have at most 1.8; compare whether all its columns are of one clock and one run, its gain, and the \
+             lengths and axes of the description",
+            100.0 * torque.left,
+            100.0 * torque.alone,
+            torque.left / torque.alone.max(f64::MIN_POSITIVE)
+        ),
+    );
+    CheckFinding { level: if torque.is_foreign() { Level::Problem } else { Level::Warning }, ..found }
 }
 
 fn behind_limit(beyond: &BeyondLimit, joints: &[String]) -> CheckFinding {

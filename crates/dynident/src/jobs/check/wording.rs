@@ -5,6 +5,9 @@ use core::f64::consts::PI;
 use core::fmt::Write;
 use dynident_identification::diagnosis::{Channels, Mistake, Reading};
 
+/// Factors that are no unit's.
+const GAINS: core::ops::RangeInclusive<f64> = 0.4..=2.5;
+
 /// The kind of finding that a mistake is.
 pub(super) fn kind(mistake: &Mistake) -> &'static str {
     match mistake {
@@ -13,6 +16,7 @@ pub(super) fn kind(mistake: &Mistake) -> &'static str {
         Mistake::Offset { .. } => "offset",
         Mistake::PositionUnit { .. } | Mistake::TorqueUnit { .. } | Mistake::TimeUnit { .. } => "unit",
         Mistake::Coupled { .. } => "coupling",
+        Mistake::Lag { .. } => "lag",
         Mistake::Gravity { .. } => "mounting",
     }
 }
@@ -70,6 +74,11 @@ pub(super) fn sentence(mistake: &Mistake, joints: &[String]) -> String {
             "the position of {} is in another unit than the others, or of the motor side: times {factor:.6} it is rad (m)",
             of_joints(which, joints)
         ),
+        Mistake::TorqueUnit { joint, factor } if GAINS.contains(factor) => format!(
+            "the torque of joint `{}` has another gain (motor constant, gear ratio) than the study says: times {factor:.3} it is \
+             Nm (N)",
+            joints[*joint]
+        ),
         Mistake::TorqueUnit { joint, factor } => format!(
             "the torque of joint `{}` is in another unit than the others, or of the motor side: times {factor:.3} it is Nm (N)",
             joints[*joint]
@@ -90,6 +99,14 @@ pub(super) fn sentence(mistake: &Mistake, joints: &[String]) -> String {
         Mistake::TimeUnit { factor } => {
             format!("the recorder had another rate: times {factor:.3} the stamps are seconds")
         }
+        Mistake::Lag { joints: which, channels, lag_s } => format!(
+            "{} of {} is logged {:.3} s {} than {}: two clocks, or a buffer",
+            channels_text(*channels),
+            of_joints(which, joints),
+            lag_s.abs(),
+            if *lag_s > 0.0 { "later" } else { "earlier" },
+            if *channels == Channels::Torque { "the motion" } else { "all else" }
+        ),
         Mistake::Gravity { gravity_m_s2: [0.0, 0.0, 0.0] } => {
             "the torque is without gravity: the controller took it off, or nothing pulls at this robot".to_owned()
         }
@@ -110,7 +127,9 @@ pub(super) fn alternative(mistake: &Mistake, joints: &[String], format: Option<&
 pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
     let gain = |joint: &usize| (before.left[*joint].max(1e-6) / after.left[*joint].max(1e-6)).ln();
     let named: Vec<usize> = match mistake {
-        Mistake::Sign { joints, .. } | Mistake::PositionUnit { joints, .. } => joints.clone(),
+        Mistake::Sign { joints, .. } | Mistake::PositionUnit { joints, .. } | Mistake::Lag { joints, .. } => {
+            joints.clone()
+        }
         Mistake::Offset { joint, .. } | Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. } => {
             vec![*joint]
         }

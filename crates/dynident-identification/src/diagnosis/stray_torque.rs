@@ -1,0 +1,52 @@
+//! Torques that do not belong to one robot and motion with the others: noise, another channel, a clock or a gain of
+//! their own that no reading mends.
+
+use super::reading::Reading;
+
+/// Times what parameters of the joint's own leave of its torque that one robot for all joints leaves, from which the
+/// torque is doubted, and from which it is not this robot's. Of seven sets of real logs the most is 1.8.
+const DOUBTED: f64 = 2.1;
+const FOREIGN: f64 = 2.6;
+/// Share of a joint's torque that counts as nothing.
+const LITTLE: f64 = 0.03;
+/// Share of a joint's torque that even parameters of its own leave where it has nothing to do with the motion, and that
+/// one robot leaves: more than all of it, for the other joints say what it should be.
+const MOTIONLESS: [f64; 2] = [0.75, 1.0];
+
+/// A joint's torque that the robot which explains the others does not explain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StrayTorque {
+    /// The joint's number.
+    pub joint: usize,
+    /// Share of its torque that one set of base parameters for all joints leaves.
+    pub left: f64,
+    /// The same by parameters of its own.
+    pub alone: f64,
+}
+
+impl StrayTorque {
+    /// Whether it has nothing to do with how the robot moves.
+    pub fn is_motionless(&self) -> bool {
+        let [alone, left] = MOTIONLESS;
+        self.alone > alone && self.left > left
+    }
+
+    /// Whether one robot leaves so much more of it than parameters of its own that it is not this robot's.
+    pub fn is_foreign(&self) -> bool {
+        self.left > FOREIGN * self.alone
+    }
+}
+
+/// The torques of a reading that do not belong to one robot with the others: those that have nothing to do with the
+/// motion, else the one of which one robot leaves most beside its own parameters, for it spoils its neighbours'.
+pub(super) fn stray_torques(reading: &Reading) -> Vec<StrayTorque> {
+    let of = |joint: usize| StrayTorque { joint, left: reading.free[joint], alone: reading.alone[joint] };
+    let all: Vec<StrayTorque> = (0..reading.free.len()).map(of).collect();
+    let motionless: Vec<StrayTorque> = all.iter().filter(|torque| torque.is_motionless()).copied().collect();
+    if !motionless.is_empty() {
+        return motionless;
+    }
+    let times = |torque: &StrayTorque| torque.left / torque.alone.max(f64::MIN_POSITIVE);
+    let is_stray = |torque: &StrayTorque| torque.left > LITTLE && times(torque) > DOUBTED;
+    all.into_iter().filter(is_stray).max_by(|a, b| times(a).total_cmp(&times(b))).into_iter().collect()
+}
