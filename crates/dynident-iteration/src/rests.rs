@@ -136,11 +136,11 @@ mod tests {
 
     #[test]
     fn what_is_near_rest_is_left_as_wide_as_smoothing_reaches() {
-        // From 1 to -1 rad/s in 100 steps: within a tenth from sample 45 to 55, and half a period of ten more.
+        // From 1 to -1 rad/s in 100 steps: within 0.11 from sample 45 to 55, and half a period of ten more.
         let dq: Vec<f64> = (0..=100).map(|k| 1.0 - f64::from(k) / 50.0).collect();
         let margin = |speed_share, smoothing_periods| RestMargin { speed_share, smoothing_periods };
-        assert_eq!(margin(0.1, 0.5).samples(&dq, 10), [40..61]);
-        assert_eq!(margin(0.1, 0.0).samples(&dq, 10), [45..56]);
+        assert_eq!(margin(0.11, 0.5).samples(&dq, 10), [40..61]);
+        assert_eq!(margin(0.11, 0.0).samples(&dq, 10), [45..56]);
         assert_eq!(RestMargin::REST.samples(&dq, 10), rests(&dq, 10));
         // A joint that turns between two samples is at rest in between, however fast it is at both.
         let turned: Vec<f64> = (0..20).map(|k| if k < 10 { 1.0 } else { -1.0 }).collect();

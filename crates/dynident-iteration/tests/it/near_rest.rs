@@ -12,9 +12,12 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 
 const DRY: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
+/// A step that smoothing at 6 Hz does not blur.
+const WIDE: CoulombShape = CoulombShape::Smooth { width: 0.5 };
+
 /// A run under gains that friction holds back: 3 and 2 Nm at rest that fall to 1.5 and 1 once a joint moves.
 fn record(seed: u64, smooth: bool) -> Record {
-    let shape = if smooth { CoulombShape::Smooth { width: 0.1 } } else { DRY };
+    let shape = if smooth { WIDE } else { DRY };
     let mut terms = Vec::new();
     for joint in 0..2 {
         terms.push(TorqueTerm::Viscous(Viscous { joint }));
@@ -39,7 +42,7 @@ fn record(seed: u64, smooth: bool) -> Record {
 
 /// What such a run says, of a robot that is described with viscous and dry friction.
 fn identified(record: &Record, smooth: bool, set_aside_near_rest: bool) -> (ParametricModel, RunEstimate) {
-    let shape = if smooth { CoulombShape::Smooth { width: 0.1 } } else { DRY };
+    let shape = if smooth { WIDE } else { DRY };
     let robot = ParametricModel::new(arm(1.0, 1.0), friction(shape)).unwrap();
     let task = IterationTask::new(robot.clone(), reference()).unwrap();
     let settings = RunIdentificationSettings { set_aside_near_rest, ..settings().identification };
@@ -69,13 +72,14 @@ fn bars_hold_where_joints_stick_and_break_loose() {
     assert!(with > 2.0 && without < 1.5, "{with} with rows near rest, {without} without");
 }
 
-/// What was set aside is said, with what friction leaves there: no more than the friction that holds the joint.
+/// What was set aside is said, at most half of a run, with what friction leaves there: no more than the friction that
+/// holds the joint.
 #[test]
 fn what_is_set_aside_near_rest_is_said() {
     let (_, found) = identified(&record(1, false), false, true);
     assert_eq!(found.near_rest.len(), 2, "{:?}", found.near_rest);
     for near_rest in found.near_rest.iter().flatten() {
-        assert!(near_rest.margin != RestMargin::REST && (0.02..0.3).contains(&near_rest.share), "{near_rest:?}");
+        assert!(near_rest.margin != RestMargin::REST && (0.02..0.5).contains(&near_rest.share), "{near_rest:?}");
         assert!(near_rest.residual_nm < near_rest.dry_friction_nm, "{near_rest:?}");
     }
     assert!(found.near_rest.iter().any(Option::is_some));
