@@ -57,8 +57,8 @@ pub struct RunEstimate {
     /// The differentiator that the run chose; none where it was stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differentiator: Option<DifferentiatorChoice>,
-    /// The joints with dry friction whose torque near rest does not count, joint by joint: where rows near rest made the
-    /// fit leave more of it. Empty where they did at none, and of runs together, each of which has its own.
+    /// The joints with dry friction whose torque near rest does not count, joint by joint: where rows near rest made
+    /// the fit leave more of it. Empty where they did at none, and of runs together, each of which has its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub near_rest: Vec<Option<NearRest>>,
     /// Where runs that were fitted together have constant torques of their own: by how much each deviates from the
