@@ -31,8 +31,8 @@ const MARGINS: [RestMargin; 4] = [
 /// from rest, would know nothing of the friction that its controller has to overcome there.
 const LEAST_LEFT: f64 = 0.5;
 
-/// Residuals larger by this factor are larger: most rows are in both fits, so that chance moves their ratio by some
-/// tenths of a percent for each number that is fitted.
+/// Residuals larger by this factor are larger. Chance moves the ratio by some percent where a third of some hundred
+/// rows is left out: then rows are lost and bars widen, no more.
 const LARGER: f64 = 1.05;
 
 /// A joint whose torque near rest does not count, and what was left of it there.
