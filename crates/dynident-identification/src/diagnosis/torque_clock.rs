@@ -27,7 +27,7 @@ const DOUBTFUL: f64 = 1.5;
 const EXPLAINED: f64 = 0.02;
 
 /// Instants for each column of a joint below which shifts are not compared: parameters would follow them.
-const ROWS_PER_COLUMN: usize = 3;
+const ROWS_PER_COLUMN: usize = 2;
 
 /// A reading with a channel at another moment.
 pub(super) struct LateReading {
