@@ -9,8 +9,9 @@ use dynident_recording::filter::CutoffChoice;
 use dynident_recording::{FilterError, MotionSettings};
 use std::sync::{Arc, OnceLock};
 
-/// Longest lag that can be stated, seconds of a usual arm.
-const LONGEST_STATED_LAG_S: f64 = 0.5;
+/// Longest lag that can be stated, seconds of a usual arm: two recorders that were started by hand, and no milliseconds
+/// that are taken for seconds.
+const LONGEST_STATED_LAG_S: f64 = 2.5;
 
 /// Rows of a log that is not counted before it is needed.
 const LONG_LOG_ROWS: u64 = 200_000;
@@ -72,7 +73,7 @@ impl<'a> Logs<'a> {
         let stated = settings.torque_lag_s.as_ref();
         let mut stated = (0..model.dof()).filter_map(|joint| stated.and_then(|lags| lags.at(joint)));
         if let Some(value) = stated.find(|lag_s| lag_s.abs() > longest_s) {
-            let fix = "give seconds, at most half an own second of the robot (0.5 s of an arm of 1.2 m)";
+            let fix = "give seconds, at most two and a half own seconds of the robot (2.5 s of an arm of 1.2 m)";
             let source = FilterError::Setting { name: "torque_lag_s", value, fix };
             let log = recordings.first().map_or("", |recording| &recording.name);
             return Err(LogError::recording(log, source.into()));

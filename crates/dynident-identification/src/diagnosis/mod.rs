@@ -65,6 +65,9 @@ const MOSTLY_NOISE: f64 = 0.5;
 /// Parts of the cut-off that are tried then, where it was left to the data.
 const SLOWER: [f64; 2] = [0.5, 0.25];
 
+/// Times what the best reading in time leaves of all torque that a channel of another moment has to leave.
+const LEAVES_LESS: f64 = 0.8;
+
 /// What was found about study, robot and logs.
 #[derive(Clone, Debug)]
 pub struct Diagnosis {
@@ -176,16 +179,19 @@ fn diagnosed(
     let shifted = clock.and_then(|clock| clock.reading(robot, &as_read, &consistency, INSTANTS));
     let (mut search, further) = match shifted {
         // A fit takes it off by itself.
-        Some(late) if late.0.mistakes.is_empty() => {
-            rows.clone_from(&late.0.rows);
-            searches(&late.1.clone(), late)
+        Some(late) if late.corrected.mistakes.is_empty() => {
+            rows.clone_from(&late.corrected.rows);
+            searches(&late.reading.clone(), (late.corrected, late.reading))
         }
         Some(late) => {
             let in_time = searches(&as_read, (as_written, as_read.clone()));
-            let is_later = late.1.score() < in_time.1.believed().score() - CLEARLY_BETTER;
-            if is_later {
-                rows.clone_from(&late.0.rows);
-                searches(&as_read, late)
+            // Half a turn of a motion that repeats looks like another sign: the lag has to explain clearly more.
+            let believed = in_time.1.believed();
+            let gain = as_read.score() - believed.score();
+            let leaves_less = late.reading.left_of_all < LEAVES_LESS * believed.left_of_all;
+            if leaves_less && late.gain > gain + CLEARLY_BETTER {
+                rows.clone_from(&late.corrected.rows);
+                searches(&as_read, (late.corrected, late.reading))
             } else {
                 in_time
             }

@@ -228,8 +228,13 @@ fn refined(
     consistency: &ConsistencySettings,
 ) -> Option<(Corrected, Reading)> {
     // By the fit without physical limits: smooth, and cheap.
+    // Of a torque's gain the description's masses say as much as these err.
+    let value = |reading: &Reading, mistake: &Mistake| match mistake {
+        Mistake::TorqueUnit { .. } => reading.free_score,
+        _ => reading.lower_bound(),
+    };
     let free =
-        |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| reading.lower_bound());
+        |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| value(&reading, mistake));
     let mistake = between_those_tried(first.1.mistakes.last()?, free)?;
     let corrected = at.without(&mistake);
     let reading = corrected.reading(Some(consistency)).ok()?;
@@ -243,8 +248,12 @@ fn refined(
         Some(Mistake::Offset { offset_rad, .. }) => (offset_rad / FRAC_PI_2).fract() == 0.0,
         _ => true,
     };
-    let worth = if is_round { WORTH_REFINING } else { 0.0 };
-    (reading.score() < first.1.score() - worth).then_some((corrected, reading))
+    let is_better = if is_round {
+        reading.score() < first.1.score() - WORTH_REFINING
+    } else {
+        value(&reading, &mistake) < value(&first.1, &mistake)
+    };
+    is_better.then_some((corrected, reading))
 }
 
 /// The mistake of the same kind whose number has the least `value`, near the one of `mistake`; `None` where it has no

@@ -19,12 +19,23 @@ const REACH_ALONE_S: f64 = 0.5;
 /// Share of a piece of motion that instants keep away from its ends for that: torque is known on both sides of them.
 const SHARE_OF_PIECE: f64 = 1.0 / 6.0;
 /// Instants that shifts are compared on.
-const INSTANTS: usize = 150;
+const INSTANTS: usize = 200;
 /// Times what parameters of its own leave of a joint's torque that one robot leaves, from which its torque is shifted
 /// by itself.
 const DOUBTFUL: f64 = 1.5;
 /// Share of all torque below which nothing is left that a shift would explain.
 const EXPLAINED: f64 = 0.02;
+
+/// Instants for each column of a joint below which shifts are not compared: parameters would follow them.
+const ROWS_PER_COLUMN: usize = 2;
+
+/// A reading with a channel at another moment.
+pub(super) struct LateReading {
+    pub(super) corrected: Corrected,
+    pub(super) reading: Reading,
+    /// By how much it scores better than the channel as it was logged, on the same instants.
+    pub(super) gain: f64,
+}
 
 /// Shifts of the torque that are looked for in some recordings.
 pub(super) struct TorqueClock<'a> {
@@ -92,13 +103,18 @@ impl<'a> TorqueClock<'a> {
         as_written: &Reading,
         consistency: &ConsistencySettings,
         instants: usize,
-    ) -> Option<(Corrected, Reading)> {
+    ) -> Option<LateReading> {
         if as_written.left_of_all < EXPLAINED {
             return None;
         }
         let dof = robot.dof();
         let all: Vec<usize> = (0..dof).collect();
-        let here = Explanation::new(robot, &self.rows((&all, Channels::Torque), 0.0, INSTANTS), None).ok()?;
+        let rows = self.rows((&all, Channels::Torque), 0.0, INSTANTS);
+        let most_columns = all.iter().map(|&joint| robot.layout().joint_columns(joint).len()).max()?;
+        if rows.len() < ROWS_PER_COLUMN * most_columns {
+            return None;
+        }
+        let here = Explanation::new(robot, &rows, None).ok()?;
         let alone = here.alone_of_noise_free();
         let mut groups = vec![(all.clone(), Channels::Torque)];
         if (0..dof).any(|joint| here.free[joint] > DOUBTFUL * alone[joint]) {
@@ -137,6 +153,7 @@ impl<'a> TorqueClock<'a> {
         let (_, unshifted) = read(0.0, Vec::new())?;
         let is_better =
             reading.score() < unshifted.score() - CLEARLY_BETTER && reading.left_of_all < unshifted.left_of_all;
-        is_better.then_some((corrected, reading))
+        let gain = unshifted.score() - reading.score();
+        is_better.then_some(LateReading { corrected, reading, gain })
     }
 }
