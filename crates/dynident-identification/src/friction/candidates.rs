@@ -299,6 +299,7 @@ mod tests {
     /// Without rows near rest: one step, as wide as stated, and no friction that is told by them alone.
     #[test]
     fn what_rows_near_rest_alone_show_is_no_candidate_without_them() {
+        use FrictionKind::{AsymmetricCoulomb, AsymmetricViscous, Coulomb, Load, Quadratic, Viscous};
         let scale = JointScale::usual(0);
         let kinds = |search: &FrictionSearch| -> Vec<FrictionKind> {
             let mut kinds: Vec<_> = candidate_columns(search, scale, None).iter().map(|column| column.kind).collect();
@@ -310,7 +311,6 @@ mod tests {
         let coulomb = Some(CoulombShape::Smooth { width: 0.03 });
         let far = FrictionSearch { rows_near_rest: false, coulomb, ..all.clone() };
         assert_eq!(kinds(&all).len(), 10);
-        use FrictionKind::{AsymmetricCoulomb, AsymmetricViscous, Coulomb, Load, Quadratic, Viscous};
         assert_eq!(kinds(&far), [Viscous, AsymmetricViscous, Coulomb, AsymmetricCoulomb, Quadratic, Load]);
         // The one step is a choice of its own, though it has no neighbour on a grid.
         let columns = candidate_columns(&far, scale, None);

@@ -24,8 +24,8 @@ pub struct MotionSettings {
     /// [`SetAside`](crate::SetAside).
     pub keep_outliers: bool,
     /// Seconds by which torque comes after its motion, one for all joints or one for each; it is taken at the time of
-    /// the motion that it belongs to. Negative where it comes before; `identify` allows two and a half own seconds of the
-    /// robot (2.5 s of an arm of 1.2 m). Left out, it is taken as logged: then `identify` estimates it.
+    /// the motion that it belongs to. Negative where it comes before; `identify` allows two and a half own seconds of
+    /// the robot (2.5 s of an arm of 1.2 m). Left out, it is taken as logged: then `identify` estimates it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_lag_s: Option<OneOrMany<f64>>,
 }
