@@ -3,7 +3,6 @@
 use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::FrictionSearch;
-use crate::lag::LagCandidates;
 use crate::log_noise::LogNoise;
 use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
@@ -33,6 +32,17 @@ pub enum GainChoice {
     Stated,
     /// The logs: joint by joint one gain, from logs without and with a payload that is known.
     Unknown,
+}
+
+/// Which lags may be taken off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LagCandidates {
+    /// One for all joints, or joints with one of their own where the rows say so.
+    #[default]
+    CommonOrJoints,
+    /// One for all joints: of runs under one controller friction leaves a lag of its own at each joint, and not the
+    /// same in every run.
+    Common,
 }
 
 /// Whether other readings of the logs are tried: see [`diagnosis`](crate::diagnosis).

@@ -78,21 +78,11 @@ pub(super) fn held_out_reading(
     let mut readings: Vec<(Mistake, f64)> =
         all.par_iter().map(|mistake| (mistake.clone(), read(mistake).score + mistake.rarity())).collect();
     readings.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let joints: Vec<usize> = (0..robot.dof()).collect();
-    let late = |clock: &TorqueClock<'_>, lag_s: f64| {
-        residual(robot, &clock.rows((&joints, Channels::Torque), lag_s, INSTANTS), theta, trained)
-    };
-    if let Some((lag_s, clock)) = clock.and_then(|clock| {
-        let tried: Vec<f64> = clock.lags_s().collect();
-        let scores: Vec<f64> = tried.par_iter().map(|&lag_s| late(clock, lag_s).score).collect();
-        let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
-        Some((clock.least_near(tried[best], |lag_s| late(clock, lag_s).score), clock))
-    }) {
-        let without = late(clock, lag_s);
-        let mistake = clock.mistake((&joints, Channels::Torque), lag_s);
-        let least = readings.first().map_or(f64::INFINITY, |first| first.1);
-        let score = mistake.as_ref().map_or(f64::INFINITY, |mistake| without.score + mistake.rarity());
-        if let Some(mistake) = mistake.filter(|_| score < least && explains((score, &without), &as_written)) {
+    let least = readings.first().map_or(f64::INFINITY, |first| first.1);
+    let late = clock.and_then(|clock| late_reading((robot, clock), theta, trained));
+    if let Some((mistake, without)) = late {
+        let score = without.score + mistake.rarity();
+        if score < least && explains((score, &without), &as_written) {
             let alike = readings.iter().filter(|other| other.1 < score + ALIKE).map(|other| other.0.clone()).collect();
             let (left_as_written, left_without) = (as_written.rms, without.rms);
             return Some(HeldOutReading { log, mistake, alike, left_as_written, left_without });
@@ -112,6 +102,23 @@ pub(super) fn held_out_reading(
     };
     let (left_as_written, left_without) = (as_written.rms, without.rms);
     Some(HeldOutReading { log, mistake, alike, left_as_written, left_without })
+}
+
+/// The log with the torque of all joints at the moment that the parameters explain best; none where that is a lag that
+/// a fit takes off by itself.
+fn late_reading(
+    (robot, clock): (&ParametricModel, &TorqueClock<'_>),
+    theta: &[f64],
+    trained: &[f64],
+) -> Option<(Mistake, Residual)> {
+    let joints: Vec<usize> = (0..robot.dof()).collect();
+    let channels = (&joints[..], Channels::Torque);
+    let read = |lag_s: f64| residual(robot, &clock.rows(channels, lag_s, INSTANTS), theta, trained);
+    let tried: Vec<f64> = clock.lags_s().collect();
+    let scores: Vec<f64> = tried.par_iter().map(|&lag_s| read(lag_s).score).collect();
+    let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
+    let lag_s = clock.least_near(tried[best], |lag_s| read(lag_s).score);
+    Some((clock.mistake(channels, lag_s)?, read(lag_s)))
 }
 
 /// Whether a reading goes half of the way to what the training logs leave, or explains every joint that was not: else

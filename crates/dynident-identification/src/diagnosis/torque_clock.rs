@@ -90,7 +90,8 @@ impl<'a> TorqueClock<'a> {
             Channels::Position | Channels::Both => 0.0,
         };
         let whole_s = taken_off_s / joints.len().max(1) as f64 + lag_s;
-        let is_long = whole_s.abs() > self.least_s || lag_s.abs() > self.least_s;
+        // Of positions a fit takes nothing off.
+        let is_long = channels == Channels::Position || whole_s.abs() > self.least_s || lag_s.abs() > self.least_s;
         is_long.then(|| Mistake::Lag { joints: joints.to_vec(), channels, lag_s: whole_s })
     }
 

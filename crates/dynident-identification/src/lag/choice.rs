@@ -10,6 +10,7 @@
 
 use super::fit::LagFit;
 use super::measured::TorqueLag;
+use crate::settings::LagCandidates;
 use dynident_estimation::Estimate;
 use dynident_recording::log::OneOrMany;
 use nalgebra::{DMatrix, DVector};
@@ -42,17 +43,6 @@ pub enum LagKind {
     Joints,
     /// The study states it.
     Stated,
-}
-
-/// Which lags may be taken off.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LagCandidates {
-    /// One for all joints, or joints with one of their own where the rows say so.
-    #[default]
-    CommonOrJoints,
-    /// One for all joints: of runs under one controller friction leaves a lag of its own at each joint, and not the
-    /// same in every run.
-    Common,
 }
 
 /// What was taken off the rows, and how well the rest is known.

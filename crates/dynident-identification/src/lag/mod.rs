@@ -10,7 +10,8 @@ mod rows;
 mod samples;
 mod unknowns;
 
-pub use choice::{LagCandidates, LagChoice, LagKind};
+pub use crate::settings::LagCandidates;
+pub use choice::{LagChoice, LagKind};
 pub use fit::LagFit;
 pub use measured::{TorqueLag, delay_findings, pooled_delay};
 pub use pass::{lag_fit, lags_of_recordings};

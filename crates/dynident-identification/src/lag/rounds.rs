@@ -1,7 +1,8 @@
 //! Fitting again without the lag that the rows show.
 
-use super::choice::{LagCandidates, LagChoice, LagKind, choose_lag, with_lag_error};
+use super::choice::{LagChoice, LagKind, choose_lag, with_lag_error};
 use super::fit::LagFit;
+use crate::settings::LagCandidates;
 use dynident_estimation::Estimate;
 use dynident_recording::log::OneOrMany;
 

@@ -74,8 +74,11 @@ pub(super) fn study_check(
             findings.push(torque_unit(unit, &far, robot.model(), (&joints, format.as_ref())));
         }
     }
-    findings.extend(diagnosis.unseen_loads.iter().map(|load| unseen_load(study, robot, load)));
-    findings.extend(diagnosis.held_out.iter().map(|reading| of_held_out_log((study, robot), reading, &joints)));
+    // The runs of an iteration are no logs of its study: whether the held-out ones are predicted is judged there.
+    let loads = diagnosis.unseen_loads.iter().filter(|load| load.log < study.log.len());
+    findings.extend(loads.map(|load| unseen_load(study, robot, load)));
+    let held_out = diagnosis.held_out.iter().filter(|reading| reading.log < study.log.len());
+    findings.extend(held_out.map(|reading| of_held_out_log((study, robot), reading, &joints)));
     if findings.is_empty() {
         findings.extend(diagnosis.stray_torques.iter().map(|torque| stray_torque(torque, &joints)));
     }
