@@ -1,10 +1,10 @@
-//! The identification of one run, and of several together.
+//! What runs say about the base parameters: the identification of several together.
 
-use crate::differentiator_choice::{DifferentiatorChoice, choose_differentiator};
+use crate::differentiator_choice::DifferentiatorChoice;
 use crate::error::IterationError;
 use crate::leg::IterationTask;
 use crate::model_parameters::ModelParameters;
-use crate::near_rest::{NearRest, without_near_rest};
+use crate::near_rest::NearRest;
 use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::run_offsets::{RunOffset, choices, deviations, seen};
@@ -20,7 +20,6 @@ use dynident_identification::{
     Execution, IdentificationSettings, Logs, OffsetChoice, Recording, Training, choose_friction, consistent_stage,
     schwarz, training_rows,
 };
-use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 
 /// What a run says about the base parameters.
@@ -94,34 +93,13 @@ impl RunEstimate {
     }
 }
 
-/// Base parameters from the records of one run, one record for each leg of the task: the same identification as of any
-/// log ([`dynident_identification`]), on records in memory. Rows count within the windows; joints without rows are left
-/// out; known columns are held. The differentiator is chosen where the settings leave it to the run, and rows near rest
-/// count where friction explains them ([`NearRest`]).
-///
-/// # Errors
-/// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate.
-/// That there is no consistent set is part of the result.
-pub fn identify_run(
-    task: &IterationTask,
-    records: &[Record],
-    settings: &RunIdentificationSettings,
-) -> Result<RunEstimate, IterationError> {
-    if !settings.choose_differentiator {
-        return without_near_rest(task, records, settings);
-    }
-    let choice = choose_differentiator(task, records, settings)?;
-    let found = without_near_rest(task, records, &settings.with_differentiator(&choice.taken))?;
-    Ok(RunEstimate { differentiator: Some(choice), ..found })
-}
-
-/// As [`identify_run`] from several runs together, each weighted by its own noise joint by joint
+/// As [`identify_run`](crate::identify_run) from several runs together, each weighted by its own noise joint by joint
 /// ([`LogNoise::Own`](dynident_identification::LogNoise::Own)): bars narrow with every run, and a run that followed its
 /// trajectory badly counts for what it tells. Residuals are those of the last run. Delays are those of all runs.
 /// Where one has a constant torque that the others have not, each gets its own ([`RunOffsets`](super::RunOffsets)).
 ///
 /// # Errors
-/// As [`identify_run`].
+/// As [`identify_run`](crate::identify_run).
 pub fn identify_runs(
     task: &IterationTask,
     runs: &[RunLog<'_>],

@@ -1,39 +1,7 @@
-//! How far from rest the torque of a run's joints has to be to count, by what the fit leaves.
-//!
-//! Near rest a joint with dry friction sticks, breaks loose and jumps. Its smoothed motion does neither, and the
-//! difference comes back with the same sign in every run, so that more rows narrow the bars and not the error: drive
-//! inertias take it up, and it looks like a lag of its own at each joint. Where that is so the rows near rest have
-//! residuals that those far from it have not. So a run is fitted once with them and once without, and a joint of which
-//! they make the fit leave more goes without.
+//! A joint whose torque near rest does not count in a run, and what was left of it there.
 
-use crate::error::IterationError;
-use crate::estimate::{RunEstimate, identify_runs};
-use crate::leg::IterationTask;
-use crate::rests::{RestMargin, has_dry_friction};
-use crate::run_logs::{RunLog, recordings};
-use crate::settings::{RunIdentificationSettings, Scheme};
-use dynident_identification::examination::Stiction;
-use dynident_identification::friction::chosen_model;
-use dynident_identification::{Recording, RegressorModel, Samples};
-use dynident_simulation::Record;
+use crate::rests::RestMargin;
 use serde::{Deserialize, Serialize};
-
-/// What may be set aside, the widest first: a joint that gathers speed slowly sticks up to a fifth of it, and what
-/// smoothing makes of breaking loose lasts a period of the smoother's cut-off.
-const MARGINS: [RestMargin; 4] = [
-    RestMargin { speed_share: 0.2, smoothing_periods: 1.0 },
-    RestMargin { speed_share: 0.1, smoothing_periods: 1.0 },
-    RestMargin { speed_share: 0.1, smoothing_periods: 0.75 },
-    RestMargin { speed_share: 0.1, smoothing_periods: 0.5 },
-];
-
-/// A margin leaves a joint at least this share of a run's samples: one that rests most of the time, or hardly gets away
-/// from rest, would know nothing of the friction that its controller has to overcome there.
-const LEAST_LEFT: f64 = 0.5;
-
-/// Residuals larger by this factor are larger. Chance moves the ratio by some percent where a third of some hundred
-/// rows is left out: then rows are lost and bars widen, no more.
-const LARGER: f64 = 1.05;
 
 /// A joint whose torque near rest does not count, and what was left of it there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,129 +27,13 @@ impl NearRest {
     }
 }
 
-/// What a run says of the base parameters, without the torque near rest where friction does not explain it.
-///
-/// # Errors
-/// As [`identify_run`](crate::identify_run).
-pub(crate) fn without_near_rest(
-    task: &IterationTask,
-    records: &[Record],
-    settings: &RunIdentificationSettings,
-) -> Result<RunEstimate, IterationError> {
-    let run = OneRun { task, records, settings };
-    let all = run.identified(&[])?;
-    let has_windows = task.legs.iter().any(|leg| leg.windows().is_some());
-    let reads_rows = settings.estimation.estimator.reads_filtered_rows();
-    if settings.scheme != Scheme::AllJoints || has_windows || !reads_rows || !settings.set_aside_near_rest {
-        return Ok(all);
-    }
-    let (widest, shares) = run.widest_margins()?;
-    // Where so few rows cannot be fitted, none is left out.
-    let Some(far) = run.identified(&widest).ok().filter(|far| far.impossible.is_none()) else { return Ok(all) };
-    let asks = |joint: usize| {
-        let (near, far) = (all.joint_sigma[joint], far.joint_sigma[joint]);
-        widest[joint] != RestMargin::REST && far > 0.0 && near > LARGER * far
-    };
-    let asking: Vec<bool> = (0..widest.len()).map(asks).collect();
-    if !asking.contains(&true) {
-        return Ok(all);
-    }
-    let margin = |joint: usize| if asking[joint] { widest[joint] } else { RestMargin::REST };
-    let margins: Vec<RestMargin> = (0..widest.len()).map(margin).collect();
-    let found = if margins == widest { far } else { run.identified(&margins)? };
-    let friction = run.dry_friction_nm(&found)?;
-    let near_rest = (0..widest.len()).map(|joint| {
-        let (share, dry_friction_nm) = (shares[joint], friction[joint]);
-        let [all, far] = [&all, &found].map(|fit| fit.joint_sigma[joint] * fit.joint_sigma[joint]);
-        let residual_nm = ((all - (1.0 - share) * far) / share).max(0.0).sqrt();
-        asking[joint].then_some(NearRest { margin: margins[joint], share, residual_nm, dry_friction_nm })
-    });
-    let near_rest = near_rest.collect();
-    Ok(RunEstimate { near_rest, ..found })
-}
-
-/// The records of one run.
-struct OneRun<'a> {
-    task: &'a IterationTask,
-    records: &'a [Record],
-    settings: &'a RunIdentificationSettings,
-}
-
-impl OneRun<'_> {
-    fn log<'l>(&'l self, rest_margins: &'l [RestMargin]) -> RunLog<'l> {
-        let (legs, records) = (&self.task.legs, self.records);
-        RunLog { run: 1, legs, records, joint_sigma: &[], differentiator: None, rest_margins }
-    }
-
-    /// The estimate with these margins. Friction that rows near rest alone would show is not looked for without them.
-    fn identified(&self, rest_margins: &[RestMargin]) -> Result<RunEstimate, IterationError> {
-        let mut settings = self.settings.clone();
-        for search in &mut settings.friction {
-            let joint = self.task.robot.model().joint_index(&search.joint);
-            let margin = joint.and_then(|joint| rest_margins.get(joint)).copied().unwrap_or_default();
-            search.rows_near_rest &= margin == RestMargin::REST;
-        }
-        identify_runs(self.task, &[self.log(rest_margins)], &settings)
-    }
-
-    /// The widest margin that leaves each joint enough, rests alone for one without dry friction; and the share of the
-    /// samples that it takes.
-    fn widest_margins(&self) -> Result<(Vec<RestMargin>, Vec<f64>), IterationError> {
-        let dry = has_dry_friction(&self.task.robot, &self.settings.friction);
-        let count = |margin: RestMargin| -> Result<Vec<f64>, IterationError> {
-            let margins = vec![margin; dry.len()];
-            Ok(counted(&recordings(self.task, &[self.log(&margins)], self.settings)?, dry.len()))
-        };
-        let moving = count(RestMargin::REST)?;
-        let samples = self.records.iter().map(|record| record.samples).sum::<usize>() as f64;
-        let (mut widest, mut shares) = (vec![RestMargin::REST; dry.len()], vec![0.0; dry.len()]);
-        for margin in MARGINS {
-            let left = count(margin)?;
-            for joint in (0..dry.len()).filter(|&joint| dry[joint] && moving[joint] > 0.0) {
-                let is_enough = left[joint] >= LEAST_LEFT * samples && left[joint] < moving[joint];
-                if widest[joint] == RestMargin::REST && is_enough {
-                    (widest[joint], shares[joint]) = (margin, 1.0 - left[joint] / moving[joint]);
-                }
-            }
-        }
-        Ok((widest, shares))
-    }
-
-    /// The dry friction of each joint by an estimate of the run, Nm (N).
-    fn dry_friction_nm(&self, found: &RunEstimate) -> Result<Vec<f64>, IterationError> {
-        let robot = chosen_model(&self.task.robot, &found.friction)
-            .map_err(|source| IterationError::ChosenFriction { run: 1, source })?;
-        let model = RegressorModel::from(robot);
-        let of_joint = |joint: usize| {
-            let squares = |record: &Record| record.tau[record.of(joint)].iter().map(|tau| tau * tau).sum::<f64>();
-            let samples: usize = self.records.iter().map(|record| record.samples).sum();
-            let load = (self.records.iter().map(squares).sum::<f64>() / samples.max(1) as f64).sqrt();
-            Stiction::of(&model, joint, &found.values).under(load)
-        };
-        Ok((0..model.dof()).map(of_joint).collect())
-    }
-}
-
-/// Samples of each joint whose torque counts.
-fn counted(motions: &[Recording], joints: usize) -> Vec<f64> {
-    let mut counts = vec![0.0; joints];
-    for recording in motions {
-        let Samples::Motion(record) = &recording.samples else { continue };
-        for (joint, count) in counts.iter_mut().enumerate() {
-            let own = record.motion.set_aside.chunks_exact(record.motion.rows.max(1)).nth(joint).unwrap_or_default();
-            *count += (record.motion.rows - own.iter().filter(|aside| **aside).count()) as f64;
-        }
-    }
-    counts
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn what_friction_cannot_hold_is_unexplained() {
-        let margin = MARGINS[0];
+        let margin = RestMargin { speed_share: 0.2, smoothing_periods: 1.0 };
         let near_rest = |residual_nm| NearRest { margin, share: 0.25, residual_nm, dry_friction_nm: 2.0 };
         assert_eq!(near_rest(1.9).unexplained_nm(0.1), None);
         // A quarter of the rows with 3 Nm, the others with 0.1.
