@@ -8,7 +8,7 @@ pub(crate) fn deviance(problem: &LinearProblem, fit: &Estimate) -> f64 {
     problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
 }
 
-/// Schwarz's criterion of a fit with k free parameters and n rows: the [`deviance`] and `k ln n`; the less the better.
+/// Schwarz's criterion of a fit with k free parameters and n rows: the deviance and `k ln n`; the less the better.
 /// Source: Annals of Statistics 6 (1978) 461.
 pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
     let rows = problem.joint_rows().into_iter().sum::<usize>().max(1) as f64;
