@@ -245,7 +245,8 @@ impl TrainingPasses<'_> {
     /// What noise adds to the rows, once it is clear which columns they have.
     fn add_noise(&self, model: &RegressorModel, logs: &mut [LogFactors]) -> Result<(), LogError> {
         let one = |log: &mut LogFactors| {
-            log.noise = noise_factors(&self.logs.pass(model, log.index), model, &log.statistics)?;
+            let LogStatistics { report, filtered_rows, .. } = &log.statistics;
+            log.noise = noise_factors(&self.logs.pass(model, log.index), model, report.as_ref(), *filtered_rows)?;
             Ok(())
         };
         if self.logs.execution.parallel() {

@@ -25,10 +25,12 @@ pub(super) struct Explanation {
     pub(super) torque: Vec<f64>,
     /// By parameters of each joint's own, which no other joint shares.
     pub(super) alone: Vec<f64>,
-    /// Times that by which parameters of each joint's own follow the noise, `√(1 − p/n)`.
-    followed: Vec<f64>,
+    /// Independent instants to one of each joint's own parameters, `n/p`.
+    independent_of_own: Vec<f64>,
     /// By one set of base parameters, consistent or not.
     pub(super) free: Vec<f64>,
+    /// That set.
+    pub(super) free_parameters: Vec<f64>,
     /// By the best physically consistent set; empty where there is none.
     pub(super) consistent: Vec<f64>,
     /// By the description's own bodies with friction fitted joint by joint; empty where it has none.
@@ -55,15 +57,11 @@ impl Explanation {
             None => Vec::new(),
         };
         let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
-        let rows_of_all = rows.len().max(1) as f64;
-        let follows = |joint: usize| {
-            let parameters = robot.layout().joint_columns(joint).len() as f64;
-            (1.0 - parameters / rows_of_all).max(0.1).sqrt()
-        };
-        let followed = (0..robot.dof()).map(follows).collect();
+        let of_own = |joint: usize| rows.independent / robot.layout().joint_columns(joint).len().max(1) as f64;
+        let independent_of_own = (0..robot.dof()).map(of_own).collect();
         let nominal = left_by_nominal(robot, rows).unwrap_or_default();
         let nominal = nominal.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
-        Ok(Self { torque, alone, followed, free, consistent, nominal })
+        Ok(Self { torque, alone, independent_of_own, free, free_parameters: theta, consistent, nominal })
     }
 
     /// Sum over all joints of the logarithm of what is left beside the torque, by one set of base parameters.
@@ -81,9 +79,10 @@ impl Explanation {
         score(&self.nominal, &self.torque)
     }
 
-    /// What parameters of each joint's own would leave if they did not follow its noise.
+    /// What parameters of each joint's own would leave if they did not follow its noise: `√(1 − p/n)` of it is seen.
     pub(super) fn alone_of_noise_free(&self) -> Vec<f64> {
-        self.alone.iter().zip(&self.followed).map(|(left, followed)| left / followed).collect()
+        let seen = |of_own: &f64| (1.0 - of_own.max(1.0).recip()).max(0.1).sqrt();
+        self.alone.iter().zip(&self.independent_of_own).map(|(left, of_own)| left / seen(of_own)).collect()
     }
 
     /// The same by parameters of each joint's own.

@@ -15,7 +15,7 @@
 //! | `description_fit`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, payloads |
 //! | `held_out_reading` | mistakes that a held-out log alone has |
 //! | `same_columns` | columns that stand for two joints, torques that lost their signs |
-//! | `stray_torque` | torques that do not belong to one robot with the others |
+//! | `stray_torque`, `noise_torque` | torques that do not belong to one robot with the others, beyond what noise makes |
 
 mod candidates;
 mod description_fit;
@@ -23,6 +23,7 @@ mod explanation;
 mod held_out_reading;
 mod mistake;
 mod motion_rows;
+mod noise_torque;
 mod nominal;
 mod plausibility;
 mod reading;
@@ -52,6 +53,7 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
+use explanation::Explanation;
 use motion_rows::MotionSamples;
 use reading::Corrected;
 use search::{CLEARLY_BETTER, rough_consistency};
@@ -238,7 +240,18 @@ fn diagnosed(
     let as_written = &search.as_written;
     let same_columns = same_columns::same_columns(&as_read, &as_written.left);
     let lost_signs = same_columns::has_lost_signs(&as_read, as_written.left_of_all);
-    let stray_torques = stray_torque::stray_torques(search.believed());
+    // Of a reading that is corrected the noise is not known: its columns are other ones.
+    let noise = || {
+        let explained = Explanation::new(robot, &as_read, None)?;
+        let theta = &explained.free_parameters;
+        if search.best.is_some() {
+            return Ok(vec![0.0; robot.dof()]);
+        }
+        let noise = noise_torque::torque_of_noise(logs, &model, training, theta)?;
+        let share = |(noise, torque): (&f64, &f64)| if *torque > 0.0 { noise / torque } else { 0.0 };
+        Ok::<_, DiagnosisError>(noise.iter().zip(&explained.torque).map(share).collect())
+    };
+    let stray_torques = stray_torque::stray_torques(search.believed(), noise)?;
     Ok(Diagnosis { search, description_fit, unseen_loads, held_out, same_columns, lost_signs, stray_torques })
 }
 

@@ -4,7 +4,7 @@ use super::mistake::Channels;
 use crate::logs::Logs;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
-use crate::rows::motion_band_hz;
+use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 
@@ -21,6 +21,8 @@ pub struct MotionRows {
     pub tau: Vec<Vec<f64>>,
     /// Instants per second, before thinning.
     pub rate_hz: f64,
+    /// Number of instants that say as much: those that stand as far from each other as the rows of a fit.
+    pub independent: f64,
 }
 
 /// A recording's motion and torque, filtered alike and decimated: what instants are taken from, each with its own
@@ -32,6 +34,8 @@ pub(super) struct MotionSamples {
     pieces: Vec<usize>,
     /// From row to row, seconds.
     spacing_s: f64,
+    /// Rows to one of a fit.
+    rows_of_fit: f64,
     /// For each row the largest share of a joint's torque behind it that does not count (held, saturated, outliers);
     /// empty where every sample counts.
     invented: Vec<f64>,
@@ -51,6 +55,7 @@ impl MotionSamples {
         let joints = places.len();
         let mut rows = MotionRows::empty(joints);
         let (mut pieces, mut spacing_s, mut invented) = (vec![0], 0.0, Vec::new());
+        let mut rows_of_fit = 1.0;
         // Of a log at one rate: made with the first block; none where every sample counts.
         let mut decimator: Option<Decimator> = None;
         let (mut segment, mut panel, mut out) = (0, Vec::new(), Vec::new());
@@ -58,11 +63,13 @@ impl MotionSamples {
             if rows.rate_hz == 0.0 {
                 rows.rate_hz = block.rate_hz;
                 spacing_s = block.rate_hz.recip();
-                let settings = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
-                // Four times as many rows as a fit takes: short logs would have too few to tell readings apart.
-                let settings = settings.map(|s| DecimationSettings { factor: s.factor / 4, ..s });
+                let factor_of =
+                    |settings: &Option<DecimationSettings>| settings.as_ref().map_or(1, |s| s.factor) as f64;
+                let of_fit = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
+                let settings = denser(logs, block.rate_hz).decimation(block.rate_hz, None);
                 let settings = settings.filter(|settings| settings.factor > 1);
-                spacing_s *= settings.as_ref().map_or(1.0, |settings| settings.factor as f64);
+                spacing_s *= factor_of(&settings);
+                rows_of_fit = factor_of(&of_fit) / factor_of(&settings);
                 decimator = settings
                     .map(|settings| Decimator::new(&settings, block.rate_hz, 5 * joints))
                     .transpose()
@@ -112,7 +119,7 @@ impl MotionSamples {
             Ok(())
         };
         logs.pass(model, index).each_block(&mut take)?;
-        Ok(Self { rows, pieces, spacing_s, invented })
+        Ok(Self { rows, pieces, spacing_s, rows_of_fit, invented })
     }
 
     /// At most `most` of its instants, evenly chosen.
@@ -120,7 +127,7 @@ impl MotionSamples {
         let all: Vec<usize> = (0..self.rows.len()).filter(|&row| !self.is_invented(row)).collect();
         let count = all.len();
         let chosen: Vec<usize> = if count > most { (0..most).map(|k| all[k * count / most]).collect() } else { all };
-        self.rows.some(&chosen)
+        self.some(&chosen, count)
     }
 
     /// The longest of its pieces, seconds.
@@ -136,7 +143,7 @@ impl MotionSamples {
         let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);
         let all: Vec<usize> = self.each_piece().flat_map(inside).filter(|&row| !self.is_invented(row)).collect();
         let chosen: Vec<usize> = (0..most.min(all.len())).map(|k| all[k * all.len() / most.min(all.len())]).collect();
-        let mut rows = self.rows.some(&chosen);
+        let mut rows = self.some(&chosen, all.len());
         let shift = |to: &mut [Vec<f64>], from: &[Vec<f64>]| {
             for ((to, from), lag_s) in to.iter_mut().zip(from).zip(lag_s).filter(|(_, lag_s)| **lag_s != 0.0) {
                 let shift = lag_s / self.spacing_s;
@@ -158,6 +165,14 @@ impl MotionSamples {
         rows
     }
 
+    /// The instants with the numbers `chosen`, of `all` that there are.
+    fn some(&self, chosen: &[usize], all: usize) -> MotionRows {
+        let independent = (all as f64 / self.rows_of_fit).min(chosen.len() as f64);
+        let MotionRows { q, dq, ddq, tau, rate_hz, .. } = &self.rows;
+        let take = |of: &[Vec<f64>]| of.iter().map(|values| chosen.iter().map(|&row| values[row]).collect()).collect();
+        MotionRows { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz, independent }
+    }
+
     /// Whether a large part of some joint's torque behind a row was not measured.
     fn is_invented(&self, row: usize) -> bool {
         self.invented.get(row).is_some_and(|share| *share > INVENTED)
@@ -167,6 +182,14 @@ impl MotionSamples {
         let ends = self.pieces.iter().skip(1).copied().chain([self.rows.len()]);
         self.pieces.iter().copied().zip(ends).map(|(from, to)| from..to)
     }
+}
+
+/// The parallel filter of instants: it leaves four times as many rows as that of a fit, for short logs would have too
+/// few to tell readings apart.
+pub(super) fn denser(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
+    let of_fit = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
+    let factor = of_fit.map_or(1, |settings| settings.factor / 4).max(1);
+    ParallelFilterSettings { factor: Some(factor), ..logs.filter.clone() }
 }
 
 /// A torque with what is `marked` in it on the straight line between what is not.
@@ -194,7 +217,7 @@ impl MotionRows {
     /// No instants of `joints` joints.
     pub fn empty(joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
-        Self { q: none(), dq: none(), ddq: none(), tau: none(), rate_hz: 0.0 }
+        Self { q: none(), dq: none(), ddq: none(), tau: none(), rate_hz: 0.0, independent: 0.0 }
     }
 
     /// Position, velocity and acceleration of all joints at instant number `row`.
@@ -212,16 +235,10 @@ impl MotionRows {
         self.len() == 0
     }
 
-    /// The instants with these numbers.
-    fn some(&self, chosen: &[usize]) -> Self {
-        let take = |of: &[Vec<f64>]| of.iter().map(|values| chosen.iter().map(|&row| values[row]).collect()).collect();
-        let Self { q, dq, ddq, tau, rate_hz } = self;
-        Self { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz }
-    }
-
     /// Adds the instants of `other`.
     pub fn append(&mut self, other: &Self) {
         self.rate_hz = other.rate_hz;
+        self.independent += other.independent;
         let from = [&other.q, &other.dq, &other.ddq, &other.tau];
         for (to, from) in self.quantities_mut().into_iter().zip(from) {
             for (to, from) in to.iter_mut().zip(from) {
@@ -256,12 +273,14 @@ mod tests {
             ddq: vec![line(200.0)],
             tau: vec![line(300.0)],
             rate_hz: 10.0,
+            independent: 40.0,
         };
-        let samples = MotionSamples { rows, pieces: vec![0, 20], spacing_s: 0.1, invented: Vec::new() };
+        let samples =
+            MotionSamples { rows, pieces: vec![0, 20], spacing_s: 0.1, rows_of_fit: 4.0, invented: Vec::new() };
         assert!((samples.longest_s() - 2.0).abs() < 1e-12);
         let late = samples.shifted(Channels::Torque, &[0.25], 0.3, 100);
         // Four rows from each end of both pieces.
-        assert_eq!(late.len(), 2 * 12);
+        assert_eq!((late.len(), late.independent), (2 * 12, 6.0));
         for row in 0..late.len() {
             assert!((late.tau[0][row] - late.q[0][row] - 302.5).abs() < 1e-9);
             assert!((late.dq[0][row] - late.q[0][row] - 100.0).abs() < 1e-9);

@@ -77,7 +77,8 @@ mod tests {
     fn rows(tau: Vec<Vec<f64>>) -> MotionRows {
         let motion = |phase: f64| (0..50).map(|k| (0.3 * f64::from(k) + phase).sin()).collect::<Vec<f64>>();
         let dq = vec![motion(0.0), motion(1.0)];
-        MotionRows { q: dq.clone(), dq: dq.clone(), ddq: dq, tau, rate_hz: 100.0 }
+        let independent = dq[0].len() as f64;
+        MotionRows { q: dq.clone(), dq: dq.clone(), ddq: dq, tau, rate_hz: 100.0, independent }
     }
 
     #[test]

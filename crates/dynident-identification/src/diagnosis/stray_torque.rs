@@ -22,6 +22,8 @@ pub struct StrayTorque {
     pub left: f64,
     /// The same by parameters of its own.
     pub alone: f64,
+    /// The share of it that noise of the positions makes.
+    pub noise: f64,
 }
 
 impl StrayTorque {
@@ -31,22 +33,46 @@ impl StrayTorque {
         self.alone > alone && self.left > left
     }
 
-    /// Whether one robot leaves so much more of it than parameters of its own that it is not this robot's.
+    /// Whether one robot leaves so much more of it than parameters of its own, and than noise, that it is not this
+    /// robot's.
     pub fn is_foreign(&self) -> bool {
-        self.left > FOREIGN * self.alone
+        self.times() > FOREIGN
+    }
+
+    /// Times what parameters of its own and the noise of the positions leave that one robot leaves: parameters of its
+    /// own follow such noise where those of all joints do not.
+    pub fn times(&self) -> f64 {
+        self.left / self.alone.hypot(self.noise).max(f64::MIN_POSITIVE)
+    }
+
+    fn is_stray(&self) -> bool {
+        self.left > LITTLE && self.times() > DOUBTED
     }
 }
 
 /// The torques of a reading that do not belong to one robot with the others: those that have nothing to do with the
 /// motion, else the one of which one robot leaves most beside its own parameters, for it spoils its neighbours'.
-pub(super) fn stray_torques(reading: &Reading) -> Vec<StrayTorque> {
-    let of = |joint: usize| StrayTorque { joint, left: reading.free[joint], alone: reading.alone[joint] };
-    let all: Vec<StrayTorque> = (0..reading.free.len()).map(of).collect();
+/// `noise` tells the share of each joint's torque that noise of the positions makes; it is asked only where it matters.
+///
+/// # Errors
+/// Those of `noise`.
+pub(super) fn stray_torques<E>(
+    reading: &Reading,
+    noise: impl FnOnce() -> Result<Vec<f64>, E>,
+) -> Result<Vec<StrayTorque>, E> {
+    let of = |joint: usize| StrayTorque { joint, left: reading.free[joint], alone: reading.alone[joint], noise: 0.0 };
+    let mut all: Vec<StrayTorque> = (0..reading.free.len()).map(of).collect();
     let motionless: Vec<StrayTorque> = all.iter().filter(|torque| torque.is_motionless()).copied().collect();
     if !motionless.is_empty() {
-        return motionless;
+        return Ok(motionless);
     }
-    let times = |torque: &StrayTorque| torque.left / torque.alone.max(f64::MIN_POSITIVE);
-    let is_stray = |torque: &StrayTorque| torque.left > LITTLE && times(torque) > DOUBTED;
-    all.into_iter().filter(is_stray).max_by(|a, b| times(a).total_cmp(&times(b))).into_iter().collect()
+    if all.iter().any(StrayTorque::is_stray) {
+        all.iter_mut().zip(noise()?).for_each(|(torque, noise)| torque.noise = noise);
+    }
+    Ok(all
+        .into_iter()
+        .filter(StrayTorque::is_stray)
+        .max_by(|a, b| a.times().total_cmp(&b.times()))
+        .into_iter()
+        .collect())
 }

@@ -2,13 +2,13 @@
 
 use super::builder::RowBuilder;
 use super::filter::motion_band_hz;
-use super::pass::{LogPass, LogStatistics};
+use super::pass::LogPass;
 use super::{JointRows, RowConsumer};
 use crate::recording::{LogError, Samples};
 use crate::regressor_model::RegressorModel;
 use dynident_estimation::{SegmentSettings, SegmentedFactor};
 use dynident_model::sample::Random;
-use dynident_recording::{Derivatives, Differentiator, MotionBlock, Place};
+use dynident_recording::{Derivatives, Differentiator, ImportReport, MotionBlock, Place};
 
 /// Samples that are looked at: a power from so many is right within a tenth or so, which costs some milliseconds.
 const SAMPLES: usize = 4096;
@@ -24,7 +24,7 @@ const SEED: u64 = 0x6e6f_6973_6521;
 ///
 /// n is white noise of the standard deviation that the importer found for each joint, with a fixed seed. m has its own
 /// noise already: products of two noisy velocities come out up to twice too large, which errs to the side of noise.
-/// Long logs are looked at in pieces, short ones several times; the rows are weighted to be as many as the log has.
+/// Long logs are looked at in pieces, short ones several times; the rows are weighted to be `filtered_rows`.
 ///
 /// `None` where no noise is known: for a motion that was made already, and for differentiators that follow a commanded
 /// motion.
@@ -34,9 +34,10 @@ const SEED: u64 = 0x6e6f_6973_6521;
 pub(crate) fn noise_factors(
     pass: &LogPass<'_>,
     model: &RegressorModel,
-    statistics: &LogStatistics,
+    report: Option<&ImportReport>,
+    filtered_rows: u64,
 ) -> Result<Option<Vec<SegmentedFactor>>, LogError> {
-    let Some(report) = &statistics.report else { return Ok(None) };
+    let Some(report) = report else { return Ok(None) };
     let settings = &pass.motion.differentiator;
     let quiet = report.position_noise.iter().all(|noise| *noise == 0.0);
     if settings.reference().is_some() || matches!(pass.recording.samples, Samples::Motion(_)) {
@@ -77,7 +78,7 @@ pub(crate) fn noise_factors(
     }
     for ((factor, rows), &columns) in factors.iter_mut().zip(&difference.rows).zip(&columns) {
         let count: usize = rows.iter().map(|panel| panel.len() / (columns + 1)).sum();
-        let weight = (statistics.filtered_rows as f64 / count.max(1) as f64).sqrt();
+        let weight = (filtered_rows as f64 / count.max(1) as f64).sqrt();
         for panel in rows {
             let scaled: Vec<f64> = panel.iter().map(|x| weight * x).collect();
             factor.absorb(&scaled, panel.len() / (columns + 1)).map_err(in_rows)?;

@@ -244,16 +244,22 @@ fn stray_torque(torque: &StrayTorque, joints: &[String]) -> CheckFinding {
             ),
         );
     }
+    let noise = if torque.noise > 1.0e-3 {
+        format!(", noise of the positions {:.1} %", 100.0 * torque.noise)
+    } else {
+        String::new()
+    };
     let found = finding(
         "torque",
         format!("the torque of joint `{name}` does not belong to one robot with that of the others"),
         format!(
-            "one robot for all joints leaves {:.1} % of it, parameters of its own {:.1} %: {:.1} times as much, where logs that fit \
-             together have at most 1.8; compare whether all its columns are of one clock and one run, its gain, and the \
+            "one robot for all joints leaves {:.1} % of it, parameters of its own {:.1} %{}: {:.1} times as much, where logs that \
+             fit together have at most 1.8; compare whether all its columns are of one clock and one run, its gain, and the \
              lengths and axes of the description",
             100.0 * torque.left,
             100.0 * torque.alone,
-            torque.left / torque.alone.max(f64::MIN_POSITIVE)
+            noise,
+            torque.times()
         ),
     );
     CheckFinding { level: if torque.is_foreign() { Level::Problem } else { Level::Warning }, ..found }

@@ -1,0 +1,36 @@
+//! What the noise of the positions makes of the torque that a robot explains.
+
+use super::motion_rows::denser;
+use crate::logs::Logs;
+use crate::recording::LogError;
+use crate::regressor_model::RegressorModel;
+use crate::rows::{LogPass, noise_factors};
+
+/// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to what the base
+/// parameters `theta` predict of each joint at the instants that
+/// readings are compared on, Nm (N): `N θ` of [`noise_factors`]. Zero where no noise is known.
+///
+/// # Errors
+/// A recording that cannot be read again.
+pub(super) fn torque_of_noise(
+    logs: &Logs<'_>,
+    model: &RegressorModel,
+    training: &[usize],
+    theta: &[f64],
+) -> Result<Vec<f64>, LogError> {
+    let mut squares = vec![0.0; model.dof()];
+    for &index in training {
+        let pass = logs.pass(model, index);
+        let Some(report) = pass.each_block(&mut |_| Ok(()))? else { continue };
+        let filter = denser(logs, report.rate_hz);
+        let pass = LogPass { filter: &filter, ..pass };
+        // Weighted to be one row.
+        let Some(factors) = noise_factors(&pass, model, Some(&report), 1)? else { continue };
+        for (joint, (square, factor)) in squares.iter_mut().zip(&factors).enumerate() {
+            let own: Vec<f64> = model.layout().joint_columns(joint).iter().map(|&column| theta[column]).collect();
+            let in_rows = |source| LogError::Rows { log: logs.recordings[index].name.clone(), source };
+            *square += factor.total().residual_sum_of_squares(&own).map_err(in_rows)? / training.len() as f64;
+        }
+    }
+    Ok(squares.into_iter().map(f64::sqrt).collect())
+}
