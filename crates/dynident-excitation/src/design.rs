@@ -12,6 +12,7 @@ mod effort;
 mod envelope;
 mod metric;
 mod problem;
+mod restarts;
 mod restoration;
 mod rounds;
 mod single_change;
@@ -20,7 +21,7 @@ mod way_inside;
 use crate::criteria::Criterion;
 use crate::family::Family;
 use crate::limits::LimitSet;
-use crate::optimisers::{AugmentedLagrangianState, OptimiserError};
+use crate::optimisers::OptimiserError;
 use assess::assess;
 use clear_starts::Starts;
 use core::ops::ControlFlow;
@@ -29,6 +30,7 @@ use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
 use effort::{Effort, most_of_polishes};
 use nalgebra::DMatrix;
+use restarts::Neighbourhood;
 use restoration::restored;
 use rounds::{Candidate, Rounds, Worth};
 use serde::{Deserialize, Serialize};
@@ -201,26 +203,31 @@ pub fn design(
     // Rounds of searches from random starts, then around the best.
     let mut random = Random::new(settings.seed);
     let mut random_starts = Starts::new(task, &coarse);
-    let mut starts: Vec<AugmentedLagrangianState> =
-        (0..effort.starts).map(|_| random_starts.next(&mut random).into()).collect();
     let mut margins = vec![0.0; task.limits.constraints().len()];
     let mut best: Option<Candidate> = None;
+    let mut neighbourhood = Neighbourhood::default();
     for round in 0..=effort.rounds {
         let criterion = task.criteria[round.min(task.criteria.len() - 1)];
-        let name = if round == 0 { "search" } else { "restart" };
+        let around =
+            neighbourhood.starts((round.saturating_sub(1), task.family.joints(), effort.restarts()), &mut random);
+        let name = if around.is_some() { "restart" } else { "search" };
         let watch = watch(name);
         let stop = |value, violation| watch(value, violation) || late();
-        let each = if round == 0 { effort.evaluations_per_start } else { effort.evaluations_per_restart };
-        let worth = match &best {
+        let each = if around.is_some() { effort.evaluations_per_restart } else { effort.evaluations_per_start };
+        let starts =
+            around.unwrap_or_else(|| (0..effort.starts).map(|_| random_starts.next(&mut random).into()).collect());
+        let worth = match neighbourhood.score() {
             // Restarts around the best find a better one sooner than it comes to its own end.
             _ if round < UNFOLLOWED_ROUNDS && effort.rounds >= MANY_ROUNDS => Worth::Never,
-            Some(best) if round >= task.criteria.len() => Worth::IfBelow(best.score),
+            Some(score) if round >= task.criteria.len() => Worth::IfBelow(score),
             _ => Worth::Always,
         };
         let found = rounds.run(criterion, &margins, &starts, each, worth, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         // Scores of another criterion are no measure, but a descent that was cut short may lie far outside.
         let sharper = round < task.criteria.len() && !over();
+        neighbourhood.take(&found.best, rounds.same(criterion), sharper);
+        neighbourhood = neighbourhood.left_when_stale(effort.rounds - round);
         if sharper || best.as_ref().is_none_or(|best| found.best.score < best.score) {
             inside.store(found.best.violation <= INSIDE, Ordering::Relaxed);
             best = Some(found.best);
@@ -228,30 +235,6 @@ pub fn design(
         if over() {
             break;
         }
-        let Some(best) = &best else { continue };
-        // Around the best: most of a family's good basins lie near each other, though not so near that a descent falls
-        // back to where it came from.
-        let size = RESTART_NOISE[round % RESTART_NOISE.len()];
-        let scales = joint_scales(&best.state.x, task.family.joints());
-        let joints = task.family.joints().max(1);
-        let each = (best.state.x.len() / joints).max(1);
-        let moved = |restart: usize| {
-            // One restart near all of the best, the next with one of its joints moving otherwise; in every other round
-            // both have one more joint that does.
-            let mut draw = |is: bool| is.then(|| (random.uniform(0.0, joints as f64) as usize).min(joints - 1));
-            let near = restart.is_multiple_of(2);
-            let otherwise = [draw(!near), draw(round % 2 == 1)];
-            let noise = best.state.x.iter().zip(&scales).enumerate().map(|(k, (p, scale))| {
-                let size = match otherwise.contains(&Some(k / each)) {
-                    true => ONE_JOINT_NOISE,
-                    false if near => size,
-                    false => OTHER_JOINTS_NOISE,
-                };
-                p + size * scale * random.normal()
-            });
-            noise.collect::<Vec<f64>>().into()
-        };
-        starts = core::iter::once(best.state.clone()).chain((0..effort.restarts()).map(moved)).collect();
     }
     // The polish on a finer grid, again with tighter limits while something is broken between its samples. What is kept
     // is the best trajectory whose limits were found kept everywhere, the search's own best included; only if there is
@@ -328,15 +311,6 @@ const INSIDE: f64 = 1e-4;
 /// Rounds whose best is not followed to its end where [`MANY_ROUNDS`] come.
 const UNFOLLOWED_ROUNDS: usize = 2;
 const MANY_ROUNDS: usize = 8;
-
-/// Noise of the restarts, as shares of each joint's root mean square, round after round. With 0.3, 0.15 and 0.08 three
-/// of four restarts came back to the motion that they began around.
-const RESTART_NOISE: [f64; 2] = [0.5, 0.3];
-
-/// Noise of the restarts in which one joint moves otherwise.
-const ONE_JOINT_NOISE: f64 = 1.0;
-/// Noise of the other joints in them.
-const OTHER_JOINTS_NOISE: f64 = 0.02;
 
 /// Polishes at most.
 const POLISHES: usize = 6;

@@ -95,7 +95,7 @@ impl Rounds<'_> {
         let mut candidates = self.candidates(criterion, first);
         let better = match worth {
             Worth::Always => f64::INFINITY,
-            Worth::IfBelow(score) => score - SAME * criterion.scale(self.task.layout.columns().len()),
+            Worth::IfBelow(score) => score - self.same(criterion),
             Worth::Never => f64::NEG_INFINITY,
         };
         if candidates.first().is_none_or(|best| best.score >= better) {
@@ -108,6 +108,11 @@ impl Rounds<'_> {
         evaluations += self::evaluations(&last);
         let best = self.candidates(criterion, last).into_iter().next().ok_or(OptimiserError::Start)?;
         Ok(RoundResult { best, evaluations })
+    }
+
+    /// Scores that differ by less are the same motion's.
+    pub(super) fn same(&self, criterion: &dyn Criterion) -> f64 {
+        SAME * criterion.scale(self.task.layout.columns().len())
     }
 
     /// Goes on from one point to the end.
