@@ -130,3 +130,33 @@ fn mistakes_in_studies_of_real_logs_are_named() {
         }
     }
 }
+
+/// Torques 30 ms late, as a slow bus makes them, are no mistake of the study: the fit takes the lag off. Wrists were said
+/// to be coupled, for the torque that another is added to is larger and leaves a smaller share by itself.
+#[test]
+fn a_lag_of_a_slow_bus_is_no_coupled_wrist() {
+    const ROWS_LATE: usize = 6; // of 200 a second
+    let Some(data) = recordings() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let logs = folder.path().join("kuka_lwr4plus");
+    std::fs::create_dir(&logs).unwrap();
+    for name in ["traj1.csv", "traj2.csv", "traj3.csv"] {
+        let text = std::fs::read_to_string(data.join("kuka_lwr4plus").join(name)).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        let first = rows[0].iter().position(|column| *column == "tau1_Nm").unwrap();
+        let mut late = rows.clone();
+        late.drain(1..=ROWS_LATE);
+        for (to, from) in late[1..].iter_mut().zip(&rows[1..]) {
+            to[first..first + 7].copy_from_slice(&from[first..first + 7]);
+        }
+        let lines: Vec<String> = late.iter().map(|row| row.join(",")).collect();
+        std::fs::write(logs.join(name), lines.join("\n") + "\n").unwrap();
+    }
+    std::fs::copy(data.join("kuka_lwr4plus/kuka_lwr4.urdf"), logs.join("kuka_lwr4.urdf")).unwrap();
+    let text = std::fs::read_to_string(repository("examples/lwr4plus_23_to_1.toml")).unwrap();
+    let job = Job::new(folder.path(), &text.replace("\"../../shared/data\"", &format!("{:?}", folder.path())));
+    let options = RunOptions { data: None, threads: 2, progress: &Silent };
+    let findings = check(&job.study, &job.path, &options).unwrap().check.findings;
+    let problems: Vec<&CheckFinding> = findings.iter().filter(|one| one.level == Level::Problem).collect();
+    assert!(problems.is_empty(), "{problems:?}");
+}

@@ -95,6 +95,21 @@ impl<'a> StudyFormat<'a> {
         StudyChange { table, line: format!("scale = {}", list(&values)) }
     }
 
+    /// `scale` of the torque columns, all in one unit that is worth `unit` Nm (N): one number where they share theirs so
+    /// far.
+    pub(super) fn torque_unit(&self, unit: f64) -> StudyChange {
+        let (group, table) = self.group(true);
+        let joints = self.robot.log_joints.len();
+        let own: Vec<f64> = (0..joints).map(|place| at(group.scale.as_ref(), place, 1.0)).collect();
+        // A unit is exact.
+        let value = |own: f64| if own == 1.0 { format!("{unit:?}") } else { significant(unit * own) };
+        let line = match own.first() {
+            Some(first) if own.iter().all(|other| other == first) => format!("scale = {}", value(*first)),
+            _ => format!("scale = {}", list(&own.into_iter().map(value).collect::<Vec<_>>())),
+        };
+        StudyChange { table, line }
+    }
+
     /// Whether it is the torque's group, for each group that the channels stand for.
     fn groups(channels: Channels) -> Vec<bool> {
         match channels {

@@ -140,7 +140,7 @@ fn torque_unit(
     let of_joints = |scale: &[Option<f64>]| format.map(|format| format.torque_scale(scale));
     match common {
         Some((_, unit)) => {
-            found.write.extend(of_joints(&vec![Some(unit); joints.len()]));
+            found.write.extend(format.map(|format| format.torque_unit(unit)));
             let other = of_joints(&fit.scale).map(|change| format!("currents ({} {})", change.place(), change.line));
             found.or.extend(other);
         }

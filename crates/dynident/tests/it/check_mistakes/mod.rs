@@ -184,6 +184,20 @@ fn units_are_named() {
             named: &["scale = 0.50", "scale = 0.49"],
         },
         Case {
+            name: "newton centimetres",
+            rows: |rows| each(rows, |row| row[7..13].iter_mut().for_each(|tau| *tau *= 100.0)),
+            study: SAME,
+            kind: "unit",
+            named: &["`scale = 0.01`"],
+        },
+        Case {
+            name: "kilopond metres",
+            rows: |rows| each(rows, |row| row[7..13].iter_mut().for_each(|tau| *tau /= 9.80665)),
+            study: SAME,
+            kind: "unit",
+            named: &["`scale = 9.80665`"],
+        },
+        Case {
             name: "minutes",
             rows: |rows| each(rows, |row| row[0] /= 60.0),
             study: SAME,
@@ -442,6 +456,32 @@ fn one_absurd_torque_is_left_out_and_named() {
     let (as_it_is, spoilt) = (error(false), error(true));
     // One sample of 2500 less.
     assert!((spoilt / as_it_is - 1.0).abs() < 0.01, "{as_it_is} and {spoilt}");
+}
+
+/// Masses in grams and inertias in g m² beside lengths in metres, as some exporters write them.
+#[test]
+fn a_description_in_grams_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut description = std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap();
+    for attribute in ["mass value=\"", " ixx=\"", " ixy=\"", " ixz=\"", " iyy=\"", " iyz=\"", " izz=\""] {
+        let mut parts = description.split(attribute);
+        let mut in_grams = parts.next().unwrap().to_owned();
+        for part in parts {
+            let (number, rest) = part.split_once('"').unwrap();
+            let number: f64 = number.parse().unwrap();
+            write!(in_grams, "{attribute}{}\"{rest}", 1e3 * number).unwrap();
+        }
+        description = in_grams;
+    }
+    std::fs::write(folder.path().join("ur10.urdf"), description).unwrap();
+    for name in ["train.csv", "test.csv"] {
+        std::fs::copy(repository("examples/ur10_simulated").join(name), folder.path().join(name)).unwrap();
+    }
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let study = study.replace("../robots/ur10.urdf", "ur10.urdf").replace("ur10_simulated/", "");
+    let found = problems(&check_text(folder.path(), &study));
+    let is_named = found.first().is_some_and(|(kind, sentence)| kind == "description" && sentence.contains("gram"));
+    assert!(is_named, "{found:?}");
 }
 
 /// A log of `truth`, twenty seconds at 200 Hz with noise of 0.2 Nm and 1e-5 rad.
