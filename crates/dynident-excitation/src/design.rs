@@ -205,7 +205,7 @@ pub fn design(
     let mut random_starts = Starts::new(task, &coarse);
     let mut margins = vec![0.0; task.limits.constraints().len()];
     let mut best: Option<Candidate> = None;
-    let mut neighbourhood = Neighbourhood::default();
+    let mut neighbourhood = Neighbourhood::of_search(effort.rounds);
     for round in 0..=effort.rounds {
         let criterion = task.criteria[round.min(task.criteria.len() - 1)];
         let around =

@@ -24,36 +24,44 @@ const MORE_JOINTS: usize = 3;
 /// The same after which another neighbourhood is tried, if so many rounds are left for it.
 const STALE: usize = 5;
 const LEAST_LEFT: usize = 4;
+/// Rounds of a search that goes farther at all: with the eight that rich families have, the search stays near.
+const FAR_ROUNDS: usize = 16;
 
 /// The neighbourhood that is searched.
-#[derive(Default)]
 pub(super) struct Neighbourhood {
+    /// Whether the search has the rounds to go farther.
+    goes_far: bool,
     /// Its best motion and that one's score; none before its first round.
     best: Option<(AugmentedLagrangianState, f64)>,
-    /// Rounds in it since the last gain.
+    /// Rounds in it since the last gain, where the search goes far.
     stale: usize,
 }
 
 impl Neighbourhood {
+    /// None yet, of a search of so many rounds.
+    pub(super) fn of_search(rounds: usize) -> Self {
+        Self { goes_far: rounds >= FAR_ROUNDS, best: None, stale: 0 }
+    }
+
     /// What its best motion scores; none before its first round.
     pub(super) fn score(&self) -> Option<f64> {
         self.best.as_ref().map(|(_, score)| *score)
     }
 
-    /// Learns of the best of a round. It becomes the neighbourhood's if it is better by more than `same`, or if scores
-    /// so far are no measure.
+    /// Learns of the best of a round. It becomes the neighbourhood's if it is better, which is a gain if it is by more
+    /// than `same`, or if scores so far are no measure.
     pub(super) fn take(&mut self, found: &Candidate, same: f64, is_new_measure: bool) {
-        if is_new_measure || self.score().is_none_or(|score| found.score < score - same) {
+        let before = self.score().filter(|_| !is_new_measure).unwrap_or(f64::INFINITY);
+        let gains = found.score < before - same || before == f64::INFINITY;
+        self.stale = if gains { 0 } else { self.stale + usize::from(self.goes_far) };
+        if gains || found.score < before {
             self.best = Some((found.state.clone(), found.score));
-            self.stale = 0;
-        } else {
-            self.stale += 1;
         }
     }
 
     /// Another one, where this one has nothing better and `rounds_left` are enough for it.
     pub(super) fn left_when_stale(self, rounds_left: usize) -> Self {
-        if self.stale >= STALE && rounds_left >= LEAST_LEFT { Self::default() } else { self }
+        if self.stale >= STALE && rounds_left >= LEAST_LEFT { Self { best: None, stale: 0, ..self } } else { self }
     }
 
     /// Its best motion and `count` others around it, to follow round number `round`; none before its first.

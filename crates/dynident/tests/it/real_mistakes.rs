@@ -131,8 +131,8 @@ fn mistakes_in_studies_of_real_logs_are_named() {
     }
 }
 
-/// Torques 30 ms late, as a slow bus makes them, are no mistake of the study: the fit takes the lag off. Wrists were said
-/// to be coupled, for the torque that another is added to is larger and leaves a smaller share by itself.
+/// Torques 30 ms late, as a slow bus makes them, are no mistake of the study: the fit takes the lag off. Wrists were
+/// said to be coupled, for the torque that another is added to is larger and leaves a smaller share by itself.
 #[test]
 fn a_lag_of_a_slow_bus_is_no_coupled_wrist() {
     const ROWS_LATE: usize = 6; // of 200 a second

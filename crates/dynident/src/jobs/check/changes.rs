@@ -95,8 +95,8 @@ impl<'a> StudyFormat<'a> {
         StudyChange { table, line: format!("scale = {}", list(&values)) }
     }
 
-    /// `scale` of the torque columns, all in one unit that is worth `unit` Nm (N): one number where they share theirs so
-    /// far.
+    /// `scale` of the torque columns, all in one unit that is worth `unit` Nm (N): one number where they share theirs
+    /// so far.
     pub(super) fn torque_unit(&self, unit: f64) -> StudyChange {
         let (group, table) = self.group(true);
         let joints = self.robot.log_joints.len();
