@@ -79,14 +79,16 @@ impl Timeline {
         places
     }
 
-    /// Whether a stamp that comes late is followed by ones that make up for it: a packet that was late, not a gap.
+    /// Whether a stamp that comes late is followed by ones that make up for it: a packet that was late, not a gap. One
+    /// later than all the rows that could make up for it is no packet's, but a gap or a wrong number.
     fn catches_up(
         &self,
         (last_row, last_s): (u64, f64),
         (block, index): (&RawBlock, usize),
         next: Option<&RawBlock>,
     ) -> bool {
-        if self.clock.spacing() == Spacing::Stamps {
+        let late = (block.time_s[index] - last_s) * self.clock.rate_hz;
+        if self.clock.spacing() == Spacing::Stamps || late > LATE_ROWS as f64 {
             return false;
         }
         let own = block.row[index..].iter().zip(&block.time_s[index..]);

@@ -212,6 +212,28 @@ fn jittered_stamps_are_interpolated_when_the_data_say_so() {
     }
 }
 
+/// One stamp that is far too late, between others that wander by a fraction of a step, is no late packet: the samples
+/// up to it would be invented, a million of them and more, until memory ends.
+#[test]
+fn one_absurd_stamp_is_not_bridged() {
+    let (rows, absurd) = (400, 200);
+    let mut text = "t,q,tau\n".to_owned();
+    for i in 0..rows {
+        let t = f64::from(i) * 0.01 + if i == 100 { 0.008 } else { 0.0 };
+        let stamp = if i == absurd { 1e3 } else { t };
+        writeln!(text, "{stamp},{},{}", (3.0 * t).sin(), (5.0 * t).cos()).unwrap();
+    }
+    let file = file(text.as_bytes());
+    let format = format("time = { column = \"t\" }\nposition = { columns = \"q\" }\ntorque = { columns = \"tau\" }");
+    let mut stream =
+        MotionStream::open(&format, file.path(), &["joint".to_owned()], &MotionSettings::default()).unwrap();
+    let (mut block, mut given) = (MotionBlock::default(), 0);
+    while stream.next_block(&mut block).unwrap() {
+        given += block.rows;
+    }
+    assert!((rows as usize - 10..=rows as usize).contains(&given), "{given}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
