@@ -242,12 +242,11 @@ fn diagnosed(
     let lost_signs = same_columns::has_lost_signs(&as_read, as_written.left_of_all);
     // Of a reading that is corrected the noise is not known: its columns are other ones.
     let noise = || {
-        let explained = Explanation::new(robot, &as_read, None)?;
-        let theta = &explained.free_parameters;
         if search.best.is_some() {
             return Ok(vec![0.0; robot.dof()]);
         }
-        let noise = noise_torque::torque_of_noise(logs, &model, training, theta)?;
+        let explained = Explanation::new(robot, &as_read, None)?;
+        let noise = noise_torque::torque_of_noise(logs, &model, training, &explained.free_parameters)?;
         let share = |(noise, torque): (&f64, &f64)| if *torque > 0.0 { noise / torque } else { 0.0 };
         Ok::<_, DiagnosisError>(noise.iter().zip(&explained.torque).map(share).collect())
     };

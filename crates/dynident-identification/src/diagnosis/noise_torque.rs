@@ -7,8 +7,8 @@ use crate::regressor_model::RegressorModel;
 use crate::rows::{LogPass, noise_factors};
 
 /// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to what the base
-/// parameters `theta` predict of each joint at the instants that
-/// readings are compared on, Nm (N): `N θ` of [`noise_factors`]. Zero where no noise is known.
+/// parameters `theta` predict of each joint at the instants that readings are compared on, Nm (N): `N θ` of
+/// [`noise_factors`]. Zero where no noise is known.
 ///
 /// # Errors
 /// A recording that cannot be read again.

@@ -23,13 +23,13 @@ impl Resampler {
         Self { stamps: Vec::new(), channels: vec![Vec::new(); channels], next: 0.0, at: 0 }
     }
 
-    /// Adds the sample `index` of `columns` at `stamp`; false if it is left out for standing too close to the one
-    /// before.
+    /// Adds the sample `index` of `columns` at `stamp`; false if it is left out for not standing far enough behind the
+    /// one before, as infinite stamps never do.
     pub(crate) fn push<'a>(&mut self, stamp: f64, index: usize, columns: impl Iterator<Item = &'a Vec<f64>>) -> bool {
         match self.stamps.last() {
             None => self.next = stamp,
-            Some(last) if stamp - last < SHORTEST_STEP => return false,
-            Some(_) => {}
+            Some(last) if stamp - last >= SHORTEST_STEP => {}
+            Some(_) => return false,
         }
         self.stamps.push(stamp);
         for (channel, column) in self.channels.iter_mut().zip(columns) {

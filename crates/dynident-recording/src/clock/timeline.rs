@@ -7,6 +7,10 @@ use crate::log::RawBlock;
 /// Rows before and after a block that its places depend on.
 const AROUND: usize = MARGIN;
 
+/// Longest gap that places keep, in steps: eleven days at a kilohertz. Behind a longer one, which only a wrong stamp
+/// makes, they would lose their fractions.
+const LONGEST_GAP: f64 = 1e9;
+
 /// Rows within which late packets have caught up.
 const LATE_ROWS: usize = 32;
 
@@ -64,7 +68,7 @@ impl Timeline {
                     } else if is_gap {
                         places.holes.push(index);
                     }
-                    let even = if is_gap { hole.round().max(rows) } else { rows };
+                    let even = if is_gap && hole < LONGEST_GAP { hole.round().max(rows) } else { rows };
                     last_place + even
                 }
                 None => row as f64,
