@@ -23,8 +23,9 @@ mod reading {
     use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
     use parquet::data_type::DataType;
     use parquet::errors::ParquetError;
-    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
     use std::fs::File;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::path::PathBuf;
 
     /// Rows that are unpacked at once.
@@ -72,9 +73,16 @@ mod reading {
         FileError::broken(path, FileFormat::Parquet, place, error.to_string(), "write or copy it again")
     }
 
+    /// What the decoders of the format make of bytes that are not as their page says. They take lengths for granted
+    /// that only unpacking can check, and panic; here that is a broken file like any other.
+    fn guarded<T>(decode: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+        catch_unwind(AssertUnwindSafe(decode))
+            .unwrap_or_else(|_| Err(ParquetError::EOF("its bytes are not what they are said to be".into())))
+    }
+
     pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
         let file = File::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
-        let file = SerializedFileReader::new(file).map_err(|error| broken(path, "its footer", &error))?;
+        let file = guarded(|| SerializedFileReader::new(file)).map_err(|error| broken(path, "its footer", &error))?;
         let mut table = ParquetTable {
             path: path.to_owned(),
             file,
@@ -187,8 +195,8 @@ mod reading {
             }
             let error = |error| broken(&self.path, format!("column {}", leaf.index), &error);
             let group = self.file.get_row_group(0).map_err(error)?;
-            let mut reader = group.get_column_reader(leaf.index).map_err(error)?;
-            let read = read_block(&mut reader, 1).map_err(error)?;
+            let mut reader = checked_reader(&*group, leaf.index).map_err(error)?;
+            let read = guarded(|| read_block(&mut reader, 1)).map_err(error)?;
             if leaf.list {
                 leaf.count = read.levels.len().min(LONGEST_LIST);
             }
@@ -208,10 +216,7 @@ mod reading {
             self.readers.clear();
             for (index, leaf) in self.leaves.iter().enumerate() {
                 if (leaf.begin..leaf.begin + leaf.count).any(|column| self.slot_of[column].is_some()) {
-                    let column = group.metadata().schema_descr().column(leaf.index);
-                    let pages = group.get_column_page_reader(leaf.index).map_err(error)?;
-                    let pages = Box::new(CheckedPages::new(pages, &column));
-                    self.readers.push((index, get_column_reader(column, pages)));
+                    self.readers.push((index, checked_reader(&*group, leaf.index).map_err(error)?));
                 }
             }
             self.group += 1;
@@ -233,7 +238,8 @@ mod reading {
             for (index, reader) in &mut readers {
                 let leaf = &self.leaves[*index];
                 let place = || format!("row group {}, column {}", self.group - 1, self.names[leaf.begin]);
-                let read = read_block(reader, rows).map_err(|error| broken(&self.path, place(), &error))?;
+                let read = guarded(|| read_block(reader, rows));
+                let read = read.map_err(|error| broken(&self.path, place(), &error))?;
                 if read.rows != rows {
                     let problem = format!("it ends after {} of {rows} rows", read.rows);
                     let fix = "write or copy it again";
@@ -270,6 +276,15 @@ mod reading {
             self.next += 1;
             Ok(Some(self.next - 1))
         }
+    }
+
+    /// A column of a group of rows, whose pages are looked at before they are decoded.
+    fn checked_reader(group: &dyn RowGroupReader, index: usize) -> Result<ColumnReader, ParquetError> {
+        guarded(|| {
+            let column = group.metadata().schema_descr().column(index);
+            let pages = Box::new(CheckedPages::new(group.get_column_page_reader(index)?, &column));
+            Ok(get_column_reader(column, pages))
+        })
     }
 
     /// Some rows of a column.

@@ -243,10 +243,11 @@ fn a_trace_that_is_not_whole_says_what_is_missing() {
 #[test]
 fn what_mutated_inputs_found_is_refused() {
     // An attachment longer than its chunk; a column at a negative place; a page shorter than its packed levels; a page
-    // coded by a dictionary that is not there.
+    // coded by a dictionary that is not there; split streams of bytes that are shorter than their values.
     let corpus = ["bags/wrong_length.mcap", "parquet/negative_place.parquet", "parquet/short_page.parquet"];
     let seeds = corpus.map(|file| format!("../../fuzz/corpus/{file}"));
-    for file in seeds.iter().map(String::as_str).chain(["tests/refused/no_dictionary.parquet"]) {
+    let refused = ["tests/refused/no_dictionary.parquet", "tests/refused/short_split.parquet"];
+    for file in seeds.iter().map(String::as_str).chain(refused) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
         told(&drain(&path).expect_err(file), file.rsplit('/').next().unwrap());
     }
