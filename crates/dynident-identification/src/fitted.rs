@@ -3,13 +3,14 @@
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
-use crate::chosen_friction::{ChosenFriction, constants_of_all_rows, friction_of_logs};
+use crate::chosen_friction::{ChosenFriction, constants_of_all_rows};
 use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::excerpt::excerpts;
 use crate::execution::Execution;
 use crate::friction::{ConstantsError, JointFriction};
+use crate::friction_with_cutoff::{friction_of_less_noise, friction_with_cutoff};
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::likelihood::schwarz;
@@ -83,6 +84,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) stated_friction: Option<(Training, Estimate)>,
     /// The model with the friction that was chosen, whatever noise made of it afterwards, and how it was chosen.
     friction: (RegressorModel, Vec<JointFriction>),
+    /// The cut-off at which it was chosen, where the data chose both.
+    friction_hz: Option<f64>,
     /// What the constants of chosen friction add to the bars.
     constants_error: Option<ConstantsError>,
     pub(crate) lag: LagChoice,
@@ -234,7 +237,11 @@ fn lag_rounds<'a>(
 ) -> Result<Fitted<'a>, IdentificationError> {
     let is_free = task.settings.motion.torque_lag_s.is_none() && job.is_plain();
     let mut times = StageTimes::default();
+    // Friction by rows of less noise, once the lag is off; then the lag once more.
+    let mut of_less_noise: Option<Choices> = None;
+    let mut is_asked = choices.is_some() || !job.is_plain();
     loop {
+        let choices = choices.or(of_less_noise.as_ref());
         let mut found = fitted_once((task, &settings), (chosen, choices), execution, job)?;
         times = times.and(&found.times);
         let started = Instant::now();
@@ -242,6 +249,14 @@ fn lag_rounds<'a>(
         found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);
         let again = rounds.again(fit.as_ref(), &mut found.estimation.estimate);
         times.estimation_s += started.elapsed().as_secs_f64();
+        if !again && !core::mem::replace(&mut is_asked, true) {
+            let started = Instant::now();
+            of_less_noise = choices_of_less_noise((&found, &task.payloads), chosen)?;
+            times.estimation_s += started.elapsed().as_secs_f64();
+            if of_less_noise.is_some() {
+                continue;
+            }
+        }
         if !again {
             found.times = times;
             found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
@@ -254,6 +269,32 @@ fn lag_rounds<'a>(
         }
         settings.motion.torque_lag_s = rounds.torque_lag_s();
     }
+}
+
+/// The same choices with friction by rows of less noise; none where they stay.
+fn choices_of_less_noise(
+    (found, payloads): (&Fitted<'_>, &[Payload]),
+    chosen: &[usize],
+) -> Result<Option<Choices>, IdentificationError> {
+    let Fitted { logs, settings, robot, cutoff, friction: (model, joints), friction_hz, .. } = found;
+    let (Some(cutoff), Some(high_hz)) = (cutoff, *friction_hz) else { return Ok(None) };
+    let (model, joints) = (model.clone(), joints.clone());
+    let friction = ChosenFriction { model, joints, ..ChosenFriction::as_stated(robot.clone().into()) };
+    let places = (chosen, payloads);
+    let compared = (&friction, cutoff.cutoff_hz, high_hz);
+    let Some((own, friction)) = friction_of_less_noise((logs, settings), robot, places, compared)? else {
+        return Ok(None);
+    };
+    let cutoff = own.unwrap_or_else(|| cutoff.clone());
+    Ok(Some(Choices {
+        robot: robot.clone(),
+        drive_inertia: found.drive_inertia.clone(),
+        motion_hz: Some(cutoff.motion_hz).filter(|motion_hz| *motion_hz != cutoff.cutoff_hz),
+        cutoff: Some(cutoff),
+        friction,
+        lag: LagChoice::default(),
+        times: StageTimes::default(),
+    }))
 }
 
 /// The lags of the joints beside the parameters, where they can be taken off.
@@ -298,7 +339,7 @@ fn fitted_once<'a>(
 
     // Drives, filters and friction, by the logs where they are left to them.
     let started = Instant::now();
-    let Chosen { robot, drive_inertia, logs, cutoff, friction } = match choices {
+    let Chosen { robot, drive_inertia, logs, cutoff, friction, friction_hz } = match choices {
         Some(choices) => chosen_before((logs, settings), choices, (chosen, payloads))?,
         None => chosen_here((logs, settings), robot, (chosen, payloads), job)?,
     };
@@ -334,6 +375,7 @@ fn fitted_once<'a>(
         drive_inertia,
         stated_friction: friction.stated,
         friction: (friction.model, friction.joints),
+        friction_hz,
         constants_error: friction.constants_error,
         lag: LagChoice::default(),
         between_logs: None,
@@ -349,6 +391,8 @@ struct Chosen<'a> {
     logs: Logs<'a>,
     cutoff: Option<CutoffByError>,
     friction: ChosenFriction,
+    /// The cut-off at which friction was chosen, where the data chose both.
+    friction_hz: Option<f64>,
 }
 
 /// Drives, filters and friction by the logs where they are left to them.
@@ -364,17 +408,18 @@ fn chosen_here<'a>(
     };
     let first = RegressorModel::from(robot.clone());
     let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
+    let mut friction_hz = None;
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
         let friction = ChosenFriction::as_stated(first);
-        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+        (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
-        let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
-        let friction = friction_of_logs((&logs, &of_constants), settings, &robot, (chosen, payloads))?;
-        let cutoff = choose_cutoff((&logs, settings), &friction.model, chosen)?.or(cutoff);
-        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+        let at_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
+        let (of_friction, friction) = friction_with_cutoff((&logs, settings), &robot, (chosen, payloads), at_hz)?;
+        friction_hz = at_hz;
+        let cutoff = of_friction.or(cutoff);
+        (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
-    Ok(Chosen { robot, drive_inertia, logs, cutoff, friction })
+    Ok(Chosen { robot, drive_inertia, logs, cutoff, friction, friction_hz })
 }
 
 /// The same as an excerpt chose it, the constants of friction by all rows.
@@ -384,18 +429,10 @@ fn chosen_before<'a>(
     (chosen, payloads): (&[usize], &[Payload]),
 ) -> Result<Chosen<'a>, IdentificationError> {
     let Choices { robot, drive_inertia, cutoff, motion_hz, friction, .. } = choices;
-    let logs = with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz));
+    let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
     let logs = logs.with_motion_band(*motion_hz);
     let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
     let friction = constants_of_all_rows((&of_constants, settings), robot, friction, (chosen, payloads))?;
     let (robot, drive_inertia) = (robot.clone(), drive_inertia.clone());
-    Ok(Chosen { robot, drive_inertia, logs, cutoff: cutoff.clone(), friction })
-}
-
-/// The logs with a cut-off that was chosen.
-fn with_choice<'a>(logs: Logs<'a>, settings: &IdentificationSettings, cutoff_hz: Option<f64>) -> Logs<'a> {
-    match cutoff_hz {
-        Some(cutoff_hz) => logs.with_cutoff(&settings.motion, cutoff_hz),
-        None => logs,
-    }
+    Ok(Chosen { robot, drive_inertia, logs, cutoff: cutoff.clone(), friction, friction_hz: None })
 }

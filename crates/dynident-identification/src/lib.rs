@@ -119,6 +119,7 @@
 mod bandwidth;
 mod between_logs;
 mod check;
+mod chosen_constants;
 mod chosen_friction;
 mod conditional;
 pub mod consistent;
@@ -133,6 +134,8 @@ mod execution;
 mod fitted;
 pub mod friction;
 mod friction_by_log;
+mod friction_passes;
+mod friction_with_cutoff;
 mod identify;
 mod lag;
 mod less_noise;

@@ -8,6 +8,12 @@ pub(crate) fn deviance(problem: &LinearProblem, fit: &Estimate) -> f64 {
     problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
 }
 
+/// Schwarz's criterion of one joint whose n rows leave noise of `sigma`, with k numbers that are its own.
+pub(crate) fn schwarz_of_joint(rows: usize, sigma: f64, own: usize) -> f64 {
+    let rows = rows.max(1) as f64;
+    rows * 2.0 * sigma.max(f64::MIN_POSITIVE).ln() + own as f64 * rows.ln()
+}
+
 /// Schwarz's criterion of a fit with k free parameters and n rows: the deviance and `k ln n`; the less the better.
 /// Source: Annals of Statistics 6 (1978) 461.
 pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {

@@ -117,6 +117,15 @@ impl<'a> Logs<'a> {
         self
     }
 
+    /// The same with a cut-off that was chosen, or as it is.
+    #[must_use]
+    pub(crate) fn with_chosen_cutoff(self, settings: &MotionSettings, cutoff_hz: Option<f64>) -> Self {
+        match cutoff_hz {
+            Some(cutoff_hz) => self.with_cutoff(settings, cutoff_hz),
+            None => self,
+        }
+    }
+
     /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
     #[must_use]
     pub(crate) fn without_keeping(mut self) -> Self {

@@ -19,6 +19,7 @@ pub use fits::{NamedEstimator, default_settings};
 pub use table::{TABLE_HEADER, csv_header, csv_line, goals, table_line};
 
 use crate::accuracy::BenchmarkError;
+use core::ops::Range;
 use dynident_dynamics::Column;
 use dynident_estimation::EstimationError;
 use dynident_identification::Identification;
@@ -28,14 +29,15 @@ use fits::MULTIPLES;
 use rayon::prelude::*;
 use simulated::{CaseRobot, Simulated};
 
-/// Fits `runs` recordings of a case in all ways; the estimators by name only if `by_name`.
+/// Fits the recordings `runs` (by number: each has robot, motion and noise of its own) of a case in all ways; the
+/// estimators by name only if `by_name`.
 ///
 /// # Errors
 /// A robot, motion or recording that cannot be made, a default fit that fails. What else fails is a figure.
-pub fn case_figures(case: &DefaultCase, runs: u64, by_name: bool) -> Result<CaseFigures, BenchmarkError> {
+pub fn case_figures(case: &DefaultCase, runs: Range<u64>, by_name: bool) -> Result<CaseFigures, BenchmarkError> {
     let failed = |reason: String| BenchmarkError::Excitation { robot: case.label(), reason };
     let robot = CaseRobot::new(case).map_err(failed)?;
-    let done: Vec<(Simulated, RunFigures)> = (0..runs)
+    let done: Vec<(Simulated, RunFigures)> = runs
         .into_par_iter()
         .map(|run| {
             let made = Simulated::new(case, &robot, run).map_err(failed)?;

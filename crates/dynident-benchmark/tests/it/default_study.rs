@@ -10,7 +10,7 @@ use std::error::Error;
 
 fn figures(case: &DefaultCase, threads: usize) -> Result<CaseFigures, Box<dyn Error>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    Ok(pool.install(|| case_figures(case, 2, false))?)
+    Ok(pool.install(|| case_figures(case, 0..2, false))?)
 }
 
 /// Whatever becomes the default of a study becomes that of the experiment, or this fails.
@@ -70,9 +70,23 @@ fn a_lag_that_all_joints_share_is_found_beside_chosen_friction() -> Result<(), B
     let is_it =
         |case: &&DefaultCase| case.robot.name == "UR10" && case.friction.name() == "Stribeck" && case.lag_s == 8e-3;
     let case = DEFAULT_CASES.iter().find(is_it).ok_or("no such case")?;
-    let found = case_figures(case, 1, false)?;
+    let found = case_figures(case, 0..1, false)?;
     assert!(found.lag_found_s.is_some_and(|lag_s| (lag_s - 8e-3).abs() < 1e-3), "{found:?}");
     assert_eq!(found.tellable, found.told, "{found:?}");
+    Ok(())
+}
+
+/// Noise of the positions of 1e-3 rad: a step of 0.015 rad/s looked dry at a joint (6.7 times the error with the laws
+/// stated), and terms that nobody has made up for a smeared one (3.6 times). Two recordings make a factor of two by
+/// chance; constants that have to be found as well cost something.
+#[test]
+fn noise_of_the_positions_does_not_spoil_friction() -> Result<(), Box<dyn Error>> {
+    let is_it = |case: &&&DefaultCase| case.noise.position_rad >= 1e-3 && case.motion.duration_s <= 10.0;
+    for case in DEFAULT_CASES.iter().filter(|case| is_it(&case)) {
+        let found = case_figures(case, 0..2, false)?;
+        assert!(found.over_laws_stated() < 2.5, "{}: {found:?}", case.label());
+        assert_eq!(found.tellable, found.told, "{found:?}");
+    }
     Ok(())
 }
 
@@ -81,7 +95,7 @@ fn a_lag_that_all_joints_share_is_found_beside_chosen_friction() -> Result<(), B
 fn estimators_of_repeated_motion_are_given_one() -> Result<(), Box<dyn Error>> {
     let is_it = |case: &&DefaultCase| case.robot.name == "planar 2R" && case.friction.name() == "asymmetric";
     let case = DEFAULT_CASES.iter().find(is_it).ok_or("no such case")?;
-    let found = case_figures(case, 1, true)?;
+    let found = case_figures(case, 0..1, true)?;
     let settled = |estimator: NamedEstimator| {
         let place = NamedEstimator::ALL.iter().position(|one| *one == estimator);
         place.and_then(|place| found.by_name[place]).is_some_and(|named| named.settled == 1)

@@ -9,7 +9,8 @@ use dynident_model::terms::{
 
 /// Widths of the smooth Coulomb step, rad/s or m/s of a usual arm, as all velocities here; beside them the sign and
 /// what the study states.
-const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+const WIDTHS: [f64; 7] = [NARROWEST, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+const NARROWEST: f64 = 0.002;
 /// Stribeck velocities.
 const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
@@ -205,6 +206,11 @@ impl JointScale {
     #[cfg(test)]
     pub(super) const fn usual(joint: usize) -> Self {
         Self { joint, velocity: 1.0, position: 1.0 }
+    }
+
+    /// The narrowest step that is looked for beside the sign, rad/s (m/s).
+    pub(super) fn narrowest_width(self) -> f64 {
+        NARROWEST * self.velocity
     }
 
     pub(crate) fn of(model: &Model, joint: usize) -> Self {

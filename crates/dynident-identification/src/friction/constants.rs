@@ -93,6 +93,14 @@ pub(super) fn step_of(term: &TorqueTerm) -> Option<CoulombShape> {
     }
 }
 
+/// Width of the smooth step of a term that changes its sign at rest, rad/s (m/s).
+pub(crate) fn smooth_width(term: &TorqueTerm) -> Option<f64> {
+    match step_of(term)? {
+        CoulombShape::Smooth { width } => Some(width),
+        CoulombShape::Sign { .. } => None,
+    }
+}
+
 /// The terms of a joint with one step at rest, that of Coulomb friction: they are one friction,
 /// `(F_c + F_s e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`. Stribeck friction beside a smooth step keeps its own: where real joints
 /// creep before they break loose, the data tell the two apart.

@@ -104,6 +104,11 @@ impl FrictionConstants {
         Self { joints, scales, axes }
     }
 
+    /// How many of them a joint has.
+    pub(crate) fn count(&self, joint: usize) -> usize {
+        self.axes.iter().filter(|axis| self.joints[axis.joint].0 == joint).count()
+    }
+
     /// Whether there is none to move.
     pub(crate) fn is_empty(&self) -> bool {
         self.axes.is_empty()

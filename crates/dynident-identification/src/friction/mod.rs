@@ -5,6 +5,7 @@ mod choice;
 mod constants;
 mod constants_fit;
 mod search;
+mod second_start;
 mod weak_terms;
 
 pub use candidates::FrictionSearch;
@@ -12,4 +13,6 @@ pub use choice::{FrictionCandidate, FrictionConstant, JointFriction, chosen_mode
 
 pub(crate) use candidates::{CandidateColumn, JointScale, candidate_columns, step_columns};
 pub(crate) use choice::choose_friction;
+pub(crate) use constants::smooth_width;
 pub(crate) use constants_fit::{ConstantsError, ConstantsStep, FrictionConstants};
+pub(crate) use second_start::second_start;

@@ -1,0 +1,272 @@
+//! The constants of the friction that joints chose, together with all parameters: passes over the recordings from where
+//! the terms were found, and from a second start where such steps are known to end beside the best.
+
+use crate::error::IdentificationError;
+use crate::estimators::Estimator;
+use crate::friction::{ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, second_start};
+use crate::friction_passes::{with_friction_of, with_terms, without_bars};
+use crate::likelihood::{deviance, schwarz_of_joint};
+use crate::regressor_model::RegressorModel;
+use crate::training::{LogFactors, TrainingPasses, plain_estimate};
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::{Estimate, LinearProblem};
+use dynident_model::terms::TorqueTerm;
+
+/// Passes over the recordings for the constants of chosen friction, at most.
+const MOST_PASSES: usize = 8;
+/// Passes after which terms that are not seen are dropped although constants still move.
+const DROP_PASSES: usize = 3;
+/// Times that a step which makes the fit worse is halved: the constants are as good as they get.
+const MOST_HALVINGS: usize = 3;
+/// Passes at least where friction depends on the load, which is the fit's before.
+const LOAD_PASSES: usize = 3;
+
+/// The constants of a pass, the step from there, and what the fit left before it.
+struct LastPass {
+    constants: FrictionConstants,
+    steps: Vec<f64>,
+    misfit: f64,
+    halvings: usize,
+}
+
+/// One pass over the recordings for the constants of chosen friction: rows with the columns beside them, and the fit.
+struct ConstantsPass {
+    wide: RegressorModel,
+    factors: Vec<LogFactors>,
+    problem: LinearProblem,
+    fit: Estimate,
+}
+
+impl ConstantsPass {
+    /// The step from here, and how well the constants are known, by the covariance that bars are made of.
+    fn step(
+        &self,
+        passes: &TrainingPasses<'_>,
+        (constants, model): (&FrictionConstants, &RegressorModel),
+        gains: &[usize],
+    ) -> Result<ConstantsStep, IdentificationError> {
+        let wide_problem = passes.free_problem(&self.wide, &self.factors, (model, &self.fit, gains))?;
+        let solve = |problem: &LinearProblem| plain_estimate(&passes.settings.estimation, problem);
+        Ok(constants.step((model, &self.fit), (&self.wide, &wide_problem), solve)?)
+    }
+}
+
+/// What a step says of the constants' intervals, to the joints that have them.
+fn take_intervals(
+    joints: &mut [JointFriction],
+    model: &RegressorModel,
+    constants: &FrictionConstants,
+    step: &ConstantsStep,
+) {
+    for (joint, found) in constants.with_intervals(step) {
+        let name = &model.model().joints()[joint].name;
+        joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.constants.clone_from(&found));
+    }
+}
+
+/// The best constants from where the terms were found and, for joints of which rows near rest count, from a
+/// [second start](second_start); joint by joint the friction that says most of the rows with the fewest numbers
+/// (Schwarz). Gains of some joints are unknowns, too.
+pub(crate) fn best_constants(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    (joints, near_rest): (&mut Vec<JointFriction>, &[&str]),
+    (model, gains): (RegressorModel, &[usize]),
+) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
+    let mut others = joints.clone();
+    let mut is_moved = vec![false; joints.len()];
+    for (one, is_moved) in others.iter_mut().zip(&mut is_moved).filter(|(one, _)| near_rest.contains(&&one.joint[..])) {
+        let place = model.model().joint_index(&one.joint);
+        let scale = place.map(|joint| JointScale::of(robot.model(), joint));
+        if let (Some(terms), Some(scale)) = (&one.terms, scale)
+            && let Some(start) = second_start(terms, scale)
+        {
+            one.choose(&start);
+            *is_moved = true;
+        }
+    }
+    let first = with_constants(passes, robot, joints, (model, gains))?;
+    if !is_moved.contains(&true) {
+        return Ok(first);
+    }
+
+    // From the other start; then of both what is better.
+    let start = passes.with_friction(robot, &others, &first.0)?;
+    let second = with_constants(passes, robot, &mut others, (start, gains))?;
+    let of_joints = |model: &RegressorModel, joints: &[JointFriction]| -> Result<Vec<f64>, IdentificationError> {
+        let scores = friction_scores(passes, model, joints)?;
+        let place = |one: &JointFriction| model.model().joint_index(&one.joint);
+        Ok(joints.iter().map(|one| place(one).map_or(0.0, |place| scores[place])).collect())
+    };
+    let (of_first, of_second) = (of_joints(&first.0, joints)?, of_joints(&second.0, &others)?);
+    let is_better: Vec<bool> = is_moved
+        .iter()
+        .zip(of_first.iter().zip(&of_second))
+        .map(|(moved, (first, second))| *moved && second < first)
+        .collect();
+    if !is_better.contains(&true) {
+        return Ok(first);
+    }
+    let is_all = is_better == is_moved;
+    for ((one, other), _) in
+        joints.iter_mut().zip(others).zip(&is_better).filter(|(_, is_better)| is_all || **is_better)
+    {
+        *one = other;
+    }
+    if is_all {
+        return Ok(second);
+    }
+    let start = passes.with_friction(robot, joints, &first.0)?;
+    with_constants(passes, robot, joints, (start, gains))
+}
+
+/// One step of the constants from where they are, for joints that chose their friction by other rows; none where there
+/// is nothing to move.
+pub(crate) fn one_step(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    joints: &mut [JointFriction],
+    model: &RegressorModel,
+) -> Result<Option<(RegressorModel, ConstantsError)>, IdentificationError> {
+    let constants = FrictionConstants::new(model, joints);
+    if !model.needs_load() && constants.is_empty() {
+        return Ok(None);
+    }
+    let measured = passes.constants_pass(&constants, model)?;
+    let step = measured.step(passes, (&constants, model), &[])?;
+    take_intervals(joints, model, &constants, &step);
+    let error = step.error().clone();
+    let terms = constants.moved(&step.steps);
+    Ok(Some((with_chosen(robot, joints, &terms, (model, &measured.fit))?, error)))
+}
+
+/// Schwarz's criterion of every joint of a model, with the terms and the constants of its friction as its own numbers;
+/// 0 for a joint without rows.
+pub(crate) fn friction_scores(
+    passes: &TrainingPasses<'_>,
+    model: &RegressorModel,
+    joints: &[JointFriction],
+) -> Result<Vec<f64>, IdentificationError> {
+    let rows = passes.rows_once(model.clone())?;
+    let fit = plain_estimate(&without_bars(passes.settings), &rows.problem)?;
+    let constants = FrictionConstants::new(model, joints);
+    let mut scores = vec![0.0; model.dof()];
+    for ((&joint, count), sigma) in rows.joints.iter().zip(rows.problem.joint_rows()).zip(&fit.joint_sigma) {
+        let is_own = |term: &&TorqueTerm| term.is_joint_friction() && term.own_joint() == Some(joint);
+        let terms = model.parametric.terms().iter().filter(is_own).count();
+        scores[joint] = schwarz_of_joint(count, *sigma, terms + constants.count(joint));
+    }
+    Ok(scores)
+}
+
+/// The model with the constants of the terms that its joints chose, and without terms that are not seen with the
+/// constants free; and what the error of the constants adds to the bars. Gains of some joints are unknowns, too.
+pub(crate) fn with_constants(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    joints: &mut [JointFriction],
+    (mut model, gains): (RegressorModel, &[usize]),
+) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
+    let equal_weights = matches!(passes.settings.estimation.estimator, Estimator::Ordinary);
+    let mut last: Option<LastPass> = None;
+    let mut error = None;
+    for pass in 1..=MOST_PASSES {
+        let constants = FrictionConstants::new(&model, joints);
+        if !model.needs_load() && constants.is_empty() {
+            break;
+        }
+        let measured = passes.constants_pass(&constants, &model)?;
+        let fit = &measured.fit;
+
+        // A step that made the fit worse was too long; where no length makes it better the constants are found.
+        let misfit = misfit(&measured.problem, fit, equal_weights);
+        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit) {
+            before.halvings += 1;
+            let is_over = before.halvings > MOST_HALVINGS;
+            before.steps.iter_mut().for_each(|step| *step *= if is_over { 0.0 } else { 0.5 });
+            let terms = before.constants.moved(&before.steps);
+            model = with_chosen(robot, joints, &terms, (&model, fit))?;
+            if is_over {
+                break;
+            }
+            continue;
+        }
+
+        let step = measured.step(passes, (&constants, &model), gains)?;
+        take_intervals(joints, &model, &constants, &step);
+        error = Some(step.error().clone());
+        let has_settled = step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
+
+        // Terms that are not seen once constants are free: the weakest of every joint, then again.
+        let fewer = constants.without_weakest((&model, &measured.problem.column_norms()), &step);
+        if pass == MOST_PASSES {
+            if !fewer.is_empty() {
+                model = with_chosen(robot, joints, &fewer, (&model, fit))?;
+            }
+            break;
+        }
+        if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
+            model = with_chosen(robot, joints, &fewer, (&model, fit))?;
+            last = None;
+            continue;
+        }
+        if has_settled {
+            break;
+        }
+        let terms = constants.moved(&step.steps);
+        model = with_chosen(robot, joints, &terms, (&model, fit))?;
+        last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
+    }
+    Ok((model, error))
+}
+
+/// The robot with these terms at the joints that chose theirs, and the load of a fit of the model before.
+fn with_chosen(
+    robot: &ParametricModel,
+    joints: &mut [JointFriction],
+    terms: &[(usize, Vec<TorqueTerm>)],
+    (before, fit): (&RegressorModel, &Estimate),
+) -> Result<RegressorModel, IdentificationError> {
+    for (joint, terms) in terms {
+        let name = &before.model().joints()[*joint].name;
+        joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.choose(terms));
+    }
+    with_friction_of(robot, joints, (before, fit))
+}
+
+impl TrainingPasses<'_> {
+    /// The robot with this friction, and the load of a fit with the friction of `before`.
+    fn with_friction(
+        &self,
+        robot: &ParametricModel,
+        joints: &[JointFriction],
+        before: &RegressorModel,
+    ) -> Result<RegressorModel, IdentificationError> {
+        let rows = self.rows_once(before.clone())?;
+        let fit = plain_estimate(&without_bars(self.settings), &rows.problem)?;
+        with_friction_of(robot, joints, (before, &fit))
+    }
+
+    /// The rows of a model with the columns that its constants ask for beside it.
+    fn constants_pass(
+        &self,
+        constants: &FrictionConstants,
+        model: &RegressorModel,
+    ) -> Result<ConstantsPass, IdentificationError> {
+        let wide = with_terms(model, constants.neighbours().into_iter());
+        let factors = self.read(&wide)?;
+        let own = factors.iter().map(|log| log.clone().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
+        let problem = self.stated_problem(model, &self.columns(model)?, &own)?;
+        let fit = plain_estimate(&without_bars(self.settings), &problem)?;
+        Ok(ConstantsPass { wide, factors, problem, fit })
+    }
+}
+
+/// What a fit leaves: its deviance; where joints count alike the sum of squares.
+fn misfit(problem: &LinearProblem, fit: &Estimate, equal_weights: bool) -> f64 {
+    if !equal_weights {
+        return deviance(problem, fit);
+    }
+    let of_joint = |(rows, sigma): (usize, &f64)| rows as f64 * sigma * sigma;
+    problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
+}

@@ -1,0 +1,91 @@
+//! Where the constants of a joint's friction begin a second time.
+//!
+//! Steps of Gauss and Newton end at the best constants near their start, and two starts are known to lie in the wrong
+//! valley. A dry step (the sign) has no width that could move: it is the limit of a narrow one, and noise of the
+//! velocity can make it look best on a grid. And a Coulomb step wider than half the velocity at which Stribeck friction
+//! has fallen off leaves the step at rest to the Stribeck term: the two have changed places.
+
+use super::candidates::{JointScale, STRIBECK_WIDTH};
+use super::constants::{step_of, with_one_step};
+use dynident_model::terms::{CoulombShape, Stribeck, TorqueTerm};
+
+/// A Coulomb step this part of the Stribeck velocity wide is done where Stribeck friction begins to fall off.
+const WIDE: f64 = 0.5;
+
+/// The same terms with the step at rest where the other valley is; `None` where they are in it already.
+pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
+    let is_coulomb = |term: &&TorqueTerm| matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_));
+    let step = step_of(terms.iter().find(is_coulomb)?)?;
+    let stribeck = terms.iter().find_map(|term| match term {
+        TorqueTerm::Stribeck(own) => Some(STRIBECK_WIDTH * own.speed),
+        _ => None,
+    });
+    let width = match (step, stribeck) {
+        (CoulombShape::Sign { dead_band: 0.0 }, of_stribeck) => {
+            of_stribeck.unwrap_or(f64::INFINITY).min(scale.narrowest_width())
+        }
+        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > WIDE / STRIBECK_WIDTH * of_stribeck => {
+            of_stribeck
+        }
+        _ => return None,
+    };
+    let moved = |term: &TorqueTerm| {
+        let mut term = term.clone();
+        match &mut term {
+            TorqueTerm::Coulomb(own) => own.shape = CoulombShape::Smooth { width },
+            TorqueTerm::DirectionalCoulomb(own) => own.shape = CoulombShape::Smooth { width },
+            TorqueTerm::Stribeck(Stribeck { shape, speed, .. }) => {
+                *shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * *speed };
+            }
+            _ => {}
+        }
+        term
+    };
+    Some(with_one_step(terms.iter().map(moved).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::terms::{Coulomb, LoadFriction, Viscous};
+
+    const USUAL: JointScale = JointScale::usual(0);
+    const DRY: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
+
+    fn smooth(width: f64) -> CoulombShape {
+        CoulombShape::Smooth { width }
+    }
+
+    fn coulomb(shape: CoulombShape) -> TorqueTerm {
+        TorqueTerm::Coulomb(Coulomb { joint: 0, shape })
+    }
+
+    fn load(shape: CoulombShape) -> TorqueTerm {
+        TorqueTerm::Load(LoadFriction { joint: 0, shape })
+    }
+
+    fn stribeck(shape: CoulombShape) -> TorqueTerm {
+        TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.08, exponent: 1.0, shape })
+    }
+
+    #[test]
+    fn a_dry_step_begins_as_a_narrow_one() {
+        let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
+        let found = second_start(&[viscous.clone(), coulomb(DRY)], USUAL);
+        assert_eq!(found, Some(vec![viscous.clone(), coulomb(smooth(0.002))]));
+        // A width that a study has stated for a dead band is its own; what is smooth and alone can move already.
+        assert_eq!(second_start(&[coulomb(CoulombShape::Sign { dead_band: 0.01 })], USUAL), None);
+        assert_eq!(second_start(&[viscous, coulomb(smooth(0.1))], USUAL), None);
+    }
+
+    #[test]
+    fn a_step_that_changed_places_with_stribeck_friction_begins_below_it() {
+        let found = second_start(&[coulomb(smooth(0.14)), stribeck(smooth(0.02)), load(smooth(0.14))], USUAL);
+        // Load-dependent friction goes with it: it is one friction.
+        assert_eq!(found, Some(vec![coulomb(smooth(0.02)), stribeck(smooth(0.02)), load(smooth(0.02))]));
+        assert_eq!(second_start(&[coulomb(smooth(0.03)), stribeck(smooth(0.02))], USUAL), None);
+        // A dry joint's Stribeck friction is dry; its second start is not.
+        let found = second_start(&[coulomb(DRY), stribeck(DRY)], USUAL);
+        assert_eq!(found, Some(vec![coulomb(smooth(0.002)), stribeck(smooth(0.02))]));
+    }
+}

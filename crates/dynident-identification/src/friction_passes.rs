@@ -1,0 +1,60 @@
+//! What every pass over the recordings for friction needs: a model with further columns, and the rows of it.
+
+use crate::error::IdentificationError;
+use crate::estimators::EstimationSettings;
+use crate::friction::{JointFriction, chosen_model};
+use crate::payload::with_free_gains;
+use crate::regressor_model::RegressorModel;
+use crate::settings::IdentificationSettings;
+use crate::training::{LogFactors, TrainingPasses};
+use dynident_dynamics::{Column, ParametricModel};
+use dynident_estimation::{CovarianceMethod, Estimate, LinearProblem};
+use dynident_model::terms::TorqueTerm;
+
+/// Settings of a fit whose error bars nobody wants.
+pub(crate) fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {
+    EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() }
+}
+
+/// The model with those of these terms as columns that it does not have.
+pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = TorqueTerm>) -> RegressorModel {
+    let known = model.layout().columns();
+    let mut further: Vec<TorqueTerm> = Vec::new();
+    for term in terms {
+        if !known.contains(&Column::Term(term.clone())) && !further.contains(&term) {
+            further.push(term);
+        }
+    }
+    model.with_further_columns(further)
+}
+
+/// The robot with the friction that its joints chose, and the gains and the load of a fit of the model before.
+pub(crate) fn with_friction_of(
+    robot: &ParametricModel,
+    joints: &[JointFriction],
+    (before, fit): (&RegressorModel, &Estimate),
+) -> Result<RegressorModel, IdentificationError> {
+    let torque_gains = before.torque_gains.clone();
+    let next = RegressorModel { torque_gains, ..RegressorModel::from(chosen_model(robot, joints)?) };
+    Ok(next.with_load_of(before, &fit.values))
+}
+
+impl TrainingPasses<'_> {
+    /// The rows of `wide`, with the `free` gains of some joints as unknowns about `fit`, whose columns are those of
+    /// `model` and what logs add to them.
+    pub(crate) fn free_problem(
+        &self,
+        wide: &RegressorModel,
+        factors: &[LogFactors],
+        (model, fit, free): (&RegressorModel, &Estimate, &[usize]),
+    ) -> Result<LinearProblem, IdentificationError> {
+        let columns = self.columns(wide)?;
+        let problem = self.stated_problem(wide, &columns, factors)?;
+        let (base, wide_base) = (model.layout().columns().len(), wide.layout().columns().len());
+        let mut values = fit.values[..base].to_vec();
+        values.resize(wide_base, 0.0);
+        values.extend_from_slice(&fit.values[base..]);
+        let known: Vec<Vec<f64>> = self.training.iter().map(|&log| columns.known(log)).collect();
+        Ok(with_free_gains(problem, free, (&known, &values))?)
+    }
+}

@@ -1,0 +1,73 @@
+//! Friction and the cut-off at which it is chosen.
+//!
+//! Friction has details above the motion's band, so it is chosen at the highest cut-off that serves the parameters. But
+//! that cut-off is predicted with the friction that a study begins with, whose wide step does not mind noise of the
+//! velocity. With the friction that was found the prediction can be another: noise smears a narrow step, and terms that
+//! nobody has make up for it. So where the fit then asks for a lower cut-off and the noise is more than a small part of
+//! a step's width, friction is chosen there as well, and on the rows of that cut-off the one counts that says most of
+//! them with the fewest numbers (Schwarz, Annals of Statistics 6 (1978) 461).
+
+use crate::bandwidth::{CutoffByError, choose_cutoff};
+use crate::chosen_friction::{ChosenFriction, friction_of_logs, friction_score};
+use crate::error::IdentificationError;
+use crate::friction::smooth_width;
+use crate::logs::{LogSpectrum, Logs};
+use crate::payload::Payload;
+use crate::settings::IdentificationSettings;
+use dynident_dynamics::ParametricModel;
+
+/// Cut-offs closer than this are one: they are tried in steps of √2.
+const LOWER: f64 = 1.2;
+/// Noise of the velocity that is less than this part of a step's width does not smear it: it widens a smooth step by
+/// half the square of this part.
+const SMEARED: f64 = 0.05;
+
+/// Friction that the recordings `training` choose at the cut-off `at_hz` (of the logs where there is none), and the
+/// cut-off for a fit with it.
+///
+/// # Errors
+/// Recordings that cannot be read, rows that do not carry an estimate.
+pub(crate) fn friction_with_cutoff(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    (training, payloads): (&[usize], &[Payload]),
+    at_hz: Option<f64>,
+) -> Result<(Option<CutoffByError>, ChosenFriction), IdentificationError> {
+    let logs = logs.clone().with_chosen_cutoff(&settings.motion, at_hz);
+    let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
+    let friction = friction_of_logs((&logs, &of_constants), settings, robot, (training, payloads))?;
+    Ok((choose_cutoff((&logs, settings), &friction.model, training)?, friction))
+}
+
+/// The friction that the recordings choose at the cut-off of the fit, where they chose `friction` at a higher one,
+/// `high_hz`, whose noise smears it, and where the other says more of the rows; with its own cut-off.
+///
+/// # Errors
+/// As [`friction_with_cutoff`].
+pub(crate) fn friction_of_less_noise(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    (training, payloads): (&[usize], &[Payload]),
+    (friction, low_hz, high_hz): (&ChosenFriction, f64, f64),
+) -> Result<Option<(Option<CutoffByError>, ChosenFriction)>, IdentificationError> {
+    if LOWER * low_hz > high_hz || friction.joints.is_empty() || !is_smeared(logs, friction, high_hz) {
+        return Ok(None);
+    }
+    let logs = logs.clone().with_chosen_cutoff(&settings.motion, Some(low_hz));
+    let (cutoff, other) = friction_with_cutoff((&logs, settings), robot, (training, payloads), None)?;
+    let rows = logs.with_torque_beyond_motion(&robot.clone().into())?;
+    let score = |friction: &ChosenFriction| friction_score((&rows, settings), robot, friction, (training, payloads));
+    Ok((score(&other)? < score(friction)?).then_some((cutoff, other)))
+}
+
+/// Whether noise of the positions behind a low-pass at `cutoff_hz` makes noise of the velocity that smears the
+/// narrowest smooth step: white noise of σ has `σ 2π √(2 f³ / 3 rate)` there. What is smeared does not look dry.
+fn is_smeared(logs: &Logs<'_>, friction: &ChosenFriction, cutoff_hz: f64) -> bool {
+    let widths = friction.joints.iter().flat_map(|joint| joint.terms.iter().flatten()).filter_map(smooth_width);
+    let narrowest = widths.fold(f64::INFINITY, f64::min);
+    let noise = |log: &LogSpectrum| {
+        let of_position = log.position_noise.iter().copied().fold(0.0, f64::max);
+        of_position * core::f64::consts::TAU * (2.0 * cutoff_hz.powi(3) / (3.0 * log.rate_hz)).sqrt()
+    };
+    logs.spectra().iter().map(noise).fold(0.0, f64::max) > SMEARED * narrowest
+}
