@@ -3,14 +3,13 @@
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
-use crate::chosen_friction::{ChosenFriction, constants_of_all_rows};
+use crate::chosen_friction::{ChosenFriction, constants_of_all_rows, friction_of_less_noise, friction_with_cutoff};
 use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::excerpt::excerpts;
 use crate::execution::Execution;
 use crate::friction::{ConstantsError, JointFriction};
-use crate::friction_with_cutoff::{friction_of_less_noise, friction_with_cutoff};
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::likelihood::schwarz;

@@ -119,7 +119,6 @@
 mod bandwidth;
 mod between_logs;
 mod check;
-mod chosen_constants;
 mod chosen_friction;
 mod conditional;
 pub mod consistent;
@@ -134,8 +133,6 @@ mod execution;
 mod fitted;
 pub mod friction;
 mod friction_by_log;
-mod friction_passes;
-mod friction_with_cutoff;
 mod identify;
 mod lag;
 mod less_noise;

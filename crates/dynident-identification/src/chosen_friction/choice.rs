@@ -1,13 +1,13 @@
 //! The friction of the joints as their recordings choose it: which terms, then their constants.
 
-use crate::chosen_constants::{best_constants, friction_scores, one_step, with_constants};
+use super::constants::{best_constants, friction_scores, one_step, with_constants};
+use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{
     CandidateColumn, ConstantsError, FrictionSearch, JointFriction, JointScale, candidate_columns,
     choose_friction as choose_terms, step_columns,
 };
-use crate::friction_passes::{with_friction_of, with_terms, without_bars};
 use crate::logs::Logs;
 use crate::payload::{Payload, free_gains};
 use crate::regressor_model::RegressorModel;

@@ -7,8 +7,8 @@
 //! a step's width, friction is chosen there as well, and on the rows of that cut-off the one counts that says most of
 //! them with the fewest numbers (Schwarz, Annals of Statistics 6 (1978) 461).
 
+use super::choice::{ChosenFriction, friction_of_logs, friction_score};
 use crate::bandwidth::{CutoffByError, choose_cutoff};
-use crate::chosen_friction::{ChosenFriction, friction_of_logs, friction_score};
 use crate::error::IdentificationError;
 use crate::friction::smooth_width;
 use crate::logs::{LogSpectrum, Logs};

@@ -1,10 +1,10 @@
 //! The constants of the friction that joints chose, together with all parameters: passes over the recordings from where
 //! the terms were found, and from a second start where such steps are known to end beside the best.
 
+use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, second_start};
-use crate::friction_passes::{with_friction_of, with_terms, without_bars};
 use crate::likelihood::{deviance, schwarz_of_joint};
 use crate::regressor_model::RegressorModel;
 use crate::training::{LogFactors, TrainingPasses, plain_estimate};
