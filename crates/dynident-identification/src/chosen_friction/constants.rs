@@ -4,7 +4,9 @@
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
-use crate::friction::{ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, second_start};
+use crate::friction::{
+    ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, is_one_friction, second_start,
+};
 use crate::likelihood::{deviance, schwarz_of_joint};
 use crate::regressor_model::RegressorModel;
 use crate::training::{LogFactors, TrainingPasses, plain_estimate};
@@ -99,10 +101,12 @@ pub(crate) fn best_constants(
         Ok(joints.iter().map(|one| place(one).map_or(0.0, |place| scores[place])).collect())
     };
     let (of_first, of_second) = (of_joints(&first.0, joints)?, of_joints(&second.0, &others)?);
+    let is_possible = |one: &JointFriction| one.terms.as_deref().is_none_or(is_one_friction);
     let is_better: Vec<bool> = is_moved
         .iter()
+        .zip(&others)
         .zip(of_first.iter().zip(&of_second))
-        .map(|(moved, (first, second))| *moved && second < first)
+        .map(|((moved, other), (first, second))| *moved && second < first && is_possible(other))
         .collect();
     if !is_better.contains(&true) {
         return Ok(first);

@@ -2,15 +2,18 @@
 //!
 //! Steps of Gauss and Newton end at the best constants near their start, and two starts are known to lie in the wrong
 //! valley. A dry step (the sign) has no width that could move: it is the limit of a narrow one, and noise of the
-//! velocity can make it look best on a grid. And a Coulomb step wider than half the velocity at which Stribeck friction
+//! velocity can make it look best on a grid. (With Stribeck friction it stays: that is dry as well, and with a step of
+//! its own it takes up what is at rest.) And a Coulomb step wider than half the velocity at which Stribeck friction
 //! has fallen off leaves the step at rest to the Stribeck term: the two have changed places.
 
 use super::candidates::{JointScale, STRIBECK_WIDTH};
-use super::constants::{step_of, with_one_step};
-use dynident_model::terms::{CoulombShape, Stribeck, TorqueTerm};
+use super::constants::{smooth_width, step_of, with_one_step};
+use dynident_model::terms::{CoulombShape, TorqueTerm};
 
 /// A Coulomb step this part of the Stribeck velocity wide is done where Stribeck friction begins to fall off.
 const WIDE: f64 = 0.5;
+/// Part of the Stribeck term's own step that a Coulomb step of the same friction has at least.
+const NARROW: f64 = 0.5;
 
 /// The same terms with the step at rest where the other valley is; `None` where they are in it already.
 pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
@@ -21,9 +24,7 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
         _ => None,
     });
     let width = match (step, stribeck) {
-        (CoulombShape::Sign { dead_band: 0.0 }, of_stribeck) => {
-            of_stribeck.unwrap_or(f64::INFINITY).min(scale.narrowest_width())
-        }
+        (CoulombShape::Sign { dead_band: 0.0 }, None) => scale.narrowest_width(),
         (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > WIDE / STRIBECK_WIDTH * of_stribeck => {
             of_stribeck
         }
@@ -34,9 +35,6 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
         match &mut term {
             TorqueTerm::Coulomb(own) => own.shape = CoulombShape::Smooth { width },
             TorqueTerm::DirectionalCoulomb(own) => own.shape = CoulombShape::Smooth { width },
-            TorqueTerm::Stribeck(Stribeck { shape, speed, .. }) => {
-                *shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * *speed };
-            }
             _ => {}
         }
         term
@@ -44,10 +42,21 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
     Some(with_one_step(terms.iter().map(moved).collect()))
 }
 
+/// Whether Coulomb and Stribeck friction can be one friction: with a Coulomb step far narrower than that of the
+/// Stribeck term the joint is dry, and Stribeck friction that is not comes out too large.
+pub(crate) fn is_one_friction(terms: &[TorqueTerm]) -> bool {
+    let width = |is_wanted: fn(&TorqueTerm) -> bool| terms.iter().filter(|term| is_wanted(term)).find_map(smooth_width);
+    let coulomb = width(|term| matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_)));
+    match (coulomb, width(|term| matches!(term, TorqueTerm::Stribeck(_)))) {
+        (Some(coulomb), Some(stribeck)) => coulomb >= NARROW * stribeck,
+        _ => true,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_model::terms::{Coulomb, LoadFriction, Viscous};
+    use dynident_model::terms::{Coulomb, LoadFriction, Stribeck, Viscous};
 
     const USUAL: JointScale = JointScale::usual(0);
     const DRY: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
@@ -84,8 +93,16 @@ mod tests {
         // Load-dependent friction goes with it: it is one friction.
         assert_eq!(found, Some(vec![coulomb(smooth(0.02)), stribeck(smooth(0.02)), load(smooth(0.02))]));
         assert_eq!(second_start(&[coulomb(smooth(0.03)), stribeck(smooth(0.02))], USUAL), None);
-        // A dry joint's Stribeck friction is dry; its second start is not.
-        let found = second_start(&[coulomb(DRY), stribeck(DRY)], USUAL);
-        assert_eq!(found, Some(vec![coulomb(smooth(0.002)), stribeck(smooth(0.02))]));
+        // A dry joint's Stribeck friction is dry, and stays so.
+        assert_eq!(second_start(&[coulomb(DRY), stribeck(DRY)], USUAL), None);
+    }
+
+    /// The paper's arm with dry friction came out with 0.0025 beside 0.0116 and Stribeck friction 15 % too large.
+    #[test]
+    fn a_dry_joint_has_no_wide_stribeck_friction() {
+        assert!(!is_one_friction(&[coulomb(smooth(0.0025)), stribeck(smooth(0.0116))]));
+        assert!(is_one_friction(&[coulomb(smooth(0.015)), stribeck(smooth(0.0175))]));
+        assert!(is_one_friction(&[coulomb(DRY), stribeck(DRY)]));
+        assert!(is_one_friction(&[coulomb(smooth(0.0025))]));
     }
 }
