@@ -4,14 +4,18 @@ use dynident_estimation::{Estimate, LinearProblem};
 
 /// −2 ln of the likelihood with every joint's noise as found, `Σ_j n_j ln σ_j²`, up to a constant of the rows.
 pub(crate) fn deviance(problem: &LinearProblem, fit: &Estimate) -> f64 {
-    let of_joint = |(rows, sigma): (usize, &f64)| rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln();
+    let of_joint = |(rows, sigma): (usize, &f64)| deviance_of_joint(rows, *sigma);
     problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
+}
+
+/// That of one joint whose n rows leave noise of `sigma`.
+fn deviance_of_joint(rows: usize, sigma: f64) -> f64 {
+    rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln()
 }
 
 /// Schwarz's criterion of one joint whose n rows leave noise of `sigma`, with k numbers that are its own.
 pub(crate) fn schwarz_of_joint(rows: usize, sigma: f64, own: usize) -> f64 {
-    let rows = rows.max(1) as f64;
-    rows * 2.0 * sigma.max(f64::MIN_POSITIVE).ln() + own as f64 * rows.ln()
+    deviance_of_joint(rows, sigma) + own as f64 * (rows.max(1) as f64).ln()
 }
 
 /// Schwarz's criterion of a fit with k free parameters and n rows: the deviance and `k ln n`; the less the better.

@@ -6,7 +6,7 @@ use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{
     CandidateColumn, ConstantsError, FrictionSearch, JointFriction, JointScale, candidate_columns,
-    choose_friction as choose_terms, step_columns,
+    choose_friction as choose_terms, smooth_width, step_columns,
 };
 use crate::logs::Logs;
 use crate::payload::{Payload, free_gains};
@@ -15,7 +15,7 @@ use crate::settings::IdentificationSettings;
 use crate::training::{Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::Estimate;
-use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
+use dynident_model::terms::TorqueTerm;
 
 /// A model with the friction that its recordings chose.
 #[derive(Clone, Debug)]
@@ -159,8 +159,5 @@ pub(crate) fn constants_of_all_rows(
 
 /// The width of the smooth step that a joint's friction has.
 fn smooth_step_width(joint: &JointFriction) -> Option<f64> {
-    joint.terms.iter().flatten().find_map(|term| match term {
-        TorqueTerm::Coulomb(Coulomb { shape: CoulombShape::Smooth { width }, .. }) => Some(*width),
-        _ => None,
-    })
+    joint.terms.iter().flatten().filter(|term| matches!(term, TorqueTerm::Coulomb(_))).find_map(smooth_width)
 }

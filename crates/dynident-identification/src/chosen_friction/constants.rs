@@ -9,7 +9,7 @@ use crate::friction::{
 };
 use crate::likelihood::{deviance, schwarz_of_joint};
 use crate::regressor_model::RegressorModel;
-use crate::training::{LogFactors, TrainingPasses, plain_estimate};
+use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_model::terms::TorqueTerm;
@@ -151,8 +151,7 @@ pub(crate) fn friction_scores(
     model: &RegressorModel,
     joints: &[JointFriction],
 ) -> Result<Vec<f64>, IdentificationError> {
-    let rows = passes.rows_once(model.clone())?;
-    let fit = plain_estimate(&without_bars(passes.settings), &rows.problem)?;
+    let (rows, fit) = passes.rows_and_fit(model)?;
     let constants = FrictionConstants::new(model, joints);
     let mut scores = vec![0.0; model.dof()];
     for ((&joint, count), sigma) in rows.joints.iter().zip(rows.problem.joint_rows()).zip(&fit.joint_sigma) {
@@ -246,9 +245,15 @@ impl TrainingPasses<'_> {
         joints: &[JointFriction],
         before: &RegressorModel,
     ) -> Result<RegressorModel, IdentificationError> {
-        let rows = self.rows_once(before.clone())?;
-        let fit = plain_estimate(&without_bars(self.settings), &rows.problem)?;
+        let (_, fit) = self.rows_and_fit(before)?;
         with_friction_of(robot, joints, (before, &fit))
+    }
+
+    /// The rows of a model and a fit without bars.
+    fn rows_and_fit(&self, model: &RegressorModel) -> Result<(Training, Estimate), IdentificationError> {
+        let rows = self.rows_once(model.clone())?;
+        let fit = plain_estimate(&without_bars(self.settings), &rows.problem)?;
+        Ok((rows, fit))
     }
 
     /// The rows of a model with the columns that its constants ask for beside it.

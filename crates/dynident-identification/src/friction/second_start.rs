@@ -17,8 +17,7 @@ const NARROW: f64 = 0.5;
 
 /// The same terms with the step at rest where the other valley is; `None` where they are in it already.
 pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
-    let is_coulomb = |term: &&TorqueTerm| matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_));
-    let step = step_of(terms.iter().find(is_coulomb)?)?;
+    let step = step_of(terms.iter().find(|term| is_coulomb(term))?)?;
     let stribeck = terms.iter().find_map(|term| match term {
         TorqueTerm::Stribeck(own) => Some(STRIBECK_WIDTH * own.speed),
         _ => None,
@@ -42,12 +41,15 @@ pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Ve
     Some(with_one_step(terms.iter().map(moved).collect()))
 }
 
+fn is_coulomb(term: &TorqueTerm) -> bool {
+    matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_))
+}
+
 /// Whether Coulomb and Stribeck friction can be one friction: with a Coulomb step far narrower than that of the
 /// Stribeck term the joint is dry, and Stribeck friction that is not comes out too large.
 pub(crate) fn is_one_friction(terms: &[TorqueTerm]) -> bool {
     let width = |is_wanted: fn(&TorqueTerm) -> bool| terms.iter().filter(|term| is_wanted(term)).find_map(smooth_width);
-    let coulomb = width(|term| matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_)));
-    match (coulomb, width(|term| matches!(term, TorqueTerm::Stribeck(_)))) {
+    match (width(is_coulomb), width(|term| matches!(term, TorqueTerm::Stribeck(_)))) {
         (Some(coulomb), Some(stribeck)) => coulomb >= NARROW * stribeck,
         _ => true,
     }
