@@ -76,7 +76,7 @@ ARMS = {
     "ur10": {
         "urdf": "robots/ur10.urdf",
         "study": searched(UR10, [1.5] * 3 + [2.0] * 3, [4.0] * 3 + [6.0] * 3, [230.0, 230.0, 100.0, 35.0, 35.0, 35.0],
-                          "bandwidth_hz = [1.5, 1.5, 2.0, 4.0, 4.0, 4.0]\nspeed_steps = [0.5]\n"),
+                          "bandwidth_hz = 4.0\nspeed_steps = [0.5]\n"),
         "friction": [10, 10, 7, 3, 3, 2], "damping": [8, 8, 6, 2, 2, 1.5], "armature": [1, 1, 0.8, 0.2, 0.2, 0.2],
         "stribeck": [3, 3, 2, 1, 1, 0.6], "load": [0.03] * 6, "torque_noise": 0.1, "step": 2.5e-4,
         "clip": [330, 330, 150, 4, 6, 4], "catch": [2, 0.0, 0.15, 25.0],
@@ -84,7 +84,7 @@ ARMS = {
     "panda": {
         "urdf": "robots/panda_arm7.urdf",
         "study": searched([f"panda_joint{k}" for k in range(1, 8)], [1.5] * 7, [6, 5, 6, 8, 10, 10, 10], [60.0] * 4 + [7.0] * 3,
-                          "bandwidth_hz = [1.5, 1.5, 1.5, 2.0, 3.0, 3.0, 3.0]\n"),
+                          "bandwidth_hz = 4.0\n"),
         "friction": [0.9, 0.9, 0.7, 0.7, 0.4, 0.4, 0.3], "damping": [0.6, 0.6, 0.5, 0.5, 0.3, 0.3, 0.2], "armature": [0.1] * 7,
         "stribeck": [0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.1], "load": [0.03] * 7, "torque_noise": 0.05, "step": 2.5e-4,
         "clip": [87, 87, 87, 10, 12, 1.2, 12], "catch": [3, -1.5, 0.15, 8.0],

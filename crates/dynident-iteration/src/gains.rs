@@ -1,25 +1,79 @@
 //! Gains of a first controller from the nominal model, its uncertainty, and a stated bandwidth.
 
+use crate::loop_delay::{highest_omega, share_of_all};
 use crate::posture::{at_sample, inertia_matrix};
-use crate::typical_drives::with_typical_drives;
+use crate::typical_drives::{TIMES_THE_LIGHTEST, with_typical_drives, with_typical_inertia};
 use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{
     ComputedTorqueSettings, ControllerModel, ControllerSettings, FrictionCompensation, JointPdSettings,
 };
 use dynident_simulation::{PerJoint, Reference, SimulationError, require};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// Postures of each motion that are looked at.
 const POSTURES: usize = 200;
+
+/// What gains are derived from, apart from the nominal model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GainSettings {
+    /// Natural frequency of each joint, Hz.
+    pub bandwidth_hz: PerJoint,
+    /// How much lighter than the nominal model the robot may be, percent.
+    pub uncertainty_percent: f64,
+    /// How late the controller may see or act, s.
+    pub delay_s: f64,
+}
 
 /// Controllers whose gains come from the nominal model and a bandwidth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DerivedControllers {
     /// Joint PD.
     pub model_free: ControllerSettings,
-    /// Computed torque with the nominal model; joint PD with its gravity where it knows nothing of the drives.
+    /// Computed torque with the nominal model.
     pub first: ControllerSettings,
+    /// The parameters of that model where the nominal ones know nothing of the drives: with typical inertia of theirs.
+    pub first_model: Option<Vec<f64>>,
     /// Computed torque with the newest model.
     pub model_based: ControllerSettings,
+    /// Natural frequency of each joint without a model, Hz: what was asked for, or as much as the delay allows.
+    pub model_free_hz: Vec<f64>,
+    /// The same with the nominal model.
+    pub first_hz: Vec<f64>,
+    /// The same with the newest model.
+    pub model_based_hz: Vec<f64>,
+}
+
+/// A joint whose loop is slower than was asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct LoweredBandwidth {
+    /// Its name.
+    pub joint: String,
+    /// With which model: `none`, `nominal` or `newest`.
+    pub model: String,
+    /// What was asked for, Hz.
+    pub asked_hz: f64,
+    /// What it has, Hz.
+    pub hz: f64,
+}
+
+/// The joints whose loops with a `model` have less than they were `asked_hz` for.
+pub fn lowered_bandwidths(
+    model: &str,
+    given_hz: &[f64],
+    names: &[String],
+    asked_hz: &PerJoint,
+) -> Vec<LoweredBandwidth> {
+    let of_joint = |(joint, (name, &hz)): (usize, (&String, &f64))| LoweredBandwidth {
+        joint: name.clone(),
+        model: model.to_owned(),
+        asked_hz: asked_hz.of(joint),
+        hz,
+    };
+    // Hz to rad/s and back rounds.
+    let is_lower = |one: &LoweredBandwidth| one.hz < one.asked_hz * (1.0 - 1e-9);
+    names.iter().zip(given_hz).enumerate().map(of_joint).filter(is_lower).collect()
 }
 
 /// Controllers of a robot whose nominal bodies are known, critically damped, with the natural frequency `ω = 2π
@@ -27,58 +81,100 @@ pub struct DerivedControllers {
 ///
 /// * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
 /// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; where the model has drive
-///   inertia or friction of which the description says nothing, joint PD with the nominal gravity takes its place, and
-///   M_jj has the inertia of a typical drive (the effort limit accelerates it by 300 rad/s²);
+///   inertia of which the description says nothing, with that of a typical drive (the effort limit accelerates it by
+///   300 rad/s²), which M_jj has, too;
 /// * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
 /// So the lightest robot that the uncertainty leaves is not faster than stated: under computed torque anywhere, under
 /// joint PD in the posture that is heaviest for the joint (in lighter ones it is faster, and more than critically
 /// damped). A heavier one is slower, and sags more: whether that is enough, the rehearsal shows.
 ///
+/// A controller that acts late swings where it is fast: a folded arm under joint PD has a tenth of the inertia that its
+/// gains are for. So `ω` is lowered, joint by joint and then for all together, until in every posture along the motions
+/// a robot with that delay keeps a phase margin of 30 degrees. It is never raised.
+///
 /// # Errors
-/// A bandwidth that is not positive, a bound that takes all inertia away, a nominal model without inertia.
+/// A bandwidth that is not positive, a bound that takes all inertia away, a nominal model without inertia, a delay that
+/// is negative.
 pub fn derived_controllers(
     robot: &ParametricModel,
     references: &[&Reference],
-    bandwidth_hz: &PerJoint,
-    uncertainty_percent: f64,
+    settings: &GainSettings,
 ) -> Result<DerivedControllers, SimulationError> {
-    let dof = robot.dof();
+    let GainSettings { bandwidth_hz, uncertainty_percent, delay_s } = settings;
+    let (dof, delay_s) = (robot.dof(), *delay_s);
+    require((0.0..=1e3).contains(&delay_s), "delay_s", delay_s, "give 0 to 1000 s")?;
     let bandwidth =
         bandwidth_hz.values("bandwidth_hz", dof, "give more than 0 and at most 100000 Hz", |f| f > 0.0 && f <= 1e5)?;
     let typical = with_typical_drives(robot);
     let parameters = typical.as_deref().unwrap_or(robot.nominal());
-    let mut model = ControllerModel::from_parameters(robot.model(), robot.terms(), parameters)?;
+    let matrices = mass_matrices(robot, references, parameters)?;
     let mut largest = vec![0.0_f64; dof];
-    for reference in references {
-        let step = (reference.samples() / POSTURES).max(1);
-        for sample in (0..reference.samples()).step_by(step) {
-            let [q, ..] = at_sample(reference, sample);
-            let matrix = inertia_matrix(&mut model, &q);
-            largest.iter_mut().enumerate().for_each(|(joint, most)| *most = most.max(matrix[(joint, joint)]));
-        }
+    for matrix in &matrices {
+        largest.iter_mut().enumerate().for_each(|(joint, most)| *most = most.max(matrix[(joint, joint)]));
     }
     for (joint, inertia) in robot.model().joints().iter().zip(&largest) {
         let what = format!("nominal inertia about {}", joint.name);
         require(*inertia > 0.0 && inertia.is_finite(), what, *inertia, "state the gains: the description has none")?;
     }
     let left = 1.0 - 0.01 * uncertainty_percent;
-    let omega: Vec<f64> = bandwidth.iter().map(|f| core::f64::consts::TAU * f).collect();
+    let asked: Vec<f64> = bandwidth.iter().map(|f| core::f64::consts::TAU * f).collect();
+    let lowered = |ratio: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        asked.iter().enumerate().map(|(joint, asked)| asked.min(highest_omega(ratio(joint), delay_s))).collect()
+    };
+    // Computed torque with a model that is heavier than the robot.
+    let first_model = with_typical_inertia(robot);
+    let drives = if first_model.is_some() { TIMES_THE_LIGHTEST } else { 1.0 };
+    let with_nominal = lowered(&|_| drives);
+    let with_model = lowered(&|_| 1.0 / left);
+    // Joint PD in the posture where the joint is lightest, the others free.
+    let mut lightest = vec![f64::INFINITY; dof];
+    for inverse in matrices.iter().filter_map(|matrix| matrix.clone().cholesky().map(|own| own.inverse())) {
+        lightest.iter_mut().enumerate().for_each(|(joint, least)| *least = least.min(1.0 / inverse[(joint, joint)]));
+    }
+    let mut alone = lowered(&|joint| (largest[joint] / lightest[joint]).max(1.0));
+    let kd: Vec<f64> = alone.iter().zip(&largest).map(|(omega, inertia)| 2.0 * omega * inertia).collect();
+    let share = matrices.iter().filter_map(|matrix| share_of_all(matrix, &kd, &alone, delay_s)).fold(1.0, f64::min);
+    alone.iter_mut().for_each(|omega| *omega *= share);
+
     let each = |of: &dyn Fn(usize) -> f64| PerJoint::Each((0..dof).map(of).collect());
     let pd = JointPdSettings {
-        kp: each(&|joint| omega[joint].powi(2) * left * largest[joint]),
-        kd: each(&|joint| 2.0 * omega[joint] * left * largest[joint]),
+        kp: each(&|joint| alone[joint].powi(2) * left * largest[joint]),
+        kd: each(&|joint| 2.0 * alone[joint] * left * largest[joint]),
     };
-    let computed = |share: f64| {
+    let computed = |omega: &[f64], share: f64| {
         ControllerSettings::ComputedTorque(ComputedTorqueSettings {
             kp: each(&|joint| share * omega[joint].powi(2)),
             kd: each(&|joint| 2.0 * share.sqrt() * omega[joint]),
             friction: FrictionCompensation::Reference,
         })
     };
+    let in_hz = |omega: &[f64]| omega.iter().map(|omega| omega / core::f64::consts::TAU).collect();
     Ok(DerivedControllers {
-        model_free: ControllerSettings::JointPd(pd.clone()),
-        first: if typical.is_some() { ControllerSettings::PdGravity(pd) } else { computed(left) },
-        model_based: computed(1.0),
+        model_free: ControllerSettings::JointPd(pd),
+        first: computed(&with_nominal, left),
+        first_model,
+        model_based: computed(&with_model, 1.0),
+        model_free_hz: in_hz(&alone),
+        first_hz: in_hz(&with_nominal),
+        model_based_hz: in_hz(&with_model),
     })
+}
+
+/// Mass matrices in postures along the motions.
+fn mass_matrices(
+    robot: &ParametricModel,
+    references: &[&Reference],
+    parameters: &[f64],
+) -> Result<Vec<DMatrix<f64>>, SimulationError> {
+    let mut model = ControllerModel::from_parameters(robot.model(), robot.terms(), parameters)?;
+    let mut matrices = Vec::new();
+    for reference in references {
+        let step = (reference.samples() / POSTURES).max(1);
+        for sample in (0..reference.samples()).step_by(step) {
+            let [q, ..] = at_sample(reference, sample);
+            matrices.push(inertia_matrix(&mut model, &q));
+        }
+    }
+    Ok(matrices)
 }

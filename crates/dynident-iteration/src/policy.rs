@@ -65,7 +65,10 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     let Some(last) = records.last() else {
         return match settings.start {
             StartWith::ModelFree => model_free(1.0),
-            StartWith::Prior => Next::Run(RunPlan::with_model(run, ModelParameters::All(prior.to_vec()), 1.0)),
+            StartWith::Prior => {
+                let own = settings.first_model.as_deref().unwrap_or(prior);
+                Next::Run(RunPlan::with_model(run, ModelParameters::All(own.to_vec()), 1.0))
+            }
         };
     };
     let newest = model_of(last);

@@ -5,8 +5,8 @@ use crate::posture::{at_sample, inertia_matrix};
 use crate::rests::{highest_speeds, with_dry_steps};
 use crate::robot::{Breach, Envelope};
 use dynident_dynamics::ParametricModel;
-use dynident_model::InertialParameters;
 use dynident_model::sample::Random;
+use dynident_model::{InertialParameters, Model};
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{
     LimitedQuantity, LoopSettings, Plant, Reference, RunLimits, RunStatus, SimulationError, closed_loop, require,
@@ -17,6 +17,10 @@ use thiserror::Error;
 
 /// A smaller share of the largest eigenvalue counts as none: rounding alone makes it.
 const SINGULAR: f64 = 1e-12;
+/// Delay of a controller of which nothing is known, seconds of a usual arm.
+const DELAY_S: f64 = 0.008;
+/// Longest delay that can be stated, s.
+const MOST_DELAY_S: f64 = 10.0;
 
 /// How a motion is rehearsed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,6 +32,11 @@ pub struct RehearsalSettings {
     pub uncertainty_percent: f64,
     /// Robots within that which are simulated beside the model itself. Default 4.
     pub robots: usize,
+    /// How late the robot's controller may see or act, between its sensors and its drives, seconds: gains that are
+    /// derived bear it, and the robots are simulated with it. That of a loop that runs in the drives is theirs. Default
+    /// 8 ms of an arm of 1.2 m, of others as much in their own seconds: some cycles of control over a network.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
     /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.
     /// Default 200.
     pub postures: usize,
@@ -37,7 +46,7 @@ pub struct RehearsalSettings {
 
 impl Default for RehearsalSettings {
     fn default() -> Self {
-        Self { uncertainty_percent: 30.0, robots: 4, postures: 200, seed: 1 }
+        Self { uncertainty_percent: 30.0, robots: 4, delay_s: None, postures: 200, seed: 1 }
     }
 }
 
@@ -49,8 +58,15 @@ impl RehearsalSettings {
     pub fn validate(&self) -> Result<(), SimulationError> {
         let percent = self.uncertainty_percent;
         require((0.0..=90.0).contains(&percent), "rehearsal.uncertainty_percent", percent, "give 0 to 90")?;
+        let delay_s = self.delay_s.unwrap_or(0.0);
+        require((0.0..=MOST_DELAY_S).contains(&delay_s), "rehearsal.delay_s", delay_s, "give 0 to 10 s")?;
         require(self.robots <= 1000, "rehearsal.robots", self.robots as f64, "give at most 1000")?;
         require(self.postures <= 1_000_000, "rehearsal.postures", self.postures as f64, "give at most 1000000")
+    }
+
+    /// How late a controller outside of such a robot may be, s.
+    pub fn delay_s(&self, model: &Model) -> f64 {
+        self.delay_s.unwrap_or_else(|| model.own_scale().seconds(DELAY_S))
     }
 }
 
@@ -121,6 +137,36 @@ fn room_words(verdict: &RunStatus) -> &'static str {
     }
 }
 
+/// One robot of a rehearsal.
+#[derive(Clone, Copy)]
+struct Rehearsing {
+    /// 0 for the model itself, or the number of one that differs.
+    number: usize,
+    /// How late its controller is.
+    delay_s: f64,
+}
+
+impl Rehearsing {
+    /// Most samples of delay that a simulated loop has.
+    const MOST_SAMPLES: f64 = 1000.0;
+
+    fn delay_samples(self, rate_hz: f64) -> usize {
+        (self.delay_s * rate_hz).round().min(Self::MOST_SAMPLES) as usize
+    }
+
+    fn words(self, settings: &RehearsalSettings) -> String {
+        let percent = settings.uncertainty_percent;
+        let robot = match self.number {
+            0 => "the model itself".to_owned(),
+            number => format!("a robot up to {percent} % off the model ({number} of {})", settings.robots),
+        };
+        match self.delay_s {
+            0.0 => robot,
+            late => format!("{robot}, its controller {:.3} ms late (rehearsal.delay_s),", 1e3 * late),
+        }
+    }
+}
+
 /// What is rehearsed.
 pub(crate) struct Rehearsed<'a> {
     pub(crate) robot: &'a ParametricModel,
@@ -180,10 +226,14 @@ impl Rehearsed<'_> {
                 shown.largest_torque.iter_mut().zip(&tau).for_each(|(most, tau)| *most = most.max(tau.abs()));
             }
         }
-        // The closed loop.
+        // The closed loop, as it should be and as late as it may be.
         if let Some(believed) = self.believed.filter(|_| self.controller.can_be_simulated()) {
-            for number in 0..=settings.robots {
-                if let Err(failure) = self.simulate(believed, (number, settings), &mut random, &mut shown)? {
+            let in_drives = matches!(self.controller, ControllerSettings::PositionLoop(_));
+            let delay_s = if in_drives { 0.0 } else { settings.delay_s(self.robot.model()) };
+            let late = (0..=settings.robots).map(|number| Rehearsing { number, delay_s });
+            let itself = Rehearsing { number: 0, delay_s: 0.0 };
+            for one in core::iter::once(itself).chain(late.skip(usize::from(delay_s == 0.0))) {
+                if let Err(failure) = self.simulate(believed, (one, settings), &mut random, &mut shown)? {
                     return Ok(Err(failure));
                 }
             }
@@ -191,17 +241,17 @@ impl Rehearsed<'_> {
         Ok(Ok(shown))
     }
 
-    /// One robot: the model itself, or one that differs.
+    /// One robot along all motions.
     fn simulate(
         &self,
         believed: &[f64],
-        (number, settings): (usize, &RehearsalSettings),
+        (one, settings): (Rehearsing, &RehearsalSettings),
         random: &mut Random,
         shown: &mut Rehearsal,
     ) -> Result<Result<(), RehearsalFailure>, SimulationError> {
         let model = self.robot.model();
         let (of_bodies, of_terms) = believed.split_at(model.inertial_count());
-        let off = if number == 0 { 0.0 } else { 0.01 * settings.uncertainty_percent };
+        let off = if one.number == 0 { 0.0 } else { 0.01 * settings.uncertainty_percent };
         let mut factor = || if random.bits() & 1 == 0 { 1.0 + off } else { 1.0 - off };
         let bodies: Vec<InertialParameters> = of_bodies
             .chunks_exact(10)
@@ -218,21 +268,16 @@ impl Rehearsed<'_> {
         if let Some(envelope) = self.envelope {
             envelope.limit(&mut limits);
         }
-        let looped = LoopSettings { limits, ..LoopSettings::default() };
+        let mut looped = LoopSettings { limits, ..LoopSettings::default() };
         for reference in self.references {
+            looped.sensors.feedback_delay_samples = one.delay_samples(reference.rate_hz());
             let mut controller = self.controller.build(model.dof(), self.model)?;
             let run = closed_loop(&mut plant, controller.as_mut(), reference, &looped)?;
             let largest = shown.largest_tracking_error_rad.iter_mut().zip(&run.max_error);
             largest.for_each(|(most, error)| *most = most.max(*error));
             let outside = self.envelope.and_then(|envelope| envelope.outside(&run.q, run.samples, run.rate_hz));
             if !run.status.is_done() || outside.is_some() {
-                let robot = match number {
-                    0 => "the model itself".to_owned(),
-                    _ => format!(
-                        "a robot up to {} % off the model ({number} of {})",
-                        settings.uncertainty_percent, settings.robots
-                    ),
-                };
+                let robot = one.words(settings);
                 return Ok(Err(match outside.filter(|_| run.status.is_done()) {
                     Some(breach) => RehearsalFailure::Outside { robot, breach },
                     None => RehearsalFailure::Loop { robot, verdict: run.status },

@@ -184,6 +184,8 @@ pub struct IterationSettings {
     /// The controller of the first run where that has the prior as its model: a poor model asks for less trust than a
     /// good one. Default [`controller`](Self::controller).
     pub first: Option<ControllerSettings>,
+    /// The model of the first run's controller in place of the prior, all parameters; default the prior.
+    pub first_model: Option<Vec<f64>>,
     /// The controller without a model: joint PD (16 and 8) by default. It is also what a bad model falls back to.
     pub model_free: ControllerSettings,
     /// The controller with the model so far: the paper's finite-time law with its gains of joint 2 (4 and 4) by
@@ -216,6 +218,7 @@ impl Default for IterationSettings {
             identification: RunIdentificationSettings::default(),
             start: StartWith::default(),
             first: None,
+            first_model: None,
             model_free: ControllerSettings::JointPd(JointPdSettings { kp: 16.0.into(), kd: 8.0.into() }),
             controller: ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(4.0, 4.0)),
             reject: true,

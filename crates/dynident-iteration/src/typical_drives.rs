@@ -5,6 +5,8 @@ use dynident_model::terms::{JointProperty, TermAction};
 
 /// Acceleration that a drive gives its own inertia at full effort, rad/s² (m/s²) of a usual arm.
 const DRIVE_ACCELERATION: f64 = 300.0;
+/// How much lighter than typical a drive may be: geared arms have up to 500 rad/s².
+pub(crate) const TIMES_THE_LIGHTEST: f64 = 500.0 / DRIVE_ACCELERATION;
 /// Dry friction, and viscous friction at full velocity, as shares of the effort.
 const FRICTION: f64 = 0.05;
 /// Velocity of a joint whose description has no limit, rad/s (m/s) of a usual arm.
@@ -16,6 +18,16 @@ const SPEED: f64 = 2.0;
 /// it, and as much viscous friction at the velocity limit.
 /// None if nothing was to be filled in.
 pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
+    filled_in(robot, |_| true)
+}
+
+/// The same with inertia alone: what a controller may take for true until runs have shown better, for friction that is
+/// not there would be pushed against.
+pub(crate) fn with_typical_inertia(robot: &ParametricModel) -> Option<Vec<f64>> {
+    filled_in(robot, |property| property == JointProperty::DriveInertia)
+}
+
+fn filled_in(robot: &ParametricModel, is_wanted: impl Fn(JointProperty) -> bool) -> Option<Vec<f64>> {
     let mut parameters = robot.nominal().to_vec();
     let bodies = robot.model().inertial_count();
     let own = robot.model().own_scale();
@@ -24,6 +36,9 @@ pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
         let Some(joint) = term.own_joint().filter(|_| parameters[bodies + place] == 0.0) else { continue };
         let (limits, turns) = (&robot.model().joints()[joint].limits, robot.model().joints()[joint].turns());
         let Some(effort) = limits.effort else { continue };
+        if term.property().is_some_and(|property| !is_wanted(property)) {
+            continue;
+        }
         let typical = match (term.property(), term.action()) {
             (Some(JointProperty::DriveInertia), _) => effort / own.acceleration(turns, DRIVE_ACCELERATION),
             (Some(JointProperty::Friction), _) => FRICTION * effort,

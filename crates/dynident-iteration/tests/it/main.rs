@@ -7,6 +7,7 @@ mod held_out;
 mod home;
 mod identification;
 mod iteration;
+mod late_controllers;
 mod near_rest;
 mod policy;
 mod pooling;

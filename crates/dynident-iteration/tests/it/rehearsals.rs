@@ -4,12 +4,12 @@ use super::robots::{joints, pd, reference};
 use dynident_dynamics::{ParametricModel, Workspace, mass_matrix};
 use dynident_iteration::robot::{Envelope, EnvelopeSettings};
 use dynident_iteration::{
-    Iteration, IterationSettings, IterationStatus, IterationTask, RehearsalSettings, Robot, RobotRun, RunRequest,
-    SafetySettings, SimulatedRobot, StartWith, derived_controllers, iterate,
+    GainSettings, Iteration, IterationSettings, IterationStatus, IterationTask, RehearsalSettings, Robot, RobotRun,
+    RunRequest, SafetySettings, SimulatedRobot, StartWith, derived_controllers, iterate,
 };
 use dynident_model::{Model, load_robot};
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings};
-use dynident_simulation::{LoopSettings, Plant, SimulationError};
+use dynident_simulation::{LoopSettings, PerJoint, Plant, SimulationError};
 use std::path::Path;
 
 fn model() -> Model {
@@ -129,10 +129,12 @@ fn a_model_without_a_mass_matrix_is_not_loaded() {
 /// posture of the motion.
 #[test]
 fn what_a_rehearsal_shows_is_kept() {
+    // These gains are the simulator's: it is not late.
+    let rehearsal = Some(RehearsalSettings { delay_s: Some(0.0), ..RehearsalSettings::default() });
     let settings = IterationSettings {
         model_free: pd(),
         controller: pd(),
-        safety: safety(envelope()),
+        safety: SafetySettings { rehearsal, ..safety(envelope()) },
         max_runs: 1,
         ..IterationSettings::default()
     };
@@ -153,7 +155,8 @@ fn what_a_rehearsal_shows_is_kept() {
 fn gains_come_from_inertia_and_bandwidth() {
     let model = model();
     let matrix = mass_matrix(&model, &mut Workspace::new(&model), &[-0.4, 0.3]).to_vec();
-    let derived = derived_controllers(&robot(), &[&reference()], &vec![2.0, 3.0].into(), 30.0).unwrap();
+    let gains = |bandwidth_hz: PerJoint| GainSettings { bandwidth_hz, uncertainty_percent: 30.0, delay_s: 0.0 };
+    let derived = derived_controllers(&robot(), &[&reference()], &gains(vec![2.0, 3.0].into())).unwrap();
     let ControllerSettings::JointPd(pd) = &derived.model_free else { panic!("{derived:?}") };
     let ControllerSettings::ComputedTorque(computed) = &derived.model_based else { panic!("{derived:?}") };
     for (joint, bandwidth_hz) in [(0, 2.0), (1, 3.0)] {
@@ -164,9 +167,9 @@ fn gains_come_from_inertia_and_bandwidth() {
         assert!((pd.kd.of(joint) / (2.0 * omega * inertia) - 1.0).abs() < 1e-10);
         assert!((computed.kp.of(joint) - omega * omega).abs() < 1e-9);
     }
-    assert!(derived_controllers(&robot(), &[&reference()], &0.0.into(), 30.0).is_err());
+    assert!(derived_controllers(&robot(), &[&reference()], &gains(0.0.into())).is_err());
     let none = robot().with_nominal(vec![0.0; 20]).unwrap();
-    let error = derived_controllers(&none, &[&reference()], &2.0.into(), 30.0).unwrap_err().to_string();
+    let error = derived_controllers(&none, &[&reference()], &gains(2.0.into())).unwrap_err().to_string();
     assert!(error.contains("nominal inertia") && error.contains(&joints()[0]), "{error}");
 }
 

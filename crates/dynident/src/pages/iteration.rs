@@ -100,6 +100,9 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     if !points.is_empty() {
         page.add(Text { paragraphs: Vec::new(), points });
     }
+    if let Some(sentence) = file.lowered_bandwidths_sentence() {
+        page.add(Text { paragraphs: Vec::new(), points: vec![(Tone::Plain, sentence)] });
+    }
     let forecasts = file.runs.iter().filter_map(|run| Some((run_name(run), run.forecast.as_ref()?)));
     let mut points: Vec<(Tone, String)> =
         forecasts.map(|(run, forecast)| (Tone::Plain, format!("run {run}: {}", forecast.sentence()))).collect();

@@ -4,7 +4,9 @@ use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
 use dynident_identification::examination::TorqueLag;
-use dynident_iteration::{DifferentiatorChoice, HeldOutRun, RunEvidence, RunOffset, Shortfall, WarmUp};
+use dynident_iteration::{
+    DifferentiatorChoice, HeldOutRun, LoweredBandwidth, RunEvidence, RunOffset, Shortfall, WarmUp,
+};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -41,6 +43,10 @@ pub struct IterationsFile {
     pub declined: Option<RunForecast>,
     /// Names of the joints.
     pub joints: Vec<String>,
+    /// Joints whose loops are slower than `bandwidth_hz`, so that a late controller holds them; empty where the gains
+    /// are stated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lowered_bandwidths: Vec<LoweredBandwidth>,
     /// Length of each run, s; of legs one after another, of all of them once.
     pub duration_s: f64,
     /// The runs.
@@ -81,6 +87,28 @@ impl IterationsFile {
             )));
         }
         Ok(file)
+    }
+
+    /// Which loops are slower than asked for, and what would make them faster.
+    pub fn lowered_bandwidths_sentence(&self) -> Option<String> {
+        let in_words = |model: &str| match model {
+            "none" => "without a model",
+            "nominal" => "with the description's model",
+            _ => "with the newest model",
+        };
+        let mut each: Vec<String> = Vec::new();
+        for of_model in self.lowered_bandwidths.chunk_by(|one, next| one.model == next.model) {
+            let joints: Vec<String> =
+                of_model.iter().map(|one| format!("{} {:.2} Hz of {}", one.joint, one.hz, one.asked_hz)).collect();
+            each.push(format!("{}: {}", in_words(&of_model[0].model), joints.join(", ")));
+        }
+        (!each.is_empty()).then(|| {
+            format!(
+                "Gains are lower than bandwidth_hz asks for, so that a controller which acts late holds the robot in \
+                 every posture of the motion ({}); if its sensors and drives are faster, state rehearsal.delay_s",
+                each.join("; ")
+            )
+        })
     }
 
     /// The state in one line: how it stands, runs, tracking, what is unmet.

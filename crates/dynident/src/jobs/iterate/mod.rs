@@ -206,7 +206,7 @@ fn iterated(
         Some(_) => limits_of(study, &robot).map_err(Error::section(study_path, "design.limits"))?,
         None => Limits::default(),
     };
-    let settings = section.guarded(settings, (study, limits), &robot, &references).map_err(in_section)?;
+    let (settings, lowered) = section.guarded(settings, (study, limits), &robot, &references).map_err(in_section)?;
     let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {
@@ -218,6 +218,7 @@ fn iterated(
         truth: truth.map(|truth| truth.base_values),
         bound: if one && simulated { bound::cramer_rao(&robot, &legs, &simulation.sensors) } else { None },
         sensors: &simulation.sensors,
+        lowered,
     };
     let planner = planner((study, study_path), &section, &legs, options)?;
     let held_out = held_out.map(|trajectory| section.held_out_motion(&trajectory)).transpose().map_err(in_section)?;

@@ -8,7 +8,7 @@ use crate::result::{
 };
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
-use dynident_iteration::{IterationStatus, Leg, MotionForecast, RunEstimate, RunRecord, Shortfall};
+use dynident_iteration::{IterationStatus, Leg, LoweredBandwidth, MotionForecast, RunEstimate, RunRecord, Shortfall};
 use dynident_simulation::SensorSettings;
 use std::path::Path;
 
@@ -35,6 +35,8 @@ pub(super) struct IterationReport<'a> {
     pub(super) bound: Option<Vec<f64>>,
     /// What it follows from.
     pub(super) sensors: &'a SensorSettings,
+    /// Joints whose loops are slower than asked for.
+    pub(super) lowered: Vec<LoweredBandwidth>,
 }
 
 /// One iteration of legs that are identified together, so far.
@@ -141,6 +143,7 @@ impl IterationReport<'_> {
             declined: declined.map(|forecast| run_forecast(forecast, None)),
             unmet: shortfalls.iter().map(unmet).collect(),
             joints: self.robot.parametric.joint_names(),
+            lowered_bandwidths: self.lowered.clone(),
             duration_s: self.duration_s,
             runs,
             tracking_improvement,

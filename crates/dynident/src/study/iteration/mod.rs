@@ -263,6 +263,7 @@ impl IterationSection {
             },
             start: self.start.unwrap_or_default(),
             first: self.first.clone(),
+            first_model: None,
             model_free: self.model_free.clone().unwrap_or(default.model_free),
             controller: study.controller.clone().unwrap_or(default.controller),
             reject: !self.literal,

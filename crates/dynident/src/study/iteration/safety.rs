@@ -5,7 +5,10 @@ use crate::error::StudyError;
 use crate::study::StudyRobot;
 use dynident_excitation::limits::Limits;
 use dynident_iteration::robot::{EnvelopeSettings, ProcessLimits, ProcessMode};
-use dynident_iteration::{HomeSettings, IterationSettings, SafetySettings, StartWith, derived_controllers};
+use dynident_iteration::{
+    GainSettings, HomeSettings, IterationSettings, LoweredBandwidth, SafetySettings, StartWith, derived_controllers,
+    lowered_bandwidths,
+};
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Reference};
 
@@ -62,7 +65,18 @@ impl IterationSection {
         ))
     }
 
-    /// The settings with controllers, envelope and rehearsal of the robot that is to move along `references`.
+    /// How late a controller of this robot may be, s: the simulated one is as late as its sensors.
+    fn delay_s(&self, study: &Study, robot: &StudyRobot) -> f64 {
+        let simulation = study.simulation.clone().unwrap_or_default();
+        let rate_hz = self.rate_hz.unwrap_or(simulation.rate_hz);
+        match self.rehearsal.delay_s {
+            None if !self.is_outside() => simulation.sensors.feedback_delay_samples as f64 / rate_hz,
+            _ => self.rehearsal.delay_s(robot.model()),
+        }
+    }
+
+    /// The settings with controllers, envelope and rehearsal of the robot that is to move along `references`, and the
+    /// joints whose derived loops are slower than `bandwidth_hz`.
     ///
     /// # Errors
     /// Numbers that do not fit.
@@ -72,8 +86,9 @@ impl IterationSection {
         (study, limits): (&Study, Limits),
         robot: &StudyRobot,
         references: &[&Reference],
-    ) -> Result<IterationSettings, StudyError> {
+    ) -> Result<(IterationSettings, Vec<LoweredBandwidth>), StudyError> {
         self.rehearsal.validate()?;
+        let mut lowered = Vec::new();
         let (outside, model) = (self.is_outside(), robot.model());
         // Before there is a model the drives' loop gets nothing but the path.
         if let (Some(ControllerSettings::PositionLoop(own)), None) = (&study.controller, &self.model_free) {
@@ -81,10 +96,19 @@ impl IterationSection {
             settings.model_free = ControllerSettings::PositionLoop(own);
         }
         if let Some(bandwidth) = &self.bandwidth_hz {
-            let uncertainty = self.rehearsal.uncertainty_percent;
-            let derived = derived_controllers(&robot.parametric, references, bandwidth, uncertainty)?;
+            let gains = GainSettings {
+                bandwidth_hz: bandwidth.clone(),
+                uncertainty_percent: self.rehearsal.uncertainty_percent,
+                delay_s: self.delay_s(study, robot),
+            };
+            let derived = derived_controllers(&robot.parametric, references, &gains)?;
+            let names = robot.parametric.joint_names();
+            let mut note = |model: &str, given_hz: &[f64]| {
+                lowered.extend(lowered_bandwidths(model, given_hz, &names, bandwidth));
+            };
             let is_own = matches!(settings.model_free, ControllerSettings::PositionLoop(_));
             if self.model_free.is_none() && !is_own {
+                note("none", &derived.model_free_hz);
                 settings.model_free = derived.model_free;
             }
             // Gains of the description's bodies: their weight is known as well.
@@ -93,9 +117,11 @@ impl IterationSection {
             }
             let open = self.start.is_none() || study.controller.is_none();
             if self.first.is_none() && settings.start == StartWith::Prior && open {
-                settings.first = Some(derived.first);
+                note("nominal", &derived.first_hz);
+                (settings.first, settings.first_model) = (Some(derived.first), derived.first_model);
             }
             if study.controller.is_none() {
+                note("newest", &derived.model_based_hz);
                 settings.controller = derived.model_based;
             }
         }
@@ -109,7 +135,7 @@ impl IterationSection {
             home: self.home_settings(robot, limits)?,
         };
         settings.safety.validate(model.dof())?;
-        Ok(settings)
+        Ok((settings, lowered))
     }
 
     /// That somebody is there to be asked for passes along the motion.

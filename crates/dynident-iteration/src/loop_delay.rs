@@ -1,0 +1,71 @@
+//! How fast a joint's loop may be when its controller acts late.
+//!
+//! A joint of inertia `m` under `K_p = ω² m̂`, `K_d = 2 ω m̂` has the open loop `L(s) = r (2 ω s + ω²) e^(-τ s) / s²`,
+//! with `r = m̂ / m` the gains' inertia over the joint's own and `τ` the delay. `|L| = 1` at `ω_c = x ω`,
+//! `x² = 2 r² + r √(4 r² + 1)`, where the phase margin is `atan 2x - ω_c τ` (Åström and Murray, *Feedback Systems*,
+//! 2008, chapter 9).
+
+use nalgebra::{DMatrix, DVector};
+
+/// Least phase margin, rad: 30 degrees.
+const MARGIN: f64 = core::f64::consts::FRAC_PI_6;
+
+/// The highest natural frequency with that margin, rad/s; infinite without a delay.
+pub(crate) fn highest_omega(ratio: f64, delay_s: f64) -> f64 {
+    let crossover = (2.0 * ratio * ratio + ratio * (4.0 * ratio * ratio + 1.0).sqrt()).sqrt();
+    ((2.0 * crossover).atan() - MARGIN) / (crossover * delay_s)
+}
+
+/// The share of their natural frequencies `omega` (rad/s) at which joints under velocity gains `kd` (Nms/rad) in a
+/// posture of mass matrix `M` keep that margin; 1 where they do. None where `M` is not positive definite.
+///
+/// Joint by joint a loop may be slow enough and all of them together too fast: the fastest motion of all joints crosses
+/// over at `λ`, the largest eigenvalue of `M⁻¹ K_d`, as a single joint with `r = λ / 2ω` does.
+pub(crate) fn share_of_all(matrix: &DMatrix<f64>, kd: &[f64], omega: &[f64], delay_s: f64) -> Option<f64> {
+    let root = DMatrix::from_diagonal(&DVector::from_iterator(kd.len(), kd.iter().map(|kd| kd.sqrt())));
+    let fastest = (&root * matrix.clone().cholesky()?.inverse() * &root).symmetric_eigenvalues().max();
+    // The least phase is that of the joint whose position gain is the largest beside its velocity gain.
+    let highest = omega.iter().copied().fold(0.0, f64::max);
+    Some((highest_omega(fastest / (2.0 * highest), delay_s) / highest).min(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The loop `m q̈ = -K_d q̇(t - τ) - K_p q(t - τ)` in small steps: at the highest frequency a deflection dies away,
+    /// at three times that (no margin left) it grows.
+    #[test]
+    fn the_highest_frequency_is_stable_and_three_times_that_is_not() {
+        for ratio in [1.0, 1.5, 4.0, 10.0] {
+            let delay_s = 0.008;
+            let highest = highest_omega(ratio, delay_s);
+            let grows = |omega: f64| {
+                let (step, late) = (1e-5, 800);
+                let (mut q, mut dq) = (1.0_f64, 0.0_f64);
+                let mut seen = std::collections::VecDeque::from(vec![(1.0, 0.0); late]);
+                let seconds = 20.0 / omega;
+                for _ in 0..(seconds / step) as usize {
+                    let (late_q, late_dq) = seen.pop_front().unwrap();
+                    dq -= step * ratio * (omega * omega * late_q + 2.0 * omega * late_dq);
+                    q += step * dq;
+                    seen.push_back((q, dq));
+                }
+                q.abs().max(dq.abs() / omega) > 1.0
+            };
+            assert!(!grows(highest), "{ratio}");
+            assert!(grows(3.0 * highest), "{ratio}");
+        }
+    }
+
+    /// Without coupling it is the rule of the single joint.
+    #[test]
+    fn all_together_is_the_single_joint_where_nothing_couples() {
+        let (m, omega, delay_s) = (2.5, 40.0, 0.01);
+        let kd = 2.0 * omega * m;
+        let share = share_of_all(&DMatrix::from_diagonal_element(2, 2, m), &[kd, kd], &[omega; 2], delay_s).unwrap();
+        assert!((share - highest_omega(1.0, delay_s) / omega).abs() < 1e-12);
+        assert_eq!(share_of_all(&DMatrix::from_diagonal_element(2, 2, m), &[kd, kd], &[omega; 2], 1e-4), Some(1.0));
+        assert_eq!(share_of_all(&DMatrix::zeros(1, 1), &[1.0], &[1.0], delay_s), None);
+    }
+}
