@@ -2,6 +2,7 @@
 //! output. What a program for a real robot looks like, and what the tests speak to.
 //!
 //!     robot_client ROBOT.urdf [--fault KIND] [--part PART] [--at SAMPLE] [--marker FILE] [--unwatched yes]
+//!         [--brakes MS]
 //!
 //! A stop message, or the end of its input, stops the robot at the next sample; so does a sample outside of the
 //! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
@@ -34,6 +35,8 @@ struct Client {
     part: String,
     marker: String,
     watched: bool,
+    /// Where it misbehaves: how long it needs to stand after its stop, ms; then its marker file says so.
+    brakes: u64,
     /// What the host writes: read aside, so that a stop is heard in the middle of a motion.
     messages: Receiver<Value>,
 }
@@ -45,6 +48,7 @@ fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or("give the robot's URDF file")?;
     let (mut fault, mut at, mut marker, mut watched) = (String::new(), 50, String::new(), true);
+    let mut brakes = 0;
     let mut part = "motion".to_owned();
     while let Some(name) = arguments.next() {
         let value = arguments.next().ok_or("an option without a value")?;
@@ -54,6 +58,7 @@ fn main() -> Result<()> {
             "--part" => part = value,
             "--marker" => marker = value,
             "--unwatched" => watched = false,
+            "--brakes" => brakes = value.parse()?,
             _ => return Err(format!("unknown option {name}").into()),
         }
     }
@@ -70,7 +75,7 @@ fn main() -> Result<()> {
             }
         }
     });
-    let mut client = Client { plant, joints, fault, at, part, marker, watched, messages };
+    let mut client = Client { plant, joints, fault, at, part, marker, watched, brakes, messages };
     client.hello()?;
     while let Ok(message) = client.messages.recv() {
         match message["type"].as_str() {
@@ -208,6 +213,13 @@ impl Client {
                 return Ok(true);
             }
             _ => {}
+        }
+        if self.brakes > 0 {
+            let message = self.messages.recv()?;
+            std::thread::sleep(Duration::from_millis(self.brakes));
+            self.mark("stands")?;
+            send(&json!({ "type": "end", "status": "stopped", "reason": message["type"] }))?;
+            return Ok(true);
         }
         Ok(false)
     }

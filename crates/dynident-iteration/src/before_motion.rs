@@ -41,7 +41,8 @@ impl Commanded<'_> {
     }
 }
 
-/// Every leg at each speed step before the first run, then in every pass of a warm-up, then the run itself.
+/// Every leg at each speed step before the first run that gets to its end, then in every pass of a warm-up, then the
+/// run itself.
 pub(crate) fn motions<'a>(
     task: &'a IterationTask,
     settings: &IterationSettings,
@@ -51,7 +52,9 @@ pub(crate) fn motions<'a>(
     let legs = |speed: f64, purpose: RunPurpose| {
         task.legs.iter().enumerate().map(move |(place, leg)| Commanded { place, leg, speed, purpose })
     };
-    let steps = if before.is_empty() { &settings.safety.speed_steps[..] } else { &[] };
+    // A run that was stopped early shows nothing of the rest of its motion, nor of a next controller.
+    let is_first = !before.iter().any(|record| record.done);
+    let steps = if is_first { &settings.safety.speed_steps[..] } else { &[] };
     let slow = steps.iter().filter(|&&step| step < 1.0).flat_map(|&step| legs(step, RunPurpose::Run));
     let warm = (1..=passes).flat_map(|pass| legs(1.0, RunPurpose::WarmUp { pass, of: passes }));
     slow.chain(warm).chain(legs(1.0, RunPurpose::Run)).collect()

@@ -1,6 +1,7 @@
 //! A motion is commanded: prepared, allowed, run, and what it came to.
 
 use crate::before_motion::{Commanded, next_motion, rehearsed, ways_of};
+use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::home::{FoundWays, HomeError};
 use crate::iteration::Iteration;
@@ -30,8 +31,8 @@ pub(crate) enum Came {
     Run(RobotRun),
     /// The iteration ends here.
     Stopped(IterationStatus),
-    /// A stop was asked for: what was recorded of the motion, if it had begun, and how it ended.
-    Interrupted(Option<RobotRun>, String),
+    /// It does not count: what was recorded of the motion, if it had begun, and why.
+    CutShort(Option<RobotRun>, CutShort),
 }
 
 impl Iteration {
@@ -83,13 +84,13 @@ impl Iteration {
         let stop = supervisor.stop().cloned();
         let stop_requested = || stop.as_ref().is_some_and(StopSignal::is_requested);
         if stop_requested() {
-            return Ok(Came::Interrupted(None, "between two runs".to_owned()));
+            return Ok(Came::CutShort(None, CutShort::Interrupted("between two runs".to_owned())));
         }
         let mut shown = next_motion(task, (plan, controller), (motion, reference), own.as_ref().zip(found));
         shown.rehearsal.clone_from(rehearsal);
         if !supervisor.allows(&shown) {
             if stop_requested() {
-                return Ok(Came::Interrupted(None, "before a run".to_owned()));
+                return Ok(Came::CutShort(None, CutShort::Interrupted("before a run".to_owned())));
             }
             let reason = format!("run {} was not allowed", plan.run);
             return Ok(Came::Stopped(IterationStatus::Waiting { reason }));
@@ -106,12 +107,13 @@ impl Iteration {
         *last_motion = Some(Instant::now());
         Ok(match &came.status {
             RobotStatus::Waiting { .. } => Came::Stopped(IterationStatus::Waiting { reason: came.status.to_string() }),
-            RobotStatus::Failed { fault } => {
-                Came::Stopped(IterationStatus::Refused { reason: format!("run {}: {fault}", plan.run) })
+            RobotStatus::Failed { .. } => {
+                let how = format!("run {}: {}", plan.run, came.status);
+                Came::CutShort(Some(came), CutShort::Failed(how))
             }
             RobotStatus::Interrupted { .. } => {
                 let how = came.status.to_string();
-                Came::Interrupted(Some(came), how)
+                Came::CutShort(Some(came), CutShort::Interrupted(how))
             }
             RobotStatus::Done
             | RobotStatus::Simulated { .. }

@@ -3,6 +3,7 @@
 use crate::before_motion::motions;
 use crate::commanding::Came;
 use crate::convergence::Shortfall;
+use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};
 use crate::forecast::MotionForecast;
@@ -52,8 +53,8 @@ struct NextRunMotion {
 enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
-    /// A stop was asked for: what was recorded of the run, and how it ended.
-    Interrupted(Vec<RobotRun>, String),
+    /// It does not count: what was recorded of the run, and why.
+    CutShort(Vec<RobotRun>, CutShort),
 }
 
 impl Iteration {
@@ -118,9 +119,9 @@ impl Iteration {
             let came = match self.commanded(*robot, with, &motion, supervisor, last_motion)? {
                 Came::Run(came) => came,
                 Came::Stopped(status) => return Ok(PlannedRun::Stopped(status)),
-                Came::Interrupted(came, how) => {
+                Came::CutShort(came, why) => {
                     runs.extend(came);
-                    return Ok(PlannedRun::Interrupted(runs, how));
+                    return Ok(PlannedRun::CutShort(runs, why));
                 }
             };
             let done = came.status.is_done();
@@ -360,12 +361,10 @@ pub fn iterate_supervised(
         if let Some(held_out) = iteration.held_out_due(&records)? {
             match iteration.held_out_made(held_out, &mut *robots[0], &records, supervisor, &mut last_motion)? {
                 HeldOutCame::Stopped(status) => return outcome(status, records),
-                HeldOutCame::Interrupted(runs, how) => {
+                HeldOutCame::CutShort(runs, why) => {
                     let run = records.len();
-                    let kept = store.map_or(Ok(None), |store| store.keep_interrupted(run, &runs, &how))?;
-                    let kept = kept.map_or_else(String::new, |path| format!("; what was recorded: {}", path.display()));
-                    let reason = format!("{how}{kept}. The same command goes on with the held-out run after run {run}");
-                    return outcome(IterationStatus::Interrupted { reason }, records);
+                    let next = format!("the held-out run after run {run}");
+                    return outcome(why.kept(store, run, &runs, &next)?, records);
                 }
                 HeldOutCame::Run(found, came) => {
                     if let (Some(store), Some(last)) = (store, records.last()) {
@@ -406,12 +405,9 @@ pub fn iterate_supervised(
         };
         match iteration.made(robots, (&plan, next), &records, good, supervisor, &mut last_motion)? {
             PlannedRun::Stopped(status) => return outcome(status, records),
-            PlannedRun::Interrupted(runs, how) => {
-                let kept = store.map_or(Ok(None), |store| store.keep_interrupted(plan.run, &runs, &how))?;
-                let kept =
-                    kept.map_or_else(String::new, |path| format!("; what was recorded of it: {}", path.display()));
-                let reason = format!("{how}{kept}. The same command goes on with run {}", plan.run);
-                return outcome(IterationStatus::Interrupted { reason }, records);
+            PlannedRun::CutShort(runs, why) => {
+                let next = format!("run {}", plan.run);
+                return outcome(why.kept(store, plan.run, &runs, &next)?, records);
             }
             PlannedRun::Run(record, runs) => {
                 if record.accepted && record.estimate.is_some() && iteration.settings.pool {

@@ -3,6 +3,7 @@
 use crate::before_motion::Commanded;
 use crate::commanding::Came;
 use crate::convergence::Shortfall;
+use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
@@ -24,7 +25,7 @@ use std::time::Instant;
 pub(crate) enum HeldOutCame {
     Run(HeldOutRun, Box<RobotRun>),
     Stopped(IterationStatus),
-    Interrupted(Vec<RobotRun>, String),
+    CutShort(Vec<RobotRun>, CutShort),
 }
 
 impl Iteration {
@@ -85,9 +86,7 @@ impl Iteration {
         let came = match self.commanded(robot, (&task, &plan, &prepared), &motion, supervisor, last_motion)? {
             Came::Run(came) => came,
             Came::Stopped(status) => return Ok(HeldOutCame::Stopped(status)),
-            Came::Interrupted(came, how) => {
-                return Ok(HeldOutCame::Interrupted(came.into_iter().collect(), how));
-            }
+            Came::CutShort(came, why) => return Ok(HeldOutCame::CutShort(came.into_iter().collect(), why)),
         };
         let (evidence, reason) = if came.status.is_done() {
             match self.held_out_evidence(held_out, &came, records, known) {

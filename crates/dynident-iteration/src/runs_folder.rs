@@ -80,8 +80,21 @@ impl RunsFolder {
     /// # Errors
     /// A folder behind a symbolic link, files of somebody else's: then nothing is removed.
     pub(crate) fn remove_runs(&self) -> Result<(), IterationError> {
-        let numbered = || self.planned.iter().chain(&self.held_out).map(|(_, folder)| folder);
-        if self.kept.is_empty() && numbered().next().is_none() {
+        self.may_remove_runs()?;
+        self.removable().try_for_each(|folder| remove(folder))
+    }
+
+    /// The folders of runs, and of what was planned for them.
+    fn removable(&self) -> impl Iterator<Item = &PathBuf> {
+        self.kept.iter().chain(self.planned.iter().chain(&self.held_out).map(|(_, folder)| folder))
+    }
+
+    /// That [`remove_runs`](Self::remove_runs) would find nothing in its way.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn may_remove_runs(&self) -> Result<(), IterationError> {
+        if self.removable().next().is_none() {
             return Ok(());
         }
         if self.runs.is_symlink() {
@@ -89,8 +102,7 @@ impl RunsFolder {
                 "is a symbolic link, and runs are not removed through one: give another --out, or remove them";
             return Err(IterationError::State { path: self.runs.clone(), problem: problem.to_owned() });
         }
-        let folders = || self.kept.iter().chain(numbered());
-        for folder in folders() {
+        for folder in self.removable() {
             for file in files(folder)? {
                 if !is_own(&file) {
                     let problem = "is no file of an iteration, so its folder is not removed: move it away";
@@ -98,7 +110,7 @@ impl RunsFolder {
                 }
             }
         }
-        folders().try_for_each(|folder| remove(folder))
+        Ok(())
     }
 
     /// Removes what was planned for any run but `next`: other runs have been made, or those before are gone; and the

@@ -15,8 +15,8 @@ pub struct SafetySettings {
     pub envelope: Option<Envelope>,
     /// How every motion is rehearsed before it is commanded. Default not at all.
     pub rehearsal: Option<RehearsalSettings>,
-    /// Shares of its speed at which the motion is run before the first run, slowest first; those of 1 are the run
-    /// itself. Default none. These runs are not identified.
+    /// Shares of its speed at which the motion is run before the first run, slowest first, and again as long as no run
+    /// got to its end; those of 1 are the run itself. Default none. These runs are not identified.
     pub speed_steps: Vec<f64>,
     /// How long the motion of a run is made over and over before it, s, so that friction is at its working temperature:
     /// before the first run of a call, and again where the robot has stood longer than this. Default 0: not at all.

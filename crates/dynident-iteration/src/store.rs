@@ -1,6 +1,7 @@
 //! An iteration on disk: every run whole or not at all.
 
 use crate::error::IterationError;
+use crate::fingerprint::other_settings;
 use crate::forecast::MotionForecast;
 use crate::held_out_motion::HeldOutRun;
 use crate::planner::PlannedMotion;
@@ -94,6 +95,15 @@ impl IterationStore {
         Ok(store)
     }
 
+    /// That a fresh start in the folder may remove the runs that are there. Changes nothing.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open) without `resume`.
+    pub fn may_begin_afresh(folder: &Path) -> Result<(), IterationError> {
+        let runs = folder.join("runs");
+        if runs.is_dir() { RunsFolder::look(&runs)?.may_remove_runs() } else { Ok(()) }
+    }
+
     /// The runs that are there, in order.
     ///
     /// # Errors
@@ -114,9 +124,7 @@ impl IterationStore {
                 return Err(state(format!("has the schema {}, not {RUN_SCHEMA}", file.schema)));
             }
             if file.fingerprint != self.fingerprint {
-                return Err(state(
-                    "belongs to an iteration with other settings: start afresh, or give another folder".to_owned(),
-                ));
+                return Err(state(other_settings(&file.fingerprint, &self.fingerprint)));
             }
             if file.record.run != records.len() + 1 {
                 return Err(state(format!("holds run {}", file.record.run)));

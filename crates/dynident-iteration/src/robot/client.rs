@@ -198,18 +198,34 @@ impl Client {
         let stop = ToClient::Stop { reason: reason.to_owned() };
         let ends = Instant::now() + Duration::from_secs_f64(self.limits.stop_s);
         self.run_ends = None;
-        let mut sent = self.send(&stop, "end").is_ok();
-        while sent {
-            let left_s = ends.saturating_duration_since(Instant::now()).as_secs_f64();
-            match self.next("end", left_s) {
+        let left = || ends.saturating_duration_since(Instant::now());
+        let mut listens = self.send(&stop, "end").is_ok();
+        while listens {
+            match self.next("end", left().as_secs_f64()) {
                 Ok(Heard::Message(ToHost::End { .. })) => return Stopping::Confirmed,
                 Ok(Heard::Message(message)) => keep(message),
-                Ok(Heard::StopRequested) => {}
-                Err(_) => sent = false,
+                // What it writes on its way to the end need not be a message.
+                Ok(Heard::StopRequested) | Err(RobotFault::Garbage { .. }) => {}
+                Err(_) => listens = false,
             }
+        }
+        // It may be busy with the stop though it does not speak any more.
+        if self.group.exit_within(left()).is_some() {
+            return Stopping::Unknown;
         }
         self.limits.bye_s = 0.0;
         Stopping::Unanswered
+    }
+
+    /// Stops the client after a fault in the middle of a motion; none where none was under way.
+    pub(super) fn stop_after(&mut self, fault: &RobotFault) -> Option<Stopping> {
+        if let (RobotFault::Short { .. }, false) = (fault, self.moving) {
+            // By its own word the run is over, and no answer is due. If it is not, it has the time of a stop.
+            let _ = self.send(&ToClient::Stop { reason: fault.to_string() }, "end");
+            self.limits.bye_s = self.limits.bye_s.max(self.limits.stop_s);
+            return Some(Stopping::Unknown);
+        }
+        (self.moving && !self.stop_sent).then(|| self.stop(&fault.to_string(), &mut |_| {}))
     }
 
     /// The next message, in time; or that somebody asks for a stop, as long as none was sent.
@@ -318,6 +334,7 @@ fn pass_lines(output: impl Read, sender: &SyncSender<Event>) {
     loop {
         let mut bytes = Vec::new();
         let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+        let unfinished = bytes.len() as u64 >= LONGEST_LINE && bytes.last() != Some(&b'\n');
         let line = match read {
             Ok(0) | Err(_) => return,
             Ok(count) if count as u64 >= LONGEST_LINE => Err(LineError::TooLong),
@@ -326,9 +343,12 @@ fn pass_lines(output: impl Read, sender: &SyncSender<Event>) {
         if line.as_ref().is_ok_and(|line| line.trim().is_empty()) {
             continue;
         }
-        let last = line.is_err();
         // Nobody listens any more: the robot was given up.
-        if sender.send(Event::Line(line)).is_err() || last {
+        if sender.send(Event::Line(line)).is_err() {
+            return;
+        }
+        // The rest of such a line is no line of its own. What comes after it may be the answer to a stop.
+        if unfinished && reader.skip_until(b'\n').is_err() {
             return;
         }
     }

@@ -160,7 +160,11 @@ impl Robot for FolderRobot {
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
         Ok(self.exchange(request, &self.settings.folder.join(request.folder_name())).unwrap_or_else(|fault| {
-            RobotRun::without_samples(RobotStatus::Failed { fault }, &self.joints, request.reference.rate_hz())
+            RobotRun::without_samples(
+                RobotStatus::Failed { fault, stopping: None },
+                &self.joints,
+                request.reference.rate_hz(),
+            )
         }))
     }
 }

@@ -174,10 +174,12 @@ impl ControlledRun {
         let status = match (self.end, said) {
             (Some(RunEnd::Interrupted), _) => RobotStatus::Interrupted { stopping: Stopping::Confirmed },
             (Some(RunEnd::Breach(breach)), _) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed },
-            (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault },
+            (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault, stopping: None },
             (None, Err(reason)) => RobotStatus::Stopped { reason },
             (None, Ok(())) if is_whole => RobotStatus::Done,
-            (None, Ok(())) => RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s, part } },
+            (None, Ok(())) => {
+                RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s, part }, stopping: None }
+            }
         };
         RobotRun { status, record, truth: None, ways }
     }

@@ -5,7 +5,7 @@ use super::term_description::describe;
 use super::{RobotFault, RunRequest};
 use core::fmt::Write as _;
 use dynident_model::INERTIAL_NAMES;
-use dynident_simulation::controllers::{ControllerModel, FrictionCompensation, Measured, Target};
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings, FrictionCompensation, Measured, Target};
 use dynident_simulation::{Reference, ReferenceSample};
 use serde_json::{Value, json};
 use std::io::Write as _;
@@ -107,13 +107,20 @@ fn model_json(model: &ControllerModel) -> Value {
     })
 }
 
+/// The model whose torques stand in the tables: none where the drives' own loop is to get nothing but the path. A
+/// program adds the torques where a table has them.
+fn fed_forward<'a>(request: &RunRequest<'a>) -> Option<&'a ControllerModel> {
+    let path_alone = matches!(request.controller, ControllerSettings::PositionLoop(own) if !own.feed_forward);
+    request.model.filter(|_| !path_alone)
+}
+
 /// The two files of a request: where they go, and what is in them.
 fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[(PathBuf, String); 2], RobotFault> {
     let [trajectory, controller] = ["trajectory.csv", "controller.json"].map(|name| folder.join(name));
     let mut text = serde_json::to_string_pretty(&controller_json(request, joints))
         .map_err(|error| RobotFault::File { path: controller.clone(), reason: error.to_string() })?;
     text.push('\n');
-    Ok([(trajectory, trajectory_csv(request.reference, request.model)), (controller, text)])
+    Ok([(trajectory, trajectory_csv(request.reference, fed_forward(request))), (controller, text)])
 }
 
 /// Writes `trajectory.csv` and `controller.json` into a folder, each whole or not at all.
@@ -129,7 +136,7 @@ pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Opti
     let Some(ways) = request.ways else { return Ok(None) };
     let paths = ["approach.csv", "return.csv"].map(|name| folder.join(name));
     for (path, way) in paths.iter().zip([&ways.approach, &ways.back]) {
-        write_whole(path, &trajectory_csv(way, request.model))?;
+        write_whole(path, &trajectory_csv(way, fed_forward(request)))?;
     }
     Ok(Some(paths))
 }

@@ -211,6 +211,9 @@ pub enum RobotStatus {
     Failed {
         /// How.
         fault: RobotFault,
+        /// What became of the stop; none where no motion was under way, and where nobody could be told.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        stopping: Option<Stopping>,
     },
     /// The log is not there yet: somebody has to run the trajectory and drop it.
     Waiting {
@@ -236,7 +239,8 @@ impl core::fmt::Display for RobotStatus {
             Self::Stopped { reason } => write!(f, "the robot stopped: {reason}"),
             Self::Interrupted { stopping } => write!(f, "a stop was asked for: {stopping}"),
             Self::LeftEnvelope { breach, stopping } => write!(f, "out of the envelope: {breach}; {stopping}"),
-            Self::Failed { fault } => write!(f, "{fault}"),
+            Self::Failed { fault, stopping: None } => write!(f, "{fault}"),
+            Self::Failed { fault, stopping: Some(stopping) } => write!(f, "{fault}; {stopping}"),
             Self::Waiting { folder, reason } => write!(f, "{}: {reason}", folder.display()),
         }
     }

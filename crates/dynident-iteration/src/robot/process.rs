@@ -87,20 +87,18 @@ impl Robot for ProcessRobot {
         let mut recorder = Recorder::new(request, &self.joints);
         let status = match self.converse(request, &mut recorder) {
             Ok(status) => {
-                let unanswered = matches!(
-                    &status,
-                    RobotStatus::Interrupted { stopping: Stopping::Unanswered }
-                        | RobotStatus::LeftEnvelope { stopping: Stopping::Unanswered, .. }
-                );
-                if unanswered {
+                if let RobotStatus::Interrupted { stopping } | RobotStatus::LeftEnvelope { stopping, .. } = &status
+                    && stopping.is_open()
+                {
                     self.client = None;
                 }
                 status
             }
             Err(fault) => {
+                let stopping = self.client.as_mut().and_then(|client| client.stop_after(&fault));
                 // Whatever state it is in, the next run must not begin there.
                 self.client = None;
-                RobotStatus::Failed { fault }
+                RobotStatus::Failed { fault, stopping }
             }
         };
         Ok(recorder.into_run(status))

@@ -75,8 +75,18 @@ pub enum Stopping {
     Confirmed,
     /// The program did not answer in time and was killed: nobody knows whether the robot stands.
     Unanswered,
+    /// The program ended, or said that its run was over, without an answer to the stop: nobody knows whether the robot
+    /// stands.
+    Unknown,
     /// Nobody was there to be stopped: it was seen in the log afterwards.
     SeenAfterwards,
+}
+
+impl Stopping {
+    /// Whether nobody said that the robot stands.
+    pub(crate) fn is_open(self) -> bool {
+        matches!(self, Self::Unanswered | Self::Unknown)
+    }
 }
 
 impl core::fmt::Display for Stopping {
@@ -85,6 +95,9 @@ impl core::fmt::Display for Stopping {
             Self::Confirmed => write!(f, "the robot has stopped"),
             Self::Unanswered => {
                 write!(f, "its program did not answer the stop and was killed: look at the robot before anything else")
+            }
+            Self::Unknown => {
+                write!(f, "nobody knows whether the robot stands: look at the robot before anything else")
             }
             Self::SeenAfterwards => write!(f, "seen in the log when the run was over"),
         }

@@ -51,9 +51,10 @@ impl StopSignal {
         self.shared.requested.load(Ordering::SeqCst)
     }
 
-    /// Kills every program that serves a robot, with all the processes of its group, without a word.
-    pub fn kill_robots(&self) {
-        self.each(|listener| (listener.kill)());
+    /// Kills every program that serves a robot, with all the processes of its group, without a word; whether there was
+    /// one. Nobody knows afterwards whether its robot stands.
+    pub fn kill_robots(&self) -> bool {
+        self.each(|listener| (listener.kill)()) > 0
     }
 
     /// `wake` is called when a stop is asked for, `kill` by [`kill_robots`](Self::kill_robots), until the guard is
@@ -66,10 +67,11 @@ impl StopSignal {
         Listening { signal: self.clone(), number }
     }
 
-    fn each(&self, call: impl Fn(&Listener)) {
-        if let Ok(listeners) = self.shared.listeners.lock() {
-            listeners.iter().for_each(call);
-        }
+    /// How many there are.
+    fn each(&self, call: impl Fn(&Listener)) -> usize {
+        let Ok(listeners) = self.shared.listeners.lock() else { return 0 };
+        listeners.iter().for_each(call);
+        listeners.len()
     }
 }
 

@@ -89,7 +89,7 @@ fn what_it_does_wrong_is_named() {
             Ok(())
         });
         match found.status {
-            RobotStatus::Failed { fault } => fault,
+            RobotStatus::Failed { fault, .. } => fault,
             other => panic!("{other}"),
         }
     };

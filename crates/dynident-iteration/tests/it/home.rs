@@ -241,7 +241,7 @@ fn a_program_that_knows_no_ways_is_told_apart() {
     let ways = ways();
     let old = ["--fault", "homeless"];
     let run_ = run(&mut process(ProcessMode::Run, &old, folder.path()), Some(&ways), None);
-    assert!(matches!(run_.status, RobotStatus::Failed { fault: RobotFault::NoWays }), "{}", run_.status);
+    assert!(matches!(run_.status, RobotStatus::Failed { fault: RobotFault::NoWays, .. }), "{}", run_.status);
     assert!(run_.record.samples == 0 && run_.status.to_string().contains("mode = \"step\""), "{}", run_.status);
     assert!(run(&mut process(ProcessMode::Run, &old, folder.path()), None, None).status.is_done());
     assert!(run(&mut process(ProcessMode::Step, &old, folder.path()), Some(&ways), None).status.is_done());
@@ -293,17 +293,17 @@ fn a_way_that_is_not_run_to_its_end() {
     assert_eq!((stopped.record.samples, stopped.ways.unwrap().back.samples), (251, 49));
     let short = fault("short", "approach").status;
     assert!(
-        matches!(&short, RobotStatus::Failed { fault: RobotFault::Short { part: RunPart::Approach, .. } }),
+        matches!(&short, RobotStatus::Failed { fault: RobotFault::Short { part: RunPart::Approach, .. }, .. }),
         "{short}"
     );
     // The program's own fault is a sample of the motion, in the middle of the approach.
     let early = fault("null", "approach").status;
     assert!(
-        matches!(&early, RobotStatus::Failed { fault: RobotFault::Short { part: RunPart::Approach, .. } }),
+        matches!(&early, RobotStatus::Failed { fault: RobotFault::Short { part: RunPart::Approach, .. }, .. }),
         "{early}"
     );
     let late = fault("null", "return").status;
-    assert!(matches!(&late, RobotStatus::Failed { fault: RobotFault::OutOfTurn { .. } }), "{late}");
+    assert!(matches!(&late, RobotStatus::Failed { fault: RobotFault::OutOfTurn { .. }, .. }), "{late}");
 }
 
 /// A person finds the ways beside the trajectory; logs of them are looked at where they are.

@@ -12,7 +12,9 @@ use dynident_model::terms::{
     Power, PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
 };
 use dynident_model::{Model, load_robot};
-use dynident_simulation::controllers::{ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings};
+use dynident_simulation::controllers::{
+    ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings, PositionLoopSettings,
+};
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -64,7 +66,7 @@ fn run(robot: &mut dyn Robot) -> RobotRun {
 fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
     let mut robot = ProcessRobot::new(settings(mode, name), joints()).unwrap();
     let run = run(&mut robot);
-    let RobotStatus::Failed { fault } = run.status.clone() else { panic!("{name}: {}", run.status) };
+    let RobotStatus::Failed { fault, .. } = run.status.clone() else { panic!("{name}: {}", run.status) };
     (fault, run)
 }
 
@@ -137,7 +139,7 @@ fn programs_that_hang_are_given_up() {
         let start = Instant::now();
         let mut robot = ProcessRobot::new(ProcessSettings { limits, ..settings(mode, name) }, joints()).unwrap();
         let run = run(&mut robot);
-        assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. } }), "{}", run.status);
+        assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. }, .. }), "{}", run.status);
         // 3600 s without the limits.
         assert!(start.elapsed().as_secs() < 600);
     }
@@ -148,7 +150,7 @@ fn programs_that_are_not_there_are_named() {
     let command = vec!["/nowhere/robot".to_owned()];
     let settings = ProcessSettings { command, ..settings(ProcessMode::Run, "") };
     let status = run(&mut ProcessRobot::new(settings.clone(), joints()).unwrap()).status;
-    assert!(matches!(&status, RobotStatus::Failed { fault: RobotFault::NotStarted { .. } }));
+    assert!(matches!(&status, RobotStatus::Failed { fault: RobotFault::NotStarted { .. }, .. }));
     assert!(status.to_string().contains("/nowhere/robot"));
     assert!(ProcessRobot::new(ProcessSettings { command: Vec::new(), ..settings }, joints()).is_err());
 }
@@ -280,6 +282,23 @@ fn what_is_handed_over_is_enough() {
     // Requests without meaning are refused before anybody is spoken to.
     let mut robot = ProcessRobot::new(settings(ProcessMode::Run, ""), joints()).unwrap();
     assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
+}
+
+/// Drives whose own loop is to get nothing but the path are handed no torques: a program adds what the table has.
+#[test]
+fn a_loop_without_feed_forward_gets_no_torques() {
+    let believed = ControllerModel::new(&model(), &[], &[]).unwrap();
+    let reference = reference();
+    for feed_forward in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 };
+        let mut robot = FolderRobot::new(settings, joints()).unwrap();
+        let controller = ControllerSettings::PositionLoop(PositionLoopSettings::of_robot(feed_forward));
+        let request = RunRequest { model: Some(&believed), ..RunRequest::new(1, &reference, &controller) };
+        robot.run(&request).unwrap();
+        let table = std::fs::read_to_string(robot.run_folder(1).join("trajectory.csv")).unwrap();
+        assert_eq!(table.lines().next().unwrap().contains("tau1"), feed_forward);
+    }
 }
 
 /// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs

@@ -115,10 +115,11 @@ fn no_process_of_a_robot_is_left() {
     let line = format!("'{}'; echo over >&2", command("hang", folder.path()).join("' '"));
     let mut settings = settings(ProcessMode::Run, ["sh", "-c", &line].map(str::to_owned).to_vec());
     settings.limits.run_s = Some(2.0);
+    settings.limits.stop_s = 0.2;
     let (reference, controller) = (reference(), pd());
     let request = RunRequest::new(1, &reference, &controller);
     let run = ProcessRobot::new(settings.clone(), joints()).unwrap().run(&request).unwrap();
-    assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. } }), "{}", run.status);
+    assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. }, .. }), "{}", run.status);
     assert!(!runs(&marked(folder.path())));
 
     let folder = tempfile::tempdir().unwrap();
@@ -126,7 +127,7 @@ fn no_process_of_a_robot_is_left() {
     // Far longer than this test may last: death is seen by the process.
     settings.limits.message_s = 3000.0;
     let run = ProcessRobot::new(settings, joints()).unwrap().run(&request).unwrap();
-    let RobotStatus::Failed { fault: RobotFault::Died { exit, said, .. } } = &run.status else {
+    let RobotStatus::Failed { fault: RobotFault::Died { exit, said, .. }, .. } = &run.status else {
         panic!("{}", run.status)
     };
     assert!(exit.contains('4') && said.contains("left alone"), "{}", run.status);
@@ -148,7 +149,7 @@ fn robots_can_be_killed_at_once() {
         });
         let (reference, controller) = (reference(), pd());
         let run = robot.run(&RunRequest { stop: Some(&stop), ..RunRequest::new(1, &reference, &controller) }).unwrap();
-        let RobotStatus::Failed { fault: RobotFault::Died { exit, .. } } = &run.status else {
+        let RobotStatus::Failed { fault: RobotFault::Died { exit, .. }, .. } = &run.status else {
             panic!("{}", run.status)
         };
         assert!(exit.contains('9'), "{exit}");
@@ -400,6 +401,65 @@ fn a_run_that_is_cut_short_is_kept_aside() {
     assert!(store.records().unwrap().is_empty());
     IterationStore::open(folder.path(), "test", false).unwrap();
     assert!(!kept.exists());
+}
+
+/// A fault in the middle of a motion stops the robot as a breach does: a program that answers has the time of a stop,
+/// though it needs longer than a bye; the verdict says what is known, and what was recorded is kept beside the runs.
+#[test]
+fn a_fault_in_the_middle_of_a_motion_is_a_stop() {
+    for (fault, at) in [("nan", 50), ("joints", 50), ("backwards", 50), ("garbage", 50), ("megabyte", 50)] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut own = command(fault, folder.path());
+        own.extend(["--brakes".to_owned(), "700".to_owned()]);
+        let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
+        let store = IterationStore::open(folder.path(), "test", true).unwrap();
+        let mut robot = ProcessRobot::new(settings(ProcessMode::Run, own), joints()).unwrap();
+        let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher(0)).unwrap();
+        let IterationStatus::Refused { reason } = &outcome.status else { panic!("{fault}: {}", outcome.status) };
+        let words = ["the robot has stopped", "what was recorded of it", "goes on with run 1"];
+        assert!(words.iter().all(|word| reason.contains(word)), "{fault}: {reason}");
+        // It came to its own end: nobody killed it while its brakes were closing.
+        assert_eq!(marked(folder.path()), "stands", "{fault}");
+        let kept = std::fs::read_to_string(folder.path().join("runs/interrupted_1/log.csv")).unwrap();
+        assert_eq!(kept.lines().count(), at + 1, "{fault}");
+    }
+    // Who says nothing more, and who is gone: nobody knows.
+    let open = [("hang", Stopping::Unanswered), ("die", Stopping::Unknown), ("short", Stopping::Unknown)];
+    for (fault, expected) in open {
+        let folder = tempfile::tempdir().unwrap();
+        let mut settings = settings(ProcessMode::Run, command(fault, folder.path()));
+        (settings.limits.message_s, settings.limits.stop_s) = (0.5, 0.3);
+        let (reference, controller) = (reference(), pd());
+        let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller));
+        let status = run.unwrap().status;
+        let RobotStatus::Failed { stopping: Some(stopping), .. } = &status else { panic!("{fault}: {status}") };
+        assert_eq!(*stopping, expected, "{fault}");
+        assert!(status.to_string().contains("look at the robot"), "{status}");
+    }
+}
+
+/// After a breach in the first run the next one begins slow again: what it runs under has never been seen.
+#[test]
+fn the_run_after_a_breach_begins_slow_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let tight = Envelope { tracking_error: vec![Some(0.01); 2], ..envelope() };
+    let safety = |envelope: Option<Envelope>, speed_steps: &[f64]| SafetySettings {
+        outside: true,
+        envelope,
+        speed_steps: speed_steps.to_vec(),
+        ..SafetySettings::default()
+    };
+    let store = IterationStore::open(folder.path(), "test", true).unwrap();
+    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
+    let outcome =
+        iterate_supervised(&iteration(safety(Some(tight), &[])), &mut [&mut robot], Some(&store), &mut watcher(0));
+    assert!(!outcome.unwrap().runs[0].done);
+    let mut watcher = watcher(2);
+    let iteration = iteration(safety(None, &[0.5, 1.0]));
+    let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap();
+    let speeds: Vec<(usize, f64)> = watcher.asked.iter().map(|motion| (motion.run, motion.speed)).collect();
+    // Once a run got to its end there are no slow ones.
+    assert_eq!(speeds, [(2, 0.5), (2, 1.0), (3, 1.0)], "{}", outcome.status);
 }
 
 /// A run of a robot outside that ends early is looked at by a person before the next one: one run for each call.

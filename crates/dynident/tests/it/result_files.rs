@@ -37,7 +37,7 @@ fn the_example_states_nothing_of_its_drives() {
 #[test]
 fn a_robot_that_failed_and_a_motion_that_is_not_finite_read_back() {
     let fault = RobotFault::Hung { waiting_for: "sample".to_owned(), limit_s: 2.0 };
-    assert_reads_back(&RobotStatus::Failed { fault });
+    assert_reads_back(&RobotStatus::Failed { fault, stopping: None });
     let report = r#"{"kind":"speed","joint":"elbow","worst_ratio":null,"at_s":1.0,"violated":true}"#;
     let read: LimitReport = serde_json::from_str(report).unwrap();
     assert!(read.worst_ratio == f64::INFINITY);
