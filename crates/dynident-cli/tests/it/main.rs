@@ -12,6 +12,7 @@ mod export;
 mod factors;
 mod files;
 mod iterate;
+mod iterate_again;
 mod packing;
 mod reproduce;
 mod robots_outside;

@@ -1,6 +1,7 @@
 //! Run, identify, load the better model, run again: a study's whole iteration.
 
 mod bound;
+mod fingerprint;
 mod legs;
 mod model;
 mod report;
@@ -22,13 +23,12 @@ use dynident_excitation::DesignProgress;
 use dynident_excitation::limits::Limits;
 use dynident_iteration::{
     Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, MotionPlanner, NextMotion,
-    Redesign, RunRecord, StopSignal, Supervisor, iterate_supervised,
+    Redesign, RunRecord, StopSignal, Supervisor, iterate_supervised, other_settings,
 };
 use dynident_iteration::{Robot, RobotRun};
-use fnv::FnvHasher;
-use model::{EndedStage, MODEL_FILES, RobotFiles, robot_found};
+use fingerprint::fingerprint;
+use model::{EndedStage, RobotFiles, robot_found};
 use report::{IterationReport, Stage, joined};
-use std::hash::Hasher;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -163,10 +163,15 @@ fn iterated(
     let stages = section.stages();
     let one = stages.len() == 1;
     let folder = |stage: usize| if one { out.to_owned() } else { out.join(format!("leg_{}", stage + 1)) };
-    // What an earlier call found goes before its runs do.
+    // Of another command until an iteration has written a robot: it stays until this one has its own.
+    let robot_is_own =
+        IterationsFile::read(&out.join(ITERATIONS)).is_ok_and(|earlier| !earlier.base_parameters.is_empty());
+    // What an earlier call found goes before its runs do, and nothing goes unless all may.
     if !resume {
-        let set = OutputSet::new(out).absent(ITERATIONS).absent(PAGE).absent(TRAJECTORY);
-        MODEL_FILES.into_iter().fold(set, OutputSet::absent).write()?;
+        let mut stages = (0..stages.len()).map(&folder);
+        stages.try_for_each(|folder| IterationStore::may_begin_afresh(&folder)).map_err(in_iteration)?;
+        let set = OutputSet::new(out).absent(ITERATIONS).absent(TRAJECTORY);
+        RobotFiles::none().added_to(without_page(set, robot_is_own), robot_is_own).write()?;
     }
     // All of them first: with --fresh no run of an earlier call may be left in any.
     let stores = (0..stages.len())
@@ -264,7 +269,7 @@ fn iterated(
                     let stage = Stage { leg, robot, records, status, shortfalls, declined, known_std: &known_std };
                     let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
-                    joined(all).and_then(|file| write_set(out, &file, None, RobotFiles::none()).err())
+                    joined(all).and_then(|file| write_set((out, robot_is_own), &file, None, RobotFiles::none()).err())
                 }
                 Err(error) => Some(in_iteration(error)),
             };
@@ -321,7 +326,7 @@ fn iterated(
         RobotFiles::none()
     });
     file.base_parameters.clone_from(&found.base_parameters);
-    write_set(out, &file, Some(iteration_report(&file, &traces, &time)?), found)?;
+    write_set((out, robot_is_own), &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
 }
 
@@ -340,16 +345,26 @@ fn planner(
 }
 
 /// The file, its page and the robot that was found; while runs are still being made there is no page and no robot, and
-/// none of an earlier call.
-fn write_set(out: &Path, file: &IterationsFile, page: Option<String>, found: RobotFiles) -> Result<(), Error> {
+/// none of an earlier call. A robot that is another command's stays until there is one.
+fn write_set(
+    (out, robot_is_own): (&Path, bool),
+    file: &IterationsFile,
+    page: Option<String>,
+    found: RobotFiles,
+) -> Result<(), Error> {
     let bytes = serde_json::to_vec_pretty(file)
         .map_err(|error| Error::Result { path: out.join(ITERATIONS), message: error.to_string() })?;
-    let set = found.added_to(OutputSet::new(out).file(ITERATIONS, bytes));
+    let set = found.added_to(OutputSet::new(out).file(ITERATIONS, bytes), robot_is_own);
     match page {
         Some(page) => set.file(PAGE, page),
-        None => set.absent(PAGE),
+        None => without_page(set, robot_is_own),
     }
     .write()
+}
+
+/// The set without a page of an earlier call; `identify` writes one by the same name.
+fn without_page(set: OutputSet, robot_is_own: bool) -> OutputSet {
+    if robot_is_own { set.absent(PAGE) } else { set }
 }
 
 /// What each drive gives at most: of a simulated robot the stated limits, or else the description's.
@@ -366,16 +381,6 @@ fn torque_limits(simulation: &SimulationSection, robot: &StudyRobot, simulated: 
 const ITERATIONS: &str = "iterations.json";
 const TRAJECTORY: &str = "trajectory.json";
 const PAGE: &str = "report.html";
-
-/// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
-fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> String {
-    let mut study = study.clone();
-    study.iteration = study.iteration.map(|section| section.of_runs());
-    let text = format!("{study:?} {:?} {:?} {}", robot.model(), options.data, env!("CARGO_PKG_VERSION"));
-    let mut hasher = FnvHasher::default();
-    hasher.write(text.as_bytes());
-    format!("{:016x}", hasher.finish())
-}
 
 /// What is run.
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -408,9 +413,7 @@ fn kept(
         if kept.fingerprint == fingerprint {
             return Ok(kept.all);
         }
-        return Err(wrong(
-            "belongs to an iteration with other settings: take --fresh, or give another --out".to_owned(),
-        ));
+        return Err(wrong(other_settings(&kept.fingerprint, fingerprint)));
     }
     let kept = TrajectoryFile { fingerprint: fingerprint.to_owned(), all: make()? };
     let bytes = serde_json::to_vec(&kept).map_err(|error| wrong(error.to_string()))?;

@@ -25,7 +25,7 @@ const CONTROLLER: &str = "controller.json";
 const PAGE: &str = "identification.html";
 
 /// All of them: what the iteration writes when it ends, and what is absent until then.
-pub(super) const MODEL_FILES: [&str; 7] = [RESULT, URDF, TABLE, MJCF, SDF, CONTROLLER, PAGE];
+const MODEL_FILES: [&str; 7] = [RESULT, URDF, TABLE, MJCF, SDF, CONTROLLER, PAGE];
 
 /// An iteration of legs that are identified together, as it ended.
 pub(super) struct EndedStage<'a> {
@@ -47,8 +47,11 @@ impl RobotFiles {
         Self { files: Vec::new(), base_parameters: Vec::new() }
     }
 
-    /// The set with these files, and without the others.
-    pub(super) fn added_to(self, mut set: OutputSet) -> OutputSet {
+    /// The set with these files, and without the others. Where there are none, those of another command stay.
+    pub(super) fn added_to(self, mut set: OutputSet, are_own: bool) -> OutputSet {
+        if self.files.is_empty() && !are_own {
+            return set;
+        }
         for name in MODEL_FILES {
             if self.files.iter().all(|(written, _)| *written != name) {
                 set = set.absent(name);
@@ -137,10 +140,14 @@ fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
 fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::Value, IterationError> {
     let EndedStage { iteration, records, .. } = stage;
     let model = iteration.controller_model(records, &ModelParameters::All(parameters.to_vec()))?;
-    let controller = &iteration.settings().controller;
+    let settings = iteration.settings();
     let joints = iteration.task().robot.joint_names();
     let legs = records.last().map_or(Ok(Cow::Borrowed(&iteration.task().legs[..])), |last| iteration.legs_of(last))?;
     let reference = legs[0].reference();
-    let request = RunRequest { model: Some(&model), ..RunRequest::new(records.len() + 1, reference, controller) };
+    let request = RunRequest {
+        model: Some(&model),
+        envelope: settings.safety.envelope.as_ref(),
+        ..RunRequest::new(records.len() + 1, reference, &settings.controller)
+    };
     Ok(controller_json(&request, &joints))
 }

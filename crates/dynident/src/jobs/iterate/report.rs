@@ -141,7 +141,7 @@ impl IterationReport<'_> {
             .to_owned(),
             reason: in_words(status, shortfalls, declined),
             declined: declined.map(|forecast| run_forecast(forecast, None)),
-            unmet: shortfalls.iter().map(unmet).collect(),
+            unmet: shortfalls.iter().filter(|own| !is_noise(own, status)).map(unmet).collect(),
             joints: self.robot.parametric.joint_names(),
             lowered_bandwidths: self.lowered.clone(),
             duration_s: self.duration_s,
@@ -189,6 +189,15 @@ fn in_words(status: &IterationStatus, shortfalls: &[Shortfall], declined: Option
         }
         _ => status.to_string(),
     }
+}
+
+/// Where something else ended the iteration, that runs are missing is no news, and allowing more of them no help.
+fn is_noise(shortfall: &Shortfall, status: &IterationStatus) -> bool {
+    let ended = matches!(
+        status,
+        IterationStatus::Interrupted { .. } | IterationStatus::Waiting { .. } | IterationStatus::Refused { .. }
+    );
+    ended && matches!(shortfall, Shortfall::TooFewRuns { .. })
 }
 
 fn unmet(shortfall: &Shortfall) -> UnmetCondition {

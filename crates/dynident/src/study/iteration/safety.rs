@@ -6,8 +6,8 @@ use crate::study::StudyRobot;
 use dynident_excitation::limits::Limits;
 use dynident_iteration::robot::{EnvelopeSettings, ProcessLimits, ProcessMode};
 use dynident_iteration::{
-    GainSettings, HomeSettings, IterationSettings, LoweredBandwidth, SafetySettings, StartWith, derived_controllers,
-    lowered_bandwidths,
+    GainSettings, HomeSettings, IterationSettings, LoweredBandwidth, RehearsalSettings, SafetySettings, StartWith,
+    derived_controllers, lowered_bandwidths,
 };
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Reference};
@@ -175,7 +175,8 @@ impl IterationSection {
     }
 
     /// The section without what a run does not depend on: who speaks for the robot, how long that may take, what stops
-    /// it, and where a robot outside waits. Runs made before these were corrected are still this iteration's.
+    /// it, what comes before a run, where a robot outside waits, and when the iteration ends. Runs made before these
+    /// were corrected are still this iteration's.
     pub(crate) fn of_runs(&self) -> Self {
         let mut own = self.clone();
         match &mut own.robot {
@@ -187,10 +188,22 @@ impl IterationSection {
             }
             RobotChoice::Folder(folder) => folder.wait_s = 0.0,
         }
+        let default = Self::default();
         own.envelope = EnvelopeSettings::default();
+        own.speed_steps = Vec::new();
+        (own.max_runs, own.settled) = (default.max_runs, default.settled);
+        if let Some(held_out) = &mut own.held_out {
+            held_out.every = None;
+        }
+        // Gains that are made of a bandwidth bear the delay, and another robot than the description's.
+        let RehearsalSettings { uncertainty_percent, delay_s, .. } = own.rehearsal;
+        own.rehearsal = match own.bandwidth_hz {
+            Some(_) => RehearsalSettings { uncertainty_percent, delay_s, ..default.rehearsal },
+            None => default.rehearsal,
+        };
         // A robot outside is moved to another place, or at another speed, or warmed up longer; its motion is the same.
         if self.is_outside() {
-            (own.home, own.approach_speed, own.warm_up_s) = (None, Self::default().approach_speed, 0.0);
+            (own.home, own.approach_speed, own.warm_up_s) = (None, default.approach_speed, 0.0);
         }
         own
     }
