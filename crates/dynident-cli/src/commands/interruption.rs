@@ -1,5 +1,6 @@
 //! Ctrl-C (and what else asks a program to end: SIGTERM, a terminal that goes away).
 
+use crate::terminal;
 use dynident::iteration::StopSignal;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,7 +17,12 @@ pub(crate) fn listen(stop: &StopSignal) {
     // Without a handler Ctrl-C ends the program as ever.
     let _ = ctrlc::set_handler(move || {
         if PRESSED.swap(true, Ordering::SeqCst) {
-            stop.kill_robots();
+            if stop.kill_robots() {
+                terminal::remark(
+                    "the robot's program was killed before it said that the robot stands: nobody knows whether it \
+                     does, look at it before anything else",
+                );
+            }
             std::process::exit(i32::from(STATUS));
         }
         stop.request();

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+mod answer;
 pub(crate) mod benchmark;
 pub(crate) mod check;
 pub(crate) mod completions;

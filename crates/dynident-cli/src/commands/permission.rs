@@ -1,10 +1,10 @@
 //! What a person is asked before a robot moves.
 
-use super::interruption;
+use super::answer;
 use crate::terminal;
 use dynident::iteration::{NextMotion, RunPurpose};
 use dynident::study::{RobotChoice, Study};
-use std::io::{BufRead, IsTerminal};
+use std::io::IsTerminal;
 
 /// A study names a program, and whoever wrote the study may be somebody else: it is shown, and started only by who was
 /// told `--allow-command`, or says yes.
@@ -79,12 +79,7 @@ pub(crate) fn text_asked(question: &str) -> Option<String> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;
     }
-    terminal::ask(&format!("{question} "));
-    let mut answer = String::new();
-    std::io::stdin().lock().read_line(&mut answer).ok()?;
-    if interruption::pressed() {
-        return None;
-    }
+    let answer = answer::to(&format!("{question} "))?;
     Some(answer.trim().to_owned()).filter(|answer| !answer.is_empty())
 }
 

@@ -1,6 +1,8 @@
 //! The integration tests of this crate, linked once.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
+#[cfg(unix)]
+mod answers;
 mod broken_inputs;
 mod common;
 mod contract;

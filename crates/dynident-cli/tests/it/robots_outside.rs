@@ -7,7 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 /// Says hello, sends one sample of each run, marks its place, and does then what `rest` says.
-fn robot(folder: &Path, rest: &str) -> PathBuf {
+pub(crate) fn robot(folder: &Path, rest: &str) -> PathBuf {
     let script = folder.join("robot.sh");
     let text = format!(
         r#"printf '%s\n' '{{"type":"hello","protocol":"dynident-robot/1","name":"script","joints":["joint1","joint2"],"modes":["run"]}}'
@@ -27,7 +27,7 @@ done
 }
 
 /// A study of the planar arm with that robot, at rest for a second.
-fn study(folder: &Path, further: &str) -> PathBuf {
+pub(crate) fn study(folder: &Path, further: &str) -> PathBuf {
     let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf");
     let mut rows = vec!["t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned()];
     rows.extend((0..101).map(|k| format!("{},0,0,0,0,0,0", f64::from(k) * 0.01)));
@@ -65,7 +65,7 @@ fn interrupt(program: &Child) {
     assert!(Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap().success());
 }
 
-fn said(output: &Output) -> String {
+pub(crate) fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
@@ -120,7 +120,9 @@ fn a_second_interruption_kills_the_robot() {
         std::thread::sleep(Duration::from_millis(200));
         interrupt(&program);
     }
-    assert_eq!(program.wait_with_output().unwrap().status.code(), Some(130));
+    let output = program.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert!(said(&output).contains("nobody knows whether it does, look at it"), "{}", said(&output));
     assert!(!runs(&begun));
 }
 

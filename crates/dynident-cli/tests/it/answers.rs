@@ -1,0 +1,110 @@
+//! Questions on a terminal: what was typed before one is no answer to it, and Ctrl-C ends the wait.
+
+use crate::robots_outside::{robot, study};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// The command on a terminal of its own.
+struct OnTerminal {
+    program: Child,
+    keyboard: File,
+    screen: Arc<Mutex<String>>,
+}
+
+impl OnTerminal {
+    fn iterate(study: &Path) -> Self {
+        let keyboard = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&keyboard).unwrap();
+        unlockpt(&keyboard).unwrap();
+        let name = ptsname(&keyboard, Vec::new()).unwrap().into_string().unwrap();
+        let terminal = || Stdio::from(File::options().read(true).write(true).open(&name).unwrap());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dynident"));
+        command.arg("iterate").arg(study).arg("--out").arg(study.with_file_name("result"));
+        command.args(["--allow-command", "--confirm"]);
+        let program = command.stdin(terminal()).stdout(terminal()).stderr(terminal()).spawn().unwrap();
+        let keyboard = File::from(keyboard);
+        let screen = Arc::new(Mutex::new(String::new()));
+        let (mut seen, shown) = (keyboard.try_clone().unwrap(), Arc::clone(&screen));
+        std::thread::spawn(move || {
+            let mut bytes = [0; 1024];
+            // On Linux it is an error when the program has gone.
+            while let Ok(count @ 1..) = seen.read(&mut bytes) {
+                shown.lock().unwrap().push_str(&String::from_utf8_lossy(&bytes[..count]));
+            }
+        });
+        Self { program, keyboard, screen }
+    }
+
+    fn types(&mut self, keys: &str) {
+        self.keyboard.write_all(keys.as_bytes()).unwrap();
+    }
+
+    fn screen(&self) -> String {
+        self.screen.lock().unwrap().clone()
+    }
+
+    /// Waits until the words stand on the screen so many times.
+    fn awaits(&mut self, words: &str, times: usize) {
+        for _ in 0..6000 {
+            if self.screen().matches(words).count() >= times {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        panic!("{words} not {times} times on the screen: {}", self.screen());
+    }
+
+    /// The exit status, within a minute.
+    fn ends(&mut self) -> Option<i32> {
+        for _ in 0..6000 {
+            if let Some(status) = self.program.try_wait().unwrap() {
+                return status.code();
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.program.kill().unwrap();
+        panic!("it waits still: {}", self.screen());
+    }
+}
+
+/// The robot stops the first run by itself, so that a second question comes.
+const STOPS: &str =
+    r#"printf x >>"$1/moved"; sleep 0.3; printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+
+/// An Enter too many, or a whole answer typed ahead, while the robot moves: the next question waits all the same.
+#[test]
+fn what_was_typed_before_a_question_is_no_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    robot(folder.path(), STOPS);
+    let mut terminal = OnTerminal::iterate(&study(folder.path(), ""));
+    terminal.awaits("Is the robot clear?", 1);
+    terminal.types("y\ny\n\ny\n");
+    terminal.awaits("Is the robot clear?", 2);
+    // Long enough for an answer that had been there.
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(std::fs::read_to_string(folder.path().join("moved")).unwrap(), "x", "{}", terminal.screen());
+    assert!(terminal.program.try_wait().unwrap().is_none(), "{}", terminal.screen());
+    // The question is still open.
+    terminal.types("n\n");
+    assert_eq!(terminal.ends(), Some(1), "{}", terminal.screen());
+    assert_eq!(std::fs::read_to_string(folder.path().join("moved")).unwrap(), "x");
+}
+
+/// Ctrl-C at a question: no Enter is needed, nothing moves, and the screen says so.
+#[test]
+fn an_interruption_ends_the_wait_for_an_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    robot(folder.path(), STOPS);
+    let mut terminal = OnTerminal::iterate(&study(folder.path(), ""));
+    terminal.awaits("[y/N]", 1);
+    let id = terminal.program.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert_eq!(terminal.ends(), Some(130), "{}", terminal.screen());
+    terminal.awaits("counts as answered with no", 1);
+    assert!(!folder.path().join("moved").exists());
+}
