@@ -135,7 +135,9 @@ pub fn derived_controllers(
     let mut alone = lowered(&|joint| (largest[joint] / lightest[joint]).max(1.0));
     let kd: Vec<f64> = alone.iter().zip(&largest).map(|(omega, inertia)| 2.0 * omega * inertia).collect();
     let share = matrices.iter().filter_map(|matrix| share_of_all(matrix, &kd, &alone, delay_s)).fold(1.0, f64::min);
-    alone.iter_mut().for_each(|omega| *omega *= share);
+    for omega in &mut alone {
+        *omega *= share;
+    }
 
     let each = |of: &dyn Fn(usize) -> f64| PerJoint::Each((0..dof).map(of).collect());
     let pd = JointPdSettings {
