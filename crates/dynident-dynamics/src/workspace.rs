@@ -77,12 +77,15 @@ impl<T: Scalar> CoreScratch<T> {
 #[inline(always)]
 pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: T) -> Transform<T> {
     if map.turns {
-        let entry = |i: usize, j: usize| {
-            let steady = cosine.mul_add(T::splat(map.cosine.0[i][j]), T::splat(map.constant.0[i][j]));
-            sine.mul_add(T::splat(map.sine.0[i][j]), steady)
-        };
-        let row = |i: usize| [entry(i, 0), entry(i, 1), entry(i, 2)];
-        Transform { rotation: Mat3([row(0), row(1), row(2)]), translation: map.translation.splat() }
+        // Loops and no closures: one that is not inlined is compiled without the lanes' instructions.
+        let mut rotation = [[T::ZERO; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                let steady = cosine.mul_add(T::splat(map.cosine.0[i][j]), T::splat(map.constant.0[i][j]));
+                rotation[i][j] = sine.mul_add(T::splat(map.sine.0[i][j]), steady);
+            }
+        }
+        Transform { rotation: Mat3(rotation), translation: map.translation.splat() }
     } else {
         let row = |i: usize| Vec3(map.constant.0[i]).splat().0;
         Transform {
