@@ -67,24 +67,42 @@ pub(crate) type Triple = [f64; 3];
 /// Runs the cascade over `signal` in place (in reverse order if asked), transposed direct form II. Each section starts
 /// in its steady state for the constant input `start`, as with `scipy.signal.sosfilt_zi`.
 pub(crate) fn run(sections: &[Section], signal: &mut [Triple], start: Triple, reversed: bool) {
-    for section in sections {
-        let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
-        // Unit gain: a constant x leaves y = x, so s2 = (b2 - a2) x and s1 = (b1 - a1) x + s2.
-        let mut s2 = start.map(|x| (b2 - a2) * x);
-        let mut s1 = [0, 1, 2].map(|i| (b1 - a1) * start[i] + s2[i]);
-        let mut step = |value: &mut Triple| {
+    for some in sections.chunks(2) {
+        match some {
+            [first, second] => run_together([*first, *second], signal, start, reversed),
+            _ => some.iter().for_each(|section| run_together([*section], signal, start, reversed)),
+        }
+    }
+}
+
+/// Some sections in one sweep: the second works on a sample while the first is at the next one, and each waits for
+/// nothing but itself.
+fn run_together<const N: usize>(sections: [Section; N], signal: &mut [Triple], start: Triple, reversed: bool) {
+    // Unit gain: a constant x leaves y = x, so s2 = (b2 - a2) x and s1 = (b1 - a1) x + s2.
+    let mut s2 = sections.map(|Section { b: [_, _, b2], a: [_, a2] }| start.map(|x| (b2 - a2) * x));
+    let mut s1: [Triple; N] = core::array::from_fn(|k| {
+        let Section { b: [_, b1, _], a: [a1, _] } = sections[k];
+        [0, 1, 2].map(|i| (b1 - a1) * start[i] + s2[k][i])
+    });
+    let mut step = |value: &mut Triple| {
+        for k in 0..N {
+            let Section { b: [b0, b1, b2], a: [a1, a2] } = sections[k];
             for i in 0..3 {
                 let x = value[i];
-                let y = b0 * x + s1[i];
-                s1[i] = b1 * x - a1 * y + s2[i];
-                s2[i] = b2 * x - a2 * y;
+                let y = b0 * x + s1[k][i];
+                s1[k][i] = b1 * x - a1 * y + s2[k][i];
+                s2[k][i] = b2 * x - a2 * y;
                 value[i] = y;
             }
-        };
-        if reversed {
-            signal.iter_mut().rev().for_each(&mut step);
-        } else {
-            signal.iter_mut().for_each(&mut step);
+        }
+    };
+    if reversed {
+        for value in signal.iter_mut().rev() {
+            step(value);
+        }
+    } else {
+        for value in signal {
+            step(value);
         }
     }
 }
