@@ -1,6 +1,6 @@
 //! Torque that stands still while its joint moves: repeated by a recorder, or cut off at what a channel can show.
 
-use super::outliers::middle;
+use super::outliers::middle_size;
 use crate::quantisation::{quantisation_step, usual_change};
 
 /// Shortest run of one value that is looked at, samples.
@@ -65,7 +65,7 @@ fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2]) -> bool {
     for side in sides {
         let (tau, q) = (&tau[side.clone()], &q[side]);
         samples += tau.len();
-        changes.extend(tau.windows(length.min(tau.len()).max(1)).map(|run| (run[run.len() - 1] - run[0]).abs()));
+        changes.extend(tau.windows(length.min(tau.len()).max(1)).map(|run| run[run.len() - 1] - run[0]));
         values += tau.windows(2).filter(|pair| pair[0] != pair[1]).count();
         path += q.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
         let mut current = 0;
@@ -78,7 +78,7 @@ fn is_held(tau: &[f64], q: &[f64], run: Run, extremes: [f64; 2]) -> bool {
         }
     }
     let step = quantisation_step(&tau[run.from.saturating_sub(around)..(run.to + around).min(tau.len())]);
-    let changes_enough = step.is_none_or(|step| middle(&mut changes) > QUANTA * step);
+    let changes_enough = step.is_none_or(|step| middle_size(changes.into_iter()) > QUANTA * step);
     let moved = q[run.from..run.to].windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
     // To and fro: how far apart its ends are says nothing.
     let [low, high] = q[run.from..run.to]

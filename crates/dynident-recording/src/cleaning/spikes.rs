@@ -1,6 +1,6 @@
 //! Single positions that no motion makes.
 
-use super::outliers::{limit_of, middle};
+use super::outliers::{limit_of, middle_size};
 use crate::quantisation::{quantisation_step, usual_change};
 
 /// Samples to either side that a judgement needs.
@@ -37,8 +37,7 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
         (d[3] - d[2]) - 2.0 * (d[2] - d[1]) + (d[1] - d[0])
     };
     let all: Vec<f64> = (2..n - 2).map(|i| fourth(x, i)).collect();
-    let mut sizes: Vec<f64> = all.iter().map(|c| c.abs()).collect();
-    let overall = NORMAL * middle(&mut sizes);
+    let overall = NORMAL * middle_size(all.iter().copied());
     // Place, size, distance in units of the least, and whether it is the pattern of a spike.
     let mut apart: Vec<(usize, f64, f64, bool)> = Vec::new();
     let inside = own.start.max(REACH)..own.end.min(n - REACH);
@@ -47,8 +46,8 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
     while from < inside.end {
         let to = (from + half).min(inside.end);
         let (low, high) = (from.saturating_sub(half / 2 + 2), (to + half / 2 - 2).min(all.len()));
-        let mut sizes: Vec<f64> = all[low..high].iter().map(|c| c.abs()).collect();
-        let least = TIMES_NOISE * f64::max(NORMAL * middle(&mut sizes), 0.5 * overall);
+        let noise = NORMAL * middle_size(all[low..high].iter().copied());
+        let least = TIMES_NOISE * f64::max(noise, 0.5 * overall);
         for i in from..to {
             let at = |k: usize| all[i + k - 4];
             let peak = at(2);
