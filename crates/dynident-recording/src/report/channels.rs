@@ -1,6 +1,6 @@
 //! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
 
-use super::jumps::{Jump, JumpCheck, LoneSample};
+use super::jumps::{Jump, JumpCheck, LoneSample, RUN};
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -80,6 +80,16 @@ impl Extreme {
         Self { value: f64::NEG_INFINITY, run: 0, longest: 0 }
     }
 
+    /// Takes values of which `largest` is the largest.
+    #[inline]
+    fn see_all(&mut self, largest: f64, values: impl Iterator<Item = f64>) {
+        if largest < self.value {
+            self.run = 0;
+        } else {
+            values.for_each(|value| self.see(value));
+        }
+    }
+
     #[inline]
     fn see(&mut self, value: f64) {
         if value < self.value {
@@ -109,11 +119,19 @@ impl ChannelCheck {
     }
 
     pub(crate) fn see(&mut self, values: &[f64]) {
-        for value in values {
-            self.high.see(*value);
-            self.low.see(-value);
-            self.zeros += u64::from(*value == 0.0);
-            self.jumps.see(*value);
+        // Where no value of a run is an extreme, one look is enough for all of them.
+        for run in values.chunks(RUN) {
+            let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
+            for &value in run {
+                low = if value < low { value } else { low };
+                high = if value > high { value } else { high };
+            }
+            self.high.see_all(high, run.iter().copied());
+            self.low.see_all(-low, run.iter().map(|value| -value));
+            if low <= 0.0 && high >= 0.0 {
+                self.zeros += run.iter().filter(|value| **value == 0.0).count() as u64;
+            }
+            self.jumps.see_all(run);
         }
         self.samples += values.len() as u64;
     }

@@ -21,6 +21,11 @@ const TIMES_OTHERS: f64 = 5.0;
 /// A jump goes by this share of the channel's range at least: encoders flicker at rest.
 const JUMP_SHARE_OF_RANGE: f64 = 0.01;
 
+/// Samples that are looked at together.
+pub(super) const RUN: usize = 64;
+/// Less than `MEMORY` to the power of `RUN`: what remains at least of the largest step nearby at the end of a run.
+const LEFT_AFTER_RUN: f64 = 0.5;
+
 /// A sample that stands alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -88,6 +93,33 @@ impl JumpCheck {
     /// The next sample comes after a gap of the stamps: what happened meanwhile is no jump.
     pub(super) fn begin_piece(&mut self) {
         self.since_gap = 0;
+    }
+
+    /// Takes the next samples, at most [`RUN`]: as [`see`](Self::see) one by one does.
+    pub(super) fn see_all(&mut self, values: &[f64]) {
+        let [before, middle] = self.last;
+        let [first, .., next_to_last, last] = *values else { return values.iter().for_each(|value| self.see(*value)) };
+        let step = |pair: &[f64]| (pair[1] - pair[0]).abs();
+        let larger = |a: f64, b: f64| if b > a { b } else { a };
+        let begun = [(middle - before).abs(), (first - middle).abs()];
+        let largest = values.windows(2).map(step).fold(larger(begun[0], begun[1]), larger);
+        // None of them is alone, wraps, or is one of the largest: what is left to do is little.
+        let is_usual = self.since_gap >= 2
+            && largest < TIMES_NEARBY * LEFT_AFTER_RUN * self.nearby
+            && self.turn.is_none_or(|turn| largest < 0.5 * turn)
+            && self.largest.len() == LARGEST
+            && self.largest[LARGEST - 1].0 >= largest;
+        if !is_usual {
+            return values.iter().for_each(|value| self.see(*value));
+        }
+        let passed = &values[..values.len() - 1];
+        let steps = begun.into_iter().chain(passed.windows(2).map(step));
+        self.nearby = steps.fold(self.nearby, |nearby, step| larger(MEMORY * nearby, step));
+        self.low = passed.iter().fold(self.low.min(middle), |low, value| if *value < low { *value } else { low });
+        self.high = passed.iter().fold(self.high.max(middle), |high, value| larger(high, *value));
+        self.last = [next_to_last, last];
+        self.samples += values.len() as u64;
+        self.since_gap += values.len() as u64;
     }
 
     #[inline]
@@ -208,6 +240,22 @@ mod tests {
         assert_eq!(seen(None, (0..2000).map(|i| angle(i / 6 * 6))).jumps().0, 0);
         assert_eq!(seen(None, (0..2000).map(|i| (angle(i) / 0.01).round() * 0.01)).jumps().0, 0);
         assert_eq!(seen(None, (0..2000).map(|i| angle(i.clamp(600, 1400)))).jumps().0, 0);
+    }
+
+    #[test]
+    fn samples_seen_together_are_seen_as_one_by_one() {
+        let pi = core::f64::consts::PI;
+        let moving = |i: usize| 2.5 + 1.5 * (i as f64 * 0.01).sin() + 1e-4 * noise(i);
+        let wrapped = |i: usize| if moving(i) > pi { moving(i) - 2.0 * pi } else { moving(i) };
+        let spoilt = |i: usize| wrapped(i) + if i % 517 == 3 { 0.7 } else { 0.0 } + if i > 1500 { 0.2 } else { 0.0 };
+        for turn in [None, Some(2.0 * pi)] {
+            for run in [1, 2, 3, 7, RUN] {
+                let samples: Vec<f64> = (0..3000).map(spoilt).collect();
+                let mut together = JumpCheck::new(turn);
+                samples.chunks(run).for_each(|run| together.see_all(run));
+                assert_eq!(format!("{together:?}"), format!("{:?}", seen(turn, samples)), "{turn:?} {run}");
+            }
+        }
     }
 
     #[test]
