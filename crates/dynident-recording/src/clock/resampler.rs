@@ -23,19 +23,28 @@ impl Resampler {
         Self { stamps: Vec::new(), channels: vec![Vec::new(); channels], next: 0.0, at: 0 }
     }
 
-    /// Adds the sample `index` of `columns` at `stamp`; false if it is left out for not standing far enough behind the
-    /// one before, as infinite stamps never do.
-    pub(crate) fn push<'a>(&mut self, stamp: f64, index: usize, columns: impl Iterator<Item = &'a Vec<f64>>) -> bool {
-        match self.stamps.last() {
-            None => self.next = stamp,
-            Some(last) if stamp - last >= SHORTEST_STEP => {}
-            Some(_) => return false,
+    /// Adds the samples of `columns` from `index` on at the stamps that `stamps` gives, up to one that does not stand
+    /// far enough behind the one before, as infinite stamps never do; returns how many were added.
+    pub(crate) fn push<'a>(
+        &mut self,
+        stamps: impl Iterator<Item = f64>,
+        index: usize,
+        columns: impl Iterator<Item = &'a Vec<f64>>,
+    ) -> usize {
+        let before = self.stamps.len();
+        for stamp in stamps {
+            match self.stamps.last() {
+                None => self.next = stamp,
+                Some(last) if stamp - last >= SHORTEST_STEP => {}
+                Some(_) => break,
+            }
+            self.stamps.push(stamp);
         }
-        self.stamps.push(stamp);
+        let added = self.stamps.len() - before;
         for (channel, column) in self.channels.iter_mut().zip(columns) {
-            channel.push(column[index]);
+            channel.extend_from_slice(&column[index..index + added]);
         }
-        true
+        added
     }
 
     /// Appends to `out` every grid point that later samples cannot change, or all that remain if the segment `ended`.
@@ -50,10 +59,15 @@ impl Resampler {
             if self.at + ahead > n {
                 break;
             }
-            if (self.stamps[self.at] - self.next).abs() <= 1e-6 {
+            let on_grid = self.run_on_grid(ahead);
+            if on_grid > 0 {
                 for (channel, out) in self.channels.iter().zip(out.iter_mut()) {
-                    out.push(channel[self.at]);
+                    out.extend_from_slice(&channel[self.at..self.at + on_grid]);
                 }
+                for _ in 1..on_grid {
+                    self.next += 1.0;
+                }
+                self.at += on_grid - 1;
             } else if self.at + 1 < n {
                 self.interpolate(out);
             } else {
@@ -71,6 +85,17 @@ impl Resampler {
         for channel in &mut self.channels {
             channel.drain(..used);
         }
+    }
+
+    /// Samples from the one at work on that stand on successive grid points each, as many as `ahead` lets come now.
+    fn run_on_grid(&self, ahead: usize) -> usize {
+        let mut next = self.next;
+        let is_on_grid = |stamp: &&f64| {
+            let is_near = (**stamp - next).abs() <= 1e-6;
+            next += 1.0;
+            is_near
+        };
+        self.stamps[self.at..=self.stamps.len() - ahead].iter().take_while(is_on_grid).count()
     }
 
     fn interpolate(&self, out: &mut [Vec<f64>]) {
@@ -99,7 +124,7 @@ mod tests {
         let values = [stamps.iter().map(|t| signal(*t)).collect::<Vec<f64>>()];
         let (mut resampler, mut out) = (Resampler::new(1), vec![Vec::new()]);
         for (index, stamp) in stamps.iter().enumerate() {
-            resampler.push(*stamp, index, values.iter());
+            resampler.push(core::iter::once(*stamp), index, values.iter());
             if index % piece == 0 {
                 resampler.drain(false, &mut out);
             }

@@ -57,13 +57,19 @@ impl Segmenter {
         out: &mut [Vec<f64>],
         columns: impl Fn() -> I,
     ) -> usize {
-        for index in at..rows.steps.len() {
+        let mut index = at;
+        while index < rows.steps.len() {
             if self.last && rows.begins[index] {
                 self.close(out);
                 return index;
             }
             let (first, _) = *self.first.get_or_insert((rows.steps[index], rows.time_s[index]));
-            self.crowded += u64::from(!self.resampler.push(rows.steps[index] - first, index, columns()));
+            let follow = rows.begins[index + 1..].iter().take_while(|begins| !**begins).count();
+            let steps = &rows.steps[index..=index + follow];
+            let added = self.resampler.push(steps.iter().map(|step| step - first), index, columns());
+            // What ended the run is one that stands too close.
+            self.crowded += u64::from(added < steps.len());
+            index += (added + 1).min(steps.len());
             self.last = true;
         }
         self.resampler.drain(false, out);
