@@ -1,17 +1,26 @@
 //! Lines of a text table: capped in length, counted, comments and blanks left out.
 
 use crate::error::RecordingError;
-use std::io::{BufRead, BufReader, Read};
+use core::ops::Range;
+use memchr::memchr;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// Longest line that is read; a humanoid's log row has a few thousand bytes.
 const MAX_LINE_BYTES: usize = 1 << 20;
+/// Bytes of a buffer: as many are asked for at a time as a reader below would copy through one of its own.
+const BUFFER_BYTES: usize = 1 << 19;
 
 /// The lines that matter of one file.
 pub(super) struct Lines {
     path: PathBuf,
-    reader: BufReader<Box<dyn Read + Send>>,
+    text: Box<dyn Read + Send>,
+    /// What was read and is still needed stands in front: lines are looked at where they lie.
     buffer: Vec<u8>,
+    filled: usize,
+    /// The line last read, with its newline.
+    line: Range<usize>,
+    ended: bool,
     /// 1-based number of the line last read.
     number: u64,
     /// Whether the line last read ended with a newline: a last line without one may be cut off.
@@ -27,8 +36,16 @@ impl core::fmt::Debug for Lines {
 impl Lines {
     /// The lines of `text`, which stands in the file at `path`.
     pub(super) fn new(path: &Path, text: Box<dyn Read + Send>) -> Self {
-        let reader = BufReader::with_capacity(1 << 18, text);
-        Self { path: path.to_owned(), reader, buffer: Vec::new(), number: 0, complete: true }
+        Self {
+            path: path.to_owned(),
+            text,
+            buffer: vec![0; BUFFER_BYTES],
+            filled: 0,
+            line: 0..0,
+            ended: false,
+            number: 0,
+            complete: true,
+        }
     }
 
     pub(super) fn number(&self) -> u64 {
@@ -41,13 +58,16 @@ impl Lines {
 
     /// Whether nothing follows the line last read.
     pub(super) fn at_end(&mut self) -> Result<bool, RecordingError> {
-        let rest = self.reader.fill_buf();
-        Ok(rest.map_err(|source| RecordingError::Io { file: self.path.clone(), source })?.is_empty())
+        while self.line.end == self.filled && !self.ended {
+            self.read_on()?;
+        }
+        Ok(self.line.end == self.filled)
     }
 
     /// The line that [`advance`](Self::advance) moved to, without byte-order mark, newline and outer blanks.
     pub(super) fn line(&self) -> &[u8] {
-        let line = self.buffer.strip_suffix(b"\n").unwrap_or(&self.buffer);
+        let line = &self.buffer[self.line.clone()];
+        let line = line.strip_suffix(b"\n").unwrap_or(line);
         let line = if self.number == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { line };
         line.strip_suffix(b"\r").unwrap_or(line)
     }
@@ -55,30 +75,103 @@ impl Lines {
     /// Moves to the next line that is neither blank nor a comment; false at the end of the file.
     pub(super) fn advance(&mut self) -> Result<bool, RecordingError> {
         loop {
-            self.buffer.clear();
-            let limit = MAX_LINE_BYTES as u64 + 1;
-            let read = self
-                .reader
-                .by_ref()
-                .take(limit)
-                .read_until(b'\n', &mut self.buffer)
-                .map_err(|source| RecordingError::Io { file: self.path.clone(), source })?;
-            if read == 0 {
+            self.next_line()?;
+            if self.line.is_empty() {
                 return Ok(false);
-            }
-            self.number += 1;
-            self.complete = self.buffer.ends_with(b"\n");
-            if !self.complete && self.buffer.len() > MAX_LINE_BYTES {
-                return Err(RecordingError::LineTooLong {
-                    file: self.path.clone(),
-                    line: self.number,
-                    limit: MAX_LINE_BYTES,
-                });
             }
             let first = self.line().iter().find(|byte| !byte.is_ascii_whitespace());
             if first.is_some_and(|byte| *byte != b'#') {
                 return Ok(true);
             }
+        }
+    }
+
+    /// Moves to the next line; an empty one, without even a newline, at the end of the file.
+    fn next_line(&mut self) -> Result<(), RecordingError> {
+        self.line.start = self.line.end;
+        let mut seen = 0;
+        loop {
+            let found = memchr(b'\n', &self.buffer[self.line.start + seen..self.filled]);
+            seen = found.map_or(self.filled - self.line.start, |at| seen + at + 1);
+            self.line.end = self.line.start + seen;
+            if found.is_some() || self.ended || seen > MAX_LINE_BYTES {
+                self.complete = found.is_some();
+                break;
+            }
+            self.read_on()?;
+        }
+        self.number += u64::from(seen > 0);
+        if seen > MAX_LINE_BYTES + usize::from(self.complete) {
+            let file = self.path.clone();
+            return Err(RecordingError::LineTooLong { file, line: self.number, limit: MAX_LINE_BYTES });
+        }
+        Ok(())
+    }
+
+    /// Reads further bytes behind the line, which moves to the front.
+    fn read_on(&mut self) -> Result<(), RecordingError> {
+        self.buffer.copy_within(self.line.start..self.filled, 0);
+        self.filled -= self.line.start;
+        self.line = 0..self.line.len();
+        if self.filled == self.buffer.len() {
+            self.buffer.resize(2 * self.filled, 0);
+        }
+        let read = loop {
+            match self.text.read(&mut self.buffer[self.filled..]) {
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                read => break read,
+            }
+        };
+        let read = read.map_err(|source| RecordingError::Io { file: self.path.clone(), source })?;
+        self.ended = read == 0;
+        self.filled += read;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A reader that gives a few bytes at a time.
+    struct Dribble(std::io::Cursor<Vec<u8>>, usize);
+
+    impl Read for Dribble {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            let most = buffer.len().min(self.1);
+            self.0.read(&mut buffer[..most])
+        }
+    }
+
+    fn lines(text: &[u8], most: usize) -> Result<Vec<(u64, Vec<u8>, bool)>, RecordingError> {
+        let mut lines = Lines::new(Path::new("log"), Box::new(Dribble(std::io::Cursor::new(text.to_vec()), most)));
+        let mut found = Vec::new();
+        while lines.advance()? {
+            found.push((lines.number(), lines.line().to_vec(), lines.complete()));
+        }
+        assert!(lines.at_end()?);
+        Ok(found)
+    }
+
+    #[test]
+    fn lines_are_the_same_however_the_bytes_come() {
+        let text = b"\xEF\xBB\xBFa,b\r\n\n  # no\n1,2\n   \n3,4";
+        for most in [1, 2, 5, 100] {
+            let [first, second, third] = &lines(text, most).unwrap()[..] else { panic!("three lines") };
+            assert_eq!((first.0, &first.1[..], first.2), (1, &b"a,b"[..], true));
+            assert_eq!((second.0, &second.1[..], second.2), (4, &b"1,2"[..], true));
+            assert_eq!((third.0, &third.1[..], third.2), (6, &b"3,4"[..], false));
+        }
+        assert!(lines(b"", 1).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_line_may_be_a_megabyte_long_and_no_longer() {
+        for (length, newline, is_read) in [(0, true, true), (0, false, true), (1, true, false), (1, false, false)] {
+            let mut text = vec![b'1'; MAX_LINE_BYTES + length];
+            text.extend(newline.then_some(b'\n'));
+            assert_eq!(lines(&text, usize::MAX).is_ok(), is_read, "{length} {newline}");
+            assert_eq!(lines(&text, 4096).is_ok(), is_read, "{length} {newline}");
         }
     }
 }

@@ -1,0 +1,147 @@
+//! Rows as recorders print them, read in one go: numbers of few digits, no blanks, no quotes.
+//!
+//! What is not like that is left to [`TextTable`](super::text::TextTable), field by field.
+
+use memchr::memchr2;
+
+/// Digits whose number is exact as a double, whatever they are.
+const MOST_DIGITS: usize = 15;
+const POWERS: [f64; MOST_DIGITS + 1] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+
+/// Reads the fields of `line` that have a place in `values`, field by field that of `places`; false where the line has
+/// not as many fields, or where one of them is none that is read here.
+pub(super) fn read_plain_row(line: &[u8], delimiter: u8, places: &[Option<usize>], values: &mut [f64]) -> bool {
+    let mut rest = line;
+    for (field, place) in places.iter().enumerate() {
+        let is_last = field + 1 == places.len();
+        let ends = |length: usize| match rest.get(length) {
+            Some(byte) => *byte == delimiter && !is_last,
+            None => is_last,
+        };
+        let plain = place.and_then(|_| plain_decimal(rest)).filter(|(_, length)| ends(*length));
+        let length = match (place, plain) {
+            (Some(place), Some((value, length))) => {
+                values[*place] = value;
+                length
+            }
+            _ => {
+                let length = memchr2(delimiter, b'"', rest).unwrap_or(rest.len());
+                if !ends(length) {
+                    return false;
+                }
+                if let Some(place) = place {
+                    let Some(value) = other_number(&rest[..length]) else { return false };
+                    values[*place] = value;
+                }
+                length
+            }
+        };
+        rest = rest.get(length + 1..).unwrap_or(&[]);
+    }
+    true
+}
+
+/// A field that has an exponent or more digits; NaN for an empty one.
+fn other_number(field: &[u8]) -> Option<f64> {
+    let field = field.trim_ascii();
+    if field.is_empty() { Some(f64::NAN) } else { core::str::from_utf8(field).ok()?.parse().ok() }
+}
+
+/// The number such as `-12.345678` that `text` begins with, and its length: both the digits as an integer below 2⁵³ and
+/// the power of ten are exact, so that one division rounds correctly.
+pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
+    let sign = usize::from(text.first() == Some(&b'-'));
+    let digits = &text[sign..];
+    let digit = |at: usize| digits.get(at).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10);
+    let (mut integer, mut count) = (0_u64, 0);
+    while let Some(next) = digit(count).filter(|_| count < MOST_DIGITS) {
+        integer = 10 * integer + u64::from(next);
+        count += 1;
+    }
+    let whole = count;
+    let mut length = whole;
+    if digits.get(whole) == Some(&b'.') {
+        let eight = digits[whole + 1..].first_chunk().filter(|_| whole + 8 <= MOST_DIGITS);
+        if let Some(eight) = eight.and_then(eight_digits) {
+            integer = 100_000_000 * integer + eight;
+            count += 8;
+        }
+        while let Some(next) = digit(count + 1).filter(|_| count < MOST_DIGITS) {
+            integer = 10 * integer + u64::from(next);
+            count += 1;
+        }
+        length = count + 1;
+    }
+    // A digit more is not read here.
+    if count == 0 || digit(length).is_some() {
+        return None;
+    }
+    let value = integer as f64 / POWERS[count - whole];
+    Some((if sign == 1 { -value } else { value }, sign + length))
+}
+
+/// Eight digits at once: pairs, then fours, then all. Source: Lemire, Softw. Pract. Exp. 51 (2021) 1700.
+fn eight_digits(text: &[u8; 8]) -> Option<u64> {
+    let bytes = u64::from_le_bytes(*text);
+    let upper_halves = 0xF0F0_F0F0_F0F0_F0F0;
+    let are_digits = bytes & upper_halves == 0x3030_3030_3030_3030
+        && bytes.wrapping_add(0x0606_0606_0606_0606) & upper_halves == 0x3030_3030_3030_3030;
+    are_digits.then(|| {
+        let pairs = (bytes & 0x0F0F_0F0F_0F0F_0F0F).wrapping_mul((10 << 8) + 1) >> 8;
+        let fours = (pairs & 0x00FF_00FF_00FF_00FF).wrapping_mul((100 << 16) + 1) >> 16;
+        (fours & 0x0000_FFFF_0000_FFFF).wrapping_mul((10_000 << 32) + 1) >> 32
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(line: &str, places: &[Option<usize>]) -> Option<Vec<u64>> {
+        let mut values = vec![0.0; places.iter().flatten().count()];
+        read_plain_row(line.as_bytes(), b',', places, &mut values)
+            .then(|| values.into_iter().map(f64::to_bits).collect())
+    }
+
+    #[test]
+    fn the_same_bits_as_the_standard_library_reads() {
+        let mut state = 1_u64;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let integer = (state >> 3) % 10_u64.pow(1 + (state % 19) as u32);
+            let mut text = integer.to_string();
+            text.insert((state >> 40) as usize % (text.len() + 1), '.');
+            if state & 4 == 0 {
+                text.insert(0, '-');
+            }
+            if state % 5 == 0 {
+                text += "e-3";
+            }
+            let expected = text.parse::<f64>().unwrap().to_bits();
+            assert_eq!(row(&text, &[Some(0)]), Some(vec![expected]), "{text}");
+            assert_eq!(row(&format!("x,{text},1"), &[None, Some(0), None]), Some(vec![expected]), "{text}");
+            let digits = text.bytes().filter(u8::is_ascii_digit).count();
+            if digits <= MOST_DIGITS && !text.contains('e') {
+                let plain = plain_decimal(text.as_bytes()).map(|(value, length)| (value.to_bits(), length));
+                assert_eq!(plain, Some((expected, text.len())), "{text}");
+            }
+        }
+        for text in ["", "-", ".", "-.", "+1", "nan", "1234567890123456", "0.1234567890123456", "--1"] {
+            assert_eq!(plain_decimal(text.as_bytes()), None, "{text}");
+        }
+        assert_eq!(plain_decimal(b"-0,5"), Some((-0.0, 2)));
+    }
+
+    #[test]
+    fn rows_that_are_not_plain_are_left_alone() {
+        let places = [Some(0), Some(1)];
+        for line in ["1", "1,2,3", "1,\"2\"", "1,0x2", "1;2", "\"1,2", "1,2,", ""] {
+            assert_eq!(row(line, &places), None, "{line}");
+        }
+        let both = |a: f64, b: f64| Some(vec![a.to_bits(), b.to_bits()]);
+        assert_eq!(row("1, 2 ", &places), both(1.0, 2.0));
+        assert_eq!(row("1.5,", &places), both(1.5, f64::NAN));
+        assert_eq!(row("-inf,1e5", &places), both(f64::NEG_INFINITY, 1e5));
+    }
+}
