@@ -6,6 +6,7 @@ use super::{EstimatorError, TrainingRows};
 use crate::recording::LogError;
 use dynident_recording::derivative::ButterworthZeroPhase;
 use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
+use rayon::prelude::*;
 
 /// Order of the low-pass, as of the differentiator's default.
 const ORDER: usize = 4;
@@ -48,7 +49,12 @@ impl InstrumentSource for BandMotion<'_, '_> {
         let (rate_hz, pieces) = positions(self.rows, log)?;
         self.pieces.clear();
         for (segment, q) in pieces {
-            let piece = q.iter().map(|q| self.smoothed(rate_hz, q)).collect::<Result<Piece, _>>();
+            let one = |q: &Vec<f64>| self.smoothed(rate_hz, q);
+            let piece = if self.rows.logs.execution.parallel() {
+                q.par_iter().map(one).collect::<Result<Piece, _>>()
+            } else {
+                q.iter().map(one).collect()
+            };
             let piece = piece.map_err(|problem| self.refused(format!("the instruments' filter: {problem}")))?;
             self.pieces.push((segment, piece));
         }

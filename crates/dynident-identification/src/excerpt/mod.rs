@@ -8,6 +8,7 @@
 
 mod pieces;
 
+use crate::execution::Execution;
 use crate::recording::{LogError, Recording, Samples, Whole};
 use crate::settings::IdentificationSettings;
 use dynident_recording::{
@@ -44,6 +45,7 @@ pub(crate) fn excerpts(
     recordings: &[Recording],
     settings: &IdentificationSettings,
     training: &[usize],
+    execution: Execution<'_>,
 ) -> Result<Option<Vec<Recording>>, LogError> {
     let differentiator = &settings.motion.differentiator;
     let has_cutoff = differentiator.wants_cutoff() || differentiator.cutoff_hz().is_some();
@@ -65,7 +67,7 @@ pub(crate) fn excerpts(
         let share = ((LONG as f64 * rows(index) as f64 / all as f64) as u64).max(LEAST) as usize;
         if let Samples::Log(log) = &recordings[index].samples
             && rows(index) > LEAST
-            && let Some((excerpt, whole)) = excerpt(&recordings[index], log, settings, share)?
+            && let Some((excerpt, whole)) = excerpt(&recordings[index], log, settings, share, execution.parallel())?
         {
             found[index].samples = Samples::Log(Box::new(excerpt));
             found[index].whole = Some(whole);
@@ -75,12 +77,14 @@ pub(crate) fn excerpts(
     Ok(changed.then_some(found))
 }
 
-/// At most about `most` rows of a log; `None` where too many of them would be left out.
+/// At most about `most` rows of a log, read `beside` by a thread of its own or here; `None` where too many of them
+/// would be left out.
 fn excerpt(
     recording: &Recording,
     log: &Log,
     settings: &IdentificationSettings,
     most: usize,
+    beside: bool,
 ) -> Result<Option<(Log, Whole)>, LogError> {
     let named = |source: RecordingError| LogError::recording(&recording.name, source);
     // Logged velocities and accelerations are for comparison only; lag and ends are for the passes that come.
@@ -88,7 +92,8 @@ fn excerpt(
     (read.format.velocity, read.format.acceleration) = (None, None);
     let motion = MotionSettings { keep_outliers: settings.motion.keep_outliers, ..MotionSettings::default() };
     let build = |_: &_| -> Result<Box<dyn Differentiator>, FilterError> { Ok(Box::new(AsLogged)) };
-    let mut stream = MotionStream::with_differentiator(&read, &motion, build).map_err(named)?;
+    let stream = MotionStream::with_differentiator(&read, &motion, build).map_err(named)?.without_channels();
+    let mut stream = if beside { stream.read_beside() } else { stream };
     let given_hz = settings.motion.differentiator.cutoff_hz().unwrap_or(0.0);
     let needed_hz = SAMPLES_IN_PERIOD * stream.cutoff().cutoff_hz.max(given_hz);
     let factor = ((stream.rate_hz() / needed_hz) as usize).clamp(1, 1000);

@@ -99,6 +99,7 @@ impl LogPass<'_> {
             }
             (_, Some(kept)) => Motion::Kept(kept),
             _ => match self.recording.open(self.model.model(), self.motion)? {
+                Some(stream) if self.reader_thread => Motion::Stream(Box::new(stream.read_beside())),
                 Some(stream) => Motion::Stream(Box::new(stream)),
                 None => return Err(LogError::NoSamples { log: name.clone() }),
             },

@@ -17,7 +17,7 @@ pub(crate) use spikes::replace_spikes;
 
 use crate::clock::timeline::{Places, Timeline};
 use crate::error::RecordingError;
-use crate::log::{LogReader, RawBlock};
+use crate::log::{LogReader, RawBlock, RawBlocks};
 use holes::{Before, Filled, fill, last_rows};
 use set_aside::Tally;
 use std::collections::VecDeque;
@@ -34,7 +34,7 @@ pub(crate) struct CleanBlock {
 /// A log's rows, read ahead and cleaned.
 #[derive(Debug)]
 pub(crate) struct CleanRows {
-    reader: LogReader,
+    reader: RawBlocks,
     timeline: Timeline,
     keep_outliers: bool,
     joints: usize,
@@ -56,7 +56,7 @@ pub(crate) struct CleanRows {
 impl CleanRows {
     pub(crate) fn new(reader: LogReader, timeline: Timeline, joints: &[String], keep_outliers: bool) -> Self {
         Self {
-            reader,
+            reader: RawBlocks::new(reader),
             timeline,
             keep_outliers,
             joints: joints.len(),
@@ -72,7 +72,12 @@ impl CleanRows {
         }
     }
 
-    pub(crate) fn reader(&self) -> &LogReader {
+    /// The same, its rows read ahead by a thread of their own from now on.
+    pub(crate) fn read_beside(self) -> Self {
+        Self { reader: self.reader.beside(), ..self }
+    }
+
+    pub(crate) fn reader(&self) -> &RawBlocks {
         &self.reader
     }
 
@@ -118,11 +123,9 @@ impl CleanRows {
     }
 
     fn read(&mut self, read: &mut dyn FnMut(&RawBlock)) -> Result<Option<RawBlock>, RecordingError> {
-        let mut block = RawBlock::default();
-        if self.ended || !self.reader.next_block(&mut block)? {
-            self.ended = true;
-            return Ok(None);
-        }
+        let next = if self.ended { None } else { self.reader.next_block()? };
+        self.ended = next.is_none();
+        let Some(block) = next else { return Ok(None) };
         read(&block);
         for (joint, tau) in block.tau.iter().enumerate() {
             let [low, high] = &mut self.extremes[joint];
@@ -162,10 +165,7 @@ impl CleanRows {
 
             let next_tau = next.map(|next| &next.tau[joint][..]);
             let tau = joined(&tau_tail[joint], &block.tau[joint], next_tau, usize::MAX);
-            let mut values = tau[own.start.saturating_sub(held::AROUND)..own.end].to_vec();
-            values.sort_by(f64::total_cmp);
-            let part = values.len() / 20;
-            let spread = values[values.len() - 1 - part] - values[part];
+            let spread = spread(tau[own.start.saturating_sub(held::AROUND)..own.end].to_vec());
             self.spread[joint] = self.spread[joint].max(spread);
             let held_runs = held::held_runs(&tau, &q, self.extremes[joint]);
             let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint]);
@@ -206,6 +206,17 @@ impl CleanRows {
         }
         (block, marked)
     }
+}
+
+/// From the value above a twentieth of all to the one below a twentieth.
+fn spread(mut values: Vec<f64>) -> f64 {
+    let part = values.len() / 20;
+    let above = values.len() - 1 - part;
+    let (below, largest, _) = values.select_nth_unstable_by(above, f64::total_cmp);
+    let largest = *largest;
+    // The one value of a single sample is both.
+    let smallest = if part < above { *below.select_nth_unstable_by(part, f64::total_cmp).1 } else { largest };
+    largest - smallest
 }
 
 /// Keeps the last samples of what has passed.

@@ -17,4 +17,5 @@ pub(crate) mod sections;
 pub use cutoff::{CutoffChoice, cutoff};
 pub use decimation::{DecimationSettings, Decimator};
 pub use periods::{AveragedPeriods, averaged_periods};
+pub(crate) use position_noise::NoiseSpectra;
 pub use position_noise::position_noise;

@@ -16,19 +16,43 @@ const PIECE_SAMPLES: usize = 1 << 12;
 ///
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70, on second differences.
 pub fn position_noise<S: AsRef<[f64]>>(q: &[S], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
-    q.iter().map(|q| of_joint(q.as_ref(), rate_hz, cutoff_hz).unwrap_or(0.0)).collect()
+    NoiseSpectra::of(q, rate_hz).beyond(cutoff_hz)
 }
 
-fn of_joint(q: &[f64], rate_hz: f64, cutoff_hz: f64) -> Option<f64> {
+/// The spectra that noise is told from, whatever the cut-off; none for a joint that does not tell.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NoiseSpectra {
+    joints: Vec<Option<Vec<f64>>>,
+    rate_hz: f64,
+}
+
+impl NoiseSpectra {
+    /// Of the uniformly sampled positions `q`.
+    pub(crate) fn of<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> Self {
+        Self { joints: q.iter().map(|q| spectrum(q.as_ref())).collect(), rate_hz }
+    }
+
+    /// [`position_noise`] with a cut-off.
+    pub(crate) fn beyond(&self, cutoff_hz: f64) -> Vec<f64> {
+        let of_joint = |spectrum: &Vec<f64>| noise_beyond(spectrum, self.rate_hz, cutoff_hz);
+        self.joints.iter().map(|spectrum| spectrum.as_ref().and_then(of_joint).unwrap_or(0.0)).collect()
+    }
+}
+
+fn spectrum(q: &[f64]) -> Option<Vec<f64>> {
     let q = &q[..q.len().min(CUTOFF_SAMPLES)];
     let first = q.first()?;
     if q.len() < 64 || q.iter().all(|x| x == first) || q.iter().any(|x| !x.is_finite()) {
         return None;
     }
     let second: Vec<f64> = q.windows(3).map(|x| (x[2] - x[1]) - (x[1] - x[0])).collect();
-    let length = PIECE_SAMPLES.min(1 << (second.len() / 2).checked_ilog2()?);
-    let spectrum = welch(&second, length)?;
+    welch(&second, PIECE_SAMPLES.min(1 << (second.len() / 2).checked_ilog2()?))
+}
+
+fn noise_beyond(spectrum: &[f64], rate_hz: f64, cutoff_hz: f64) -> Option<f64> {
     let bins = spectrum.len();
+    // Those of a real signal's transform.
+    let length = 2 * (bins - 1);
     let bin = |hertz: f64| (hertz / rate_hz * length as f64) as usize;
     // At least eight bins, the highest ones at worst.
     let from = bin(cutoff_hz).clamp(1, bins.saturating_sub(8).max(1));

@@ -7,13 +7,16 @@
 //!
 //! What a file holds is the business of dynident-formats, where a further format goes; text becomes a table here.
 
+mod blocks;
 mod column_pattern;
 mod columns;
 mod file;
 mod format;
 mod lines;
 mod mapping;
+mod memo;
 mod memory;
+mod plain_row;
 mod reader;
 mod row_count;
 mod row_rules;
@@ -21,6 +24,7 @@ mod source;
 mod text;
 mod units;
 
+pub(crate) use blocks::RawBlocks;
 pub use file::FileLog;
 pub use format::{
     ChannelGroup, ClockRule, ColumnRef, Columns, Header, LogFormat, Missing, OneOrMany, TimeColumn, TimeUnit,
@@ -31,6 +35,7 @@ pub use row_rules::RowRule;
 pub use source::{LogGroup, LogSource, LogTable};
 pub use units::{Quantity, si_factor, unit_names};
 
+use memo::Memo;
 use row_count::RowCount;
 use std::path::Path;
 use std::sync::Arc;
@@ -51,6 +56,7 @@ pub struct Log {
     source: Arc<dyn LogSource>,
     /// For a format that asks for a fraction of them.
     row_count: Arc<RowCount>,
+    memo: Arc<Memo>,
     /// What the columns mean, and which part of the log is asked for.
     pub format: LogFormat,
     /// Names of the joints, in the order of the format's columns.
@@ -65,7 +71,7 @@ impl Log {
 
     /// As [`new`](Self::new), for a source that others hold as well.
     pub fn shared(source: Arc<dyn LogSource>, format: LogFormat, joints: &[String]) -> Self {
-        Self { source, row_count: Arc::default(), format, joints: joints.to_vec() }
+        Self { source, row_count: Arc::default(), memo: Arc::default(), format, joints: joints.to_vec() }
     }
 
     /// The log whose main file is at `path`; the `file` keys of channel groups are relative to its folder.

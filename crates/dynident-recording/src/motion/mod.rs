@@ -5,6 +5,7 @@
 
 mod block;
 mod marks;
+mod opening;
 mod stream;
 mod torque_lag;
 

@@ -2,17 +2,16 @@
 
 use super::block::{MotionBlock, MotionSettings};
 use super::marks::kept_runs;
+use super::opening::Opening;
 use super::torque_lag::TorqueShift;
-use crate::cleaning::{CleanBlock, CleanRows, replace_spikes};
+use crate::cleaning::{CleanBlock, CleanRows};
+use crate::clock::Clock;
 use crate::clock::segments::{PlacedRows, Segmenter};
 use crate::clock::timeline::Timeline;
-use crate::clock::{Clock, clock};
 use crate::derivative::{Derivatives, Differentiator, Place};
 use crate::error::{FilterError, RecordingError};
-use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
-use crate::filter::position_noise;
+use crate::filter::CutoffChoice;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
-use crate::quantisation::quantisation_step;
 use crate::reference::Reference;
 use crate::report::ImportReport;
 use crate::report::channels::ChannelCheck;
@@ -34,8 +33,8 @@ const CHUNK_ROWS: usize = 8192;
 /// A log on its way to a motion; memory does not grow with the log's length, unless the differentiator needs
 /// the whole log.
 ///
-/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off; then the log is read once more
-/// from the start, as [`next_block`](Self::next_block) is called.
+/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off, once for all passes over a
+/// [`Log`] and its clones; then the log is read from the start, as [`next_block`](Self::next_block) is called.
 #[derive(Debug)]
 pub struct MotionStream {
     rows_in: CleanRows,
@@ -81,14 +80,6 @@ pub struct MotionStream {
     in_cut: bool,
     unmapped: u64,
     given: u64,
-}
-
-/// The first part of a log, as read for the decisions.
-struct Prefix {
-    row: Vec<u64>,
-    time_s: Vec<f64>,
-    q: Vec<Vec<f64>>,
-    tau: Vec<Vec<f64>>,
 }
 
 impl MotionStream {
@@ -151,32 +142,10 @@ impl MotionStream {
         build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
     ) -> Result<Self, RecordingError> {
         let Log { format, joints, .. } = log;
-        let (mut prefix, time_label) = prefix(log)?;
-        if !settings.keep_outliers {
-            for q in &mut prefix.q {
-                let rows = 0..q.len();
-                replace_spikes(q, rows);
-            }
-        }
-        let clock = match format.rate_hz {
-            Some(rate_hz) => Clock {
-                rate_hz,
-                uniform: true,
-                median_step_s: rate_hz.recip(),
-                misfit_uniform: None,
-                misfit_stamps: None,
-                drift_steps: None,
-                smoothing_rows: 0,
-                evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
-            },
-            None => clock(format.clock, &prefix.time_s, &prefix.row, &prefix.q, format.max_gap_steps)
-                .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
-        };
-        let timeline = Timeline::new(&clock, format.max_gap_steps, 0.0);
-        let longest = longest_segment(timeline, &prefix);
-        let cutoff = cutoff(&longest, clock.rate_hz);
+        let opening = Opening::of(log, settings.keep_outliers)?;
+        let (clock, cutoff) = (opening.clock.clone(), opening.cutoff.clone());
         let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
-        let position_noise = position_noise(&longest, clock.rate_hz, in_force_hz);
+        let position_noise = opening.noise.beyond(in_force_hz);
         let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
         let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
         let differentiator = build(&cutoff)?;
@@ -185,8 +154,8 @@ impl MotionStream {
             for (index, joint) in joints.iter().enumerate() {
                 let mut check = ChannelCheck::new(quantity, joint);
                 check.quantisation_step = match quantity {
-                    Quantity::Position => quantisation_step(&prefix.q[index]),
-                    Quantity::Torque => quantisation_step(&prefix.tau[index]),
+                    Quantity::Position => opening.position_steps[index],
+                    Quantity::Torque => opening.torque_steps[index],
                     Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature => None,
                 };
                 checks.push(check);
@@ -240,6 +209,19 @@ impl MotionStream {
             unmapped: 0,
             given: 0,
         })
+    }
+
+    /// The same, its rows read ahead by a thread of their own: the motion does not differ by a bit.
+    #[must_use]
+    pub fn read_beside(self) -> Self {
+        Self { rows_in: self.rows_in.read_beside(), ..self }
+    }
+
+    /// The same whose [`report`](Self::report) says nothing of single channels: for a pass that nobody asks about
+    /// them.
+    #[must_use]
+    pub fn without_channels(self) -> Self {
+        Self { checks: Vec::new(), ..self }
     }
 
     /// Samples per second of the motion.
@@ -544,41 +526,4 @@ impl MotionStream {
         report.find();
         report
     }
-}
-
-/// Reads the first [`CUTOFF_SAMPLES`] rows.
-fn prefix(log: &Log) -> Result<(Prefix, String), RecordingError> {
-    let mut reader = LogReader::open(log)?;
-    let columns = || vec![Vec::new(); log.joints.len()];
-    let mut prefix = Prefix { row: Vec::new(), time_s: Vec::new(), q: columns(), tau: columns() };
-    let mut raw = RawBlock::default();
-    while prefix.row.len() < CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
-        prefix.row.extend_from_slice(&raw.row);
-        prefix.time_s.extend_from_slice(&raw.time_s);
-        for (all, block) in prefix.q.iter_mut().zip(&raw.q).chain(prefix.tau.iter_mut().zip(&raw.tau)) {
-            all.extend_from_slice(block);
-        }
-    }
-    Ok((prefix, reader.time_label()))
-}
-
-/// Positions of the longest uninterrupted piece of the prefix, on the uniform clock.
-fn longest_segment(mut timeline: Timeline, prefix: &Prefix) -> Vec<Vec<f64>> {
-    let joints = prefix.q.len();
-    let rows = RawBlock { row: prefix.row.clone(), time_s: prefix.time_s.clone(), ..RawBlock::default() };
-    let places = timeline.places(&rows, None);
-    let rows = PlacedRows { time_s: &prefix.time_s, steps: &places.steps, begins: &places.begins };
-    let mut segmenter = Segmenter::new(joints);
-    let mut longest = vec![Vec::new(); joints];
-    let mut at = 0;
-    while at < prefix.row.len() {
-        let mut piece = vec![Vec::new(); joints];
-        at = segmenter.feed(rows, at, &mut piece, || prefix.q.iter());
-        segmenter.close(&mut piece);
-        segmenter.reopen();
-        if piece.first().map_or(0, Vec::len) > longest.first().map_or(0, Vec::len) {
-            longest = piece;
-        }
-    }
-    longest
 }

@@ -1,0 +1,115 @@
+//! The blocks of a log one after another, read here or on a thread of their own.
+
+use super::reader::{LinesDropped, LogReader, RawBlock};
+use crate::error::RecordingError;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::JoinHandle;
+
+/// Blocks that may wait: enough that neither side stands still for the other's longer ones.
+const WAITING: usize = 4;
+
+/// Where blocks come from.
+#[derive(Debug)]
+enum Source {
+    Here(Box<LogReader>),
+    Beside { blocks: Receiver<Read>, thread: Option<JoinHandle<()>> },
+}
+
+/// A block or the end, and what was left out so far.
+type Read = (Result<Option<RawBlock>, RecordingError>, LinesDropped);
+
+/// The blocks of one pass over a log, the same wherever they are read.
+#[derive(Debug)]
+pub(crate) struct RawBlocks {
+    label: String,
+    source: Source,
+    dropped: LinesDropped,
+}
+
+impl RawBlocks {
+    pub(crate) fn new(reader: LogReader) -> Self {
+        let label = reader.label().to_owned();
+        Self { label, source: Source::Here(Box::new(reader)), dropped: LinesDropped::default() }
+    }
+
+    /// The same, read ahead by a thread of its own from now on.
+    pub(crate) fn beside(self) -> Self {
+        let Source::Here(mut reader) = self.source else { return self };
+        let (give, blocks) = sync_channel(WAITING);
+        let thread = std::thread::spawn(move || {
+            loop {
+                let read = next_of(&mut reader);
+                let is_last = !matches!(read, Ok(Some(_)));
+                // Nobody listens any more where the pass has ended before the log.
+                if give.send((read, reader.dropped().clone())).is_err() || is_last {
+                    return;
+                }
+            }
+        });
+        Self { source: Source::Beside { blocks, thread: Some(thread) }, ..self }
+    }
+
+    /// The next rows; `None` at the end.
+    ///
+    /// # Errors
+    /// What reading them can give.
+    pub(crate) fn next_block(&mut self) -> Result<Option<RawBlock>, RecordingError> {
+        let (read, dropped) = match &mut self.source {
+            Source::Here(reader) => (next_of(reader), reader.dropped().clone()),
+            Source::Beside { blocks, thread } => match blocks.recv() {
+                Ok(read) => read,
+                Err(_) => {
+                    if let Some(Err(panic)) = thread.take().map(JoinHandle::join) {
+                        std::panic::resume_unwind(panic);
+                    }
+                    return Ok(None);
+                }
+            },
+        };
+        self.dropped = dropped;
+        read
+    }
+
+    /// What messages call the log.
+    pub(crate) fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Rows and lines left out so far.
+    pub(crate) fn dropped(&self) -> &LinesDropped {
+        &self.dropped
+    }
+}
+
+fn next_of(reader: &mut LogReader) -> Result<Option<RawBlock>, RecordingError> {
+    let mut block = RawBlock::default();
+    Ok(reader.next_block(&mut block)?.then_some(block))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::JointSamples;
+
+    #[test]
+    fn the_same_blocks_are_read_here_and_beside() {
+        let mut q: Vec<f64> = (0..20_000).map(f64::from).collect();
+        q[7] = f64::NAN;
+        let samples = JointSamples::at_rate(10.0, vec![q.clone()], vec![q]);
+        let mut log = samples.into_log("log", &["elbow".to_owned()]).unwrap();
+        log.format.missing = crate::log::Missing::Drop;
+        let blocks = || RawBlocks::new(LogReader::open(&log).unwrap());
+        let (mut here, mut beside) = (blocks(), blocks().beside());
+        loop {
+            let (one, other) = (here.next_block().unwrap(), beside.next_block().unwrap());
+            assert_eq!(one, other);
+            if one.is_none() {
+                break;
+            }
+        }
+        assert_eq!((here.dropped(), here.dropped().missing), (beside.dropped(), 1));
+        assert_eq!(beside.next_block().unwrap(), None);
+        // A pass that ends before the log leaves no thread that waits for ever.
+        drop(blocks().beside());
+    }
+}

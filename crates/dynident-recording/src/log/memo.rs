@@ -1,0 +1,70 @@
+//! What was found out about a log once for all passes over it.
+
+use super::Log;
+use super::format::LogFormat;
+use core::any::Any;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// The last thing that was found, and what it holds for. Its type is the business of those who find it, which stand
+/// above this module.
+#[derive(Debug, Default)]
+pub(super) struct Memo(Mutex<Option<(About, Arc<dyn Any + Send + Sync>)>>);
+
+/// A description may be changed between passes, and a file may be written anew.
+#[derive(Debug, PartialEq)]
+struct About {
+    format: LogFormat,
+    joints: Vec<String>,
+    keep_outliers: bool,
+    file: Option<(u64, Option<SystemTime>)>,
+}
+
+impl Log {
+    /// What `find` finds of this log, read with or without its outliers; not asked again while neither the description
+    /// nor the file changes. Of clones that are described alike it is found once for all.
+    ///
+    /// # Errors
+    /// Those of `find`, which is asked again then.
+    pub(crate) fn found_once<T: Any + Send + Sync, E>(
+        &self,
+        keep_outliers: bool,
+        find: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Arc<T>, E> {
+        let file = self.source.path().and_then(|path| path.metadata().ok());
+        let about = About {
+            format: self.format.clone(),
+            joints: self.joints.clone(),
+            keep_outliers,
+            file: file.map(|data| (data.len(), data.modified().ok())),
+        };
+        let mut known = self.memo.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, found)) = known.as_ref().filter(|(known, _)| *known == about)
+            && let Ok(found) = Arc::clone(found).downcast()
+        {
+            return Ok(found);
+        }
+        let found = Arc::new(find()?);
+        *known = Some((about, found.clone()));
+        Ok(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::log::JointSamples;
+
+    #[test]
+    fn what_was_found_holds_until_the_description_changes() {
+        let samples = JointSamples::at_rate(10.0, vec![vec![1.0]], vec![vec![2.0]]);
+        let mut log = samples.into_log("log", &["elbow".to_owned()]).unwrap();
+        let of = |log: &super::Log, keep, value: i32| *log.found_once(keep, || Ok::<_, ()>(value)).unwrap();
+        assert!(log.found_once(true, || Err::<i32, _>(())).is_err());
+        assert_eq!(
+            [of(&log, true, 1), of(&log.clone(), true, 2), of(&log, false, 3), of(&log, false, 4)],
+            [1, 1, 3, 3]
+        );
+        log.format.bridge_gaps = !log.format.bridge_gaps;
+        assert_eq!([of(&log, false, 5), of(&log, false, 6)], [5, 5]);
+    }
+}
