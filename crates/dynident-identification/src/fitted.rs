@@ -85,6 +85,8 @@ pub(crate) struct Fitted<'a> {
     friction: (RegressorModel, Vec<JointFriction>),
     /// The cut-off at which it was chosen, where the data chose both.
     friction_hz: Option<f64>,
+    /// The cut-off that was chosen before friction; none where it was not asked here.
+    before_friction: Option<Option<CutoffByError>>,
     /// What the constants of chosen friction add to the bars.
     constants_error: Option<ConstantsError>,
     pub(crate) lag: LagChoice,
@@ -148,7 +150,7 @@ fn choices_of_excerpt(
         return Ok(None);
     }
     let started = Instant::now();
-    let Some(recordings) = excerpts(recordings, settings, chosen)? else { return Ok(None) };
+    let Some(recordings) = excerpts(recordings, settings, chosen, execution)? else { return Ok(None) };
     let read_s = started.elapsed().as_secs_f64();
     let (robot, payloads, settings) = (robot.clone(), payloads.clone(), settings.clone());
     let task = IdentificationTask { robot, recordings, payloads, settings };
@@ -208,7 +210,7 @@ fn without_lag<'a>(
         return Ok(found);
     }
     let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-    let mut of_stated = fitted_once((task, &stated), (chosen, None), execution, job)?;
+    let mut of_stated = fitted_like(&found, (task, &stated), chosen, execution, job)?;
     let mut first = LagRounds::of(LagCandidates::Common);
     let mut times = found.times.and(&of_stated.times);
     if first.again(free_lag(&of_stated, chosen)?.as_ref(), &mut of_stated.estimation.estimate) {
@@ -241,7 +243,7 @@ fn lag_rounds<'a>(
     let mut is_asked = choices.is_some() || !job.is_plain();
     loop {
         let choices = choices.or(of_less_noise.as_ref());
-        let mut found = fitted_once((task, &settings), (chosen, choices), execution, job)?;
+        let mut found = fitted_once((task, &settings), (chosen, Known::from(choices)), execution, job)?;
         times = times.and(&found.times);
         let started = Instant::now();
         let fit = if is_free { free_lag(&found, chosen)? } else { None };
@@ -324,10 +326,39 @@ fn has_free_lag(found: &Fitted<'_>) -> bool {
         && found.settings.estimation.estimator.reads_filtered_rows()
 }
 
+/// What is known before logs are read.
+#[derive(Clone, Copy)]
+enum Known<'k, 'a> {
+    Nothing,
+    /// Choices that were made by an excerpt, or by rows of less noise.
+    Choices(&'k Choices),
+    /// A fit to the same recordings that differs only in how its friction was chosen.
+    Alike(&'k Fitted<'a>),
+}
+
+impl<'k> From<Option<&'k Choices>> for Known<'k, '_> {
+    fn from(choices: Option<&'k Choices>) -> Self {
+        choices.map_or(Self::Nothing, Self::Choices)
+    }
+}
+
+/// [`fitted_once`] with other friction than `found`: where that has no lag taken off, drives and first cut-off are its.
+fn fitted_like<'a>(
+    found: &Fitted<'a>,
+    (task, settings): (&'a IdentificationTask, &IdentificationSettings),
+    chosen: &[usize],
+    execution: Execution<'a>,
+    job: &mut Job<'_, '_>,
+) -> Result<Fitted<'a>, IdentificationError> {
+    let is_alike = found.settings.motion.torque_lag_s == settings.motion.torque_lag_s;
+    let known = if is_alike { Known::Alike(found) } else { Known::Nothing };
+    fitted_once((task, settings), (chosen, known), execution, job)
+}
+
 /// One way from logs to an estimate, with the lag of the settings taken off; with choices where they are made.
 fn fitted_once<'a>(
     (task, settings): (&'a IdentificationTask, &IdentificationSettings),
-    (chosen, choices): (&[usize], Option<&Choices>),
+    (chosen, known): (&[usize], Known<'_, 'a>),
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
@@ -338,9 +369,10 @@ fn fitted_once<'a>(
 
     // Drives, filters and friction, by the logs where they are left to them.
     let started = Instant::now();
-    let Chosen { robot, drive_inertia, logs, cutoff, friction, friction_hz } = match choices {
-        Some(choices) => chosen_before((logs, settings), choices, (chosen, payloads))?,
-        None => chosen_here((logs, settings), robot, (chosen, payloads), job)?,
+    let Chosen { robot, drive_inertia, logs, before_friction, cutoff, friction, friction_hz } = match known {
+        Known::Choices(choices) => chosen_before((logs, settings), choices, (chosen, payloads))?,
+        Known::Alike(found) => chosen_here((logs, settings), robot, (chosen, payloads), (job, Some(found)))?,
+        Known::Nothing => chosen_here((logs, settings), robot, (chosen, payloads), (job, None))?,
     };
     let choice_s = started.elapsed().as_secs_f64();
 
@@ -375,6 +407,7 @@ fn fitted_once<'a>(
         stated_friction: friction.stated,
         friction: (friction.model, friction.joints),
         friction_hz,
+        before_friction,
         constants_error: friction.constants_error,
         lag: LagChoice::default(),
         between_logs: None,
@@ -388,25 +421,33 @@ struct Chosen<'a> {
     robot: ParametricModel,
     drive_inertia: Option<DriveInertiaChoice>,
     logs: Logs<'a>,
+    /// The cut-off before friction was chosen; none where it was not asked.
+    before_friction: Option<Option<CutoffByError>>,
     cutoff: Option<CutoffByError>,
     friction: ChosenFriction,
     /// The cut-off at which friction was chosen, where the data chose both.
     friction_hz: Option<f64>,
 }
 
-/// Drives, filters and friction by the logs where they are left to them.
+/// Drives, filters and friction by the logs where they are left to them; drives and the first cut-off as a fit that is
+/// alike chose them.
 fn chosen_here<'a>(
     (logs, settings): (Logs<'a>, &IdentificationSettings),
     robot: &ParametricModel,
     (chosen, payloads): (&[usize], &[Payload]),
-    job: &Job<'_, '_>,
+    (job, alike): (&Job<'_, '_>, Option<&Fitted<'a>>),
 ) -> Result<Chosen<'a>, IdentificationError> {
-    let (robot, drive_inertia) = match job.arm() {
-        Some(_) => (robot.clone(), None),
-        None => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
+    let (robot, drive_inertia) = match (job.arm(), alike) {
+        (Some(_), _) => (robot.clone(), None),
+        (None, Some(alike)) => (alike.robot.clone(), alike.drive_inertia.clone()),
+        (None, None) => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
     };
     let first = RegressorModel::from(robot.clone());
-    let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
+    let cutoff = match alike.and_then(|alike| alike.before_friction.clone()) {
+        Some(cutoff) => cutoff,
+        None => choose_cutoff((&logs, settings), &first, chosen)?,
+    };
+    let before_friction = Some(cutoff.clone());
     let mut friction_hz = None;
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
         let friction = ChosenFriction::as_stated(first);
@@ -418,7 +459,11 @@ fn chosen_here<'a>(
         let cutoff = of_friction.or(cutoff);
         (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
-    Ok(Chosen { robot, drive_inertia, logs, cutoff, friction, friction_hz })
+    let logs = match alike {
+        Some(alike) => logs.with_motion_of(&alike.logs),
+        None => logs,
+    };
+    Ok(Chosen { robot, drive_inertia, logs, before_friction, cutoff, friction, friction_hz })
 }
 
 /// The same as an excerpt chose it, the constants of friction by all rows.
@@ -433,5 +478,13 @@ fn chosen_before<'a>(
     let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
     let friction = constants_of_all_rows((&of_constants, settings), robot, friction, (chosen, payloads))?;
     let (robot, drive_inertia) = (robot.clone(), drive_inertia.clone());
-    Ok(Chosen { robot, drive_inertia, logs, cutoff: cutoff.clone(), friction, friction_hz: None })
+    Ok(Chosen {
+        robot,
+        drive_inertia,
+        logs,
+        before_friction: None,
+        cutoff: cutoff.clone(),
+        friction,
+        friction_hz: None,
+    })
 }

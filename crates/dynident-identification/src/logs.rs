@@ -126,6 +126,15 @@ impl<'a> Logs<'a> {
         }
     }
 
+    /// The same with what `other` has kept of the same recordings, where both have the same motion.
+    #[must_use]
+    pub(crate) fn with_motion_of(mut self, other: &Self) -> Self {
+        if self.motion == other.motion && core::ptr::eq(self.recordings, other.recordings) {
+            self.kept = Arc::clone(&other.kept);
+        }
+        self
+    }
+
     /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
     #[must_use]
     pub(crate) fn without_keeping(mut self) -> Self {
