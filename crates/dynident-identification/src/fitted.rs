@@ -85,8 +85,8 @@ pub(crate) struct Fitted<'a> {
     friction: (RegressorModel, Vec<JointFriction>),
     /// The cut-off at which it was chosen, where the data chose both.
     friction_hz: Option<f64>,
-    /// The cut-off that was chosen before friction; none where it was not asked here.
-    before_friction: Option<Option<CutoffByError>>,
+    /// The cut-off that was chosen here before friction.
+    before_friction: Option<CutoffByError>,
     /// What the constants of chosen friction add to the bars.
     constants_error: Option<ConstantsError>,
     pub(crate) lag: LagChoice,
@@ -421,8 +421,8 @@ struct Chosen<'a> {
     robot: ParametricModel,
     drive_inertia: Option<DriveInertiaChoice>,
     logs: Logs<'a>,
-    /// The cut-off before friction was chosen; none where it was not asked.
-    before_friction: Option<Option<CutoffByError>>,
+    /// The cut-off before friction was chosen, where it was chosen here.
+    before_friction: Option<CutoffByError>,
     cutoff: Option<CutoffByError>,
     friction: ChosenFriction,
     /// The cut-off at which friction was chosen, where the data chose both.
@@ -444,10 +444,10 @@ fn chosen_here<'a>(
     };
     let first = RegressorModel::from(robot.clone());
     let cutoff = match alike.and_then(|alike| alike.before_friction.clone()) {
-        Some(cutoff) => cutoff,
+        Some(cutoff) => Some(cutoff),
         None => choose_cutoff((&logs, settings), &first, chosen)?,
     };
-    let before_friction = Some(cutoff.clone());
+    let before_friction = cutoff.clone();
     let mut friction_hz = None;
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
         let friction = ChosenFriction::as_stated(first);

@@ -56,15 +56,15 @@ impl RawBlocks {
     pub(crate) fn next_block(&mut self) -> Result<Option<RawBlock>, RecordingError> {
         let (read, dropped) = match &mut self.source {
             Source::Here(reader) => (next_of(reader), reader.dropped().clone()),
-            Source::Beside { blocks, thread } => match blocks.recv() {
-                Ok(read) => read,
-                Err(_) => {
+            Source::Beside { blocks, thread } => {
+                let Ok(read) = blocks.recv() else {
                     if let Some(Err(panic)) = thread.take().map(JoinHandle::join) {
                         std::panic::resume_unwind(panic);
                     }
                     return Ok(None);
-                }
-            },
+                };
+                read
+            }
         };
         self.dropped = dropped;
         read

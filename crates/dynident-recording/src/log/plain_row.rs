@@ -20,22 +20,19 @@ pub(super) fn read_plain_row(line: &[u8], delimiter: u8, places: &[Option<usize>
             None => is_last,
         };
         let plain = place.and_then(|_| plain_decimal(rest)).filter(|(_, length)| ends(*length));
-        let length = match (place, plain) {
-            (Some(place), Some((value, length))) => {
+        let length = if let (Some(place), Some((value, length))) = (place, plain) {
+            values[*place] = value;
+            length
+        } else {
+            let length = memchr2(delimiter, b'"', rest).unwrap_or(rest.len());
+            if !ends(length) {
+                return false;
+            }
+            if let Some(place) = place {
+                let Some(value) = other_number(&rest[..length]) else { return false };
                 values[*place] = value;
-                length
             }
-            _ => {
-                let length = memchr2(delimiter, b'"', rest).unwrap_or(rest.len());
-                if !ends(length) {
-                    return false;
-                }
-                if let Some(place) = place {
-                    let Some(value) = other_number(&rest[..length]) else { return false };
-                    values[*place] = value;
-                }
-                length
-            }
+            length
         };
         rest = rest.get(length + 1..).unwrap_or(&[]);
     }
@@ -62,7 +59,7 @@ pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
     let whole = count;
     let mut length = whole;
     if digits.get(whole) == Some(&b'.') {
-        let eight = digits[whole + 1..].first_chunk().filter(|_| whole + 8 <= MOST_DIGITS);
+        let eight = digits[whole + 1..].first_chunk().copied().filter(|_| whole + 8 <= MOST_DIGITS);
         if let Some(eight) = eight.and_then(eight_digits) {
             integer = 100_000_000 * integer + eight;
             count += 8;
@@ -82,8 +79,8 @@ pub(super) fn plain_decimal(text: &[u8]) -> Option<(f64, usize)> {
 }
 
 /// Eight digits at once: pairs, then fours, then all. Source: Lemire, Softw. Pract. Exp. 51 (2021) 1700.
-fn eight_digits(text: &[u8; 8]) -> Option<u64> {
-    let bytes = u64::from_le_bytes(*text);
+fn eight_digits(text: [u8; 8]) -> Option<u64> {
+    let bytes = u64::from_le_bytes(text);
     let upper_halves = 0xF0F0_F0F0_F0F0_F0F0;
     let are_digits = bytes & upper_halves == 0x3030_3030_3030_3030
         && bytes.wrapping_add(0x0606_0606_0606_0606) & upper_halves == 0x3030_3030_3030_3030;
@@ -115,7 +112,7 @@ mod tests {
             if state & 4 == 0 {
                 text.insert(0, '-');
             }
-            if state % 5 == 0 {
+            if state.is_multiple_of(5) {
                 text += "e-3";
             }
             let expected = text.parse::<f64>().unwrap().to_bits();
