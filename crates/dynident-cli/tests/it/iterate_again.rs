@@ -128,7 +128,7 @@ fn a_result_of_identify_stays_until_there_is_another() {
     }
     study(at, "max_runs = 2");
     let (_, words) = iterate(at, &["--fresh"]);
-    assert!(!names.iter().any(|name| theirs(name)), "{words}");
+    assert!(!names.iter().any(theirs), "{words}");
     let result = std::fs::read_to_string(at.join("out/result.json")).unwrap();
     assert!(result.contains("base_parameters"));
 }
