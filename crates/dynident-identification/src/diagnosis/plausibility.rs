@@ -65,14 +65,13 @@ pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
     !is_rate_of_a_recorder(model, report.rate_hz) || report.channels.iter().any(is_behind)
 }
 
-/// Whether a log has jumps that no motion makes: readings of it would mean nothing.
+/// Whether a log has jumps that no motion makes: readings of it would mean nothing. Lone samples that were set aside
+/// are gone.
 pub(super) fn has_jumps(report: &ImportReport) -> bool {
     let is_measured = |channel: &&ChannelReport| matches!(channel.channel, Quantity::Position | Quantity::Torque);
-    report
-        .channels
-        .iter()
-        .filter(is_measured)
-        .any(|channel| channel.turns > 0 || channel.lone_samples > 0 || channel.jumps > 0)
+    report.channels.iter().filter(is_measured).any(|channel| {
+        channel.turns > 0 || channel.jumps > 0 || (channel.lone_samples > 0 && !report.sets_aside(channel))
+    })
 }
 
 /// Whether a recorder of such a robot has this rate.

@@ -25,6 +25,9 @@ pub(crate) const SHORTEST_STEP: f64 = 0.1;
 /// Share by which one spacing has to predict positions better than another to be believed.
 const CLEARLY: f64 = 0.1;
 
+/// Share of rows with equal stamps that have the positions of the one before where rows are repeated.
+const MOST_REPEAT: f64 = 0.9;
+
 /// What the first rows say about the clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -35,6 +38,10 @@ pub struct Clock {
     pub uniform: bool,
     /// Median step in seconds.
     pub median_step_s: f64,
+    /// Whether rows whose stamp equals the one before repeat it: they are no samples. Otherwise such stamps are
+    /// rounded, and their rows are as far apart as all others.
+    #[serde(default)]
+    pub repeats_rows: bool,
     /// RMS error with which each position follows from its four neighbours by a cubic, relative to the motion, if the
     /// spacing is taken as even; `None` if the question was idle.
     pub misfit_uniform: Option<f64>,
@@ -83,6 +90,9 @@ impl Clock {
 /// varies by more than 0.1 %, samples stand at the stamps smoothed by local lines, over as many rows as predict
 /// left-out stamps best: the drift is followed, jitter is averaged out.
 ///
+/// Equal stamps: where such rows repeat the positions of the one before and others do not, rows are repeated and take
+/// no time. Otherwise stamps are rounded to more than a step, and the mean step counts every row.
+///
 /// Steps are the unit throughout, so nothing depends on the unit of time. `Err` holds the reason why no rate follows.
 pub(crate) fn clock(
     rule: ClockRule,
@@ -91,17 +101,19 @@ pub(crate) fn clock(
     q: &[Vec<f64>],
     max_gap_steps: f64,
 ) -> Result<Clock, String> {
-    let mut steps: Vec<f64> = (1..time_s.len())
-        .filter(|i| row[*i] == row[i - 1] + 1)
-        .map(|i| time_s[i] - time_s[i - 1])
-        .filter(|step| *step > 0.0 && step.is_finite())
-        .collect();
+    let successive = || (1..time_s.len()).filter(|i| row[*i] == row[i - 1] + 1);
+    let all = successive().map(|i| time_s[i] - time_s[i - 1]);
+    let mut steps: Vec<f64> = all.filter(|step| *step > 0.0 && step.is_finite()).collect();
     if steps.is_empty() {
         return Err("no time step is positive".to_owned());
     }
     steps.sort_by(f64::total_cmp);
     let median = steps[steps.len() / 2];
     let usual = &steps[..steps.partition_point(|step| *step <= max_gap_steps * median)];
+    let equal: Vec<usize> = successive().filter(|i| time_s[*i] == time_s[i - 1]).collect();
+    let repeats_rows = !equal.is_empty() && repeat_the_one_before(q, &equal, successive());
+    let rounded = if repeats_rows { 0 } else { equal.len() };
+    let usual = [&vec![0.0; rounded], usual].concat();
     let count = usual.len() as f64;
     let mean = usual.iter().sum::<f64>() / count;
     let deviation = (usual.iter().map(|step| (step - mean).powi(2)).sum::<f64>() / count).sqrt();
@@ -114,13 +126,18 @@ pub(crate) fn clock(
         rate_hz,
         uniform: true,
         median_step_s: median,
+        repeats_rows,
         misfit_uniform: None,
         misfit_stamps: None,
         drift_steps: None,
         smoothing_rows: 0,
         evidence: String::new(),
     };
-    let share = format!("{:.3} % jitter", 100.0 * jitter);
+    let by_rows = match rounded {
+        0 => String::new(),
+        _ => format!("; {rounded} of {} stamps equal the one before: they are rounded, and all rows count", row.len()),
+    };
+    let share = format!("{:.3} % jitter{by_rows}", 100.0 * jitter);
     if rule == ClockRule::Auto && jitter < NEGLIGIBLE_JITTER {
         result.evidence = format!("even spacing: {share} is negligible");
         return Ok(result);
@@ -131,12 +148,16 @@ pub(crate) fn clock(
     result.misfit_stamps = Some(stamps);
     result.drift_steps = drift.map(|drift| drift.steps);
     let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
+    // Rounding alone makes stamps stray by what they are rounded to, either way.
+    let by_rounding = if rounded > 0 { 2.0 * median / mean } else { 0.0 };
     let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
     (result.uniform, result.smoothing_rows) = match rule {
         ClockRule::Stamps => (false, 0),
         ClockRule::Smoothed => (false, smoothing_rows),
         ClockRule::Auto if stamps_predict_better => (false, 0),
-        ClockRule::Auto if drift.is_some_and(|drift| drift.matters()) => (false, smoothing_rows),
+        ClockRule::Auto if drift.is_some_and(|drift| drift.matters() && drift.steps > by_rounding) => {
+            (false, smoothing_rows)
+        }
         ClockRule::Uniform | ClockRule::Auto => (true, 0),
     };
     let believed = match result.spacing() {
@@ -159,6 +180,17 @@ pub(crate) fn clock(
         }
     };
     Ok(result)
+}
+
+/// Whether the rows `equal` have the positions of the row before, while `all` rows mostly have not.
+fn repeat_the_one_before(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Item = usize>) -> bool {
+    let is_same = |i: usize| q.iter().all(|q| q[i] == q[i - 1]);
+    let share = |rows: &mut dyn Iterator<Item = usize>| {
+        let (same, count) = rows.fold((0_u32, 0_u32), |(same, count), i| (same + u32::from(is_same(i)), count + 1));
+        f64::from(same) / f64::from(count.max(1_u32))
+    };
+    let others = &mut all.filter(|i| equal.binary_search(i).is_err());
+    share(&mut equal.iter().copied()) > MOST_REPEAT && share(others) < 1.0 - MOST_REPEAT
 }
 
 /// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over
@@ -235,6 +267,35 @@ pub(crate) fn lagrange(at: f64, nodes: [f64; 4]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Stamps with two decimals of a recorder at 125 Hz and 200 Hz: four steps of 10 ms for five rows, one for two. The
+    /// rate is that of the rows.
+    #[test]
+    fn rounded_stamps_keep_the_rate_of_the_rows() {
+        for rate_hz in [125.0, 200.0, 1000.0] {
+            let time: Vec<f64> = (0..2000).map(|i| (f64::from(i) / rate_hz * 100.0).round() / 100.0).collect();
+            let q: Vec<f64> = (0..2000).map(|i| (f64::from(i) / rate_hz * 4.0).sin()).collect();
+            let row: Vec<u64> = (0..2000).collect();
+            let found = clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap();
+            assert!((found.rate_hz / rate_hz - 1.0).abs() < 2e-3, "{rate_hz}: {found:?}");
+            assert!(found.uniform && !found.repeats_rows, "{found:?}");
+        }
+    }
+
+    /// Rows that stand twice are no samples: the rate is that of the others. A robot at rest whose stamps are rounded
+    /// repeats its positions as well, and no row of it is another's copy.
+    #[test]
+    fn repeated_rows_are_told_from_a_robot_at_rest() {
+        let twice = |i: u32| f64::from(i / 2) * 0.008;
+        let row: Vec<u64> = (0..2000).collect();
+        let time: Vec<f64> = (0..2000).map(twice).collect();
+        let q: Vec<f64> = time.iter().map(|t| (4.0 * t).sin()).collect();
+        let found = clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap();
+        assert!(found.repeats_rows && (found.rate_hz - 125.0).abs() < 1e-6, "{found:?}");
+        let time: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.8).round() / 100.0).collect();
+        let found = clock(ClockRule::Auto, &time, &row, &[vec![0.7; 2000]], 5.0).unwrap();
+        assert!(!found.repeats_rows && (found.rate_hz / 125.0 - 1.0).abs() < 2e-3, "{found:?}");
+    }
 
     /// A deterministic jitter in ±0.4 steps.
     fn jitter(i: usize) -> f64 {

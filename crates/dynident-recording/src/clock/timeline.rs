@@ -68,7 +68,12 @@ impl Timeline {
                     } else if is_gap {
                         places.holes.push(index);
                     }
-                    let even = if is_gap && hole < LONGEST_GAP { hole.round().max(rows) } else { rows };
+                    let even = match (is_gap && hole < LONGEST_GAP, self.clock.repeats_rows && time == 0.0) {
+                        // No time has passed: the row is left out for standing where the one before does.
+                        (_, true) => 0.0,
+                        (true, false) => hole.round().max(rows),
+                        (false, false) => rows,
+                    };
                     last_place + even
                 }
                 None => row as f64,

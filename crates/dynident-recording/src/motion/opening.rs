@@ -45,6 +45,7 @@ impl Opening {
                 rate_hz,
                 uniform: true,
                 median_step_s: rate_hz.recip(),
+                repeats_rows: false,
                 misfit_uniform: None,
                 misfit_stamps: None,
                 drift_steps: None,

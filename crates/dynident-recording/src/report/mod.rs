@@ -132,6 +132,15 @@ pub struct ImportReport {
 }
 
 impl ImportReport {
+    /// Whether the lone samples of a channel were set aside: left out, or replaced by what their neighbours say.
+    pub fn sets_aside(&self, channel: &ChannelReport) -> bool {
+        self.set_aside.iter().any(|found| {
+            found.channel == channel.channel
+                && found.joint == channel.joint
+                && matches!(found.reason, Reason::Outlier | Reason::Spike)
+        })
+    }
+
     /// The joints whose positions jump, and what to do about it.
     fn position_jumps(&self) -> Option<(String, String)> {
         let jumping = |channel: &ChannelReport| Some((channel.joint.clone(), channel.jumps, channel.worst_jump?));
@@ -192,7 +201,13 @@ impl ImportReport {
             add(Level::Warning, "position", message);
         }
         if self.duplicate_stamps > 0 {
-            add(Level::Warning, "time", format!("{} stamps equal the one before", self.duplicate_stamps));
+            let what = if self.clock.repeats_rows {
+                "rows repeat the one before, stamp and positions; they are left out, and the rate is that of the others"
+            } else {
+                "stamps equal the one before; if they are rounded that does no harm, for the rate is that of all rows \
+                 over the time they span"
+            };
+            add(Level::Warning, "time", format!("{} {what}", self.duplicate_stamps));
         }
         if self.backward_stamps > 0 {
             add(Level::Problem, "time", format!("{} stamps are earlier than the one before", self.backward_stamps));
@@ -248,10 +263,8 @@ impl ImportReport {
                 );
                 add(Level::Problem, &name, message);
             }
-            let is_set_aside =
-                |found: &SetAside| of_channel(found, Reason::Outlier) || of_channel(found, Reason::Spike);
             if let Some(worst) = &channel.worst_lone_sample
-                && !self.set_aside.iter().any(is_set_aside)
+                && !self.sets_aside(channel)
             {
                 let message = format!(
                     "{} samples stand alone, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field \
