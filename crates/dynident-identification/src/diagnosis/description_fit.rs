@@ -2,6 +2,7 @@
 
 use super::motion_rows::MotionRows;
 use super::nominal::nominal_torque;
+use super::wrong_mass::{WrongMass, wrong_mass};
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
@@ -40,6 +41,8 @@ pub struct DescriptionFit {
     /// For each joint the share of its torque's squares beside friction, drive inertia and an offset that the bodies
     /// explain; none where even the best bodies explain little of that.
     pub explained: Vec<Option<f64>>,
+    /// One body's mass that explains what else asks for another unit of most torques.
+    pub wrong_mass: Option<WrongMass>,
 }
 
 impl DescriptionFit {
@@ -82,13 +85,29 @@ impl DescriptionFit {
 /// the share of each joint's torque that the best robot of this description leaves.
 pub(super) fn description_fit(robot: &ParametricModel, rows: &MotionRows, left: &[f64]) -> Option<DescriptionFit> {
     let nominal = nominal_torque(robot, rows)?;
-    let fits = nominal.iter().zip(left).enumerate().map(|(joint, of)| joint_fit(rows, joint, of));
-    let (scale, explained) = fits.unzip();
-    nominal.iter().flatten().any(|&tau| tau != 0.0).then_some(DescriptionFit { scale, explained })
+    let fits: Vec<JointFit> =
+        nominal.iter().zip(left).enumerate().map(|(joint, of)| joint_fit(rows, joint, of)).collect();
+    let left_by_scales = fits.iter().map(|fit| fit.left).sum();
+    let scale = fits.iter().map(|fit| fit.scale).collect();
+    let explained = fits.iter().map(|fit| fit.explained).collect();
+    let mut fit = DescriptionFit { scale, explained, wrong_mass: None };
+    if !fit.joints_in_another_unit().is_empty() {
+        fit.wrong_mass = wrong_mass(robot, rows, left_by_scales);
+    }
+    nominal.iter().flatten().any(|&tau| tau != 0.0).then_some(fit)
+}
+
+/// What the description's bodies say of one joint.
+#[derive(Default)]
+struct JointFit {
+    /// Share of its torque's squares beside friction that its own factor leaves.
+    left: f64,
+    scale: Option<f64>,
+    explained: Option<f64>,
 }
 
 /// The factor of one joint's column and the share explained.
-fn joint_fit(rows: &MotionRows, joint: usize, (predicted, best_left): (&Vec<f64>, &f64)) -> (Option<f64>, Option<f64>) {
+fn joint_fit(rows: &MotionRows, joint: usize, (predicted, best_left): (&Vec<f64>, &f64)) -> JointFit {
     let (dq, ddq) = (&rows.dq[joint], &rows.ddq[joint]);
     let tau = DVector::from_column_slice(&rows.tau[joint]);
     let fit = |columns: usize| {
@@ -103,12 +122,16 @@ fn joint_fit(rows: &MotionRows, joint: usize, (predicted, best_left): (&Vec<f64>
         let left = (&tau - &matrix * &solution).norm_squared();
         Some((left, solution))
     };
-    let Some((without, _)) = fit(4) else { return (None, None) };
+    let Some((without, _)) = fit(4).filter(|(without, _)| *without > 0.0) else { return JointFit::default() };
     // Bodies that need no torque of this joint explain none of it; those of another sign neither.
     let (share, gain) = fit(5).map_or((0.0, 0.0), |(with, solution)| (1.0 - with / without, solution[4]));
     let share = if gain > 0.0 { share } else { 0.0 };
     let is_telling = best_left.powi(2) * tau.norm_squared() < TELLING.powi(2) * without;
-    ((share > EXPLAINED && gain.is_finite()).then(|| gain.recip()), is_telling.then_some(share))
+    JointFit {
+        left: 1.0 - share,
+        scale: (share > EXPLAINED && gain.is_finite()).then(|| gain.recip()),
+        explained: is_telling.then_some(share),
+    }
 }
 
 #[cfg(test)]
@@ -119,7 +142,9 @@ mod tests {
     fn a_unit_is_common_where_joints_agree_and_constants_of_motors_are_none() {
         let unit = |scale: &[f64]| {
             let scale: Vec<Option<f64>> = scale.iter().copied().map(Some).collect();
-            DescriptionFit { explained: vec![None; scale.len()], scale }.common_unit().map(|(name, _)| name)
+            DescriptionFit { explained: vec![None; scale.len()], scale, wrong_mass: None }
+                .common_unit()
+                .map(|(name, _)| name)
         };
         assert_eq!(unit(&[0.0114, 0.00992, 0.0111, 0.0174, 0.0154]), Some("Ncm"));
         assert_eq!(unit(&[9.7, 11.2, 10.8, 17.0, 15.1]), Some("kgf m"));

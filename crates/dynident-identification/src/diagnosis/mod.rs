@@ -12,7 +12,7 @@
 //! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `reading`, `search` | their sum, and the reading with the best |
 //! | `torque_clock` | torque of another moment |
-//! | `description_fit`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, payloads |
+//! | `description_fit`, `wrong_mass`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, one wrong mass, payloads |
 //! | `held_out_reading` | mistakes that a held-out log alone has |
 //! | `same_columns` | columns that stand for two joints, torques that lost their signs |
 //! | `stray_torque`, `noise_torque` | torques that do not belong to one robot with the others, beyond what noise makes |
@@ -33,6 +33,7 @@ mod stray_torque;
 mod torque_clock;
 mod units;
 mod unseen_load;
+mod wrong_mass;
 
 pub use description_fit::DescriptionFit;
 pub use held_out_reading::HeldOutReading;
@@ -44,6 +45,7 @@ pub use same_columns::SameColumn;
 pub use search::Search;
 pub use stray_torque::StrayTorque;
 pub use unseen_load::UnseenLoad;
+pub use wrong_mass::WrongMass;
 
 use crate::logs::Logs;
 use crate::recording::{LogError, Role};

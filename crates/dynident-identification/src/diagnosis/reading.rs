@@ -17,6 +17,9 @@ const UNEXPLAINED: f64 = 0.9;
 /// What a joint beyond its limits costs, as if e times as much of one joint's torque were left.
 const LIMIT_COST: f64 = 1.0;
 
+/// Margin from which instants are so few that parameters of each joint's own say nothing.
+const FEW_INSTANTS: f64 = 1.5;
+
 /// The samples with some mistakes corrected, and how well a robot explains them.
 #[derive(Clone, Debug)]
 pub struct Reading {
@@ -28,6 +31,10 @@ pub struct Reading {
     pub free: Vec<f64>,
     /// The same by parameters of each joint's own, freed of what these follow of the noise.
     pub alone: Vec<f64>,
+    /// Whether what parameters of a joint's own leave says anything: there are instants enough.
+    pub own_parameters_tell: Vec<bool>,
+    /// Times as much as usual that another reading has to gain, for there are few instants to tell them apart.
+    pub margin: f64,
     /// The share of all joints' torque together that no consistent robot explains, unweighted.
     pub left_of_all: f64,
     /// Joints beyond their limits.
@@ -64,9 +71,10 @@ impl Reading {
         self.mistakes.iter().any(is_far)
     }
 
-    /// Whether it leaves far more than parameters of each joint's own do: then it is no explanation either.
+    /// Whether it leaves far more than parameters of each joint's own do, and these say something: then it is no
+    /// explanation either.
     pub fn is_unexplained(&self) -> bool {
-        self.consistent_score - self.alone_score > UNEXPLAINED * self.left.len() as f64
+        self.margin < FEW_INSTANTS && self.consistent_score - self.alone_score > UNEXPLAINED * self.left.len() as f64
     }
 
     /// The least that [`score`](Self::score) could be, whatever a consistent robot leaves.
@@ -129,6 +137,8 @@ impl Corrected {
             left: shares(best),
             free: shares(&explained.free),
             alone: shares(&explained.alone_of_noise_free()),
+            own_parameters_tell: explained.own_parameters_tell(),
+            margin: explained.margin(),
             left_of_all: if all > 0.0 { left_of_all / all } else { 0.0 },
             beyond: beyond_limits(self.robot.model(), &self.rows),
             plausible_rate: is_rate_of_a_recorder(self.robot.model(), self.rows.rate_hz),

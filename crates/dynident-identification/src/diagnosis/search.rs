@@ -108,7 +108,10 @@ pub(super) fn search(
         alike = rest.iter().filter(close).take(MOST_ALIKE).map(|(_, other)| other.clone()).collect();
         (at, best) = (corrected, reading);
     }
-    let found = !best.mistakes.is_empty();
+    // Of few instants a reading that is a little better says nothing.
+    let has_to_gain = as_written.margin * CLEARLY_BETTER * best.mistakes.len() as f64;
+    let found =
+        !best.mistakes.is_empty() && (as_written.margin <= 1.0 || best.score() <= as_written.score() - has_to_gain);
     Search { as_written, best: found.then_some(best), alike, tried }
 }
 

@@ -11,6 +11,9 @@ use dynident_recording::{Finding, Level};
 /// Standard deviations below zero from which friction counts as negative. On the real logs that this was first tried
 /// on, honest joints stay above −2.5 and dead ones lie below −8.
 const CLEARLY_NEGATIVE: f64 = 5.0;
+/// The same as a share of what is left of the joint's torque: less may be the work of what the model has no term for,
+/// as at a wrist whose torque is measured behind the gear and is mostly noise.
+const SHARE_OF_LEFT: f64 = 0.5;
 
 /// The mean friction of a joint by the estimate, each term at the root mean square of its column.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,12 +25,14 @@ pub struct FrictionSign {
     pub torque: f64,
     /// Its standard deviation by the estimate's covariance.
     pub std: f64,
+    /// What the estimate leaves of the joint's torque, Nm (N), root mean square.
+    pub left: f64,
 }
 
 impl FrictionSign {
     /// Whether friction is negative beyond doubt.
     pub fn is_reversed(&self) -> bool {
-        self.std > 0.0 && self.torque < -CLEARLY_NEGATIVE * self.std
+        self.std > 0.0 && self.torque < -CLEARLY_NEGATIVE * self.std && self.torque < -SHARE_OF_LEFT * self.left
     }
 }
 
@@ -53,15 +58,17 @@ pub fn friction_signs(model: &RegressorModel, problem: &LinearProblem, estimate:
         let torque = own.iter().map(|&index| weight(index) * estimate.values[index]).sum();
         let pairs = own.iter().flat_map(|&a| own.iter().map(move |&b| (a, b)));
         let variance: f64 = pairs.map(|(a, b)| weight(a) * weight(b) * estimate.covariance[(a, b)]).sum();
-        (!own.is_empty()).then(|| FrictionSign { joint: names[joint].clone(), torque, std: variance.max(0.0).sqrt() })
+        let (std, left) = (variance.max(0.0).sqrt(), estimate.joint_sigma[joint]);
+        (!own.is_empty()).then(|| FrictionSign { joint: names[joint].clone(), torque, std, left })
     };
     (0..model.dof()).filter_map(of_joint).collect()
 }
 
-/// A sentence for each joint whose friction is negative.
-pub fn friction_sign_findings(signs: &[FrictionSign]) -> impl Iterator<Item = Finding> {
-    signs.iter().filter(|sign| sign.is_reversed()).map(|sign| Finding {
-        level: Level::Problem,
+/// A sentence for each joint whose friction is negative; a warning where other readings of the logs were tried and none
+/// is better (`no_other_reading`): then it is the work of what the model has no term for.
+pub fn friction_sign_findings(signs: &[FrictionSign], no_other_reading: bool) -> impl Iterator<Item = Finding> {
+    signs.iter().filter(|sign| sign.is_reversed()).map(move |sign| Finding {
+        level: if no_other_reading { Level::Warning } else { Level::Problem },
         channel: format!("torque {}", sign.joint),
         message: format!(
             "its friction comes out as {:.3} ± {:.3} Nm (N) and would drive the joint: its torque, or its position, has the opposite sign, or its torque is another joint's; \

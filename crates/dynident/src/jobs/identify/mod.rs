@@ -12,6 +12,7 @@ use crate::jobs::provenance::{beside, now, provenance, seen_from};
 use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
+use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
 use dynident_identification::{
@@ -355,10 +356,12 @@ fn result_file(
 fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSummary> {
     let joints = found.model().joint_names();
     let pairs = found.training.logs.iter().zip(&found.examination.delays);
+    let is_the_best = |diagnosis: &Diagnosis| diagnosis.search.best.is_none() && !diagnosis.is_unexplained();
+    let no_other_reading = found.diagnosis.as_ref().is_some_and(is_the_best);
     let training = pairs.map(|(factors, delays)| {
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
         summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
-        summary.model_findings.extend(friction_sign_findings(&found.examination.friction_signs));
+        summary.model_findings.extend(friction_sign_findings(&found.examination.friction_signs, no_other_reading));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));

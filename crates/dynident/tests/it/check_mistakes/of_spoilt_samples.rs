@@ -1,0 +1,161 @@
+//! Logs whose samples are spoilt beside another mistake, or alone: lone spikes, rounded stamps, repeated rows, torques
+//! of nothing; a body of the description that weighs ten times too much.
+
+use super::{
+    Case, JOINTS, Row, SAME, WITH_DRIVES, all_are_named, check_text, checked, checked_in, each, problems, read,
+};
+use crate::common::{Random, repository};
+use dynident::recording::Level;
+use dynident::{RunOptions, Silent, Study, identify};
+use std::fmt::Write;
+
+fn spike(rows: &mut [Row], column: usize, value: f64) {
+    let middle = rows.len() / 2;
+    rows[middle][column] = value;
+}
+
+/// One absurd sample is replaced or left out, and hides no other mistake.
+#[test]
+fn lone_samples_hide_no_mistake() {
+    all_are_named(&[
+        Case {
+            name: "a spike of the position, all in degrees",
+            rows: |rows| {
+                each(rows, |row| row[1..7].iter_mut().for_each(|q| *q = q.to_degrees()));
+                spike(rows, 3, -999.0);
+            },
+            study: SAME,
+            kind: "unit",
+            named: &["\"deg\""],
+        },
+        Case {
+            name: "a spike of the torque, the lift reversed",
+            rows: |rows| {
+                each(rows, |row| row[8] = -row[8]);
+                spike(rows, 10, 1e9);
+            },
+            study: SAME,
+            kind: "sign",
+            named: &["sign = [1, -1, 1"],
+        },
+    ]);
+    for (column, value) in [(2, -999.0), (9, 300.0)] {
+        let mut found = Vec::new();
+        let case = Case {
+            name: "a spike alone",
+            rows: if column == 2 { |rows| spike(rows, 2, -999.0) } else { |rows| spike(rows, 9, 300.0) },
+            study: SAME,
+            kind: "",
+            named: &[],
+        };
+        let check = checked(&case);
+        found.extend(problems(&check));
+        assert!(found.is_empty() && check.tried > 100, "{column} {value}: {found:?}, {} tried", check.tried);
+    }
+}
+
+/// Every torque is noise: nothing explains it, and that is said.
+#[test]
+fn torques_of_nothing_are_named() {
+    let case = Case {
+        name: "noise",
+        rows: |rows| {
+            let mut random = Random(7);
+            each_with(rows, &mut random);
+        },
+        study: SAME,
+        kind: "torque",
+        named: &["nothing to do with the motion"],
+    };
+    all_are_named(&[case]);
+}
+
+fn each_with(rows: &mut [Row], random: &mut Random) {
+    for row in rows {
+        row[7..].iter_mut().for_each(|tau| *tau = 20.0 * random.normal());
+    }
+}
+
+/// Parts of an honest log raise no alarm: what a joint's own parameters leave of few instants says nothing.
+#[test]
+fn parts_of_a_log_raise_no_alarm() {
+    let case = |name, rows| Case { name, rows, study: SAME, kind: "", named: &[] };
+    let parts = [
+        case("first 60 %", |rows| rows.truncate(1500)),
+        case("last 60 %", |rows| drop(rows.drain(..1000))),
+        case("middle", |rows| {
+            rows.truncate(2000);
+            drop(rows.drain(..500));
+        }),
+        case("first 40 %", |rows| rows.truncate(1000)),
+    ];
+    for part in &parts {
+        let check = checked_in(part, &["train.csv"]);
+        assert!(problems(&check).is_empty(), "{}: {:?}", part.name, problems(&check));
+    }
+}
+
+/// The fitted value of a parameter, held-out error in percent, and the rate of the training log.
+fn identified(change: fn(&mut Vec<Row>), decimals: Option<usize>) -> (f64, f64, f64) {
+    let folder = tempfile::tempdir().unwrap();
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let study = study
+        .replace("../robots/ur10.urdf", &repository("robots/ur10.urdf").display().to_string())
+        .replace("[format]", WITH_DRIVES)
+        .replace("ur10_simulated/", "");
+    for name in ["train.csv", "test.csv"] {
+        let (header, mut rows) = read(name);
+        change(&mut rows);
+        let mut text = header + "\n";
+        for row in &rows {
+            let time = decimals.map_or_else(|| row[0].to_string(), |decimals| format!("{:.decimals$}", row[0]));
+            let fields: Vec<String> = row[1..].iter().map(f64::to_string).collect();
+            writeln!(text, "{time},{}", fields.join(",")).unwrap();
+        }
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let path = folder.path().join("study.toml");
+    std::fs::write(&path, study).unwrap();
+    let options = RunOptions { data: None, threads: 2, progress: &Silent };
+    let result = identify(&Study::load(&path).unwrap(), &path, &options).unwrap().result;
+    let error = result.validation[0].model.relative_error_percent.unwrap();
+    let value = result.base_parameters.iter().find(|one| one.symbol == "Iyy2").unwrap().value;
+    (value, error, result.logs[0].import.rate_hz)
+}
+
+/// Stamps with two decimals at 125 Hz, and rows that stand twice, give the model of the log as it was: before, rows
+/// were spaced by the steps of the stamps, and inertias came out 1.6 times and more too large.
+#[test]
+fn rounded_stamps_and_repeated_rows_do_no_harm() {
+    let (value, error, rate) = identified(|_| {}, None);
+    let twice: fn(&mut Vec<Row>) = |rows| *rows = rows.iter().flat_map(|row| [*row, *row]).collect();
+    for (name, change, decimals) in [("rounded", (|_| {}) as fn(&mut Vec<Row>), Some(2)), ("twice", twice, None)] {
+        let (own, own_error, own_rate) = identified(change, decimals);
+        assert!((own_rate / rate - 1.0).abs() < 1e-3, "{name}: {own_rate} for {rate} Hz");
+        // Ends of a rounded log lie up to half a step of the stamps elsewhere: some 1e-4 of its length.
+        assert!((own / value - 1.0).abs() < 0.01, "{name}: {own} for {value}");
+        assert!(own_error < 1.05 * error, "{name}: {own_error} % for {error} %");
+    }
+}
+
+/// One body that weighs ten times too much asks for another unit of every torque: the body is named, as a warning, for
+/// the fit does not suffer, and no unit is advised.
+#[test]
+fn one_wrong_mass_is_no_unit_of_torque() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap();
+    let mass = "3.87";
+    assert_eq!(urdf.matches(&format!("<mass value=\"{mass}\"")).count(), 1, "the forearm's mass");
+    let urdf = urdf.replace(&format!("<mass value=\"{mass}\""), "<mass value=\"38.7\"");
+    std::fs::write(folder.path().join("arm.urdf"), urdf).unwrap();
+    for name in ["train.csv", "test.csv"] {
+        std::fs::copy(repository("examples/ur10_simulated").join(name), folder.path().join(name)).unwrap();
+    }
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let study = study.replace("../robots/ur10.urdf", "arm.urdf").replace("ur10_simulated/", "");
+    let check = check_text(folder.path(), &study);
+    assert!(problems(&check).is_empty(), "{:?}", problems(&check));
+    let named = check.findings.iter().find(|finding| finding.kind == "description").expect("the body is named");
+    assert!(named.level == Level::Warning && named.sentence().contains("forearm_link"), "{}", named.sentence());
+    assert!(JOINTS.iter().all(|joint| !named.sentence().contains(joint)) && named.write.is_empty());
+}
