@@ -19,8 +19,45 @@ pub struct DerivativeComparison {
     /// count by how fast they are. Zero where either signal is.
     #[serde(default)]
     pub correlation: f64,
+    /// `Σ a b / Σ a²`: how many times the derivative the logged signal is; none where the derivative is nothing beside
+    /// it, as that of a dead position.
+    #[serde(default)]
+    pub ratio: Option<f64>,
     /// Shift of the logged signal behind the derivative, where the derivative varies most.
     pub lag: Option<Lag>,
+}
+
+/// Correlation from which the logged signal is the derivative times a number.
+const PROPORTIONAL: f64 = 0.98;
+/// How far that number is from 1 where it is another unit, or another rate of the log.
+const OTHER: f64 = 0.05;
+/// Share of the logged signal's squares below which the derivative is nothing.
+const NOTHING: f64 = 1e-12;
+/// Units of velocity that are taken for rad/s, and what the logged numbers are then times the derivative.
+const UNITS: [(&str, f64); 4] =
+    [("deg/s", 57.295_78), ("revolutions a minute", 9.549_297), ("revolutions a second", 0.159_154_9), ("mrad/s", 1e3)];
+/// Share by which such a number may differ from a unit's.
+const UNIT_SHARE: f64 = 0.02;
+
+impl DerivativeComparison {
+    /// How many times the derivative the logged signal is, where it is that throughout and not once.
+    pub(crate) fn times(&self) -> Option<f64> {
+        let is_other = |ratio: &f64| *ratio > 0.0 && ratio.ln().abs() > OTHER;
+        self.ratio.filter(is_other).filter(|_| self.correlation > PROPORTIONAL)
+    }
+
+    /// What a velocity that is `times` the derivative may be, of a log at `rate_hz`.
+    pub(crate) fn velocity_in_words(times: f64, rate_hz: f64) -> String {
+        let is_it = |(_, unit): &&(&str, f64)| (times / unit - 1.0).abs() < UNIT_SHARE;
+        match UNITS.iter().find(is_it) {
+            Some((unit, _)) => format!("is {times:.4} times the position's derivative throughout: it is in {unit}"),
+            None => format!(
+                "is {times:.4} times the position's derivative throughout: it is in another unit, or, where it is so of \
+                 every joint, the rate is {:.4} Hz in place of {rate_hz:.4}",
+                times * rate_hz
+            ),
+        }
+    }
 }
 
 /// Accumulates a [`DerivativeComparison`].
@@ -72,7 +109,8 @@ impl Comparison {
 
     /// The lag is looked for within a period of the cut-off: what is later is none of this motion.
     pub(crate) fn report(&self, rate_hz: f64, cutoff_hz: f64) -> DerivativeComparison {
-        let ratio = (self.difference / self.power).sqrt();
+        let tells = self.power > NOTHING * self.logged_power;
+        let difference = if tells { (self.difference / self.power).sqrt() } else { 0.0 };
         let reach = ((rate_hz / cutoff_hz).ceil() as usize).clamp(3, 100).min(self.derived.len() / 4);
         DerivativeComparison {
             joint: self.joint.clone(),
@@ -80,7 +118,8 @@ impl Comparison {
                 let correlation = self.product / (self.power * self.logged_power).sqrt();
                 if correlation.is_finite() { correlation } else { 0.0 }
             },
-            relative_rms_difference: if ratio.is_finite() { ratio } else { 0.0 },
+            ratio: Some(self.product / self.power).filter(|ratio| tells && ratio.is_finite()),
+            relative_rms_difference: if difference.is_finite() { difference } else { 0.0 },
             lag: best_lag(&self.derived, &self.logged, reach, rate_hz),
         }
     }
@@ -96,6 +135,26 @@ mod tests {
             comparison.see(derived, logged);
         }
         comparison.report(1000.0, 10.0)
+    }
+
+    /// Velocities of another unit, or of a log whose rate is stated wrongly, are a number times the derivative; noise
+    /// is not, nor is what a dead position leaves.
+    #[test]
+    fn another_unit_is_told_from_noise() {
+        let swing = |times: f64| -> (Vec<f64>, Vec<f64>) {
+            (0..2000).map(|i| (f64::from(i) * 0.01).sin()).map(|x| (x, times * x)).unzip()
+        };
+        for (times, words) in [(9.5493, "revolutions a minute"), (57.3, "deg/s"), (1.25, "the rate is 125.0000 Hz")] {
+            let found = compared(&[swing(times)]).times().unwrap();
+            assert!((found / times - 1.0).abs() < 1e-9);
+            let said = DerivativeComparison::velocity_in_words(found, 100.0);
+            assert!(said.contains(words), "{said}");
+        }
+        assert_eq!(compared(&[swing(1.02)]).times(), None);
+        let noisy: Vec<f64> = (0..2000).map(|i| (f64::from(i) * f64::from(i) * 0.37).sin()).collect();
+        assert_eq!(compared(&[(swing(1.0).0, noisy.clone())]).times(), None);
+        let dead = compared(&[(vec![1e-17; 2000], noisy)]);
+        assert_eq!((dead.ratio, dead.relative_rms_difference), (None, 0.0));
     }
 
     /// A short first piece at nearly constant velocity, in which noise decides the sign of a centred correlation.

@@ -290,6 +290,9 @@ impl ImportReport {
                 if comparison.correlation < -0.5 {
                     let message = "the logged signal has the opposite sign of the position's derivative";
                     add(Level::Problem, &name, message.to_owned());
+                } else if let Some(times) = comparison.times().filter(|_| quantity == "velocity") {
+                    let message = DerivativeComparison::velocity_in_words(times, self.rate_hz);
+                    add(Level::Warning, &name, message);
                 } else if difference > 20.0 && comparison.lag.is_some() {
                     let message = format!(
                         "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
