@@ -34,7 +34,8 @@ pub struct RehearsalSettings {
     pub robots: usize,
     /// How late the robot's controller may see or act, between its sensors and its drives, seconds: gains that are
     /// derived bear it, and the robots are simulated with it. That of a loop that runs in the drives is theirs. Default
-    /// 8 ms of an arm of 1.2 m, of others as much in their own seconds: some cycles of control over a network.
+    /// 8 ms of an arm of 1.2 m, of others as much in their own seconds: some cycles of control over a network. In a
+    /// study by default none where the gains are stated, or the robot waits for every torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
     /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.

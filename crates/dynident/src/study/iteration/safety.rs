@@ -29,12 +29,7 @@ impl IterationSection {
     pub(crate) fn check_gains(&self, study: &Study, robot: &StudyRobot) -> Result<(), StudyError> {
         let controllers = [study.controller.as_ref(), self.model_free.as_ref(), self.first.as_ref()];
         let own_loop = controllers.into_iter().flatten().any(|controller| !controller.can_be_simulated());
-        let steps = match &self.robot {
-            RobotChoice::Simulation | RobotChoice::Function => true,
-            RobotChoice::Process(process) => process.mode == ProcessMode::Step,
-            RobotChoice::Folder(_) => false,
-        };
-        if own_loop && steps {
+        if own_loop && self.steps() {
             let fix = "here Dynident computes every torque: state what kp and kd of the drives' loop are, or let a \
                        program run it (mode = \"run\")";
             return Err(StudyError::conflict("kind = \"position-loop\"", fix));
@@ -65,13 +60,25 @@ impl IterationSection {
         ))
     }
 
-    /// How late a controller of this robot may be, s: the simulated one is as late as its sensors.
+    /// Whether the robot waits for every torque, which Dynident computes: there is no delay but what it states.
+    fn steps(&self) -> bool {
+        match &self.robot {
+            RobotChoice::Simulation | RobotChoice::Function => true,
+            RobotChoice::Process(process) => process.mode == ProcessMode::Step,
+            RobotChoice::Folder(_) => false,
+        }
+    }
+
+    /// How late a controller of this robot may be, s, where the study does not state it: the simulated one is as late
+    /// as its sensors, and stated gains are those that a robot has run under, with whatever delay it has.
     fn delay_s(&self, study: &Study, robot: &StudyRobot) -> f64 {
         let simulation = study.simulation.clone().unwrap_or_default();
         let rate_hz = self.rate_hz.unwrap_or(simulation.rate_hz);
         match self.rehearsal.delay_s {
+            Some(stated) => stated,
             None if !self.is_outside() => simulation.sensors.feedback_delay_samples as f64 / rate_hz,
-            _ => self.rehearsal.delay_s(robot.model()),
+            None if self.steps() || self.bandwidth_hz.is_none() => 0.0,
+            None => self.rehearsal.delay_s(robot.model()),
         }
     }
 
@@ -129,7 +136,8 @@ impl IterationSection {
         settings.safety = SafetySettings {
             outside,
             envelope: (outside || stated).then(|| self.envelope.envelope(model)).transpose()?,
-            rehearsal: outside.then(|| self.rehearsal.clone()),
+            rehearsal: outside
+                .then(|| RehearsalSettings { delay_s: Some(self.delay_s(study, robot)), ..self.rehearsal.clone() }),
             speed_steps: self.speed_steps.clone(),
             warm_up_s: self.warm_up_s,
             home: self.home_settings(robot, limits)?,
