@@ -97,7 +97,8 @@ impl Timeline {
         next: Option<&RawBlock>,
     ) -> bool {
         let late = (block.time_s[index] - last_s) * self.clock.rate_hz;
-        if self.clock.spacing() == Spacing::Stamps || late > LATE_ROWS as f64 {
+        // Rows that are repeated come twice in their time: they would make up for any gap.
+        if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > LATE_ROWS as f64 {
             return false;
         }
         let own = block.row[index..].iter().zip(&block.time_s[index..]);
@@ -133,5 +134,28 @@ impl Timeline {
         self.past.extend(own);
         let unneeded = self.past.len().saturating_sub(AROUND);
         self.past.drain(..unneeded);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::clock;
+    use crate::log::ClockRule;
+
+    /// A hole of ten samples in a log whose rows stand twice is a gap: the repeated rows behind it are no late packet.
+    #[test]
+    fn repeated_rows_make_up_for_no_gap() {
+        let sample = |row: usize| row / 2 + if row < 400 { 0 } else { 10 };
+        let time_s: Vec<f64> = (0..800).map(|row| sample(row) as f64 * 0.008).collect();
+        let row: Vec<u64> = (0..800).collect();
+        let q: Vec<f64> = time_s.iter().map(|t| (3.0 * t).sin()).collect();
+        let clock = clock(ClockRule::Auto, &time_s, &row, &[q], 5.0).unwrap();
+        assert!(clock.repeats_rows, "{clock:?}");
+        let block = RawBlock { row, time_s, ..RawBlock::default() };
+        let places = Timeline::new(&clock, 5.0, 0.0).places(&block, None);
+        let begins: Vec<usize> = (0..800).filter(|row| places.begins[*row]).collect();
+        assert_eq!(begins, [400]);
+        assert!((places.steps[799] - sample(799) as f64).abs() < 1e-6, "{}", places.steps[799]);
     }
 }

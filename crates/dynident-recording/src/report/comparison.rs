@@ -1,6 +1,7 @@
 //! A logged derivative against the derivative of the position.
 
 use super::lag::{Lag, best_lag};
+use crate::log::{Quantity, si_factor};
 use serde::{Deserialize, Serialize};
 
 /// Samples kept for the lag, at most.
@@ -33,9 +34,8 @@ const PROPORTIONAL: f64 = 0.98;
 const OTHER: f64 = 0.05;
 /// Share of the logged signal's squares below which the derivative is nothing.
 const NOTHING: f64 = 1e-12;
-/// Units of velocity that are taken for rad/s, and what the logged numbers are then times the derivative.
-const UNITS: [(&str, f64); 4] =
-    [("deg/s", 57.295_78), ("revolutions a minute", 9.549_297), ("revolutions a second", 0.159_154_9), ("mrad/s", 1e3)];
+/// Units of velocity that are taken for rad/s.
+const UNITS: [&str; 2] = ["deg/s", "rpm"];
 /// Share by which such a number may differ from a unit's.
 const UNIT_SHARE: f64 = 0.02;
 
@@ -48,9 +48,12 @@ impl DerivativeComparison {
 
     /// What a velocity that is `times` the derivative may be, of a log at `rate_hz`.
     pub(crate) fn velocity_in_words(times: f64, rate_hz: f64) -> String {
-        let is_it = |(_, unit): &&(&str, f64)| (times / unit - 1.0).abs() < UNIT_SHARE;
-        match UNITS.iter().find(is_it) {
-            Some((unit, _)) => format!("is {times:.4} times the position's derivative throughout: it is in {unit}"),
+        let is_it =
+            |unit: &&str| si_factor(unit, Quantity::Velocity).is_some_and(|si| (times * si - 1.0).abs() < UNIT_SHARE);
+        match UNITS.into_iter().find(is_it) {
+            Some(unit) => format!(
+                "is {times:.4} times the position's derivative throughout: write `unit = \"{unit}\"` under velocity"
+            ),
             None => format!(
                 "is {times:.4} times the position's derivative throughout: it is in another unit, or, where it is so of \
                  every joint, the rate is {:.4} Hz in place of {rate_hz:.4}",
@@ -144,7 +147,9 @@ mod tests {
         let swing = |times: f64| -> (Vec<f64>, Vec<f64>) {
             (0..2000).map(|i| (f64::from(i) * 0.01).sin()).map(|x| (x, times * x)).unzip()
         };
-        for (times, words) in [(9.5493, "revolutions a minute"), (57.3, "deg/s"), (1.25, "the rate is 125.0000 Hz")] {
+        for (times, words) in
+            [(9.5493, "unit = \"rpm\""), (57.3, "unit = \"deg/s\""), (1.25, "the rate is 125.0000 Hz")]
+        {
             let found = compared(&[swing(times)]).times().unwrap();
             assert!((found / times - 1.0).abs() < 1e-9);
             let said = DerivativeComparison::velocity_in_words(found, 100.0);
