@@ -3,7 +3,9 @@
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
-use crate::chosen_friction::{ChosenFriction, constants_of_all_rows, friction_of_less_noise, friction_with_cutoff};
+use crate::chosen_friction::{
+    ChosenFriction, choose_friction, constants_of_all_rows, friction_of_less_noise, friction_with_cutoff,
+};
 use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
@@ -450,8 +452,13 @@ fn chosen_here<'a>(
     let before_friction = cutoff.clone();
     let mut friction_hz = None;
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let friction = ChosenFriction::as_stated(first);
-        (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+        let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
+        let friction = if settings.friction_before.is_empty() {
+            ChosenFriction::as_stated(first)
+        } else {
+            choose_friction((&logs, settings), &robot, (chosen, payloads))?
+        };
+        (logs, cutoff, friction)
     } else {
         let at_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
         let (of_friction, friction) = friction_with_cutoff((&logs, settings), &robot, (chosen, payloads), at_hz)?;

@@ -2,7 +2,7 @@
 
 use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
-use crate::friction::FrictionSearch;
+use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
 use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
@@ -79,6 +79,10 @@ pub struct IdentificationSettings {
     pub drive_inertia: Vec<String>,
     /// Joints whose friction the training logs choose; none by default.
     pub friction: Vec<FrictionSearch>,
+    /// Friction that other recordings chose and the robot's terms hold already: what is unknown of its constants stands
+    /// in the error bars by what these recordings tell of them. None by default, and without effect where friction is
+    /// chosen.
+    pub friction_before: Vec<JointFriction>,
     /// Whether training logs share their offsets; by default they do.
     pub offsets: OffsetChoice,
     /// Whether training logs share the noise of their joints; by default they do.
@@ -106,6 +110,7 @@ impl Default for IdentificationSettings {
             intervals: false,
             drive_inertia: Vec::new(),
             friction: Vec::new(),
+            friction_before: Vec::new(),
             offsets: OffsetChoice::default(),
             log_noise: LogNoise::default(),
             lags: LagCandidates::default(),

@@ -179,8 +179,9 @@ impl RunsFit<'_> {
             identification.motion.torque_lag_s = rounds.torque_lag_s();
             let logs = Logs::new(robot.model(), recordings, identification.filters(), &all, None, execution)?;
             let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
-            let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
-            training.friction_choice = chosen.joints;
+            let mut training =
+                training_rows((&logs, &identification), chosen.model.clone(), &all, &settings.payloads, None)?;
+            training.friction_choice.clone_from(&chosen.joints);
             if training.problem.joint_rows().iter().sum::<usize>() == 0 {
                 let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
                 return Err(IterationError::Record { joints: robot.joint_names(), problem });
@@ -194,6 +195,7 @@ impl RunsFit<'_> {
                 lag_fit((&logs, &identification), &training.model, (&training.columns, &found.values, &[]), &all)?;
             if !rounds.again(fit.as_ref(), &mut found) {
                 let schwarz = schwarz(&training.problem, &found);
+                let found = chosen.with_error_of_constants(training.problem.columns(), found);
                 let with = (&all[..], found, rounds.choice());
                 let estimate = all_joints((&logs, &identification), training, with, runs)?;
                 return Ok(RunsEstimate { estimate, schwarz });

@@ -3,6 +3,7 @@
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
+use crate::final_fit::friction_chosen;
 use crate::held_out_motion::HeldOutMotion;
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
@@ -168,7 +169,11 @@ impl Iteration {
             Cow::Borrowed(_) => (Cow::Borrowed(&self.task), Cow::Borrowed(settings)),
             Cow::Owned(robot) => (
                 Cow::Owned(IterationTask { robot, ..self.task.clone() }),
-                Cow::Owned(RunIdentificationSettings { friction: Vec::new(), ..settings.clone() }),
+                Cow::Owned(RunIdentificationSettings {
+                    friction: Vec::new(),
+                    friction_before: friction_chosen(before),
+                    ..settings.clone()
+                }),
             ),
         })
     }

@@ -72,6 +72,7 @@ pub(crate) fn identification_settings(
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
     identification.friction.clone_from(&settings.friction);
+    identification.friction_before.clone_from(&settings.friction_before);
     // Of runs under one controller friction leaves another lag at each joint, and not the same in every run.
     identification.lags = LagCandidates::Common;
     identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };

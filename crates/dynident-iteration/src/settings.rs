@@ -4,7 +4,7 @@ use crate::safety::SafetySettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
-use dynident_identification::friction::FrictionSearch;
+use dynident_identification::friction::{FrictionSearch, JointFriction};
 use dynident_identification::payload::Payload;
 use dynident_model::Model;
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
@@ -63,6 +63,9 @@ pub struct RunIdentificationSettings {
     pub estimation: EstimationSettings,
     /// Joints whose friction the first run that is able to chooses, for itself and all runs after it. Default none.
     pub friction: Vec<FrictionSearch>,
+    /// Friction that a run before chose, which the robot's terms hold: what is unknown of its constants stands in the
+    /// bars. The iteration fills it in.
+    pub friction_before: Vec<JointFriction>,
     /// What is known of the bodies of the consistent set that controllers get; `None` gives them the estimate as it is.
     pub consistency: Option<ConsistencySettings>,
     /// What legs carry. Default nothing.
@@ -87,6 +90,7 @@ impl Default for RunIdentificationSettings {
             set_aside_near_rest: true,
             estimation: EstimationSettings::default(),
             friction: Vec::new(),
+            friction_before: Vec::new(),
             consistency: Some(ConsistencySettings::default()),
             payloads: Vec::new(),
             run_offsets: RunOffsets::default(),

@@ -217,6 +217,19 @@ pub enum RecordingError {
         /// Samples looked at.
         samples: u64,
     },
+    /// Rows that stand in no order of time.
+    #[error(
+        "{log}: {backward} of {rows} stamps are earlier than the one before: the rows stand in no order of time; \
+         sort them by the time column (`sort` or pandas' `sort_values`), or name another column as time"
+    )]
+    Unordered {
+        /// Label of the log.
+        log: String,
+        /// Stamps that are earlier than the one before.
+        backward: u64,
+        /// Rows of the log.
+        rows: u64,
+    },
     /// No segment of the log is long enough for the filter.
     #[error(
         "{log}: the longest uninterrupted piece has {found} samples, the {method} filter needs {needed}; \

@@ -1,6 +1,6 @@
 //! `dynident identify STUDY.toml --out DIR`, or of factors in place of a study and its logs.
 
-use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting};
+use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting, show_problems};
 use crate::{Verdict, summary, terminal};
 use dynident::{
     Factors, IdentificationOutcome, OutputSet, RunOptions, Study, check_writable, identify, identify_factors,
@@ -15,8 +15,6 @@ const TABLE: &str = "identified.toml";
 const MJCF: &str = "identified.xml";
 /// The same as an SDF, where the user's is one.
 const SDF: &str = "identified.sdf";
-/// Problems on standard error; the others stand in the file.
-const PROBLEMS_SHOWN: usize = 8;
 
 /// Options of `identify`.
 #[derive(clap::Args)]
@@ -79,15 +77,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     } else if !context.quiet {
         terminal::print(&summary::identification(result, &options.out, &models))?;
     }
-    let problems = &result.problems;
-    for problem in problems.iter().take(PROBLEMS_SHOWN) {
-        terminal::remark(&format!("PROBLEM: {problem}"));
-    }
-    if problems.len() > PROBLEMS_SHOWN {
-        terminal::remark(&format!("and {} more problems, listed in result.json", problems.len() - PROBLEMS_SHOWN));
-    }
+    show_problems(&result.problems, ", listed in result.json");
     let within = judged(&result.validation, options.max_validation_error);
-    Ok(if problems.is_empty() { within } else { Verdict::Negative })
+    Ok(if result.problems.is_empty() { within } else { Verdict::Negative })
 }
 
 /// The model of a study and its logs.

@@ -30,6 +30,9 @@ use dynident::{Progress, Silent, Study, study_inputs};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
+/// Problems that standard error shows.
+const PROBLEMS_SHOWN: usize = 8;
+
 /// What every command knows of how it was called.
 pub(crate) struct Context {
     pub(crate) json: bool,
@@ -77,6 +80,16 @@ pub(crate) fn percentage(text: &str) -> Result<f64, String> {
     let value =
         text.trim_end_matches('%').parse::<f64>().map_err(|error| format!("{error}: give a number of percent"))?;
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("give 0 or more percent".to_owned()) }
+}
+
+/// The first problems of a result on standard error, and how many there are more, `listed` where.
+pub(crate) fn show_problems(problems: &[String], listed: &str) {
+    for problem in problems.iter().take(PROBLEMS_SHOWN) {
+        terminal::remark(&format!("PROBLEM: {problem}"));
+    }
+    if problems.len() > PROBLEMS_SHOWN {
+        terminal::remark(&format!("and {} more problems{listed}", problems.len() - PROBLEMS_SHOWN));
+    }
 }
 
 /// Whether every log stays below the error that was asked for, if one was: of the model that is written, which is the

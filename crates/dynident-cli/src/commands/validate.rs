@@ -1,6 +1,6 @@
 //! `dynident validate DIR/result.json --study STUDY.toml`.
 
-use super::{Context, json, judged, known_in, message_of};
+use super::{Context, json, judged, known_in, message_of, show_problems};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, validate};
 use std::path::PathBuf;
@@ -27,5 +27,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let file = validate(&options.result, &study, &options.study, &run).map_err(known_in(&options.study))?;
     terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) })?;
-    Ok(judged(&file.validation, options.max_validation_error))
+    show_problems(&file.problems, "");
+    let within = judged(&file.validation, options.max_validation_error);
+    Ok(if file.problems.is_empty() { within } else { Verdict::Negative })
 }

@@ -1,6 +1,6 @@
 //! The friction of the joints as their recordings choose it: which terms, then their constants.
 
-use super::constants::{best_constants, friction_scores, one_step, with_constants};
+use super::constants::{best_constants, error_of_constants, friction_scores, one_step, with_constants};
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
@@ -34,6 +34,14 @@ impl ChosenFriction {
     /// A model whose friction is all stated.
     pub(crate) fn as_stated(model: RegressorModel) -> Self {
         Self { model, joints: Vec::new(), stated: None, constants_error: None }
+    }
+
+    /// An estimate over the columns `symbols` with what is unknown of the constants of friction in its bars.
+    pub fn with_error_of_constants(&self, symbols: &[String], estimate: Estimate) -> Estimate {
+        match &self.constants_error {
+            Some(error) => error.added_to(symbols, &estimate),
+            None => estimate,
+        }
     }
 }
 
@@ -80,7 +88,9 @@ fn friction_by_terms(
         .filter_map(|search| Some((stated.model().joint_index(&search.joint)?, search)))
         .collect();
     if searches.is_empty() {
-        return Ok(ChosenFriction::as_stated(stated));
+        let passes = TrainingPasses { logs: of_constants, settings, training, payloads, known_arm: None };
+        let constants_error = error_of_constants(&passes, &settings.friction_before, &stated)?;
+        return Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) });
     }
     let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);

@@ -124,6 +124,21 @@ pub(crate) fn best_constants(
     with_constants(passes, robot, joints, (start, gains))
 }
 
+/// What is unknown of the constants of friction that `model` has and other rows chose, by these rows; none where there
+/// is no constant.
+pub(crate) fn error_of_constants(
+    passes: &TrainingPasses<'_>,
+    joints: &[JointFriction],
+    model: &RegressorModel,
+) -> Result<Option<ConstantsError>, IdentificationError> {
+    let constants = FrictionConstants::new(model, joints);
+    if constants.is_empty() {
+        return Ok(None);
+    }
+    let step = passes.constants_pass(&constants, model)?.step(passes, (&constants, model), &[])?;
+    Ok(Some(step.error().clone()))
+}
+
 /// One step of the constants from where they are, for joints that chose their friction by other rows; none where there
 /// is nothing to move.
 pub(crate) fn one_step(

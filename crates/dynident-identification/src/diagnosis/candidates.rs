@@ -15,6 +15,9 @@ const EARTH_M_S2: f64 = 9.81;
 /// Share by which gravity differs over the earth, and with how many digits people write it.
 const NEAR_EARTH: f64 = 0.03;
 
+/// A zero that is a little off, rad: what lies between it and larger ones is found from there.
+const NEAR: f64 = FRAC_PI_6 / 3.0;
+
 /// Times its range that a joint travels where its unit is far too small.
 pub(super) const FAR: f64 = 2.0;
 
@@ -119,7 +122,7 @@ fn orders(dof: usize) -> Vec<Mistake> {
 
 /// Zeros a quarter or half a turn away, or near where they should be.
 fn zeros(model: &Model) -> Vec<Mistake> {
-    let offsets = [-FRAC_PI_2, FRAC_PI_2, PI, -FRAC_PI_6, FRAC_PI_6];
+    let offsets = [-FRAC_PI_2, FRAC_PI_2, PI, -FRAC_PI_6, FRAC_PI_6, -NEAR, NEAR];
     let turning = (0..model.dof()).filter(|&joint| model.joints()[joint].turns());
     turning.flat_map(|joint| offsets.map(|offset_rad| Mistake::Offset { joint, offset_rad })).collect()
 }

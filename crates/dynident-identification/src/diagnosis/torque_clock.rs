@@ -5,7 +5,7 @@ use super::explanation::Explanation;
 use super::mistake::{Channels, Mistake};
 use super::motion_rows::{MotionRows, MotionSamples};
 use super::reading::{Corrected, Reading};
-use super::search::{CLEARLY_BETTER, least_in};
+use super::search::{CLEARLY_BETTER, least_by_thirds};
 use crate::consistent::ConsistencySettings;
 use crate::lag::LONGEST_DELAY_S;
 use dynident_dynamics::ParametricModel;
@@ -69,7 +69,8 @@ impl<'a> TorqueClock<'a> {
 
     /// The lag near `lag_s` of which `value` is least.
     pub(super) fn least_near(&self, lag_s: f64, value: impl Fn(f64) -> f64) -> f64 {
-        least_in(lag_s, self.step_s, value).clamp(-self.reach_s, self.reach_s)
+        least_by_thirds([lag_s - self.step_s, lag_s + self.step_s], 0.02 * self.step_s, value)
+            .clamp(-self.reach_s, self.reach_s)
     }
 
     /// Instants with the torque, or the motion, of `joints` taken `lag_s` later.

@@ -20,6 +20,7 @@ mod plain_row;
 mod reader;
 mod row_count;
 mod row_rules;
+mod shared_samples;
 mod source;
 mod text;
 mod units;
@@ -32,6 +33,7 @@ pub use format::{
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
 pub use row_rules::RowRule;
+pub use shared_samples::{SharedSamples, shared_samples};
 pub use source::{LogGroup, LogSource, LogTable};
 pub use units::{Quantity, si_factor, unit_names};
 

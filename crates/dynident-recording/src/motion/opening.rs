@@ -9,6 +9,7 @@ use crate::filter::NoiseSpectra;
 use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
 use crate::log::{Log, LogReader, RawBlock};
 use crate::quantisation::quantisation_step;
+use crate::report::rows_to_a_value;
 use std::sync::Arc;
 
 /// What the first rows decide, whatever is done with the rows.
@@ -20,6 +21,8 @@ pub(super) struct Opening {
     /// Quantisation steps of positions and torques, joint by joint.
     pub(super) position_steps: Vec<Option<f64>>,
     pub(super) torque_steps: Vec<Option<f64>>,
+    /// Rows to new positions and to new torques, where a recorder repeats them.
+    pub(super) rows_to_a_value: [Option<u64>; 2],
 }
 
 impl Opening {
@@ -34,6 +37,7 @@ impl Opening {
     fn read(log: &Log, keep_outliers: bool) -> Result<Self, RecordingError> {
         let format = &log.format;
         let (mut first, time_label) = FirstRows::of(log)?;
+        let rows_to_a_value = [&first.q, &first.tau].map(|channels| rows_to_a_value(channels));
         if !keep_outliers {
             for q in &mut first.q {
                 let rows = 0..q.len();
@@ -62,6 +66,7 @@ impl Opening {
             noise: NoiseSpectra::of(&longest, clock.rate_hz),
             position_steps: steps(&first.q),
             torque_steps: steps(&first.tau),
+            rows_to_a_value,
             clock,
         })
     }

@@ -29,6 +29,8 @@ const UNSETTLED_PERIODS: f64 = 1.5;
 const BRIDGED_PERIODS: f64 = 0.2;
 /// Rows of a [`MotionBlock`] at least, but for the last of a segment.
 const CHUNK_ROWS: usize = 8192;
+/// A log without an uninterrupted piece stands in no order of time where more than one row in so many steps back.
+const ROWS_TO_A_STEP_BACK: u64 = 10;
 
 /// A log on its way to a motion; memory does not grow with the log's length, unless the differentiator needs
 /// the whole log.
@@ -68,6 +70,8 @@ pub struct MotionStream {
     short_segments: [u64; 2],
     longest_short: usize,
     rows: u64,
+    /// Of positions and of torques.
+    rows_to_a_value: [Option<u64>; 2],
     time_check: TimeCheck,
     checks: Vec<ChannelCheck>,
     velocity: Vec<Comparison>,
@@ -149,6 +153,8 @@ impl MotionStream {
         let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
         let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
         let differentiator = build(&cutoff)?;
+        // Rows that come twice are left out, and what remains repeats nothing.
+        let rows_to_a_value = if clock.repeats_rows { [None; 2] } else { opening.rows_to_a_value };
         let mut checks = Vec::new();
         for (quantity, _) in format.groups() {
             for (index, joint) in joints.iter().enumerate() {
@@ -199,6 +205,7 @@ impl MotionStream {
             short_segments: [0; 2],
             longest_short: 0,
             rows: 0,
+            rows_to_a_value,
             checks,
             velocity,
             acceleration,
@@ -276,6 +283,11 @@ impl MotionStream {
 
     fn finish(&self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
         *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
+        let backward = self.time_check.backward;
+        if self.segments == 0 && ROWS_TO_A_STEP_BACK * backward > self.rows {
+            let log = self.rows_in.reader().label().to_owned();
+            return Err(RecordingError::Unordered { log, backward, rows: self.rows });
+        }
         if self.segments == 0 {
             return Err(RecordingError::TooShort {
                 log: self.rows_in.reader().label().to_owned(),
@@ -514,6 +526,8 @@ impl MotionStream {
             segments: self.segments,
             short_segments: self.short_segments,
             unmapped_samples: self.unmapped,
+            rows_to_a_position: self.rows_to_a_value[0],
+            rows_to_a_torque: self.rows_to_a_value[1],
             set_aside: self.rows_in.set_aside(),
             bridged: self.rows_in.bridged(),
             channels: self.checks.iter().map(ChannelCheck::report).collect(),

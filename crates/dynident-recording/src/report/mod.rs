@@ -6,12 +6,14 @@
 
 pub(crate) mod channels;
 pub(crate) mod comparison;
+mod held_rows;
 mod jumps;
 mod lag;
 pub(crate) mod steps;
 
 pub use channels::ChannelReport;
 pub use comparison::DerivativeComparison;
+pub(crate) use held_rows::rows_to_a_value;
 pub use jumps::{Jump, LoneSample};
 pub use lag::{Lag, best_lag};
 
@@ -107,6 +109,12 @@ pub struct ImportReport {
     pub short_segments: [u64; 2],
     /// Samples left out because the differentiator does not apply there.
     pub unmapped_samples: u64,
+    /// Rows to a new set of positions, where the recorder repeats them; none where every row may have new ones.
+    #[serde(default)]
+    pub rows_to_a_position: Option<u64>,
+    /// The same of torques.
+    #[serde(default)]
+    pub rows_to_a_torque: Option<u64>,
     /// Samples whose torque does not count, and positions that were replaced, by joint.
     #[serde(default)]
     pub set_aside: Vec<SetAside>,
@@ -129,6 +137,18 @@ pub struct ImportReport {
     pub position_noise: Vec<f64>,
     /// All of this as sentences, where it matters.
     pub findings: Vec<Finding>,
+}
+
+/// `2nd`, `3rd`, `4th`, ..
+fn ordinal(number: u64) -> String {
+    let ending = match (number % 100, number % 10) {
+        (11..=13, _) => "th",
+        (_, 1) => "st",
+        (_, 2) => "nd",
+        (_, 3) => "rd",
+        _ => "th",
+    };
+    format!("{number}{ending}")
 }
 
 impl ImportReport {
@@ -216,6 +236,16 @@ impl ImportReport {
             let message =
                 format!("{} samples stand too close to the one before and were left out", self.crowded_samples);
             add(Level::Info, "time", message);
+        }
+        for (quantity, every) in [("position", self.rows_to_a_position), ("torque", self.rows_to_a_torque)] {
+            let Some(every) = every else { continue };
+            let message = format!(
+                "new values come at every {} row only ({:.4} Hz), the rows between repeat them, which makes steps of the \
+                 motion and a lag: log at the robot's own rate, or keep one row in {every}",
+                ordinal(every),
+                self.rate_hz / every as f64
+            );
+            add(Level::Warning, quantity, message);
         }
         // Rows left out.
         if self.dropped.missing > 0 {

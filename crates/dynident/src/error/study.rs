@@ -129,6 +129,20 @@ pub enum StudyError {
         /// The log to test on.
         held_out: String,
     },
+    /// A held-out log that holds samples which the model is fitted to, saved once more.
+    #[error(
+        "log `{held_out}` is to test what `{training}` is fitted to, and holds the same samples: from its row {held_out_row} on they are those of `{training}` from row {training_row} on (no two runs of a robot agree to the last digit in every position and torque): give a log of another run, or parts that do not overlap"
+    )]
+    SameSamples {
+        /// The log that is fitted to.
+        training: String,
+        /// Its 0-based data row from which on both are the same.
+        training_row: u64,
+        /// The log to test on.
+        held_out: String,
+        /// The same of the log to test on.
+        held_out_row: u64,
+    },
     /// Keys of which one can be given.
     #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {

@@ -32,16 +32,7 @@ pub(crate) fn provenance(
         if read[..index].iter().any(|(_, earlier)| is_same(earlier, source)) {
             continue;
         }
-        inputs.push(match source {
-            StudyInput::File(path) => input(what, path, folder)?,
-            StudyInput::Samples(samples) => {
-                let numbers = samples.numbers().map(f64::to_le_bytes);
-                input_in_memory(what, &samples.label(), numbers)
-            }
-            StudyInput::Description(robot) => {
-                input_in_memory(what, &robot.path.display().to_string(), core::iter::once(&robot.text))
-            }
-        });
+        inputs.push(read_input(what, source, folder)?);
     }
     // A study may have been put together in memory, where the path is a name only.
     let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
@@ -73,6 +64,23 @@ fn identified_by(study: &Study, own: Option<InputFile>, inputs: Vec<InputFile>) 
     let mut identity = hexadecimal(&identity.finalize());
     identity.truncate(DIGITS);
     Provenance { identity, version: version.to_owned(), command: None, study: own, inputs }
+}
+
+/// What is known of `source`, which was read as `what`, seen from `folder`.
+///
+/// # Errors
+/// [`Error::File`] for one that cannot be read again.
+pub(crate) fn read_input(what: &str, source: &StudyInput, folder: &Path) -> Result<InputFile, Error> {
+    Ok(match source {
+        StudyInput::File(path) => input(what, path, folder)?,
+        StudyInput::Samples(samples) => {
+            let numbers = samples.numbers().map(f64::to_le_bytes);
+            input_in_memory(what, &samples.label(), numbers)
+        }
+        StudyInput::Description(robot) => {
+            input_in_memory(what, &robot.path.display().to_string(), core::iter::once(&robot.text))
+        }
+    })
 }
 
 /// [`provenance()`] of a motion that is designed, simulated or iterated, with what else was read.

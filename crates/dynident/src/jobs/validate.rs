@@ -3,15 +3,15 @@
 use crate::error::Error;
 use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::seen_from;
-use crate::result::{ResultFile, VALIDATION_SCHEMA, ValidationFile};
-use crate::study::{Folders, Study, StudyRobot};
+use crate::jobs::provenance::{read_input, seen_from};
+use crate::result::{InputFile, LogSummary, ResultFile, VALIDATION_SCHEMA, ValidationFile};
+use crate::study::{Folders, Study, StudyInput, StudyRobot};
 use dynident_identification::examination::{HeldOutExamination, ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
 /// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none
-/// has.
+/// has. A log that the model was fitted to is a problem of the file that comes back: it proves nothing.
 ///
 /// # Errors
 /// If the result does not belong to the study's robot, and everything that reading logs can give.
@@ -70,10 +70,35 @@ pub fn validate_result(
         summary.import.file = seen_from(folder, Path::new(&summary.import.file));
         summary
     };
+    let logs: Vec<LogSummary> = tested.iter().map(summary).collect();
+    let mut problems = Vec::new();
+    for (log, &index) in logs.iter().zip(&chosen) {
+        let input = read_input("log", &StudyInput::from(study.log_source(&folders, index)?), folder)?;
+        if let Some(fitted) = fitted_to(stored, &input) {
+            problems.push(format!(
+                "log `{}` is `{fitted}`, which the model was fitted to: its figures prove nothing; give a log of another run",
+                log.log
+            ));
+        }
+    }
+    problems.extend(logs.iter().flat_map(LogSummary::problems));
     Ok(ValidationFile {
         schema: VALIDATION_SCHEMA.to_owned(),
         name: study_name(study, study_path),
-        logs: tested.iter().map(summary).collect(),
+        logs,
+        problems,
         validation: tested.into_iter().map(|log| log.validation).collect(),
     })
+}
+
+/// The name of the log with the content of `input` that a result was fitted to; none where it was not, and where parts
+/// of that file were held out.
+fn fitted_to<'a>(stored: &'a ResultFile, input: &InputFile) -> Option<&'a str> {
+    let inputs = &stored.provenance.as_ref()?.inputs;
+    let known = inputs.iter().find(|known| known.what == "log" && known.sha256 == input.sha256)?;
+    let of_file = || stored.logs.iter().filter(|log| log.import.file == known.file);
+    if of_file().any(|log| log.role == Role::Validate) {
+        return None;
+    }
+    of_file().find(|log| log.role == Role::Identify).map(|log| &log.log[..])
 }

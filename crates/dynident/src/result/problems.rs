@@ -1,6 +1,6 @@
 //! What speaks against loading a result's model into a robot.
 
-use super::{CheckFinding, ResultFile, StudyCheck};
+use super::{CheckFinding, LogSummary, ResultFile, StudyCheck};
 use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
@@ -23,17 +23,21 @@ const GOOD_PERCENT: f64 = 1.0;
 /// A joint's torque that errors count against, as a share of the largest joint's: below it, friction alone is left.
 const LEAST_SHARE: f64 = 1.0e-3;
 
+impl LogSummary {
+    /// What was found in the log and speaks against what is made of it, a sentence each.
+    pub(crate) fn problems(&self) -> Vec<String> {
+        let findings = self.import.findings.iter().chain(&self.model_findings);
+        let problems = findings.filter(|finding| finding.level == Level::Problem);
+        problems.map(|finding| format!("log `{}`, {}: {}", self.log, finding.channel, finding.message)).collect()
+    }
+}
+
 impl ResultFile {
     /// Everything that speaks against loading the model that was written into a robot, a sentence each; empty where
     /// nothing does: [`problems_of_the_model`](Self::problems_of_the_model), then the problems of the logs.
     pub(crate) fn found_problems(&self) -> Vec<String> {
         let mut problems = self.problems_of_the_model();
-        for log in &self.logs {
-            let findings = log.import.findings.iter().chain(&log.model_findings);
-            for finding in findings.filter(|finding| finding.level == Level::Problem) {
-                problems.push(format!("log `{}`, {}: {}", log.log, finding.channel, finding.message));
-            }
-        }
+        problems.extend(self.logs.iter().flat_map(LogSummary::problems));
         problems
     }
 

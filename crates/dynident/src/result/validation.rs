@@ -19,4 +19,8 @@ pub struct ValidationFile {
     pub validation: Vec<LogValidation>,
     /// What the importer found.
     pub logs: Vec<LogSummary>,
+    /// Everything that speaks against the figures, a sentence each: logs that the model was fitted to, problems of the
+    /// logs. Where there are any, the command exits with status 1.
+    #[serde(default)]
+    pub problems: Vec<String>,
 }

@@ -3,23 +3,36 @@
 use super::Study;
 use super::log_source::StudyLogSource;
 use crate::error::StudyError;
-use dynident_identification::Role;
+use dynident_identification::{Recording, Role, Samples};
 use dynident_recording::LogFormat;
+use dynident_recording::log::shared_samples;
 
 impl Study {
     /// No sample is both fitted to and tested on: two logs of different roles are not the same file (nor copies of one)
-    /// with rows in common. `sources` are where their samples are.
+    /// with rows in common, nor is one the other's samples saved once more. `sources` are where their samples are,
+    /// `recordings` the same as logs.
     ///
     /// # Errors
-    /// [`StudyError::Overlap`] with the names of both logs.
-    pub(crate) fn check_overlap(&self, sources: &[StudyLogSource]) -> Result<(), StudyError> {
+    /// [`StudyError::Overlap`] and [`StudyError::SameSamples`] with the names of both logs.
+    pub(crate) fn check_overlap(&self, sources: &[StudyLogSource], recordings: &[Recording]) -> Result<(), StudyError> {
         for held_out in self.logs_of_role(Role::Validate) {
             for training in self.logs_of_role(Role::Identify) {
-                if may_share_rows(&self.format_of(training), &self.format_of(held_out))
-                    && sources[training].has_content_of(&sources[held_out])
-                {
-                    let [training, held_out] = [training, held_out].map(|index| self.log_name(index));
+                let names = || [training, held_out].map(|index| self.log_name(index));
+                let is_same_file = sources[training].has_content_of(&sources[held_out]);
+                if is_same_file && may_share_rows(&self.format_of(training), &self.format_of(held_out)) {
+                    let [training, held_out] = names();
                     return Err(StudyError::Overlap { training, held_out });
+                }
+                let logs = [training, held_out].map(|index| &recordings[index].samples);
+                let [Samples::Log(a), Samples::Log(b)] = logs else { continue };
+                if is_same_file {
+                    continue;
+                }
+                // A log that cannot be read is left to its reader.
+                if let Ok(Some(shared)) = shared_samples(a, b) {
+                    let [training, held_out] = names();
+                    let (training_row, held_out_row) = (shared.row, shared.other_row);
+                    return Err(StudyError::SameSamples { training, training_row, held_out, held_out_row });
                 }
             }
         }

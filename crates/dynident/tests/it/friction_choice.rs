@@ -1,8 +1,11 @@
 //! Friction that is known is put into the logs of a two-joint arm: cross-validation must find which it was.
 use crate::common::{Job, Random};
 use dynident::dynamics::{Workspace, inverse_dynamics};
+use dynident::identification::friction::chosen_model;
+use dynident::identification::{Execution, Identification, identify};
 use dynident::model::load_robot;
 use dynident::result::JointFrictionResult;
+use dynident::Folders;
 use dynident::study::FrictionTerm;
 use dynident::{IdentificationOutcome, validate};
 use std::fmt::Write;
@@ -228,4 +231,41 @@ fn bars_hold_what_is_unknown_of_the_constants() {
     // Of 20 intervals that hold 95 % of the time fewer than 16 do once in 400 times, of 40 fewer than 34 once in 300.
     let share = |held: &[bool]| held.iter().filter(|held| **held).count() as f64 / held.len() as f64;
     assert!(share(&constants) >= 0.8 && share(&parameters) >= 0.85, "{} {}", share(&constants), share(&parameters));
+}
+
+/// A fit to logs whose friction was chosen before, by the same logs, has the bars of the fit that chose it: what is
+/// unknown of the constants is in both.
+#[test]
+fn bars_hold_what_is_unknown_of_constants_that_were_chosen_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = arm(folder.path());
+    write_log(&folder.path().join("a.csv"), &arm, 2000, 1.0, 0.8, 3);
+    write_log(&folder.path().join("b.csv"), &arm, 500, 1.0, 0.8, 99);
+    let job = job(folder.path(), "");
+    let robot = job.robot();
+    let mut task = job.study.task(&job.path, &robot, &Folders::new(&job.study, &job.path, None)).unwrap();
+    let chosen = identify(&task, Execution::default()).unwrap();
+    let joints = &chosen.training.friction_choice;
+    assert!(joints.iter().all(|joint| !joint.constants.is_empty()), "{joints:?}");
+
+    task.robot = chosen_model(&task.robot, joints).unwrap();
+    task.settings.friction.clear();
+    task.settings.motion = chosen.motion.clone();
+    let without = identify(&task, Execution::default()).unwrap();
+    task.settings.friction_before.clone_from(joints);
+    let with = identify(&task, Execution::default()).unwrap();
+    let bar = |found: &Identification, symbol: &str| {
+        let column = found.training.problem.columns().iter().position(|own| own == symbol).unwrap();
+        found.estimate().covariance[(column, column)].sqrt()
+    };
+    let dry: Vec<String> = with.training.problem.columns().iter().filter(|own| own.starts_with("fc")).cloned().collect();
+    assert!(dry.len() >= 2, "{:?}", with.training.problem.columns());
+    for symbol in &dry {
+        let [of_chosen, with, without] = [&chosen, &with, &without].map(|found| bar(found, symbol));
+        // The lag and the last step of the constants differ a little between the two.
+        assert!((with / of_chosen - 1.0).abs() < 0.15, "{symbol}: {with} with, {of_chosen} where it was chosen");
+        assert!(without < with, "{symbol}: {without} without, {with} with");
+    }
+    let narrowed = dry.iter().filter(|symbol| bar(&without, symbol) < 0.7 * bar(&with, symbol)).count();
+    assert!(narrowed > 0, "no bar hangs on the constants");
 }

@@ -10,7 +10,7 @@ use dynident_identification::diagnosis::{
     WrongMass,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
-use dynident_model::{Model, audit::audit};
+use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
 
@@ -21,6 +21,10 @@ const MOST_LEFT_OF_IT: f64 = 0.75;
 /// Share of all torque that is left where even the best reading explains nothing. Of a slow pendulum's noisy log a
 /// right study leaves 0.81 here.
 const NOTHING_EXPLAINED: f64 = 0.92;
+
+/// Times the least factor of a joint's torque that the largest may be where they are one unit, or the currents of
+/// drives: motor constants times gear ratios of an arm lie within five of each other.
+const MOST_SPREAD: f64 = 10.0;
 
 /// A finding under way: a sentence without its evidence.
 fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
@@ -135,7 +139,11 @@ fn torque_unit(
     let factors = factors.collect::<Vec<_>>().join(", ");
     let common = fit.common_unit();
     // Where the description is absurd by itself it is not the torques' unit.
-    let absurd = audit(model).into_iter().find(|found| ["mass-absurd", "length-unit"].contains(&found.check));
+    let audited = audit(model);
+    let of_inertia = |found: &&AuditFinding| ["inertia-too-small", "inertia-too-large"].contains(&found.check);
+    let most_have_it = 2 * audited.iter().filter(of_inertia).count() > model.bodies().len();
+    let absurd = audited.iter().find(|found| ["mass-absurd", "length-unit"].contains(&found.check));
+    let absurd = absurd.or_else(|| audited.iter().find(of_inertia).filter(|_| most_have_it));
     if let Some(absurd) = absurd {
         return finding(
             "description",
@@ -143,6 +151,20 @@ fn torque_unit(
             format!(
                 "its bodies would need other torques than the log has, times {factors}: `dynident inspect` says more; where the \
                  description is right the torque is not in Nm (N)"
+            ),
+        );
+    }
+    let scales = || far.iter().filter_map(|&joint| fit.scale[joint]);
+    let (least, most) = (scales().fold(f64::INFINITY, f64::min), scales().fold(0.0, f64::max));
+    if common.is_none() && most > MOST_SPREAD * least {
+        return finding(
+            "description",
+            "the description's masses are not this robot's, or the torques of some joints are in another unit"
+                .to_owned(),
+            format!(
+                "its bodies, friction aside, would need other torques than the log has, times {factors}: too far apart for one unit \
+                 or for the currents of drives; compare the masses of the bodies beyond these joints with the maker's data \
+                 (`dynident inspect`), and the units of their columns"
             ),
         );
     }

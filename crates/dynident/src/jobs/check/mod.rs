@@ -10,12 +10,16 @@ use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::{IdentificationError, IdentificationSettings, examine_study};
+use dynident_model::{AuditFinding, AuditLevel, audit};
 use dynident_recording::{ImportReport, Level};
 use findings::{currents_without_scale, study_check};
 use std::path::Path;
 
 /// Equations for each parameter below which a fit proves nothing.
 const EQUATIONS_PER_PARAMETER: usize = 3;
+
+/// Checks of the audit that tell of numbers which no body has, beside its problems.
+const NO_BODY: [&str; 3] = ["placeholder", "inertia-too-small", "inertia-too-large"];
 
 /// Examines a study against its robot and its logs: channels, clock and samples of every log, and which reading of the
 /// training logs a robot that can exist explains best. Nothing is written.
@@ -29,7 +33,8 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     let in_study = Error::identification::<IdentificationError>(study_path);
     let settings = study.settings(study_path, &robot)?;
     let task = study.task_with(settings, &robot, &folders)?;
-    study.check_overlap(&study.log_sources(&folders)?).map_err(Error::study(study_path))?;
+    let sources = study.log_sources(&folders)?;
+    study.check_overlap(&sources, &task.recordings).map_err(Error::study(study_path))?;
     let examined = examine_study(&task, options.execution()).map_err(in_study)?;
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
@@ -39,10 +44,11 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
     }
-    // A dead channel makes every description look like that of another robot.
+    // A dead channel makes every description look like that of another robot, and strays every torque that needs it.
     if check.findings.iter().any(|finding| finding.kind == "log" && finding.level == Level::Problem) {
-        check.findings.retain(|finding| finding.kind != "description");
+        check.findings.retain(|finding| !["description", "torque"].contains(&&finding.kind[..]));
     }
+    check.findings.extend(impossible_bodies(&robot));
     if examined.rows < EQUATIONS_PER_PARAMETER * examined.parameters {
         check.findings.push(CheckFinding {
             level: Level::Problem,
@@ -58,6 +64,32 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     }
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
+}
+
+/// Bodies of the description that cannot be, as one warning: no fit of base parameters suffers, but a body that
+/// no base parameter tells of stays as the description has it.
+fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
+    let doubtful: Vec<AuditFinding> = audit(&robot.robot.model)
+        .into_iter()
+        .filter(|found| found.level == AuditLevel::Problem || NO_BODY.contains(&found.check))
+        .collect();
+    let first = doubtful.first()?;
+    let more = match doubtful.len() {
+        1 => String::new(),
+        all => format!(" and {} more like it", all - 1),
+    };
+    Some(CheckFinding {
+        level: Level::Warning,
+        kind: "description".to_owned(),
+        what: format!("{} of the description: {}{more}", first.place, first.message),
+        evidence: format!(
+            "`dynident inspect {}` lists all, and with --fix it corrects those that one slip explains; what no log tells stays \
+             as the description has it",
+            robot.robot.path.display()
+        ),
+        write: Vec::new(),
+        or: Vec::new(),
+    })
 }
 
 /// A diagnosis as findings, with what the study alone says of units.

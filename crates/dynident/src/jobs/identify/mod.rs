@@ -121,7 +121,7 @@ fn identified(
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
-    study.check_overlap(&sources).map_err(Error::study(study_path))?;
+    study.check_overlap(&sources, &task.recordings).map_err(Error::study(study_path))?;
     let mut read = vec![("robot", study.robot_input(&robot))];
     read.extend(study.table_inputs(&folders));
     read.extend(sources.into_iter().map(|source| ("log", StudyInput::from(source))));

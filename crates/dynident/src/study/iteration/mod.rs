@@ -257,6 +257,7 @@ impl IterationSection {
                 set_aside_near_rest: !self.literal,
                 estimation,
                 friction,
+                friction_before: Vec::new(),
                 consistency: consistency.filter(|_| !self.literal),
                 payloads: study.payloads(),
                 run_offsets,

@@ -4,6 +4,7 @@
 mod of_one_column;
 mod of_one_log;
 mod of_other_moments;
+mod of_saved_again;
 mod of_spoilt_samples;
 
 use crate::common::{Job, Motion, Random, Truth, header, recordings, repository, write_log};

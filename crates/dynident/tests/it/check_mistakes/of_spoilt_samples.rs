@@ -159,3 +159,100 @@ fn one_wrong_mass_is_no_unit_of_torque() {
     assert!(named.level == Level::Warning && named.sentence().contains("forearm_link"), "{}", named.sentence());
     assert!(JOINTS.iter().all(|joint| !named.sentence().contains(joint)) && named.write.is_empty());
 }
+
+/// Hundredths of seconds, the gain of one strong joint, and the gear of a harmonic drive are named with their numbers.
+#[test]
+fn numbers_between_usual_units_are_found() {
+    all_are_named(&[
+        Case {
+            name: "hundredths of seconds",
+            rows: |rows| each(rows, |row| row[0] *= 100.0),
+            study: SAME,
+            kind: "unit",
+            named: &["scale = 0.0100"],
+        },
+        Case {
+            name: "one torque ten times too large",
+            rows: |rows| each(rows, |row| row[9] *= 10.0),
+            study: SAME,
+            kind: "unit",
+            named: &["scale = [1.0, 1.0, 0.100", "scale = [1.0, 1.0, 0.09", "scale = [1.0, 1.0, 0.10"],
+        },
+        Case {
+            name: "a gear of 137",
+            rows: |rows| each(rows, |row| row[1..7].iter_mut().for_each(|q| *q *= 137.0)),
+            study: SAME,
+            kind: "unit",
+            // 1/137 within four per cent.
+            named: &[
+                "scale = 0.0070",
+                "scale = 0.0071",
+                "scale = 0.0072",
+                "scale = 0.0073",
+                "scale = 0.0074",
+                "scale = 0.0075",
+            ],
+        },
+    ]);
+}
+
+/// Rows in no order of time are said to be; positions and torques that a recorder repeats are a warning.
+#[test]
+fn rows_out_of_order_and_rows_that_repeat_are_told() {
+    let (header, rows) = read("train.csv");
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let text = text
+        .replace("../robots/ur10.urdf", &repository("robots/ur10.urdf").display().to_string())
+        .replace("ur10_simulated/", "");
+    let path = folder.path().join("study.toml");
+    std::fs::write(&path, text).unwrap();
+    let write = |rows: &[Row]| {
+        let lines = rows.iter().map(|row| row.map(|value| value.to_string()).join(","));
+        let text = [header.clone()].into_iter().chain(lines).collect::<Vec<_>>().join("\n");
+        std::fs::write(folder.path().join("train.csv"), text).unwrap();
+    };
+    std::fs::copy(repository("examples/ur10_simulated/test.csv"), folder.path().join("test.csv")).unwrap();
+    let options = RunOptions { data: None, threads: 2, progress: &Silent };
+    // Two of five steps go back.
+    let shuffled: Vec<Row> = (0..rows.len()).map(|k| rows[k * 1009 % rows.len()]).collect();
+    write(&shuffled);
+    let study = Study::load(&path).unwrap();
+    let refused = dynident::check(&study, &path, &options).unwrap_err().to_string();
+    assert!(refused.contains("no order of time"), "{refused}");
+
+    let held: Vec<Row> = (0..rows.len())
+        .map(|k| {
+            let mut row = rows[k];
+            row[1..7].copy_from_slice(&rows[k / 5 * 5][1..7]);
+            row
+        })
+        .collect();
+    write(&held);
+    let check = dynident::check(&study, &path, &options).unwrap().check;
+    let told = check.findings.iter().find(|finding| finding.evidence.contains("every 5th row"));
+    assert!(told.is_some_and(|finding| finding.level == Level::Warning), "{:?}", check.findings);
+}
+
+/// A body that cannot be stays as described where no log tells: that is said, and is no mistake of the logs.
+#[test]
+fn bodies_that_cannot_be_are_a_warning() {
+    let urdf = std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap();
+    let no_inertia: String = urdf
+        .split_inclusive('\n')
+        .map(|line| if line.contains("<inertia ") { INERTIA_OF_NOTHING.to_owned() } else { line.to_owned() })
+        .collect();
+    assert_ne!(no_inertia, urdf);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("robot.urdf"), no_inertia).unwrap();
+    let text = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let data = repository("examples").display().to_string();
+    let text = text
+        .replace("../robots/ur10.urdf", "robot.urdf")
+        .replace("ur10_simulated/", &format!("{data}/ur10_simulated/"));
+    let check = check_text(folder.path(), &text);
+    assert!(problems(&check).is_empty(), "{:?}", problems(&check));
+    assert!(check.findings.iter().any(|finding| finding.kind == "description"), "{:?}", check.findings);
+}
+
+const INERTIA_OF_NOTHING: &str = "<inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>\n";

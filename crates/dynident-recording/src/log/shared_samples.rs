@@ -1,0 +1,203 @@
+//! Whether one log holds samples of another, though its file is another: saved again with fewer digits, a piece with
+//! its time counted from zero, every second row.
+//!
+//! No two runs of a robot give the same numbers: noise differs. So rows that agree in every position and torque to
+//! within the resolution of the coarser log, one after the other, are the same samples.
+
+use super::{Log, LogReader, RawBlock};
+use crate::error::RecordingError;
+
+/// Rows of a log up to which its samples are compared; of longer logs nothing is said.
+const MOST_ROWS: usize = 400_000;
+/// Places of the second log that are looked for in the first.
+const PLACES: usize = 12;
+/// Rows that have to agree, one after the other, and the least that do where a log has no more.
+const ROWS: usize = 100;
+const LEAST_ROWS: usize = 20;
+/// Rows of one log to a row of the other.
+const STRIDES: [usize; 5] = [1, 2, 4, 5, 10];
+/// Half a step of the coarser log, and a little for what rounding does to the numbers that are rounded.
+const HALF_STEP: f64 = 0.51;
+/// Share of a channel's range within which numbers of single precision agree.
+const SINGLE_PRECISION: f64 = 1e-6;
+
+/// Two rows, of one log and of another, from which on both hold the same samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SharedSamples {
+    /// 0-based data row in the first log's file.
+    pub row: u64,
+    /// The same of the other log.
+    pub other_row: u64,
+}
+
+/// Where `log` and `other` hold the same samples; `None` where they do not, where one of them is too long to say (more
+/// than 400,000 rows), and of robots with other joints. Joints at rest are no evidence: a held position repeats.
+///
+/// # Errors
+/// Logs that cannot be read.
+pub fn shared_samples(log: &Log, other: &Log) -> Result<Option<SharedSamples>, RecordingError> {
+    let is_long = |log: &Log| log.source().estimated_rows().is_some_and(|rows| rows > 2 * MOST_ROWS as u64);
+    if log.joints != other.joints || is_long(log) || is_long(other) {
+        return Ok(None);
+    }
+    let (Some(a), Some(b)) = (Channels::read(log)?, Channels::read(other)?) else { return Ok(None) };
+    Ok(a.shared_with(&b).map(|[row, other]| SharedSamples { row: a.row[row], other_row: b.row[other] }))
+}
+
+/// Positions, then torques, of all joints.
+struct Channels {
+    row: Vec<u64>,
+    values: Vec<Vec<f64>>,
+    joints: usize,
+}
+
+impl Channels {
+    /// `None` where there are too many rows.
+    fn read(log: &Log) -> Result<Option<Self>, RecordingError> {
+        let joints = log.joints.len();
+        let mut all = Self { row: Vec::new(), values: vec![Vec::new(); 2 * joints], joints };
+        let (mut reader, mut block) = (LogReader::open(log)?, RawBlock::default());
+        while reader.next_block(&mut block)? {
+            all.row.extend_from_slice(&block.row);
+            for (to, from) in all.values.iter_mut().zip(block.q.iter().chain(&block.tau)) {
+                to.extend_from_slice(from);
+            }
+            if all.row.len() > MOST_ROWS {
+                return Ok(None);
+            }
+        }
+        Ok(Some(all))
+    }
+
+    /// A row of each log from which on both hold the same.
+    fn shared_with(&self, other: &Self) -> Option<[usize; 2]> {
+        let tolerance: Vec<f64> = self.values.iter().zip(&other.values).map(|(a, b)| agreement(a, b)).collect();
+        let places = (0..PLACES).map(|place| place * other.row.len() / PLACES);
+        let of_place = |from: usize| {
+            // From where it moves.
+            let moving =
+                (from..other.row.len().saturating_sub(LEAST_ROWS)).find(|&row| other.moves(row, &tolerance))?;
+            let agrees = |row: usize, at: usize| {
+                let mut channels = self.values.iter().zip(&other.values).zip(&tolerance);
+                channels.all(|((a, b), tolerance)| (a[row] - b[at]).abs() <= *tolerance)
+            };
+            let follows = |row: usize, [step, other_step]: [usize; 2]| {
+                let rows = (self.row.len() - row).div_ceil(step);
+                let rows = rows.min((other.row.len() - moving).div_ceil(other_step)).min(ROWS);
+                rows >= LEAST_ROWS && (1..rows).all(|k| agrees(row + k * step, moving + k * other_step))
+            };
+            let steps = || STRIDES.into_iter().flat_map(|stride| [[stride, 1], [1, stride]]);
+            let found =
+                (0..self.row.len()).find(|&row| agrees(row, moving) && steps().any(|steps| follows(row, steps)));
+            found.map(|row| [row, moving])
+        };
+        places.filter_map(of_place).next()
+    }
+
+    /// Whether some joint moves on from a row by far more than what counts as equal.
+    fn moves(&self, row: usize, tolerance: &[f64]) -> bool {
+        let to = row + LEAST_ROWS;
+        (0..self.joints).any(|joint| {
+            let q = &self.values[joint][row..=to];
+            let [low, high] = range(q);
+            high - low > 10.0 * tolerance[joint]
+        })
+    }
+}
+
+/// By how much numbers of the same sample may differ: half a step of the coarser log.
+fn agreement(a: &[f64], b: &[f64]) -> f64 {
+    let [low, high] = range(a);
+    HALF_STEP * step(a).max(step(b)) + SINGLE_PRECISION * (high - low)
+}
+
+/// The smallest step from one row to the next: what a channel's last digit is worth, or less where it has more digits
+/// than its noise needs.
+fn step(values: &[f64]) -> f64 {
+    let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0);
+    let least = steps.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}
+
+fn range(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::JointSamples;
+
+    /// Two joints that swing; `run` gives another noise.
+    fn swing(run: u64, rows: usize) -> [Vec<Vec<f64>>; 2] {
+        let mut state = run.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut noise = || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let mut q = vec![Vec::new(); 2];
+        let mut tau = vec![Vec::new(); 2];
+        for row in 0..rows {
+            let t = row as f64 * 0.01;
+            for joint in 0..2 {
+                let phase = t * (1.0 + 0.7 * joint as f64);
+                q[joint].push(phase.sin() + 1e-4 * noise());
+                tau[joint].push(5.0 * phase.cos() + 0.05 * noise());
+            }
+        }
+        [q, tau]
+    }
+
+    fn log([q, tau]: [Vec<Vec<f64>>; 2]) -> Log {
+        JointSamples::at_rate(100.0, q, tau).into_log("a test", &["a".to_owned(), "b".to_owned()]).unwrap()
+    }
+
+    fn each(samples: &[Vec<Vec<f64>>; 2], change: impl Fn(&[f64]) -> Vec<f64>) -> [Vec<Vec<f64>>; 2] {
+        samples.clone().map(|joints| joints.iter().map(|values| change(values)).collect())
+    }
+
+    #[test]
+    fn the_same_samples_are_found_however_they_were_saved() {
+        let samples = swing(1, 1500);
+        let rounded =
+            |digits: f64| move |values: &[f64]| values.iter().map(|v| (v * digits).round() / digits).collect();
+        let saved = [
+            ("as they are", each(&samples, <[f64]>::to_vec)),
+            ("single precision", each(&samples, |v| v.iter().map(|v| f64::from(*v as f32)).collect())),
+            ("three digits", each(&samples, rounded(1e3))),
+            ("a piece", each(&samples, |v| v[400..900].to_vec())),
+            ("a piece with three digits", each(&samples, |v| rounded(1e3)(&v[437..800]))),
+            ("every second row", each(&samples, |v| v.iter().step_by(2).copied().collect())),
+            ("half of it, behind another run", {
+                let other = swing(2, 700);
+                [0, 1].map(|of| {
+                    let joint = |joint: usize| [&other[of][joint][..], &samples[of][joint][..700]].concat();
+                    (0..2).map(joint).collect()
+                })
+            }),
+        ];
+        let training = log(samples);
+        for (name, samples) in saved {
+            let held_out = log(samples);
+            assert!(shared_samples(&training, &held_out).unwrap().is_some(), "{name}");
+            assert!(shared_samples(&held_out, &training).unwrap().is_some(), "{name}, the other way round");
+        }
+    }
+
+    #[test]
+    fn another_run_of_the_same_motion_is_another() {
+        let rounded = |values: &[f64]| values.iter().map(|v| (v * 1e2).round() / 1e2).collect();
+        let coarse = |run: u64| log(each(&swing(run, 1500), rounded));
+        assert_eq!(shared_samples(&log(swing(1, 1500)), &log(swing(2, 1500))).unwrap(), None);
+        // Steps as large as the noise.
+        assert_eq!(shared_samples(&coarse(1), &coarse(2)).unwrap(), None);
+    }
+
+    #[test]
+    fn a_robot_at_rest_repeats_itself() {
+        let rest = |rows: usize| log([vec![vec![0.3; rows], vec![0.1; rows]], vec![vec![1.0; rows], vec![2.0; rows]]]);
+        assert_eq!(shared_samples(&rest(500), &rest(300)).unwrap(), None);
+    }
+}
