@@ -15,6 +15,7 @@ mod problem;
 mod restarts;
 mod restoration;
 mod rounds;
+mod shrunk;
 mod single_change;
 mod way_inside;
 
@@ -34,6 +35,7 @@ use restarts::Neighbourhood;
 use restoration::restored;
 use rounds::{Candidate, Rounds, Worth};
 use serde::{Deserialize, Serialize};
+use shrunk::shrunk;
 pub use single_change::single_changes;
 use std::time::Instant;
 use way_inside::way_inside;
@@ -43,14 +45,14 @@ use way_inside::way_inside;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 8, for condition numbers 3, with 24 or more numbers a joint 2; fewer
+    /// Random starts of the first round. Default 8, for condition numbers 4, with 24 or more numbers a joint 2; fewer
     /// for a robot so large that the search would else take more than about a minute of a core: unless one of this,
     /// `rounds`, `evaluations_per_start` and `time_limit_s` is given, it gets less of everything.
     pub starts: Option<usize>,
     /// Rounds of restarts around the best, of half as many starts and two at least. Default 1, for condition numbers
     /// 36, with 24 or more numbers a joint 8.
     pub rounds: Option<usize>,
-    /// Evaluations of one start or restart at most. Default 1,000, for condition numbers 1,000 and 500, with 24 or more
+    /// Evaluations of one start or restart at most. Default 1,000, for condition numbers 600 and 500, with 24 or more
     /// numbers a joint 2,000.
     pub evaluations_per_start: Option<usize>,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
@@ -166,17 +168,27 @@ pub fn design(
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<Design, OptimiserError> {
     let begun = Instant::now();
+    timed(task, settings, watch, &|| begun.elapsed().as_secs_f64())
+}
+
+/// [`design()`] with the seconds since its beginning from a clock of the caller's.
+fn timed(
+    task: &DesignTask<'_>,
+    settings: &DesignSettings,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+    elapsed_s: &(dyn Fn() -> f64 + Sync),
+) -> Result<Design, OptimiserError> {
     let last = *task.criteria.last().ok_or(OptimiserError::Start)?;
     // Searches end early enough that what was found can be polished and taken back inside the limits in time: what
     // keeps them already needs little of it.
-    let later = |share: f64| settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > share * limit);
+    let later = |share: f64| settings.time_limit_s.is_some_and(|limit| elapsed_s() > share * limit);
     let inside = AtomicBool::new(false);
     let evaluations = AtomicU64::new(0);
     // What the way back inside takes is known once some evaluations have been counted.
     let search_share = || match (settings.time_limit_s, evaluations.load(Ordering::Relaxed)) {
         _ if inside.load(Ordering::Relaxed) => SEARCH_SHARE_INSIDE,
         (Some(limit), done) if done > 0 => {
-            let each = begun.elapsed().as_secs_f64() * rayon::current_num_threads() as f64 / done as f64;
+            let each = elapsed_s() * rayon::current_num_threads() as f64 / done as f64;
             // On twice the samples.
             let back = 2.0 * (2 * LAST_EVALUATIONS) as f64 * each;
             (POLISH_SHARE - back / limit).clamp(SEARCH_SHARE, SEARCH_SHARE_INSIDE)
@@ -213,6 +225,7 @@ pub fn design(
         let name = if around.is_some() { "restart" } else { "search" };
         let watch = watch(name);
         let stop = |value, violation| watch(value, violation) || late();
+        let race_is_over = || later(RACE_SHARE * search_share());
         let each = if around.is_some() { effort.evaluations_per_restart } else { effort.evaluations_per_start };
         let starts =
             around.unwrap_or_else(|| (0..effort.starts).map(|_| random_starts.next(&mut random).into()).collect());
@@ -222,7 +235,7 @@ pub fn design(
             Some(score) if round >= task.criteria.len() => Worth::IfBelow(score),
             _ => Worth::Always,
         };
-        let found = rounds.run(criterion, &margins, &starts, each, worth, stop)?;
+        let found = rounds.run(criterion, &margins, &starts, each, worth, (stop, race_is_over))?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         // Scores of another criterion are no measure, but a descent that was cut short may lie far outside.
         let sharper = round < task.criteria.len() && !over();
@@ -244,7 +257,9 @@ pub fn design(
     let rounds = Rounds::new(task, &fine, logged.len(), true);
     let best = best.ok_or(OptimiserError::Start)?;
     let mut state = best.state.on_twice_the_samples(coarse.len());
-    let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
+    let (mut kept, mut values) = assess(task, criterion, state.x.clone(), &fine, &logged);
+    // What the last polish left, where it is outside.
+    let mut outside = None;
     let mut left = most_of_polishes(task, settings, fine.len());
     for _ in 0..POLISHES {
         // A search that was ended still comes back inside the limits: some tenths of a second.
@@ -259,11 +274,13 @@ pub fn design(
         state = found.best.state;
         // The last iterate, and the best that kept the limits on the samples.
         let (ended, worst) = assess(task, criterion, state.x.clone(), &fine, &logged);
-        let (polished, _) = assess(task, criterion, found.best.feasible, &fine, &logged);
+        let (polished, of_polished) = assess(task, criterion, found.best.feasible, &fine, &logged);
         let whole = ended.violation <= 0.0;
-        for candidate in [ended, polished] {
+        outside = (!whole).then(|| (ended.clone(), worst.clone()));
+        for (candidate, of) in [(ended, &worst), (polished, &of_polished)] {
             if candidate.better_than(&kept) {
                 kept = candidate;
+                values.clone_from(of);
             }
         }
         if whole || later(POLISH_SHARE) {
@@ -274,9 +291,18 @@ pub fn design(
             *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
-    // What still breaks a limit is taken back inside: a hair towards a motion that the search saw keep all, else by a
-    // search for the limits alone.
-    if kept.violation > 0.0 && !stopped.load(Ordering::Relaxed) {
+    // What still breaks a limit is taken back inside: made smaller, or a hair towards a motion that the search saw keep
+    // all, else by a search for the limits alone. The first two take some milliseconds and are done however the search
+    // ended.
+    let broken = (kept.violation > 0.0).then(|| (kept.clone(), values));
+    for (outside, worst) in outside.iter().chain(&broken) {
+        if let Some(smaller) = shrunk(task, criterion, (outside, worst), [&fine, &logged])
+            && smaller.better_than(&kept)
+        {
+            kept = smaller;
+        }
+    }
+    if kept.violation > 0.0 {
         let (inside, _) = assess(task, criterion, best.feasible, &fine, &logged);
         if let Some(between) = way_inside(task, criterion, &kept, &inside, [&fine, &logged]) {
             kept = between;
@@ -294,16 +320,19 @@ pub fn design(
         violation: kept.violation,
         parameters: kept.parameters,
         evaluations: evaluations.load(Ordering::Relaxed) as usize,
-        seconds: begun.elapsed().as_secs_f64(),
+        seconds: elapsed_s(),
     })
 }
 
 /// Shares of the time limit after which searches, polishes and the way back inside the limits end; the rest is for the
 /// check. A search whose best lies outside still ends in time for two short polishes, after the first share at least.
-const SEARCH_SHARE: f64 = 0.55;
+const SEARCH_SHARE: f64 = 0.7;
 const SEARCH_SHARE_INSIDE: f64 = 0.8;
 const POLISH_SHARE: f64 = 0.88;
 const RESTORATION_SHARE: f64 = 0.94;
+
+/// Share of the search's time after which the start that is ahead goes on alone.
+const RACE_SHARE: f64 = 0.55;
 
 /// Violation on the search's samples that a polish mends in some evaluations.
 const INSIDE: f64 = 1e-4;
