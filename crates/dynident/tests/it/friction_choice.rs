@@ -1,11 +1,11 @@
 //! Friction that is known is put into the logs of a two-joint arm: cross-validation must find which it was.
 use crate::common::{Job, Random};
+use dynident::Folders;
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::identification::friction::chosen_model;
 use dynident::identification::{Execution, Identification, identify};
 use dynident::model::load_robot;
 use dynident::result::JointFrictionResult;
-use dynident::Folders;
 use dynident::study::FrictionTerm;
 use dynident::{IdentificationOutcome, validate};
 use std::fmt::Write;
@@ -258,7 +258,14 @@ fn bars_hold_what_is_unknown_of_constants_that_were_chosen_before() {
         let column = found.training.problem.columns().iter().position(|own| own == symbol).unwrap();
         found.estimate().covariance[(column, column)].sqrt()
     };
-    let dry: Vec<String> = with.training.problem.columns().iter().filter(|own| own.starts_with("fc")).cloned().collect();
+    let dry: Vec<String> = with
+        .training
+        .problem
+        .columns()
+        .iter()
+        .filter(|own| own.starts_with("fc") || own.starts_with("fs"))
+        .cloned()
+        .collect();
     assert!(dry.len() >= 2, "{:?}", with.training.problem.columns());
     for symbol in &dry {
         let [of_chosen, with, without] = [&chosen, &with, &without].map(|found| bar(found, symbol));
