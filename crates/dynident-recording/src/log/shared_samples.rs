@@ -72,7 +72,7 @@ impl Channels {
     /// A row of each log from which on both hold the same.
     fn shared_with(&self, other: &Self) -> Option<[usize; 2]> {
         let tolerance: Vec<f64> = self.values.iter().zip(&other.values).map(|(a, b)| agreement(a, b)).collect();
-        let places = (0..PLACES).map(|place| place * other.row.len() / PLACES);
+        let mut places = (0..PLACES).map(|place| place * other.row.len() / PLACES);
         let of_place = |from: usize| {
             // From where it moves.
             let moving =
@@ -91,7 +91,7 @@ impl Channels {
                 (0..self.row.len()).find(|&row| agrees(row, moving) && steps().any(|steps| follows(row, steps)));
             found.map(|row| [row, moving])
         };
-        places.filter_map(of_place).next()
+        places.find_map(of_place)
     }
 
     /// Whether some joint moves on from a row by far more than what counts as equal.

@@ -39,7 +39,9 @@ fn training_rows_saved_again_are_no_test() {
     let (_, rows) = read("train.csv");
     let mut piece = rows[800..1600].to_vec();
     let start_s = piece[0][0];
-    piece.iter_mut().for_each(|row| row[0] -= start_s);
+    for row in &mut piece {
+        row[0] -= start_s;
+    }
     let thinned: Vec<Row> = rows.iter().step_by(2).copied().collect();
     for (name, held_out, digits) in
         [("fewer digits", rows.clone(), 4), ("a piece from zero on", piece, 9), ("every second row", thinned, 6)]
