@@ -33,7 +33,7 @@ pub use format::{
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
 pub use row_rules::RowRule;
-pub use shared_samples::{SharedSamples, shared_samples};
+pub use shared_samples::{LogSamples, SharedSamples};
 pub use source::{LogGroup, LogSource, LogTable};
 pub use units::{Quantity, si_factor, unit_names};
 

@@ -30,32 +30,26 @@ pub struct SharedSamples {
     pub other_row: u64,
 }
 
-/// Where `log` and `other` hold the same samples; `None` where they do not, where one of them is too long to say (more
-/// than 400,000 rows), and of robots with other joints. Joints at rest are no evidence: a held position repeats.
-///
-/// # Errors
-/// Logs that cannot be read.
-pub fn shared_samples(log: &Log, other: &Log) -> Result<Option<SharedSamples>, RecordingError> {
-    let is_long = |log: &Log| log.source().estimated_rows().is_some_and(|rows| rows > 2 * MOST_ROWS as u64);
-    if log.joints != other.joints || is_long(log) || is_long(other) {
-        return Ok(None);
-    }
-    let (Some(a), Some(b)) = (Channels::read(log)?, Channels::read(other)?) else { return Ok(None) };
-    Ok(a.shared_with(&b).map(|[row, other]| SharedSamples { row: a.row[row], other_row: b.row[other] }))
-}
-
-/// Positions, then torques, of all joints.
-struct Channels {
+/// Positions and torques of all rows of a log, for finding samples of another log among them.
+#[derive(Clone, Debug)]
+pub struct LogSamples {
     row: Vec<u64>,
+    /// Positions, then torques, of all joints.
     values: Vec<Vec<f64>>,
-    joints: usize,
+    joints: Vec<String>,
 }
 
-impl Channels {
-    /// `None` where there are too many rows.
-    fn read(log: &Log) -> Result<Option<Self>, RecordingError> {
-        let joints = log.joints.len();
-        let mut all = Self { row: Vec::new(), values: vec![Vec::new(); 2 * joints], joints };
+impl LogSamples {
+    /// Reads a log; `None` where it is too long to say (more than 400,000 rows).
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn read(log: &Log) -> Result<Option<Self>, RecordingError> {
+        if log.source().estimated_rows().is_some_and(|rows| rows > 2 * MOST_ROWS as u64) {
+            return Ok(None);
+        }
+        let values = vec![Vec::new(); 2 * log.joints.len()];
+        let mut all = Self { row: Vec::new(), values, joints: log.joints.clone() };
         let (mut reader, mut block) = (LogReader::open(log)?, RawBlock::default());
         while reader.next_block(&mut block)? {
             all.row.extend_from_slice(&block.row);
@@ -69,8 +63,15 @@ impl Channels {
         Ok(Some(all))
     }
 
+    /// Where both hold the same samples; `None` where they do not, and of robots with other joints. Joints at rest are
+    /// no evidence: a held position repeats.
+    pub fn shared_with(&self, other: &Self) -> Option<SharedSamples> {
+        let [row, other_row] = if self.joints == other.joints { self.rows_shared_with(other)? } else { return None };
+        Some(SharedSamples { row: self.row[row], other_row: other.row[other_row] })
+    }
+
     /// A row of each log from which on both hold the same.
-    fn shared_with(&self, other: &Self) -> Option<[usize; 2]> {
+    fn rows_shared_with(&self, other: &Self) -> Option<[usize; 2]> {
         let tolerance: Vec<f64> = self.values.iter().zip(&other.values).map(|(a, b)| agreement(a, b)).collect();
         let mut places = (0..PLACES).map(|place| place * other.row.len() / PLACES);
         let of_place = |from: usize| {
@@ -97,7 +98,7 @@ impl Channels {
     /// Whether some joint moves on from a row by far more than what counts as equal.
     fn moves(&self, row: usize, tolerance: &[f64]) -> bool {
         let to = row + LEAST_ROWS;
-        (0..self.joints).any(|joint| {
+        (0..self.joints.len()).any(|joint| {
             let q = &self.values[joint][row..=to];
             let [low, high] = range(q);
             high - low > 10.0 * tolerance[joint]
@@ -150,8 +151,9 @@ mod tests {
         [q, tau]
     }
 
-    fn log([q, tau]: [Vec<Vec<f64>>; 2]) -> Log {
-        JointSamples::at_rate(100.0, q, tau).into_log("a test", &["a".to_owned(), "b".to_owned()]).unwrap()
+    fn log([q, tau]: [Vec<Vec<f64>>; 2]) -> LogSamples {
+        let log = JointSamples::at_rate(100.0, q, tau).into_log("a test", &["a".to_owned(), "b".to_owned()]).unwrap();
+        LogSamples::read(&log).unwrap().unwrap()
     }
 
     fn each(samples: &[Vec<Vec<f64>>; 2], change: impl Fn(&[f64]) -> Vec<f64>) -> [Vec<Vec<f64>>; 2] {
@@ -181,8 +183,8 @@ mod tests {
         let training = log(samples);
         for (name, samples) in saved {
             let held_out = log(samples);
-            assert!(shared_samples(&training, &held_out).unwrap().is_some(), "{name}");
-            assert!(shared_samples(&held_out, &training).unwrap().is_some(), "{name}, the other way round");
+            assert!(training.shared_with(&held_out).is_some(), "{name}");
+            assert!(held_out.shared_with(&training).is_some(), "{name}, the other way round");
         }
     }
 
@@ -190,14 +192,14 @@ mod tests {
     fn another_run_of_the_same_motion_is_another() {
         let rounded = |values: &[f64]| values.iter().map(|v| (v * 1e2).round() / 1e2).collect();
         let coarse = |run: u64| log(each(&swing(run, 1500), rounded));
-        assert_eq!(shared_samples(&log(swing(1, 1500)), &log(swing(2, 1500))).unwrap(), None);
+        assert_eq!(log(swing(1, 1500)).shared_with(&log(swing(2, 1500))), None);
         // Steps as large as the noise.
-        assert_eq!(shared_samples(&coarse(1), &coarse(2)).unwrap(), None);
+        assert_eq!(coarse(1).shared_with(&coarse(2)), None);
     }
 
     #[test]
     fn a_robot_at_rest_repeats_itself() {
         let rest = |rows: usize| log([vec![vec![0.3; rows], vec![0.1; rows]], vec![vec![1.0; rows], vec![2.0; rows]]]);
-        assert_eq!(shared_samples(&rest(500), &rest(300)).unwrap(), None);
+        assert_eq!(rest(500).shared_with(&rest(300)), None);
     }
 }

@@ -5,7 +5,7 @@ use super::log_source::StudyLogSource;
 use crate::error::StudyError;
 use dynident_identification::{Recording, Role, Samples};
 use dynident_recording::LogFormat;
-use dynident_recording::log::shared_samples;
+use dynident_recording::log::LogSamples;
 
 impl Study {
     /// No sample is both fitted to and tested on: two logs of different roles are not the same file (nor copies of one)
@@ -15,22 +15,38 @@ impl Study {
     /// # Errors
     /// [`StudyError::Overlap`] and [`StudyError::SameSamples`] with the names of both logs.
     pub(crate) fn check_overlap(&self, sources: &[StudyLogSource], recordings: &[Recording]) -> Result<(), StudyError> {
-        for held_out in self.logs_of_role(Role::Validate) {
-            for training in self.logs_of_role(Role::Identify) {
-                let names = || [training, held_out].map(|index| self.log_name(index));
+        let held_out_logs = self.logs_of_role(Role::Validate);
+        let training_logs = self.logs_of_role(Role::Identify);
+        let names = |logs: [usize; 2]| logs.map(|index| self.log_name(index));
+        // Pairs of which only the samples can tell.
+        let mut others = Vec::new();
+        for &held_out in &held_out_logs {
+            for &training in &training_logs {
                 let is_same_file = sources[training].has_content_of(&sources[held_out]);
                 if is_same_file && may_share_rows(&self.format_of(training), &self.format_of(held_out)) {
-                    let [training, held_out] = names();
+                    let [training, held_out] = names([training, held_out]);
                     return Err(StudyError::Overlap { training, held_out });
                 }
-                let logs = [training, held_out].map(|index| &recordings[index].samples);
-                let [Samples::Log(a), Samples::Log(b)] = logs else { continue };
-                if is_same_file {
-                    continue;
-                }
-                // A log that cannot be read is left to its reader.
-                if let Ok(Some(shared)) = shared_samples(a, b) {
-                    let [training, held_out] = names();
+                others.extend((!is_same_file).then_some([training, held_out]));
+            }
+        }
+
+        // Each log is read once. One that cannot be read is left to its reader.
+        let read = |index: usize| match &recordings[index].samples {
+            Samples::Log(log) => LogSamples::read(log).ok().flatten(),
+            Samples::Motion(_) => None,
+        };
+        let is_of = |index: usize| others.iter().any(|pair| pair.contains(&index));
+        let tests: Vec<(usize, LogSamples)> = held_out_logs
+            .iter()
+            .filter(|&&index| is_of(index))
+            .filter_map(|&index| Some((index, read(index)?)))
+            .collect();
+        for &training in training_logs.iter().filter(|&&index| !tests.is_empty() && is_of(index)) {
+            let Some(fitted) = read(training) else { continue };
+            for (held_out, tested) in tests.iter().filter(|(held_out, _)| others.contains(&[training, *held_out])) {
+                if let Some(shared) = fitted.shared_with(tested) {
+                    let [training, held_out] = names([training, *held_out]);
                     let (training_row, held_out_row) = (shared.row, shared.other_row);
                     return Err(StudyError::SameSamples { training, training_row, held_out, held_out_row });
                 }
