@@ -8,7 +8,6 @@ use crate::iteration::Iteration;
 use crate::record::RunRecord;
 use crate::run_logs::{RunLog, identification_settings, recordings as recordings_of};
 use crate::store::IterationStore;
-use dynident_identification::friction::JointFriction;
 use dynident_identification::{IdentificationTask, OffsetChoice, Role};
 
 impl Iteration {
@@ -63,10 +62,4 @@ impl Iteration {
         }
         Ok(Some(identification))
     }
-}
-
-/// The friction that a run chose for itself and those after it; empty where it was stated.
-pub fn friction_chosen(records: &[RunRecord]) -> Vec<JointFriction> {
-    let choices = records.iter().filter_map(|record| Some(&record.estimate.as_ref()?.friction));
-    choices.into_iter().find(|choice| !choice.is_empty()).cloned().unwrap_or_default()
 }

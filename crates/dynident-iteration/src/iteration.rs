@@ -3,7 +3,7 @@
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
-use crate::final_fit::friction_chosen;
+use crate::friction_chosen::friction_chosen;
 use crate::held_out_motion::HeldOutMotion;
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
