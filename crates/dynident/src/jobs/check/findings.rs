@@ -140,7 +140,7 @@ fn torque_unit(
     let common = fit.common_unit();
     // Where the description is absurd by itself it is not the torques' unit.
     let audited = audit(model);
-    let of_inertia = |found: &&AuditFinding| ["inertia-too-small", "inertia-too-large"].contains(&found.check);
+    let of_inertia = |found: &&AuditFinding| found.check == "inertia-too-large";
     let most_have_it = 2 * audited.iter().filter(of_inertia).count() > model.bodies().len();
     let absurd = audited.iter().find(|found| ["mass-absurd", "length-unit"].contains(&found.check));
     let absurd = absurd.or_else(|| audited.iter().find(of_inertia).filter(|_| most_have_it));

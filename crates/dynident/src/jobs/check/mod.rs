@@ -10,7 +10,7 @@ use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::{IdentificationError, IdentificationSettings, examine_study};
-use dynident_model::{AuditFinding, AuditLevel, audit};
+use dynident_model::{AuditFinding, InertialParameters, Mat3, audit};
 use dynident_recording::{ImportReport, Level};
 use findings::{currents_without_scale, study_check};
 use std::path::Path;
@@ -18,8 +18,10 @@ use std::path::Path;
 /// Equations for each parameter below which a fit proves nothing.
 const EQUATIONS_PER_PARAMETER: usize = 3;
 
-/// Checks of the audit that tell of numbers which no body has, beside its problems.
-const NO_BODY: [&str; 3] = ["placeholder", "inertia-too-small", "inertia-too-large"];
+/// Checks of the audit that tell of bodies which cannot be, whatever the robot's size.
+const NO_BODY: [&str; 4] = ["mass-not-positive", "inertia-not-positive", "triangle-inequality", "inertia-too-large"];
+/// Inertia about the centre of mass, as a share of mass times the arm's length squared, that is none.
+const NO_INERTIA: f64 = 1e-12;
 
 /// Examines a study against its robot and its logs: channels, clock and samples of every log, and which reading of the
 /// training logs a robot that can exist explains best. Nothing is written.
@@ -66,13 +68,15 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
 }
 
-/// Bodies of the description that cannot be, as one warning: no fit of base parameters suffers, but a body that
-/// no base parameter tells of stays as the description has it.
+/// Bodies of the description that cannot be, as one warning: no fit of base parameters suffers, but a body that no
+/// base parameter tells of stays as the description has it.
 fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
-    let doubtful: Vec<AuditFinding> = audit(&robot.robot.model)
-        .into_iter()
-        .filter(|found| found.level == AuditLevel::Problem || NO_BODY.contains(&found.check))
-        .collect();
+    let model = &robot.robot.model;
+    let of_audit = audit(model).into_iter().filter(|found| NO_BODY.contains(&found.check));
+    let mut doubtful: Vec<String> =
+        of_audit.map(|AuditFinding { place, message, .. }| format!("{place} of the description: {message}")).collect();
+    let points = model.bodies().iter().filter(|body| body.prior().is_some_and(|body| is_a_point(body, model.arm_m())));
+    doubtful.extend(points.map(|body| format!("body {} of the description: has a mass and no inertia", body.name())));
     let first = doubtful.first()?;
     let more = match doubtful.len() {
         1 => String::new(),
@@ -81,7 +85,7 @@ fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
     Some(CheckFinding {
         level: Level::Warning,
         kind: "description".to_owned(),
-        what: format!("{} of the description: {}{more}", first.place, first.message),
+        what: format!("{first}{more}"),
         evidence: format!(
             "`dynident inspect {}` lists all, and with --fix it corrects those that one slip explains; what no log tells stays \
              as the description has it",
@@ -90,6 +94,13 @@ fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
         write: Vec::new(),
         or: Vec::new(),
     })
+}
+
+/// Whether a body has a mass and no inertia about its centre of mass, on an arm of this length.
+fn is_a_point(body: &InertialParameters, arm_m: f64) -> bool {
+    let trace = |inertia: Mat3| (0..3).map(|k| inertia.0[k][k].abs()).sum::<f64>();
+    let none = NO_INERTIA * body.mass_kg() * arm_m.powi(2);
+    body.mass_kg() > 0.0 && body.inertia_at_com().is_some_and(|inertia| trace(inertia) <= none)
 }
 
 /// A diagnosis as findings, with what the study alone says of units.
