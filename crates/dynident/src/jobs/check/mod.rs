@@ -75,7 +75,7 @@ fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
     let of_audit = audit(model).into_iter().filter(|found| NO_BODY.contains(&found.check));
     let mut doubtful: Vec<String> =
         of_audit.map(|AuditFinding { place, message, .. }| format!("{place} of the description: {message}")).collect();
-    let points = model.bodies().iter().filter(|body| body.prior().is_some_and(|body| is_a_point(body, model.arm_m())));
+    let points = model.bodies().iter().filter(|body| body.prior().is_some_and(|body| is_a_point(&body, model.arm_m())));
     doubtful.extend(points.map(|body| format!("body {} of the description: has a mass and no inertia", body.name())));
     let first = doubtful.first()?;
     let more = match doubtful.len() {
