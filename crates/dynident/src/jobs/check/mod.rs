@@ -10,7 +10,7 @@ use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_identification::diagnosis::Diagnosis;
 use dynident_identification::{IdentificationError, IdentificationSettings, examine_study};
-use dynident_model::{AuditFinding, InertialParameters, Mat3, audit};
+use dynident_model::{AuditFinding, AuditLevel, InertialParameters, Mat3, audit};
 use dynident_recording::{ImportReport, Level};
 use findings::{currents_without_scale, study_check};
 use std::path::Path;
@@ -72,7 +72,8 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
 /// base parameter tells of stays as the description has it.
 fn impossible_bodies(robot: &StudyRobot) -> Option<CheckFinding> {
     let model = &robot.robot.model;
-    let of_audit = audit(model).into_iter().filter(|found| NO_BODY.contains(&found.check));
+    let of_audit =
+        audit(model).into_iter().filter(|found| found.level != AuditLevel::Info && NO_BODY.contains(&found.check));
     let mut doubtful: Vec<String> =
         of_audit.map(|AuditFinding { place, message, .. }| format!("{place} of the description: {message}")).collect();
     let points = model.bodies().iter().filter(|body| body.prior().is_some_and(|body| is_a_point(&body, model.arm_m())));
