@@ -239,6 +239,9 @@ fn a_written_trajectory_is_judged_as_the_design_was() {
 
 /// The figure of V-optimality is the mean squared prediction error: for the task that is the motion itself, the number
 /// of parameters over the number of samples (tr D⁻¹D / N).
+/// Searches with other seeds that a comparison of two criteria rests on.
+const SEARCHES: u64 = 12;
+
 #[test]
 fn prediction_on_a_task() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,31 +265,37 @@ fn prediction_on_a_task() {
     // Designed for another task, in which the elbow stands still, a motion predicts it better than the one that was
     // designed for all parameters alike, at the same effort of search. (Of its own torque a motion that is best for all
     // parameters is the best predictor there is: Kiefer and Wolfowitz, Canad. J. Math. 12 (1960) 363.) So short
-    // searches end in one optimum or another: over three of them by a twentieth, and each time at all.
-    let seeds = [1, 2, 3];
-    let ratios = seeds.map(|seed| {
-        let [mut start, mut study] = [job(folder.path(), "torque_std_nm = 2.0", ""), job(folder.path(), design, "")];
-        for job in [&mut start, &mut study] {
-            job.study.design.as_mut().unwrap().search.seed = seed;
-        }
-        let all_alike = designed(&start);
-        let (times, motion) = all_alike.sampled(100.0);
-        let mut still = motion.clone();
-        let elbow = still.of(2);
-        for values in [&mut still.q, &mut still.dq, &mut still.ddq] {
-            values[elbow.clone()].fill(0.0);
-        }
-        let written = |file: &str, motion| {
-            let sampled = Sampled { joints: &all_alike.file.joints, times_s: &times, motion };
-            std::fs::write(folder.path().join(file), trajectory_csv(&sampled).unwrap()).unwrap();
-            folder.path().join(file)
-        };
-        written("task.csv", &still);
-        let path = written("all_alike.csv", &motion);
-        let checked = check_trajectory(&study.study, &study.path, &path, &Job::options(1)).unwrap().file;
-        let for_task = designed(&study);
-        assert!(for_task.file.feasible, "{:?}", for_task.file.diagnosis);
-        for_task.file.criterion_figure.unwrap() / checked.criterion_figure.unwrap()
-    });
-    assert!(ratios.iter().all(|ratio| *ratio < 1.0) && ratios.iter().sum::<f64>() / 3.0 < 0.95, "{ratios:?}");
+    // searches end in one optimum or another, and in which goes by the processor's rounding: the mean over them is
+    // below one by three of its standard errors.
+    let ratios: Vec<f64> = (1..=SEARCHES)
+        .map(|seed| {
+            let [mut start, mut study] =
+                [job(folder.path(), "torque_std_nm = 2.0", ""), job(folder.path(), design, "")];
+            for job in [&mut start, &mut study] {
+                job.study.design.as_mut().unwrap().search.seed = seed;
+            }
+            let all_alike = designed(&start);
+            let (times, motion) = all_alike.sampled(100.0);
+            let mut still = motion.clone();
+            let elbow = still.of(2);
+            for values in [&mut still.q, &mut still.dq, &mut still.ddq] {
+                values[elbow.clone()].fill(0.0);
+            }
+            let written = |file: &str, motion| {
+                let sampled = Sampled { joints: &all_alike.file.joints, times_s: &times, motion };
+                std::fs::write(folder.path().join(file), trajectory_csv(&sampled).unwrap()).unwrap();
+                folder.path().join(file)
+            };
+            written("task.csv", &still);
+            let path = written("all_alike.csv", &motion);
+            let checked = check_trajectory(&study.study, &study.path, &path, &Job::options(1)).unwrap().file;
+            let for_task = designed(&study);
+            assert!(for_task.file.feasible, "{:?}", for_task.file.diagnosis);
+            for_task.file.criterion_figure.unwrap() / checked.criterion_figure.unwrap()
+        })
+        .collect();
+    let count = SEARCHES as f64;
+    let mean = ratios.iter().sum::<f64>() / count;
+    let variance = ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    assert!(mean + 3.0 * (variance / count).sqrt() < 1.0, "{mean}: {ratios:?}");
 }
