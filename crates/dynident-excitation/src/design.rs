@@ -15,6 +15,7 @@ mod problem;
 mod restarts;
 mod restoration;
 mod rounds;
+mod shrunk;
 mod single_change;
 mod way_inside;
 
@@ -34,6 +35,7 @@ use restarts::Neighbourhood;
 use restoration::restored;
 use rounds::{Candidate, Rounds, Worth};
 use serde::{Deserialize, Serialize};
+use shrunk::shrunk;
 pub use single_change::single_changes;
 use std::time::Instant;
 use way_inside::way_inside;
@@ -166,17 +168,27 @@ pub fn design(
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<Design, OptimiserError> {
     let begun = Instant::now();
+    timed(task, settings, watch, &|| begun.elapsed().as_secs_f64())
+}
+
+/// [`design()`] with the seconds since its beginning from a clock of the caller's.
+fn timed(
+    task: &DesignTask<'_>,
+    settings: &DesignSettings,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+    elapsed_s: &(dyn Fn() -> f64 + Sync),
+) -> Result<Design, OptimiserError> {
     let last = *task.criteria.last().ok_or(OptimiserError::Start)?;
     // Searches end early enough that what was found can be polished and taken back inside the limits in time: what
     // keeps them already needs little of it.
-    let later = |share: f64| settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > share * limit);
+    let later = |share: f64| settings.time_limit_s.is_some_and(|limit| elapsed_s() > share * limit);
     let inside = AtomicBool::new(false);
     let evaluations = AtomicU64::new(0);
     // What the way back inside takes is known once some evaluations have been counted.
     let search_share = || match (settings.time_limit_s, evaluations.load(Ordering::Relaxed)) {
         _ if inside.load(Ordering::Relaxed) => SEARCH_SHARE_INSIDE,
         (Some(limit), done) if done > 0 => {
-            let each = begun.elapsed().as_secs_f64() * rayon::current_num_threads() as f64 / done as f64;
+            let each = elapsed_s() * rayon::current_num_threads() as f64 / done as f64;
             // On twice the samples.
             let back = 2.0 * (2 * LAST_EVALUATIONS) as f64 * each;
             (POLISH_SHARE - back / limit).clamp(SEARCH_SHARE, SEARCH_SHARE_INSIDE)
@@ -244,7 +256,9 @@ pub fn design(
     let rounds = Rounds::new(task, &fine, logged.len(), true);
     let best = best.ok_or(OptimiserError::Start)?;
     let mut state = best.state.on_twice_the_samples(coarse.len());
-    let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
+    let (mut kept, mut values) = assess(task, criterion, state.x.clone(), &fine, &logged);
+    // What the last polish left, where it is outside.
+    let mut outside = None;
     let mut left = most_of_polishes(task, settings, fine.len());
     for _ in 0..POLISHES {
         // A search that was ended still comes back inside the limits: some tenths of a second.
@@ -259,11 +273,13 @@ pub fn design(
         state = found.best.state;
         // The last iterate, and the best that kept the limits on the samples.
         let (ended, worst) = assess(task, criterion, state.x.clone(), &fine, &logged);
-        let (polished, _) = assess(task, criterion, found.best.feasible, &fine, &logged);
+        let (polished, of_polished) = assess(task, criterion, found.best.feasible, &fine, &logged);
         let whole = ended.violation <= 0.0;
-        for candidate in [ended, polished] {
+        outside = (!whole).then(|| (ended.clone(), worst.clone()));
+        for (candidate, of) in [(ended, &worst), (polished, &of_polished)] {
             if candidate.better_than(&kept) {
                 kept = candidate;
+                values.clone_from(of);
             }
         }
         if whole || later(POLISH_SHARE) {
@@ -274,9 +290,18 @@ pub fn design(
             *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
-    // What still breaks a limit is taken back inside: a hair towards a motion that the search saw keep all, else by a
-    // search for the limits alone.
-    if kept.violation > 0.0 && !stopped.load(Ordering::Relaxed) {
+    // What still breaks a limit is taken back inside: made smaller, or a hair towards a motion that the search saw keep
+    // all, else by a search for the limits alone. The first two take some milliseconds and are done however the search
+    // ended.
+    let broken = (kept.violation > 0.0).then(|| (kept.clone(), values));
+    for (outside, worst) in outside.iter().chain(&broken) {
+        if let Some(smaller) = shrunk(task, criterion, (outside, worst), [&fine, &logged])
+            && smaller.better_than(&kept)
+        {
+            kept = smaller;
+        }
+    }
+    if kept.violation > 0.0 {
         let (inside, _) = assess(task, criterion, best.feasible, &fine, &logged);
         if let Some(between) = way_inside(task, criterion, &kept, &inside, [&fine, &logged]) {
             kept = between;
@@ -294,7 +319,7 @@ pub fn design(
         violation: kept.violation,
         parameters: kept.parameters,
         evaluations: evaluations.load(Ordering::Relaxed) as usize,
-        seconds: begun.elapsed().as_secs_f64(),
+        seconds: elapsed_s(),
     })
 }
 

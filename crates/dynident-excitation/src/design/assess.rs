@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 const LEAST_SAMPLES: usize = 1001;
 
 /// A trajectory judged as it will be used: every logged sample, every limit between samples.
+#[derive(Clone)]
 pub(crate) struct Assessment {
     pub(crate) parameters: Vec<f64>,
     pub(crate) figure: Option<f64>,

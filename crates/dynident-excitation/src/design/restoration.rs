@@ -3,6 +3,7 @@
 use super::assess::{Assessment, assess};
 use super::effort::most_of_restoration;
 use super::rounds::Rounds;
+use super::shrunk::shrunk;
 use super::way_inside::way_inside;
 use super::{DesignProgress, DesignSettings, DesignTask, ranges};
 use crate::criteria::{Criterion, ValueAndGradient};
@@ -89,11 +90,16 @@ pub(crate) fn restored(
             evaluations += found.evaluations;
             parameters = found.best.feasible;
             let (assessed, worst) = assess(task, criterion, parameters.clone(), fine, logged);
-            let (whole, on_samples) = (assessed.violation <= 0.0, found.best.violation <= MARGIN);
+            let (mut whole, on_samples) = (assessed.violation <= 0.0, found.best.violation <= MARGIN);
             // Most of what the criterion had found is still there a hair away from it.
             if let Some(between) = way_inside(task, criterion, &best, &assessed, [fine, logged]) {
                 parameters.clone_from(&between.parameters);
                 best = between;
+            } else if let Some(smaller) = shrunk(task, criterion, (&assessed, &worst), [fine, logged])
+                && smaller.better_than(&best)
+            {
+                parameters.clone_from(&smaller.parameters);
+                (best, whole) = (smaller, true);
             } else if assessed.better_than(&best) {
                 best = assessed;
             }
