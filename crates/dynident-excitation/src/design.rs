@@ -45,14 +45,14 @@ use way_inside::way_inside;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 8, for condition numbers 3, with 24 or more numbers a joint 2; fewer
+    /// Random starts of the first round. Default 8, for condition numbers 4, with 24 or more numbers a joint 2; fewer
     /// for a robot so large that the search would else take more than about a minute of a core: unless one of this,
     /// `rounds`, `evaluations_per_start` and `time_limit_s` is given, it gets less of everything.
     pub starts: Option<usize>,
     /// Rounds of restarts around the best, of half as many starts and two at least. Default 1, for condition numbers
     /// 36, with 24 or more numbers a joint 8.
     pub rounds: Option<usize>,
-    /// Evaluations of one start or restart at most. Default 1,000, for condition numbers 1,000 and 500, with 24 or more
+    /// Evaluations of one start or restart at most. Default 1,000, for condition numbers 600 and 500, with 24 or more
     /// numbers a joint 2,000.
     pub evaluations_per_start: Option<usize>,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
@@ -225,6 +225,7 @@ fn timed(
         let name = if around.is_some() { "restart" } else { "search" };
         let watch = watch(name);
         let stop = |value, violation| watch(value, violation) || late();
+        let race_is_over = || later(RACE_SHARE * search_share());
         let each = if around.is_some() { effort.evaluations_per_restart } else { effort.evaluations_per_start };
         let starts =
             around.unwrap_or_else(|| (0..effort.starts).map(|_| random_starts.next(&mut random).into()).collect());
@@ -234,7 +235,7 @@ fn timed(
             Some(score) if round >= task.criteria.len() => Worth::IfBelow(score),
             _ => Worth::Always,
         };
-        let found = rounds.run(criterion, &margins, &starts, each, worth, stop)?;
+        let found = rounds.run(criterion, &margins, &starts, each, worth, (stop, race_is_over))?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         // Scores of another criterion are no measure, but a descent that was cut short may lie far outside.
         let sharper = round < task.criteria.len() && !over();
@@ -325,10 +326,13 @@ fn timed(
 
 /// Shares of the time limit after which searches, polishes and the way back inside the limits end; the rest is for the
 /// check. A search whose best lies outside still ends in time for two short polishes, after the first share at least.
-const SEARCH_SHARE: f64 = 0.55;
+const SEARCH_SHARE: f64 = 0.7;
 const SEARCH_SHARE_INSIDE: f64 = 0.8;
 const POLISH_SHARE: f64 = 0.88;
 const RESTORATION_SHARE: f64 = 0.94;
+
+/// Share of the search's time after which the start that is ahead goes on alone.
+const RACE_SHARE: f64 = 0.55;
 
 /// Violation on the search's samples that a polish mends in some evaluations.
 const INSIDE: f64 = 1e-4;

@@ -22,7 +22,7 @@ impl Effort {
     /// than four times as many that have not, and restarts around the best find more than further starts; restarts of
     /// 500 end no worse than of 1,000. Further rounds found nothing on the arms of docs/src/designs-compared.md, which
     /// has what these end at.
-    const RESTARTS: Self = Self { starts: 3, rounds: 36, evaluations_per_start: 1_000, evaluations_per_restart: 500 };
+    const RESTARTS: Self = Self { starts: 4, rounds: 36, evaluations_per_start: 600, evaluations_per_restart: 500 };
     /// The same for families with many numbers, whose descents are long: their starts end near each other, and restarts
     /// around the best find more than further starts.
     const LONG_RESTARTS: Self =

@@ -26,6 +26,12 @@ const DESCENT_STEPS: usize = 30;
 
 /// Violation at which a start is distinguished from others well enough.
 const LOOSE: f64 = 3e-3;
+/// Share of its evaluations after which a start is compared with others by what it would be with all limits kept, to
+/// first order. Of UR10, Panda and iiwa14, 40 starts each, the ranks after 270 to 300 of 700 evaluations correlate with
+/// those of the ends by 0.7 to 0.9, after 170 by 0.4 to 0.6.
+const RACE: f64 = 0.45;
+/// Starts of which it is worth it.
+const LEAST_RACING: usize = 4;
 /// One in so many starts is followed to the end.
 pub(super) const FOLLOWED: usize = 4;
 /// Scores that differ by less, in the criterion's scale, are the same motion's.
@@ -88,10 +94,13 @@ impl Rounds<'_> {
         starts: &[AugmentedLagrangianState],
         budget: usize,
         worth: Worth,
-        stop: impl Fn(f64, f64) -> bool + Sync,
+        (stop, race_is_over): (impl Fn(f64, f64) -> bool + Sync, impl Fn() -> bool + Sync),
     ) -> Result<RoundResult, OptimiserError> {
-        let first = self.all(criterion, margins, starts, &self.descent(criterion, budget, LOOSE, 1e-4), &stop)?;
-        let mut evaluations = evaluations(&first);
+        let settings = self.descent(criterion, budget, LOOSE, 1e-4);
+        let stop_race = |value, violation| stop(value, violation) || race_is_over();
+        let (ahead, raced) = self.race(criterion, margins, starts, &settings, &stop_race)?;
+        let first = self.all(criterion, margins, &ahead, &settings, &stop)?;
+        let mut evaluations = raced + evaluations(&first);
         let mut candidates = self.candidates(criterion, first);
         let better = match worth {
             Worth::Always => f64::INFINITY,
@@ -108,6 +117,33 @@ impl Rounds<'_> {
         evaluations += self::evaluations(&last);
         let best = self.candidates(criterion, last).into_iter().next().ok_or(OptimiserError::Start)?;
         Ok(RoundResult { best, evaluations })
+    }
+
+    /// Follows many random starts of a criterion with many optima a part of the way, and gives those that are ahead, and
+    /// the evaluations. Other starts are given back as they are: of restarts around a known motion those that end
+    /// below it are often behind it for long.
+    fn race(
+        &self,
+        criterion: &dyn Criterion,
+        margins: &[f64],
+        starts: &[AugmentedLagrangianState],
+        settings: &AugmentedLagrangianSettings,
+        stop: &(impl Fn(f64, f64) -> bool + Sync),
+    ) -> Result<(Vec<AugmentedLagrangianState>, usize), OptimiserError> {
+        let known = starts.iter().any(|start| !start.multipliers.is_empty());
+        if known || starts.len() < LEAST_RACING || !criterion.has_many_optima() {
+            return Ok((starts.to_vec(), 0));
+        }
+        let part = (RACE * settings.max_evaluations as f64).ceil() as usize;
+        let settings = AugmentedLagrangianSettings { max_evaluations: part, ..settings.clone() };
+        let mut runs = self.all(criterion, margins, starts, &settings, stop)?;
+        let evaluations = evaluations(&runs);
+        runs.sort_by(|a, b| a.lagrangian.total_cmp(&b.lagrangian));
+        runs.truncate(starts.len().div_ceil(FOLLOWED));
+        if runs.is_empty() {
+            return Err(OptimiserError::Start);
+        }
+        Ok((runs.into_iter().map(|run| run.end).collect(), evaluations))
     }
 
     /// Scores that differ by less are the same motion's.

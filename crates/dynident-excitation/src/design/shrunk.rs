@@ -10,8 +10,8 @@ use crate::criteria::Criterion;
 use crate::motion::Motion;
 use dynident_model::sample::Random;
 
-/// Most that a motion is shrunk by: what needs more is no longer the motion that was found.
-const MOST: f64 = 0.5;
+/// Most that a motion is shrunk by: a search that ends among its first steps is far outside.
+const MOST: f64 = 0.9;
 
 /// Added to each share, so that rounding does not leave a limit broken by 10⁻¹⁶.
 const HAIR: f64 = 1e-9;
@@ -28,7 +28,7 @@ const STILL: f64 = 1e-6;
 
 /// `outside`, whose rows are at most `worst`, between it and standing still in the middle of each joint's own way,
 /// with the smallest of the shares tried that keeps all limits between samples. None if it keeps them already, or if
-/// half of the motion is not small enough.
+/// a tenth of the motion is not small enough.
 ///
 /// A family whose motions are linear in its parameters needs no trial where single joints break their own limits: on
 /// the way to a motion inside a value `v > 0` that ends at `-d` is zero at the share `v / (v + d)` at the latest,
@@ -40,7 +40,7 @@ pub(super) fn shrunk(
     (outside, worst): (&Assessment, &[f64]),
     [fine, logged]: [&[f64]; 2],
 ) -> Option<Assessment> {
-    if outside.violation <= 0.0 || outside.violation.is_nan() || outside.violation > MOST {
+    if outside.violation <= 0.0 || !outside.violation.is_finite() {
         return None;
     }
     let still = standing_still(task, &outside.parameters, fine);
@@ -56,7 +56,7 @@ pub(super) fn shrunk(
     }
     let each = (outside.parameters.len() / joints).max(1);
     if shares.iter().all(|share| *share == 0.0) {
-        shares.fill(FIRST_SHARE.max(outside.violation));
+        shares.fill(FIRST_SHARE.max(outside.violation).min(MOST));
     }
     let of_all = shares.iter().copied().fold(FIRST_SHARE, f64::max);
     for doubling in 0..=DOUBLINGS {
