@@ -119,8 +119,8 @@ impl Rounds<'_> {
         Ok(RoundResult { best, evaluations })
     }
 
-    /// Follows many random starts of a criterion with many optima a part of the way, and gives those that are ahead, and
-    /// the evaluations. Other starts are given back as they are: of restarts around a known motion those that end
+    /// Follows many random starts of a criterion with many optima a part of the way, and gives those that are ahead,
+    /// and the evaluations. Other starts are given back as they are: of restarts around a known motion those that end
     /// below it are often behind it for long.
     fn race(
         &self,
