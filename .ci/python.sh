@@ -4,7 +4,10 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scratch=$1
-# Megabytes of a wheel, as promised.
+# Built as the main job built the command, so that the crates below are there; what is shipped has the profile of pyproject.toml, which is eight processor minutes of
+# linking (docs/decisions/0012-builds-and-packages.md) and larger by nothing but its absence.
+export MATURIN_PEP517_ARGS="--profile release"
+# Megabytes of a wheel, as promised of the shipped one.
 most_bytes=15000000
 
 # interpreters: the Pythons that are here, `minor path`, the oldest first.

@@ -13,7 +13,6 @@ use crate::settings::{RunIdentificationSettings, Scheme};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::estimators::estimate;
 use dynident_identification::{Execution, IdentificationSettings, Logs, Recording, RegressorModel, training_rows};
-use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 
 /// Change of a length that is tried, as a share of it.
@@ -122,7 +121,10 @@ fn left_with(
     identification: &IdentificationSettings,
     (joint, change): (Option<usize>, f64),
 ) -> Option<Left> {
-    let model = with_length(task.robot.model(), joint, 1.0 + change)?;
+    let model = task.robot.model();
+    // The first joint's distance from the base moves no torque.
+    let joints = joint.map_or_else(|| (1..model.dof()).collect(), |joint| vec![joint]);
+    let model = model.clone().with_joint_distances(&joints, 1.0 + change).ok()?;
     let robot = ParametricModel::new(model, task.robot.terms().to_vec()).ok()?;
     let all: Vec<usize> = (0..motions.len()).collect();
     let logs = Logs::new(robot.model(), motions, identification.filters(), &all, None, Execution::default()).ok()?;
@@ -132,16 +134,4 @@ fn left_with(
     let of_joints = training.joints.iter().zip(found.joint_sigma.iter().zip(training.problem.joint_rows()));
     of_joints.for_each(|(&joint, (own, count))| (sigma[joint], rows[joint]) = (*own, count));
     Some(Left { sigma, rows })
-}
-
-/// The robot with one joint, or all but the first, so many times as far from the one before.
-fn with_length(model: &Model, joint: Option<usize>, factor: f64) -> Option<Model> {
-    let mut joints = model.joints().to_vec();
-    for (place, own) in joints.iter_mut().enumerate().skip(1) {
-        if joint.is_none_or(|joint| joint == place) {
-            own.placement.translation = own.placement.translation.scale(factor);
-        }
-    }
-    let other = Model::new(model.name(), model.base().clone(), joints, model.bodies().to_vec()).ok()?;
-    other.with_gravity(model.gravity()).ok()
 }

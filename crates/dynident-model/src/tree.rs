@@ -261,6 +261,21 @@ impl Model {
         Ok(self)
     }
 
+    /// The same robot with these joints of the tree `factor` times as far from the joint before each, along the same
+    /// line: links that are longer or shorter, or mirrored. Bodies stay as they are in their own frames.
+    ///
+    /// # Errors
+    /// If a joint is not there or a number would not be finite.
+    pub fn with_joint_distances(mut self, joints: &[usize], factor: f64) -> Result<Self, ModelError> {
+        let bodies = self.body_count();
+        for &joint in joints {
+            let place = self.tree.get_mut(joint).ok_or(ModelError::Counts { joints: joint + 1, bodies })?;
+            place.placement.translation = place.placement.translation.scale(factor);
+        }
+        let Self { name, base, tree, bodies, gravity, .. } = self;
+        Self::new(&name, base, tree, bodies)?.with_gravity(gravity)
+    }
+
     /// The same robot mounted with its base turned by roll, pitch, yaw (radians, fixed axes) against the world: gravity
     /// turns the other way in the base frame.
     ///

@@ -4,7 +4,8 @@ use super::mistake::{Channels, Mistake};
 use super::motion_rows::MotionRows;
 use super::plausibility::{beyond_limits, is_rate_of_a_recorder};
 use super::units::{
-    OTHER_RATES, UNITS_OF_ONE_LENGTH, UNITS_OF_ONE_POSITION, UNITS_OF_ONE_TORQUE, UNITS_OF_POSITIONS, UNITS_OF_TIME,
+    OTHER_LENGTHS, OTHER_RATES, UNITS_OF_ONE_LENGTH, UNITS_OF_ONE_POSITION, UNITS_OF_ONE_TORQUE, UNITS_OF_POSITIONS,
+    UNITS_OF_TIME,
 };
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI, TAU};
 use dynident_dynamics::ParametricModel;
@@ -36,7 +37,14 @@ pub(super) fn candidates(robot: &ParametricModel, rows: &MotionRows, breadth: Br
     let mut all =
         [units(model, rows), signs(model.dof()), orders(model.dof()), zeros(model), mountings(model)].concat();
     if breadth == Breadth::All {
-        all.extend([units_of_one(model, rows), other_rates(model, rows), couplings(model), gravities(model)].concat());
+        all.extend(
+            [units_of_one(model, rows), other_rates(model, rows), couplings(model), gravities(model), lengths(model)]
+                .concat(),
+        );
+        // What no description's bodies say no controller took off by them.
+        if robot.nominal_base().is_some() && model.gravity().norm() > 0.0 {
+            all.push(Mistake::Compensated);
+        }
     }
     all
 }
@@ -138,6 +146,21 @@ fn couplings(model: &Model) -> Vec<Mistake> {
             ways.clone().into_iter().map(move |(channels, sign)| Mistake::Coupled { joint, with, sign, channels })
         })
         .collect()
+}
+
+/// Joints that are nearer to the one before them, farther from it, or on its other side. Where joints follow others the
+/// tree has more of them than the log.
+fn lengths(model: &Model) -> Vec<Mistake> {
+    if model.coupling().is_some() {
+        return Vec::new();
+    }
+    // Where the first joint stands in the base moves no torque.
+    let is_apart = |joint: &usize| {
+        let description = &model.joints()[*joint];
+        description.parent.is_some() && description.placement.translation.norm() > 0.0
+    };
+    let joints = (0..model.dof()).filter(is_apart);
+    joints.flat_map(|joint| OTHER_LENGTHS.map(|factor| Mistake::Length { joint, factor })).collect()
 }
 
 /// Gravity in another unit, none (torques from which a controller took it off), and some where the study has none.

@@ -69,12 +69,13 @@ pub(super) fn held_out_reading(
         return None;
     }
     // All logs are of one robot at one place.
-    let is_of_log = |mistake: &Mistake| !matches!(mistake, Mistake::Gravity { .. });
+    let is_of_log =
+        |mistake: &Mistake| !matches!(mistake, Mistake::Gravity { .. } | Mistake::Length { .. } | Mistake::Compensated);
     let mut all: Vec<Mistake> = candidates(robot, rows, Breadth::All).into_iter().filter(is_of_log).collect();
     all.extend(gains(robot, rows, theta));
     let turning = (0..robot.dof()).filter(|&joint| robot.model().joints()[joint].turns());
     all.extend(turning.flat_map(|joint| ZEROS_RAD.map(|offset_rad| Mistake::Offset { joint, offset_rad })));
-    let read = |mistake: &Mistake| residual(robot, &mistake.corrected(rows), theta, trained);
+    let read = |mistake: &Mistake| residual(robot, &mistake.corrected(robot, rows), theta, trained);
     let mut readings: Vec<(Mistake, f64)> =
         all.par_iter().map(|mistake| (mistake.clone(), read(mistake).score + mistake.rarity())).collect();
     readings.sort_by(|a, b| a.1.total_cmp(&b.1));

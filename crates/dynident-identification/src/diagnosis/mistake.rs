@@ -1,6 +1,7 @@
 //! Mistakes that studies make, as readings of the same numbers: what the motion would be if one of them was made.
 
 use super::motion_rows::MotionRows;
+use super::nominal::gravity_torque;
 use super::units::is_unit_of_time;
 use dynident_dynamics::ParametricModel;
 use dynident_model::Vec3;
@@ -81,6 +82,16 @@ pub enum Mistake {
         /// The whole lag, of torques with what the study states or a fit took off, seconds.
         lag_s: f64,
     },
+    /// The torques lack the gravity of the description's bodies: a controller that compensates it logs what it adds to
+    /// that.
+    Compensated,
+    /// The description has a joint at another distance from the one before it.
+    Length {
+        /// The joint.
+        joint: usize,
+        /// What to multiply the distance by; negative: the other way.
+        factor: f64,
+    },
     /// Gravity is another: the base is mounted otherwise, or the torque is without gravity (zero).
     Gravity {
         /// Acceleration in the frame of the base, m/s².
@@ -102,6 +113,8 @@ impl Mistake {
             | Self::TorqueUnit { .. }
             | Self::Coupled { .. }
             | Self::Lag { .. } => 0.15,
+            // Descriptions are wrong in their bodies far more often than in their joints.
+            Self::Length { .. } | Self::Compensated => 0.3,
         }
     }
 
@@ -116,6 +129,8 @@ impl Mistake {
             | Self::PositionUnit { .. }
             | Self::Coupled { .. }
             | Self::Lag { .. }
+            | Self::Length { .. }
+            | Self::Compensated
             | Self::Gravity { .. } => false,
         }
     }
@@ -124,7 +139,8 @@ impl Mistake {
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::TorqueUnit { joint: a, .. }, Self::TorqueUnit { joint: b, .. })
-            | (Self::Offset { joint: a, .. }, Self::Offset { joint: b, .. }) => a == b,
+            | (Self::Offset { joint: a, .. }, Self::Offset { joint: b, .. })
+            | (Self::Length { joint: a, .. }, Self::Length { joint: b, .. }) => a == b,
             (Self::PositionUnit { joints: a, .. }, Self::PositionUnit { joints: b, .. }) => a == b,
             (Self::TimeUnit { .. }, Self::TimeUnit { .. }) | (Self::Gravity { .. }, Self::Gravity { .. }) => true,
             _ => self == other,
@@ -143,13 +159,15 @@ impl Mistake {
             | Self::Coupled { .. }
             | Self::TimeUnit { .. }
             | Self::Lag { .. }
+            | Self::Length { .. }
+            | Self::Compensated
             | Self::Gravity { .. } => joint,
         }
     }
 
-    /// The motion as it was if this mistake was made. What the torque was at another moment is not among the instants:
-    /// of a lag they are chosen anew.
-    pub fn corrected(&self, rows: &MotionRows) -> MotionRows {
+    /// The motion of a robot as it was if this mistake was made. What the torque was at another moment is not among the
+    /// instants: of a lag they are chosen anew.
+    pub fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> MotionRows {
         let mut out = rows.clone();
         let scale = |values: &mut [f64], factor: f64| values.iter_mut().for_each(|value| *value *= factor);
         match self {
@@ -205,19 +223,23 @@ impl Mistake {
                 out.ddq.iter_mut().for_each(|values| scale(values, (factor * factor).recip()));
                 out.rate_hz /= factor;
             }
-            Self::Lag { .. } | Self::Gravity { .. } => {}
+            Self::Compensated => {
+                let gravity = gravity_torque(robot, rows);
+                for (tau, gravity) in out.tau.iter_mut().zip(gravity) {
+                    tau.iter_mut().zip(gravity).for_each(|(tau, gravity)| *tau += gravity);
+                }
+            }
+            Self::Lag { .. } | Self::Length { .. } | Self::Gravity { .. } => {}
         }
         out
     }
 
     /// The robot as it stood if this mistake was made; `None` where it is the same.
     pub fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
-        match self {
-            Self::Gravity { gravity_m_s2 } => {
-                let model = robot.model().clone().with_gravity(Vec3(*gravity_m_s2)).ok()?;
-                let again = ParametricModel::new(model, robot.terms().to_vec()).ok()?;
-                again.with_nominal(robot.nominal().to_vec()).ok()
-            }
+        let model = robot.model().clone();
+        let model = match self {
+            Self::Gravity { gravity_m_s2 } => model.with_gravity(Vec3(*gravity_m_s2)),
+            Self::Length { joint, factor } => model.with_joint_distances(&[*joint], *factor),
             Self::Sign { .. }
             | Self::Order { .. }
             | Self::Offset { .. }
@@ -225,7 +247,10 @@ impl Mistake {
             | Self::TorqueUnit { .. }
             | Self::Coupled { .. }
             | Self::Lag { .. }
-            | Self::TimeUnit { .. } => None,
-        }
+            | Self::Compensated
+            | Self::TimeUnit { .. } => return None,
+        };
+        let again = ParametricModel::new(model.ok()?, robot.terms().to_vec()).ok()?;
+        again.with_nominal(robot.nominal().to_vec()).ok()
     }
 }

@@ -260,7 +260,7 @@ fn diagnosed(
 fn description_fit_of(robot: &ParametricModel, rows: &MotionRows, search: &Search) -> Option<DescriptionFit> {
     let (mut robot, mut rows) = (robot.clone(), rows.clone());
     for mistake in search.best.iter().flat_map(|best| &best.mistakes) {
-        rows = mistake.corrected(&rows);
+        rows = mistake.corrected(&robot, &rows);
         robot = mistake.corrected_robot(&robot).unwrap_or(robot);
     }
     description_fit::description_fit(&robot, &rows, &search.believed().left)

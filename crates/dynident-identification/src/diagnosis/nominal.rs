@@ -7,15 +7,32 @@ use nalgebra::{DMatrix, DVector};
 /// The torque of the nominal bodies, one vector for each joint, Nm (N); `None` while a body's inertials are unknown.
 pub(super) fn nominal_torque(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<Vec<f64>>> {
     robot.nominal_base()?;
+    Some(torque_of(robot, rows, |[q, dq, ddq]| [q, dq, ddq]))
+}
+
+/// The torque that holds the nominal bodies against gravity, one vector for each joint, Nm (N); zeros while a body's
+/// inertials are unknown.
+pub(super) fn gravity_torque(robot: &ParametricModel, rows: &MotionRows) -> Vec<Vec<f64>> {
+    if robot.nominal_base().is_none() {
+        return vec![vec![0.0; rows.len()]; robot.dof()];
+    }
+    torque_of(robot, rows, |[q, dq, ddq]| [q, vec![0.0; dq.len()], vec![0.0; ddq.len()]])
+}
+
+fn torque_of(
+    robot: &ParametricModel,
+    rows: &MotionRows,
+    motion: impl Fn([Vec<f64>; 3]) -> [Vec<f64>; 3],
+) -> Vec<Vec<f64>> {
     let model = robot.model();
     let mut workspace = Workspace::new(model);
     let mut torque = vec![Vec::with_capacity(rows.len()); model.dof()];
     for row in 0..rows.len() {
-        let [q, dq, ddq] = rows.at(row);
+        let [q, dq, ddq] = motion(rows.at(row));
         let now = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
         torque.iter_mut().zip(now).for_each(|(joint, now)| joint.push(*now));
     }
-    Some(torque)
+    torque
 }
 
 /// Root mean square of what the nominal bodies leave of each joint's torque, Nm (N), beside viscous and Coulomb

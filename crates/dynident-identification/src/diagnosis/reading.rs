@@ -112,12 +112,14 @@ impl Corrected {
     pub(super) fn without(&self, mistake: &Mistake) -> Self {
         let robot = mistake.corrected_robot(&self.robot).unwrap_or_else(|| self.robot.clone());
         let mistakes = self.mistakes.iter().chain([mistake]).cloned().collect();
-        let rows = mistake.corrected(&self.rows);
+        let rows = mistake.corrected(&self.robot, &self.rows);
+        let growth_of = |joint: usize| {
+            let [before, after] = [&self.rows, &rows].map(|rows| norm(&rows.tau[joint]));
+            if before > 0.0 && after > before { (after / before).ln() } else { 0.0 }
+        };
         let growth = match mistake {
-            Mistake::Coupled { with, .. } => {
-                let [before, after] = [&self.rows, &rows].map(|rows| norm(&rows.tau[*with]));
-                if before > 0.0 && after > before { (after / before).ln() } else { 0.0 }
-            }
+            Mistake::Coupled { with, .. } => growth_of(*with),
+            Mistake::Compensated => (0..rows.tau.len()).map(growth_of).sum(),
             _ => 0.0,
         };
         Self { robot, rows, mistakes, torque_growth: self.torque_growth + growth }

@@ -215,6 +215,8 @@ fn twin(mistake: &Mistake) -> Option<Mistake> {
         | Mistake::Coupled { .. }
         | Mistake::TimeUnit { .. }
         | Mistake::Lag { .. }
+        | Mistake::Length { .. }
+        | Mistake::Compensated
         | Mistake::Gravity { .. } => None,
     }
 }
@@ -278,6 +280,11 @@ fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
         // A zero that is elsewhere shows in the torque: any does that brings a joint back between its stops, which the
         // description may have wrong as well.
         Some(Mistake::Offset { .. }) => return reading.torque_score() < from.torque_score() - ALIKE,
+        // Bodies that are described too heavy look so to the description, not to bodies that could be.
+        Some(Mistake::Compensated) => {
+            let score = |reading: &Reading| reading.consistent_score + reading.torque_growth;
+            return score(reading) < score(from) - CLEARLY_BETTER;
+        }
         _ => return true,
     };
     let left = reading.left[joint];
@@ -383,6 +390,9 @@ pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) ->
         Mistake::TorqueUnit { joint, factor } => {
             Some(scaled(1.2, &|times| Mistake::TorqueUnit { joint: *joint, factor: factor * times }))
         }
+        Mistake::Length { joint, factor } => {
+            Some(scaled(0.7, &|times| Mistake::Length { joint: *joint, factor: factor * times }))
+        }
         Mistake::TimeUnit { factor } if !is_unit_of_time(*factor) => {
             Some(scaled(0.4, &|times| Mistake::TimeUnit { factor: factor * times }))
         }
@@ -390,6 +400,7 @@ pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) ->
         | Mistake::Order { .. }
         | Mistake::TimeUnit { .. }
         | Mistake::Coupled { .. }
+        | Mistake::Compensated
         | Mistake::Lag { .. } => None,
     }
 }

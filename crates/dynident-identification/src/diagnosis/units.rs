@@ -6,6 +6,8 @@ use core::f64::consts::{PI, TAU};
 pub(super) const UNITS_OF_TIME: [f64; 8] = [1e-3, 1e-6, 1e-9, 1e-2, 1e3, 1e6, 1e9, 1e2];
 /// Rates that are mistaken for one another: every second sample, a decimal place, minutes.
 pub(super) const OTHER_RATES: [f64; 5] = [0.5, 2.0, 0.1, 10.0, 60.0];
+/// Distances between joints: by halves, a diameter for a radius, the other way. What lies between is found from these.
+pub(super) const OTHER_LENGTHS: [f64; 3] = [0.5, 2.0, -1.0];
 /// What positions in other units have to be multiplied by: degrees, revolutions and what somebody converted twice, half
 /// revolutions, gears of about a hundred, milliradians, counts of encoders. Gears and counts between these are found
 /// from the nearest.

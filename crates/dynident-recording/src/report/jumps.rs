@@ -50,6 +50,10 @@ pub struct Jump {
     pub after: f64,
     /// The largest step that is no jump (SI).
     pub largest_other: f64,
+    /// The period with which the channel wraps around, to within a step, where every jump leads from one end of its
+    /// range to the other (SI).
+    #[serde(default)]
+    pub period: Option<f64>,
 }
 
 /// What was seen of one channel's steps.
@@ -178,7 +182,11 @@ impl JumpCheck {
         let apart = self.largest.windows(2).rposition(is_apart).filter(|_| self.largest.len() == LARGEST);
         let Some(last) = apart else { return (0, None) };
         let (_, row, [before, after]) = self.largest[0];
-        (last as u64 + 1, Some(Jump { row, before, after, largest_other: self.largest[last + 1].0 }))
+        let largest_other = self.largest[last + 1].0;
+        // A counter that overflows is a step from either end then.
+        let is_whole_range = |kept: &(f64, u64, [f64; 2])| kept.0 >= range - 2.0 * largest_other;
+        let period = self.largest[..=last].iter().all(is_whole_range).then_some(range);
+        (last as u64 + 1, Some(Jump { row, before, after, largest_other, period }))
     }
 
     /// Steps of a whole turn.
@@ -236,6 +244,7 @@ mod tests {
         // An encoder that stands still for a while.
         let frozen = |i: usize| angle(if (700..900).contains(&i) { 700 } else { i });
         assert_eq!(seen(None, (0..2000).map(frozen)).jumps().0, 1);
+        assert_eq!(seen(None, (0..2000).map(frozen)).jumps().1.unwrap().period, None);
         // Repeated samples, an encoder's counts, rest.
         assert_eq!(seen(None, (0..2000).map(|i| angle(i / 6 * 6))).jumps().0, 0);
         assert_eq!(seen(None, (0..2000).map(|i| (angle(i) / 0.01).round() * 0.01)).jumps().0, 0);
@@ -266,6 +275,20 @@ mod tests {
         assert_eq!(seen(Some(2.0 * pi), (0..2000).map(angle)).wraps(), 0);
         let check = seen(Some(2.0 * pi), (0..2000).map(wrapped));
         assert!(check.wraps() > 3 && check.lone().1.is_none(), "{check:?}");
+    }
+
+    #[test]
+    fn a_counter_that_overflows_is_told_with_its_period() {
+        // Half a turn of sixteen bits.
+        let period = core::f64::consts::PI;
+        let counter = |i: usize| {
+            let angle = 2.0 * (i as f64 * 0.003).sin();
+            let wrapped = angle - period * (angle / period).round();
+            (wrapped * 65536.0 / period).round() * period / 65536.0
+        };
+        let (count, jump) = seen(None, (0..2000).map(counter)).jumps();
+        let found = jump.unwrap().period.unwrap();
+        assert!(count > 1 && (found - period).abs() < 0.01, "{count} {found}");
     }
 
     #[test]

@@ -169,6 +169,16 @@ impl ImportReport {
             let times = |jump: &Jump| (jump.after - jump.before).abs() / jump.largest_other;
             times(&a.2).total_cmp(&times(&b.2))
         })?;
+        let wrap = all.iter().find_map(|(joint, _, jump)| Some((joint, jump, jump.period?)));
+        if let Some((joint, jump, period)) = wrap {
+            let message = format!(
+                "jumps from one end of its range to the other, {:.6} to {:.6} at row {} of those used: it wraps around with a \
+                 period of about {period:.4}, as a counter does that overflows; unwrap it (numpy.unwrap with that `period`) \
+                 before it is read",
+                jump.before, jump.after, jump.row
+            );
+            return Some((joint.clone(), message));
+        }
         let joints = all.iter().map(|(joint, ..)| &joint[..]).collect::<Vec<_>>().join(", ");
         let cause = if all.iter().filter(|(.., jump)| jump.row == worst.row).count() > 1 {
             "rows are missing there without a gap of the stamps, or the log is put together from pieces"

@@ -64,7 +64,8 @@ impl<'a> StudyFormat<'a> {
             Mistake::Lag { joints, channels: Channels::Torque, lag_s } if self.table == "format" => {
                 vec![self.lag(joints, *lag_s)]
             }
-            Mistake::Lag { .. } => Vec::new(),
+            // The description's own, or what only another log has.
+            Mistake::Lag { .. } | Mistake::Length { .. } | Mistake::Compensated => Vec::new(),
             Mistake::Gravity { gravity_m_s2 } => {
                 let line = format!("gravity_m_s2 = {}", list(&gravity_m_s2.map(|g| number(g, 4))));
                 let mut changes = vec![StudyChange { table: "robot".to_owned(), line }];

@@ -156,15 +156,22 @@ fn torque_unit(
     }
     let scales = || far.iter().filter_map(|&joint| fit.scale[joint]);
     let (least, most) = (scales().fold(f64::INFINITY, f64::min), scales().fold(0.0, f64::max));
-    if common.is_none() && most > MOST_SPREAD * least {
+    // One joint of several may have a body that is described badly.
+    let is_alone = far.len() == 1 && joints.len() > 1;
+    if is_alone || (common.is_none() && most > MOST_SPREAD * least) {
         return finding(
             "description",
             "the description's masses are not this robot's, or the torques of some joints are in another unit"
                 .to_owned(),
             format!(
-                "its bodies, friction aside, would need other torques than the log has, times {factors}: too far apart for one unit \
-                 or for the currents of drives; compare the masses of the bodies beyond these joints with the maker's data \
-                 (`dynident inspect`), and the units of their columns"
+                "its bodies, friction aside, would need other torques than the log has, times {factors}: {}; compare the \
+                 masses of the bodies beyond these joints with the maker's data (`dynident inspect`), and the units of \
+                 their columns",
+                if is_alone {
+                    "one joint, which says nothing of the others' unit"
+                } else {
+                    "too far apart for one unit or for the currents of drives"
+                }
             ),
         );
     }

@@ -17,7 +17,8 @@ pub(super) fn kind(mistake: &Mistake) -> &'static str {
         Mistake::PositionUnit { .. } | Mistake::TorqueUnit { .. } | Mistake::TimeUnit { .. } => "unit",
         Mistake::Coupled { .. } => "coupling",
         Mistake::Lag { .. } => "lag",
-        Mistake::Gravity { .. } => "mounting",
+        Mistake::Length { .. } => "description",
+        Mistake::Gravity { .. } | Mistake::Compensated => "mounting",
     }
 }
 
@@ -107,6 +108,20 @@ pub(super) fn sentence(mistake: &Mistake, joints: &[String]) -> String {
             if *lag_s > 0.0 { "later" } else { "earlier" },
             if *channels == Channels::Torque { "the motion" } else { "all else" }
         ),
+        Mistake::Length { joint, factor } if *factor < 0.0 => format!(
+            "the description has joint `{}` on the other side of the joint before it: `xyz` of its origin has to be times {factor:.3}",
+            joints[*joint]
+        ),
+        Mistake::Length { joint, factor } => format!(
+            "the description has joint `{}` too {} the joint before it: `xyz` of its origin has to be times {factor:.3}",
+            joints[*joint],
+            if *factor > 1.0 { "near to" } else { "far from" }
+        ),
+        Mistake::Compensated => {
+            "the torque is without gravity: the controller took off that of the description's bodies; log \
+                                 the torque with gravity, or add to the columns what the controller takes off"
+                .to_owned()
+        }
         Mistake::Gravity { gravity_m_s2: [0.0, 0.0, 0.0] } => {
             "the torque is without gravity: the controller took it off, or nothing pulls at this robot".to_owned()
         }
@@ -119,6 +134,9 @@ pub(super) fn sentence(mistake: &Mistake, joints: &[String]) -> String {
 /// Another explanation, with what it would have one write.
 pub(super) fn alternative(mistake: &Mistake, joints: &[String], format: Option<&StudyFormat<'_>>) -> String {
     let changes = format.map_or_else(Vec::new, |format| format.changes(mistake));
+    if changes.is_empty() {
+        return sentence(mistake, joints);
+    }
     let write: Vec<String> = changes.iter().map(|change| format!("[{}] {}", change.table, change.line)).collect();
     format!("{} ({})", sentence(mistake, joints), write.join(", "))
 }
@@ -130,10 +148,13 @@ pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading),
         Mistake::Sign { joints, .. } | Mistake::PositionUnit { joints, .. } | Mistake::Lag { joints, .. } => {
             joints.clone()
         }
-        Mistake::Offset { joint, .. } | Mistake::TorqueUnit { joint, .. } | Mistake::Coupled { joint, .. } => {
-            vec![*joint]
+        Mistake::Offset { joint, .. }
+        | Mistake::TorqueUnit { joint, .. }
+        | Mistake::Coupled { joint, .. }
+        | Mistake::Length { joint, .. } => vec![*joint],
+        Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Compensated | Mistake::Gravity { .. } => {
+            (0..joints.len()).collect()
         }
-        Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Gravity { .. } => (0..joints.len()).collect(),
     };
     // The named joint's own torque where that tells; else the one that tells most.
     let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > 0.2);

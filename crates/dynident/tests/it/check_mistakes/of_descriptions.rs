@@ -1,0 +1,87 @@
+//! Mistakes of the description and of what a controller took off by it.
+
+use super::{Row, check_text, problems, read};
+use crate::common::repository;
+use dynident::dynamics::{Workspace, inverse_dynamics};
+use dynident::model::{Model, read_urdf};
+use std::path::Path;
+
+/// The README's example with another description and other rows.
+fn study_with(folder: &Path, urdf: &str, change: impl Fn(&mut Vec<Row>)) -> String {
+    std::fs::write(folder.join("robot.urdf"), urdf).unwrap();
+    for name in ["train.csv", "test.csv"] {
+        let (header, mut rows) = read(name);
+        change(&mut rows);
+        let line = |row: &Row| row.map(|value| value.to_string()).join(",");
+        let lines: Vec<String> = std::iter::once(header).chain(rows.iter().map(line)).collect();
+        std::fs::write(folder.join(name), lines.join("\n") + "\n").unwrap();
+    }
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let study = study.replace("../robots/ur10.urdf", "robot.urdf").replace("ur10_simulated/", "");
+    study.replace("[format]", super::WITH_DRIVES)
+}
+
+fn ur10() -> String {
+    std::fs::read_to_string(repository("robots/ur10.urdf")).unwrap()
+}
+
+/// The upper arm half as long left 4.4 % of the shoulder's torque for 2.8 %, and ended with status 0.
+#[test]
+fn a_link_of_another_length_is_named_with_its_factor() {
+    const ELBOW: &str = "xyz=\"0.0 -0.1719 0.612\"";
+    for (described, factor) in [("xyz=\"0.0 -0.08595 0.306\"", 2.0), ("xyz=\"0.0 -0.3438 1.224\"", 0.5)] {
+        let urdf = ur10();
+        assert!(urdf.contains(ELBOW));
+        let folder = tempfile::tempdir().unwrap();
+        let found =
+            problems(&check_text(folder.path(), &study_with(folder.path(), &urdf.replace(ELBOW, described), |_| {})));
+        let [(kind, sentence)] = &found[..] else { panic!("{found:?}") };
+        assert!(kind == "description" && sentence.contains("`elbow_joint`"), "{found:?}");
+        let told = sentence.split("has to be times ").nth(1).and_then(|rest| rest.split(':').next()).unwrap();
+        let told: f64 = told.trim().parse().unwrap();
+        // To a fifth of the next factor that is tried.
+        assert!((told / factor).ln().abs() < 0.1, "{sentence}");
+    }
+}
+
+/// The description's gravity at each row's position, taken off its torque.
+fn compensate(model: &Model, rows: &mut [Row]) {
+    let mut workspace = Workspace::new(model);
+    for row in rows {
+        let q: Vec<f64> = row[1..7].to_vec();
+        let gravity = inverse_dynamics(model, &mut workspace, &q, &[0.0; 6], &[0.0; 6]).to_vec();
+        row[7..13].iter_mut().zip(gravity).for_each(|(tau, gravity)| *tau -= gravity);
+    }
+}
+
+/// A controller knows gravity by the masses that the description has, and these err: torques without it are not those
+/// of a robot where nothing pulls. They were taken for another unit of torque, another mounting, or for nothing at all.
+#[test]
+fn gravity_that_a_controller_took_off_by_its_own_masses_is_named() {
+    let urdf = ur10();
+    let model = read_urdf(&urdf).unwrap().model;
+    // Masses of the description a quarter too large, those of the robot are what they are.
+    let heavier = with_bodies_times(1.25, &urdf);
+    let controller = read_urdf(&heavier).unwrap().model;
+    for (name, urdf, controller) in [("as described", urdf, &model), ("heavier than it is", heavier, &controller)] {
+        let folder = tempfile::tempdir().unwrap();
+        let study = study_with(folder.path(), &urdf, |rows| compensate(controller, rows));
+        let found = problems(&check_text(folder.path(), &study));
+        let is_named = found.len() == 1 && found[0].0 == "mounting" && found[0].1.contains("without gravity");
+        assert!(is_named, "{name}: {found:?}");
+    }
+}
+
+/// A description whose masses and moments of inertia are `factor` times as large.
+fn with_bodies_times(factor: f64, urdf: &str) -> String {
+    let mut text = urdf.to_owned();
+    for key in ["mass value=\"", "ixx=\"", "iyy=\"", "izz=\"", "ixy=\"", "ixz=\"", "iyz=\""] {
+        let pieces: Vec<&str> = text.split(key).collect();
+        let scaled = pieces[1..].iter().map(|piece| {
+            let (number, rest) = piece.split_once('"').unwrap();
+            format!("{key}{}\"{rest}", factor * number.parse::<f64>().unwrap())
+        });
+        text = std::iter::once(pieces[0].to_owned()).chain(scaled).collect();
+    }
+    text
+}
