@@ -4,7 +4,7 @@
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::between_logs::{BetweenLogs, with_variation};
 use crate::chosen_friction::{
-    ChosenFriction, choose_friction, constants_of_all_rows, friction_of_less_noise, friction_with_cutoff,
+    ChosenFriction, choose_friction, constants_of_all_rows, friction_by_cutoffs, friction_of_less_noise,
 };
 use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
 use crate::error::IdentificationError;
@@ -460,8 +460,8 @@ fn chosen_here<'a>(
         };
         (logs, cutoff, friction)
     } else {
-        let at_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
-        let (of_friction, friction) = friction_with_cutoff((&logs, settings), &robot, (chosen, payloads), at_hz)?;
+        let places = (chosen, payloads);
+        let (at_hz, of_friction, friction) = friction_by_cutoffs((&logs, settings), &robot, places, cutoff.as_ref())?;
         friction_hz = at_hz;
         let cutoff = of_friction.or(cutoff);
         (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)

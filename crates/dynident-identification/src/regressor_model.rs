@@ -4,6 +4,9 @@ use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
 use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
 
+/// A parameter holds another from this factor of it on: less is rounding.
+const HELD: f64 = 1e-9;
+
 /// A parametric model, and what estimates have added to it: the load behind load-dependent friction, the gains of
 /// logged torque.
 #[derive(Clone, Debug)]
@@ -67,6 +70,41 @@ impl RegressorModel {
         wide
     }
 
+    /// The same with the load of an estimate of `other`, where load-dependent friction needs it.
+    #[must_use]
+    pub fn with_load_of_estimate(self, other: &Self, values: &[f64]) -> Self {
+        if self.needs_load() { self.with_load_of(other, &other.without_drives(values)) } else { self }
+    }
+
+    /// Estimated values of the layout's columns without the drive inertia that base parameters of bodies hold.
+    ///
+    /// Drive inertia of the first joints cannot be told from their bodies' (`Izz1 + Ia1`), and it does not load the
+    /// gear. Of such a parameter, what lies beyond the description's bodies is taken for the drives', never more than
+    /// all of it; all counts as the bodies' where these are not described.
+    fn without_drives(&self, values: &[f64]) -> Vec<f64> {
+        let mut bodies = values.to_vec();
+        let (base, terms) = (self.base(), self.terms().len());
+        let mut nominal = self.parametric.nominal().to_vec();
+        if self.parametric.nominal_base().is_none() {
+            return bodies;
+        }
+        // A description's friction is no body either.
+        let first_term = nominal.len() - terms;
+        nominal[first_term..].fill(0.0);
+        let of_bodies = base.values(&nominal);
+        let is_drive = |column: usize| matches!(base.all_columns()[column], Column::Term(TorqueTerm::DriveInertia(_)));
+        let regrouped = base.dependent().iter().zip(base.regrouping().column_iter());
+        for (_, factors) in regrouped.filter(|(column, _)| is_drive(**column)) {
+            for (place, _) in factors.iter().enumerate().filter(|(_, factor)| **factor > HELD) {
+                if matches!(base.all_columns()[base.independent()[place]], Column::Body { .. }) {
+                    let beyond = (values[place] - of_bodies[place]).max(0.0);
+                    bodies[place] = values[place] - beyond.min(values[place].max(0.0));
+                }
+            }
+        }
+        bodies
+    }
+
     /// The same with the bodies of an estimate of `other`, where load-dependent friction needs them.
     #[must_use]
     pub fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
@@ -90,5 +128,31 @@ impl RegressorModel {
             _ => None,
         });
         needing.min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::terms::{DriveChoice, terms_per_joint};
+
+    /// Of the first joint's `Izz1 + Ia1` the drive's part loads no gear: it was taken for load.
+    #[test]
+    fn drive_inertia_that_a_body_holds_is_no_load() {
+        let model =
+            dynident_model::load_robot(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf")).unwrap().model;
+        let drives = terms_per_joint(&model, |_| DriveChoice { drive_inertia: true, ..DriveChoice::default() });
+        let parametric = ParametricModel::new(model, drives).unwrap();
+        let (mut truth, bodies) = (parametric.nominal().to_vec(), parametric.nominal_base().unwrap().to_vec());
+        let first = truth.len() - parametric.terms().len();
+        truth[first..].fill(3.0);
+        let with_drives = parametric.base().values(&truth);
+        let found = RegressorModel::from(parametric).without_drives(&with_drives);
+        let is_held = |place: &usize| with_drives[*place] != bodies[*place] && found[*place] != with_drives[*place];
+        assert!((0..bodies.len()).any(|place| is_held(&place)));
+        for place in (0..bodies.len()).filter(is_held) {
+            // Three significant digits of rounding beside values of ten.
+            assert!((found[place] - bodies[place]).abs() < 1e-12 * 10.0, "{place}");
+        }
     }
 }

@@ -152,7 +152,7 @@ impl TrainingPasses<'_> {
             let started = Instant::now();
             let plain = plain_estimate(&self.settings.estimation, &found.problem)?;
             let estimated_s = started.elapsed().as_secs_f64();
-            let with_load = found.model.clone().with_load_of(&found.model, &plain.values);
+            let with_load = found.model.clone().with_load_of_estimate(&found.model, &plain.values);
             let has_settled = load_has_settled(&found, &with_load);
             let [read_s, chosen_s] = found.timings_s;
             if has_settled {

@@ -111,7 +111,7 @@ fn predict(
     let all: Vec<usize> = (0..recordings.len()).collect();
     let logs = Logs::new(task.robot.model(), &recordings, identification.filters(), &all, None, Execution::default())?;
     let model = RegressorModel::from(task.robot.clone());
-    let model = model.clone().with_load_of(&model, &known.values);
+    let model = model.clone().with_load_of_estimate(&model, &known.values);
     let added =
         known_payloads(&settings.payloads, &model).map_err(dynident_identification::IdentificationError::from)?;
     // Legs with the same payload together.

@@ -107,7 +107,7 @@ fn friction_by_terms(
     // All candidates as columns of one set of factors, from which each candidate model is a selection.
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
-        let wide = with_terms(&first.model, further).with_load_of(&first.model, &plain.values);
+        let wide = with_terms(&first.model, further).with_load_of_estimate(&first.model, &plain.values);
         let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain, &gains))?;
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
     };

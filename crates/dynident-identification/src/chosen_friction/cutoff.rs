@@ -22,12 +22,47 @@ const LOWER: f64 = 1.2;
 /// half the square of this part.
 const SMEARED: f64 = 0.05;
 
+/// Friction that the recordings choose at the highest cut-off that serves the parameters by `before`, a prediction with
+/// the friction that a study begins with; that cut-off, and the one for a fit with the friction.
+///
+/// Friction that the study's terms do not have counts as noise in that prediction, which then asks for less than the
+/// friction is told by. So where the prediction with the friction that was found goes higher, friction is chosen there
+/// as well, and counts where it says more of these rows (Schwarz).
+///
+/// # Errors
+/// As [`friction_with_cutoff`].
+pub(crate) fn friction_by_cutoffs(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    places: (&[usize], &[Payload]),
+    before: Option<&CutoffByError>,
+) -> Result<(Option<f64>, Option<CutoffByError>, ChosenFriction), IdentificationError> {
+    let at_hz = before.map(CutoffByError::highest_alike_hz);
+    let (cutoff, friction) = friction_with_cutoff((logs, settings), robot, places, at_hz)?;
+    let higher_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
+    let Some((low_hz, high_hz)) = at_hz.zip(higher_hz).filter(|(low_hz, high_hz)| *high_hz > LOWER * low_hz) else {
+        return Ok((at_hz, cutoff, friction));
+    };
+    if friction.joints.is_empty() || is_smeared(logs, &friction, high_hz) {
+        return Ok((Some(low_hz), cutoff, friction));
+    }
+    let (of_other, other) = friction_with_cutoff((logs, settings), robot, places, Some(high_hz))?;
+    let rows = logs.clone().with_chosen_cutoff(&settings.motion, Some(high_hz));
+    let rows = rows.with_torque_beyond_motion(&robot.clone().into())?;
+    let score = |friction: &ChosenFriction| friction_score((&rows, settings), robot, friction, places);
+    Ok(if score(&other)? < score(&friction)? {
+        (Some(high_hz), of_other, other)
+    } else {
+        (Some(low_hz), cutoff, friction)
+    })
+}
+
 /// Friction that the recordings `training` choose at the cut-off `at_hz` (of the logs where there is none), and the
 /// cut-off for a fit with it.
 ///
 /// # Errors
 /// Recordings that cannot be read, rows that do not carry an estimate.
-pub(crate) fn friction_with_cutoff(
+fn friction_with_cutoff(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     robot: &ParametricModel,
     (training, payloads): (&[usize], &[Payload]),

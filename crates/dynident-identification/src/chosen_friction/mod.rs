@@ -12,4 +12,4 @@ mod passes;
 pub use choice::{ChosenFriction, choose_friction};
 
 pub(crate) use choice::constants_of_all_rows;
-pub(crate) use cutoff::{friction_of_less_noise, friction_with_cutoff};
+pub(crate) use cutoff::{friction_by_cutoffs, friction_of_less_noise};

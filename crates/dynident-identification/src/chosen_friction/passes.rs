@@ -36,7 +36,7 @@ pub(crate) fn with_friction_of(
 ) -> Result<RegressorModel, IdentificationError> {
     let torque_gains = before.torque_gains.clone();
     let next = RegressorModel { torque_gains, ..RegressorModel::from(chosen_model(robot, joints)?) };
-    Ok(next.with_load_of(before, &fit.values))
+    Ok(next.with_load_of_estimate(before, &fit.values))
 }
 
 impl TrainingPasses<'_> {

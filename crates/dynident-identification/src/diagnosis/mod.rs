@@ -10,6 +10,7 @@
 //! | `motion_rows` | a recording as a few hundred instants |
 //! | `mistake`, `candidates`, `units` | mistakes of studies, and which to try |
 //! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
+//! | `step_width` | the step of dry friction that the rows have |
 //! | `reading`, `search` | their sum, and the reading with the best |
 //! | `torque_clock` | torque of another moment |
 //! | `description_fit`, `wrong_mass`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, one wrong mass, payloads |
@@ -29,6 +30,7 @@ mod plausibility;
 mod reading;
 mod same_columns;
 mod search;
+mod step_width;
 mod stray_torque;
 mod torque_clock;
 mod units;
@@ -213,6 +215,15 @@ fn diagnosed(
     let is_shown_by_torque = gains(Reading::torque_score) || further.believed().is_shown_by_travel();
     if gains(Reading::score) && is_shown_by_torque && !makes_the_best {
         search = further;
+    }
+    // Slower motion has its steps of friction nearer to rest: another rate is none where wider steps explain as much.
+    let is_rate = |mistake: &Mistake| matches!(mistake, Mistake::TimeUnit { .. }) && mistake.is_free_factor();
+    if let Some(best) = search.best.as_ref().filter(|best| best.mistakes.iter().all(is_rate)) {
+        let wider = Corrected::new(step_width::with_steps_of(robot, &rows)?, rows.clone(), Vec::new());
+        let wider = wider.reading(Some(&consistency))?;
+        if best.score() > wider.score() - CLEARLY_BETTER {
+            search = Search { as_written: wider, best: None, alike: Vec::new(), tried: search.tried };
+        }
     }
     // Units of torque are judged in the best reading, payloads only where the study is believed.
     let as_read = rows;

@@ -18,7 +18,7 @@ fn loaded(truth: &Truth, link: &str) -> Truth {
             *inertial = inertial.plus(&payload.expressed_in(&link.placement));
         }
     }
-    Truth { model: truth.model.with_inertials(&inertials).unwrap(), drive: truth.drive.clone() }
+    Truth { model: truth.model.with_inertials(&inertials).unwrap(), ..truth.clone() }
 }
 
 /// Currents `(τ + noise)/g`.

@@ -27,7 +27,7 @@ fn loaded(truth: &Truth, link: &str) -> Truth {
             *inertial = inertial.plus(&box_at_link().expressed_in(&link.placement));
         }
     }
-    Truth { model: truth.model.with_inertials(&inertials).unwrap(), drive: truth.drive.clone() }
+    Truth { model: truth.model.with_inertials(&inertials).unwrap(), ..truth.clone() }
 }
 
 fn noisy(sigma: f64, dof: usize, random: &mut Random) -> impl FnMut(&[f64], &[f64]) -> Vec<f64> {

@@ -30,6 +30,8 @@ impl Random {
 pub(crate) struct Truth {
     pub(crate) model: Model,
     pub(crate) drive: Vec<[f64; 4]>,
+    /// Times the default width of the step of Coulomb friction.
+    pub(crate) step_times: f64,
 }
 
 impl Truth {
@@ -53,7 +55,7 @@ impl Truth {
                 [inertia, 2.0 + random.next(), 1.5 + random.next(), 0.5 * random.next()]
             })
             .collect();
-        Self { model: model.with_inertials(&inertials).unwrap(), drive }
+        Self { model: model.with_inertials(&inertials).unwrap(), drive, step_times: 1.0 }
     }
 
     /// A robot that can exist: masses up to 30 % from the description's, centres of mass up to a tenth nearer or
@@ -70,9 +72,10 @@ impl Truth {
         truth
     }
 
-    /// Width of the step of a joint's Coulomb friction: the default of a study.
+    /// Width of the step of a joint's Coulomb friction: times the default of a study.
     pub(crate) fn coulomb_width(&self, joint: usize) -> f64 {
-        self.model.own_scale().velocity(self.model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH)
+        let turns = self.model.joints()[joint].turns();
+        self.step_times * self.model.own_scale().velocity(turns, CoulombShape::USUAL_WIDTH)
     }
 
     pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
