@@ -261,15 +261,18 @@ impl Model {
         Ok(self)
     }
 
-    /// The same robot with these joints of the tree `factor` times as far from the joint before each, along the same
-    /// line: links that are longer or shorter, or mirrored. Bodies stay as they are in their own frames.
+    /// The same robot with these joints of the tree (numbers from 0, as in [`tree_joints`](Model::tree_joints)) `factor`
+    /// times as far from the joint before each, along the same line, `p → factor p` of the placement's translation in
+    /// metres: links that are longer or shorter, or mirrored. Bodies stay as they are in their own frames.
     ///
     /// # Errors
     /// If a joint is not there or a number would not be finite.
     pub fn with_joint_distances(mut self, joints: &[usize], factor: f64) -> Result<Self, ModelError> {
-        let bodies = self.body_count();
         for &joint in joints {
-            let place = self.tree.get_mut(joint).ok_or(ModelError::Counts { joints: joint + 1, bodies })?;
+            let Some(place) = self.tree.get_mut(joint) else {
+                let known = self.tree.iter().map(|joint| joint.name.clone()).collect();
+                return Err(ModelError::UnknownJoint { joint: format!("number {}", joint + 1), known });
+            };
             place.placement.translation = place.placement.translation.scale(factor);
         }
         let Self { name, base, tree, bodies, gravity, .. } = self;

@@ -4,8 +4,8 @@
 //! that cut-off is predicted with the friction that a study begins with, whose wide step does not mind noise of the
 //! velocity. With the friction that was found the prediction can be another: noise smears a narrow step, and terms that
 //! nobody has make up for it. So where the fit then asks for a lower cut-off and the noise is more than a small part of
-//! a step's width, friction is chosen there as well, and on the rows of that cut-off the one counts that says most of
-//! them with the fewest numbers (Schwarz, Annals of Statistics 6 (1978) 461).
+//! a step's width, or for a clearly higher one, friction is chosen there as well, and on the rows of that cut-off the one
+//! counts that says most of them with the fewest numbers (Schwarz, Annals of Statistics 6 (1978) 461).
 
 use super::choice::{ChosenFriction, friction_of_logs, friction_score};
 use crate::bandwidth::{CutoffByError, choose_cutoff};
@@ -17,7 +17,7 @@ use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
 
 /// Cut-offs closer than this are one: they are tried in steps of √2.
-const LOWER: f64 = 1.2;
+const APART: f64 = 1.2;
 /// Noise of the velocity that is less than this part of a step's width does not smear it: it widens a smooth step by
 /// half the square of this part.
 const SMEARED: f64 = 0.05;
@@ -40,20 +40,15 @@ pub(crate) fn friction_by_cutoffs(
     let at_hz = before.map(CutoffByError::highest_alike_hz);
     let (cutoff, friction) = friction_with_cutoff((logs, settings), robot, places, at_hz)?;
     let higher_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
-    let Some((low_hz, high_hz)) = at_hz.zip(higher_hz).filter(|(low_hz, high_hz)| *high_hz > LOWER * low_hz) else {
+    let Some((low_hz, high_hz)) = at_hz.zip(higher_hz).filter(|(low_hz, high_hz)| *high_hz > APART * low_hz) else {
         return Ok((at_hz, cutoff, friction));
     };
     if friction.joints.is_empty() || is_smeared(logs, &friction, high_hz) {
         return Ok((Some(low_hz), cutoff, friction));
     }
-    let (of_other, other) = friction_with_cutoff((logs, settings), robot, places, Some(high_hz))?;
-    let rows = logs.clone().with_chosen_cutoff(&settings.motion, Some(high_hz));
-    let rows = rows.with_torque_beyond_motion(&robot.clone().into())?;
-    let score = |friction: &ChosenFriction| friction_score((&rows, settings), robot, friction, places);
-    Ok(if score(&other)? < score(&friction)? {
-        (Some(high_hz), of_other, other)
-    } else {
-        (Some(low_hz), cutoff, friction)
+    Ok(match better_friction_at((logs, settings), robot, places, (&friction, high_hz))? {
+        Some((of_other, other)) => (Some(high_hz), of_other, other),
+        None => (Some(low_hz), cutoff, friction),
     })
 }
 
@@ -82,16 +77,27 @@ fn friction_with_cutoff(
 pub(crate) fn friction_of_less_noise(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     robot: &ParametricModel,
-    (training, payloads): (&[usize], &[Payload]),
+    places: (&[usize], &[Payload]),
     (friction, low_hz, high_hz): (&ChosenFriction, f64, f64),
 ) -> Result<Option<(Option<CutoffByError>, ChosenFriction)>, IdentificationError> {
-    if LOWER * low_hz > high_hz || friction.joints.is_empty() || !is_smeared(logs, friction, high_hz) {
+    if APART * low_hz > high_hz || friction.joints.is_empty() || !is_smeared(logs, friction, high_hz) {
         return Ok(None);
     }
-    let logs = logs.clone().with_chosen_cutoff(&settings.motion, Some(low_hz));
-    let (cutoff, other) = friction_with_cutoff((&logs, settings), robot, (training, payloads), None)?;
+    better_friction_at((logs, settings), robot, places, (friction, low_hz))
+}
+
+/// The friction that the recordings choose at the cut-off `at_hz`, with the cut-off for a fit with it, where it says
+/// more of the rows there than `friction` (Schwarz).
+fn better_friction_at(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    places: (&[usize], &[Payload]),
+    (friction, at_hz): (&ChosenFriction, f64),
+) -> Result<Option<(Option<CutoffByError>, ChosenFriction)>, IdentificationError> {
+    let logs = logs.clone().with_chosen_cutoff(&settings.motion, Some(at_hz));
+    let (cutoff, other) = friction_with_cutoff((&logs, settings), robot, places, None)?;
     let rows = logs.with_torque_beyond_motion(&robot.clone().into())?;
-    let score = |friction: &ChosenFriction| friction_score((&rows, settings), robot, friction, (training, payloads));
+    let score = |friction: &ChosenFriction| friction_score((&rows, settings), robot, friction, places);
     Ok((score(&other)? < score(friction)?).then_some((cutoff, other)))
 }
 
