@@ -20,6 +20,7 @@ mod excitation;
 mod exogeneity;
 mod factors;
 mod friction_choice;
+mod friction_cutoff;
 mod in_memory;
 mod instruments;
 mod iteration_home;
