@@ -261,9 +261,9 @@ impl Model {
         Ok(self)
     }
 
-    /// The same robot with these joints of the tree (numbers from 0, as in [`tree_joints`](Model::tree_joints)) `factor`
-    /// times as far from the joint before each, along the same line, `p → factor p` of the placement's translation in
-    /// metres: links that are longer or shorter, or mirrored. Bodies stay as they are in their own frames.
+    /// The same robot with these joints of the tree (numbers from 0, as in [`tree_joints`](Model::tree_joints))
+    /// `factor` times as far from the joint before each: `p → factor p` of the placement's translation, metres. So
+    /// links are longer, shorter, or mirrored. Bodies stay as they are in their own frames.
     ///
     /// # Errors
     /// If a joint is not there or a number would not be finite.

@@ -4,8 +4,8 @@
 //! that cut-off is predicted with the friction that a study begins with, whose wide step does not mind noise of the
 //! velocity. With the friction that was found the prediction can be another: noise smears a narrow step, and terms that
 //! nobody has make up for it. So where the fit then asks for a lower cut-off and the noise is more than a small part of
-//! a step's width, or for a clearly higher one, friction is chosen there as well, and on the rows of that cut-off the one
-//! counts that says most of them with the fewest numbers (Schwarz, Annals of Statistics 6 (1978) 461).
+//! a step's width, or for a clearly higher one, friction is chosen there as well, and on the rows of that cut-off the
+//! one counts that says most of them with the fewest numbers (Schwarz, Annals of Statistics 6 (1978) 461).
 
 use super::choice::{ChosenFriction, friction_of_logs, friction_score};
 use crate::bandwidth::{CutoffByError, choose_cutoff};

@@ -61,8 +61,8 @@ fn write_log(path: &Path, model: &Model, seed: u64) {
     std::fs::write(path, text).unwrap();
 }
 
-/// Friction was chosen at 2.4 Hz, where no joint showed that it is asymmetric. Of a SCARA like it the model's torque was
-/// 1.3 % off on another motion, where a cut-off of 14 Hz set by hand left 0.04.
+/// Friction was chosen at 2.4 Hz, where no joint showed that it is asymmetric. Of a SCARA like it the model's torque
+/// was 1.3 % off on another motion, where a cut-off of 14 Hz set by hand left 0.04.
 #[test]
 fn friction_that_the_study_lacks_does_not_hide_itself() {
     let folder = tempfile::tempdir().unwrap();
