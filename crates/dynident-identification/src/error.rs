@@ -47,6 +47,7 @@ impl From<DiagnosisError> for IdentificationError {
     fn from(error: DiagnosisError) -> Self {
         match error {
             DiagnosisError::Log(error) => Self::Log(error),
+            DiagnosisError::Model(source) => Self::from(source),
             DiagnosisError::Estimation(error) => Self::Estimation(error),
         }
     }

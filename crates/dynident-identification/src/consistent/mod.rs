@@ -16,7 +16,7 @@ mod settings;
 pub use error::ConsistencyError;
 pub use intervals::{ParameterInterval, consistent_intervals};
 pub use nearest_to_nominal::{inertials, nearest_to_nominal};
-pub use nominal_spread::nominal_covariance;
+pub use nominal_spread::{nominal_covariance, usual_errors_of_bodies};
 pub use of_estimate::consistent_with_estimate;
 pub use parameter_std::parameter_std;
 pub use problem::{

@@ -24,29 +24,41 @@ pub fn nominal_covariance(
     settings: &ConsistencySettings,
 ) -> DMatrix<f64> {
     let (base, bodies) = (robot.base(), robot.model().inertial_count());
+    let mut directions = usual_errors_of_bodies(robot, settings, 0.0);
+    for (place, spread) in term_spreads(robot, problem).into_iter().enumerate() {
+        directions.push(of_column(robot, bodies + place).iter().map(|x| x * spread).collect());
+    }
+    let spread = DMatrix::from_fn(base.count(), directions.len(), |row, column| directions[column][row]);
+    &spread * spread.transpose()
+}
+
+/// The base parameters that independent errors of one standard deviation make, ten of each body that is not known:
+/// those of [`nominal_covariance`] without terms.
+///
+/// Each body is taken for this share of its extent `thicker` than described, in all directions: those of rods and
+/// plates err across them as well.
+pub fn usual_errors_of_bodies(robot: &ParametricModel, settings: &ConsistencySettings, thicker: f64) -> Vec<Vec<f64>> {
     let references = reference_bodies(robot, settings);
-    let map = |column: usize| {
-        let mut values = vec![0.0; bodies + robot.terms().len()];
-        values[column] = 1.0;
-        base.values(&values)
-    };
     let mut directions: Vec<Vec<f64>> = Vec::new();
     for (index, body) in references.iter().enumerate() {
         let known = settings.bodies.get(robot.model().bodies()[index].name()).is_some_and(|own| own.known.is_some());
         if known {
             continue;
         }
-        let columns: Vec<Vec<f64>> = (0..10).map(|k| map(10 * index + k)).collect();
-        for direction in body_directions(body) {
+        let columns: Vec<Vec<f64>> = (0..10).map(|k| of_column(robot, 10 * index + k)).collect();
+        for direction in body_directions(body, thicker) {
             let sum = |row: usize| (0..10).map(|k| columns[k][row] * direction[k]).sum();
-            directions.push((0..base.count()).map(sum).collect());
+            directions.push((0..robot.base().count()).map(sum).collect());
         }
     }
-    for (place, spread) in term_spreads(robot, problem).into_iter().enumerate() {
-        directions.push(map(bodies + place).iter().map(|x| x * spread).collect());
-    }
-    let spread = DMatrix::from_fn(base.count(), directions.len(), |row, column| directions[column][row]);
-    &spread * spread.transpose()
+    directions
+}
+
+/// The base parameters that one parameter of a body or of a term makes.
+fn of_column(robot: &ParametricModel, column: usize) -> Vec<f64> {
+    let mut values = vec![0.0; robot.model().inertial_count() + robot.terms().len()];
+    values[column] = 1.0;
+    robot.base().values(&values)
 }
 
 /// How far the nominal value of each torque term may be wrong: 30 % of it, and half of what its joint's torque allows.
@@ -56,9 +68,13 @@ pub(super) fn term_spreads(robot: &ParametricModel, problem: &LinearProblem) -> 
     values.iter().zip(sizes).map(|(value, size)| (MASS_SHARE * value).hypot(TERM_SHARE * size)).collect()
 }
 
-/// ρ J^½ S J^½ as ten parameters, for the ten symmetric S of unit norm.
-fn body_directions(body: &[f64; 10]) -> Vec<[f64; 10]> {
-    let pseudo = InertialParameters(*body).pseudo_inertia();
+/// ρ J^½ S J^½ as ten parameters, for the ten symmetric S of unit norm, of a body that is by a share of its extent
+/// thicker.
+fn body_directions(body: &[f64; 10], thicker: f64) -> Vec<[f64; 10]> {
+    let mut pseudo = InertialParameters(*body).pseudo_inertia();
+    let of_point = InertialParameters(*body).com_m().map_or(0.0, |com| body[0] * com.dot(com));
+    let about_com = ((0..3).map(|k| pseudo[(k, k)]).sum::<f64>() - of_point).max(0.0);
+    (0..3).for_each(|k| pseudo[(k, k)] += thicker.powi(2) * about_com);
     let eigen = pseudo.symmetric_eigen();
     let root = eigen.eigenvectors
         * Matrix4::from_diagonal(&eigen.eigenvalues.map(|value| value.max(0.0).sqrt()))

@@ -1,10 +1,12 @@
 //! What the description's bodies say of each joint's torque: its unit, and whether they are this robot's at all.
 
+use super::beside_friction::BesideFriction;
 use super::motion_rows::MotionRows;
 use super::nominal::nominal_torque;
+use super::usual_errors::torques_of_likely_robots;
 use super::wrong_mass::{WrongMass, wrong_mass};
 use dynident_dynamics::ParametricModel;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Share of a joint's torque that the description's bodies, times any factor, must explain beside friction before the
 /// factor says anything.
@@ -15,7 +17,8 @@ const UNIT_FACTOR: f64 = 3.0;
 /// a joint to say anything: else that is not the work of bodies.
 const TELLING: f64 = 0.4;
 /// Share of the best explained joint below which the description is another robot's. Of six sets of real logs with
-/// described bodies the least has 0.90; descriptions of other arms with as many joints reach 0.45.
+/// described bodies the least has 0.90; descriptions of other arms with as many joints reach 0.45. Of slow or small
+/// motion their own descriptions explain less than that as well.
 const OWN_ROBOT: f64 = 0.65;
 
 /// Units of torque that are taken for Nm, and their factors.
@@ -41,6 +44,9 @@ pub struct DescriptionFit {
     /// For each joint the share of its torque's squares beside friction, drive inertia and an offset that the bodies
     /// explain; none where even the best bodies explain little of that.
     pub explained: Vec<Option<f64>>,
+    /// The least that this description explains of the best explained joint of robots that it errs about as usual, on
+    /// this motion; none where nobody had to ask.
+    pub least_of_own: Option<f64>,
     /// One body's mass that explains what else asks for another unit of most torques.
     pub wrong_mass: Option<WrongMass>,
 }
@@ -74,9 +80,11 @@ impl DescriptionFit {
         shares.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Whether the bodies, however scaled, explain no joint's torque: they are not this robot's.
+    /// Whether the bodies, however scaled, explain no joint's torque, and would explain that of any robot that they
+    /// describe with usual errors: they are not this robot's.
     pub fn is_of_another_robot(&self) -> bool {
-        self.best_explained().is_some_and(|(_, share)| share < OWN_ROBOT)
+        let least = self.least_of_own.unwrap_or(f64::INFINITY).min(OWN_ROBOT);
+        self.best_explained().is_some_and(|(_, share)| share < least)
     }
 }
 
@@ -85,14 +93,22 @@ impl DescriptionFit {
 /// the share of each joint's torque that the best robot of this description leaves.
 pub(super) fn description_fit(robot: &ParametricModel, rows: &MotionRows, left: &[f64]) -> Option<DescriptionFit> {
     let nominal = nominal_torque(robot, rows)?;
-    let fits: Vec<JointFit> =
-        nominal.iter().zip(left).enumerate().map(|(joint, of)| joint_fit(rows, joint, of)).collect();
+    let beside = BesideFriction::new(robot, rows)?;
+    let bodies: Vec<DVector<f64>> =
+        nominal.iter().enumerate().map(|(joint, torque)| beside.of(joint, torque)).collect();
+    let fits: Vec<JointFit> = (0..bodies.len())
+        .map(|joint| joint_fit(&rows.tau[joint], &beside.of(joint, &rows.tau[joint]), &bodies[joint], left[joint]))
+        .collect();
     let left_by_scales = fits.iter().map(|fit| fit.left).sum();
     let scale = fits.iter().map(|fit| fit.scale).collect();
     let explained = fits.iter().map(|fit| fit.explained).collect();
-    let mut fit = DescriptionFit { scale, explained, wrong_mass: None };
+    let mut fit = DescriptionFit { scale, explained, least_of_own: None, wrong_mass: None };
+    if fit.is_of_another_robot() {
+        let joints: Vec<usize> = (0..fits.len()).filter(|&joint| fits[joint].explained.is_some()).collect();
+        fit.least_of_own = Some(least_of_own(robot, (rows, &beside), &bodies, (&joints, left)));
+    }
     if !fit.joints_in_another_unit().is_empty() {
-        fit.wrong_mass = wrong_mass(robot, rows, left_by_scales);
+        fit.wrong_mass = wrong_mass(robot, (rows, &beside), left_by_scales);
     }
     nominal.iter().flatten().any(|&tau| tau != 0.0).then_some(fit)
 }
@@ -106,32 +122,49 @@ struct JointFit {
     explained: Option<f64>,
 }
 
-/// The factor of one joint's column and the share explained.
-fn joint_fit(rows: &MotionRows, joint: usize, (predicted, best_left): (&Vec<f64>, &f64)) -> JointFit {
-    let (dq, ddq) = (&rows.dq[joint], &rows.ddq[joint]);
-    let tau = DVector::from_column_slice(&rows.tau[joint]);
-    let fit = |columns: usize| {
-        let matrix = DMatrix::from_fn(rows.len(), columns, |row, k| match k {
-            0 => 1.0,
-            1 => dq[row],
-            2 => dq[row].signum(),
-            3 => ddq[row],
-            _ => predicted[row],
-        });
-        let solution = (matrix.transpose() * &matrix).cholesky()?.solve(&(matrix.transpose() * &tau));
-        let left = (&tau - &matrix * &solution).norm_squared();
-        Some((left, solution))
-    };
-    let Some((without, _)) = fit(4).filter(|(without, _)| *without > 0.0) else { return JointFit::default() };
-    // Bodies that need no torque of this joint explain none of it; those of another sign neither.
-    let (share, gain) = fit(5).map_or((0.0, 0.0), |(with, solution)| (1.0 - with / without, solution[4]));
-    let share = if gain > 0.0 { share } else { 0.0 };
-    let is_telling = best_left.powi(2) * tau.norm_squared() < TELLING.powi(2) * without;
+/// The factor of one joint's column and the share explained, of its torque, what friction leaves of it and of that of
+/// the bodies, and the share that the best robot leaves.
+fn joint_fit(tau: &[f64], torque: &DVector<f64>, bodies: &DVector<f64>, best_left: f64) -> JointFit {
+    let without = torque.norm_squared();
+    if without == 0.0 {
+        return JointFit::default();
+    }
+    let (share, gain) = (share_explained(torque, bodies, 0.0), torque.dot(bodies) / bodies.norm_squared());
+    let all: f64 = tau.iter().map(|tau| tau * tau).sum();
+    let is_telling = best_left.powi(2) * all < TELLING.powi(2) * without;
     JointFit {
         left: 1.0 - share,
         scale: (share > EXPLAINED && gain.is_finite()).then(|| gain.recip()),
         explained: is_telling.then_some(share),
     }
+}
+
+/// Share of a torque's squares, with those of noise, that the bodies' torque times a factor explains. Bodies that need
+/// no torque explain none; those of another sign neither.
+fn share_explained(torque: &DVector<f64>, bodies: &DVector<f64>, noise: f64) -> f64 {
+    let along = torque.dot(bodies).max(0.0);
+    let all = (torque.norm_squared() + noise) * bodies.norm_squared();
+    if all > 0.0 { along * along / all } else { 0.0 }
+}
+
+/// The least that the description explains of the best explained of `joints`, over robots whose bodies are those of the
+/// description with errors as descriptions have them, moved as in these rows and measured as well as the best robot
+/// explains them.
+fn least_of_own(
+    robot: &ParametricModel,
+    (rows, beside): (&MotionRows, &BesideFriction),
+    bodies: &[DVector<f64>],
+    (joints, left): (&[usize], &[f64]),
+) -> f64 {
+    let Some(torques) = torques_of_likely_robots(robot, rows) else { return 0.0 };
+    let most = |torque: Vec<Vec<f64>>| {
+        let share = |&joint: &usize| {
+            let noise = left[joint].powi(2) * rows.tau[joint].iter().map(|tau| tau * tau).sum::<f64>();
+            share_explained(&beside.of(joint, &torque[joint]), &bodies[joint], noise)
+        };
+        joints.iter().map(share).fold(0.0, f64::max)
+    };
+    torques.map(most).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -142,7 +175,7 @@ mod tests {
     fn a_unit_is_common_where_joints_agree_and_constants_of_motors_are_none() {
         let unit = |scale: &[f64]| {
             let scale: Vec<Option<f64>> = scale.iter().copied().map(Some).collect();
-            DescriptionFit { explained: vec![None; scale.len()], scale, wrong_mass: None }
+            DescriptionFit { explained: vec![None; scale.len()], scale, least_of_own: None, wrong_mass: None }
                 .common_unit()
                 .map(|(name, _)| name)
         };

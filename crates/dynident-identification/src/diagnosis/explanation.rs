@@ -2,10 +2,10 @@
 //! physically consistent.
 
 use super::motion_rows::MotionRows;
-use super::nominal::left_by_nominal;
+use super::nominal::{left_by_nominal, nominal_torque};
 use crate::consistent::{ConsistencySettings, consistent_parameters};
 use crate::rows::predicted_torque;
-use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
+use dynident_dynamics::{BatchWorkspace, Column, Panels, ParametricModel, regressor_panels};
 use dynident_estimation::{EstimationError, LinearProblem, SegmentSettings, SegmentedFactor};
 use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
@@ -39,6 +39,8 @@ pub(super) struct Explanation {
     pub(super) free_parameters: Vec<f64>,
     /// By the best physically consistent set; empty where there is none.
     pub(super) consistent: Vec<f64>,
+    /// That set; empty where there is none.
+    consistent_parameters: Vec<f64>,
     /// By the description's own bodies with friction fitted joint by joint; empty where it has none.
     pub(super) nominal: Vec<f64>,
 }
@@ -58,16 +60,32 @@ impl Explanation {
         let torque = residuals(&problem, &vec![0.0; theta.len()], &[])?;
         let free = residuals(&problem, &theta, &torque)?;
         let fit = consistency.and_then(|settings| consistent_parameters(robot, &problem, &free, settings).ok());
-        let consistent = match &fit {
-            Some(fit) => residuals(&problem, &fit.base_values, &torque)?,
-            None => Vec::new(),
+        let consistent_parameters = fit.map(|fit| fit.base_values).unwrap_or_default();
+        let consistent = if consistent_parameters.is_empty() {
+            Vec::new()
+        } else {
+            residuals(&problem, &consistent_parameters, &torque)?
         };
         let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
         let of_own = |joint: usize| rows.independent / robot.layout().joint_columns(joint).len().max(1) as f64;
         let independent_of_own = (0..robot.dof()).map(of_own).collect();
-        let nominal = left_by_nominal(robot, rows).unwrap_or_default();
+        let nominal = nominal_torque(robot, rows).map_or_else(Vec::new, |torque| left_by_nominal(robot, rows, &torque));
         let nominal = nominal.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
-        Ok(Self { torque, alone, independent_of_own, free, free_parameters: theta, consistent, nominal })
+        Ok(Self {
+            torque,
+            alone,
+            independent_of_own,
+            free,
+            free_parameters: theta,
+            consistent,
+            consistent_parameters,
+            nominal,
+        })
+    }
+
+    /// The best physically consistent set; the one that need not be where there is none.
+    pub(super) fn parameters(&self) -> &[f64] {
+        if self.consistent_parameters.is_empty() { &self.free_parameters } else { &self.consistent_parameters }
     }
 
     /// Sum over all joints of the logarithm of what is left beside the torque, by one set of base parameters.
@@ -109,7 +127,8 @@ impl Explanation {
     }
 }
 
-fn score(left: &[f64], torque: &[f64]) -> f64 {
+/// `Σ_j ln(left of joint j / torque of joint j)`, joints without torque aside.
+pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
     left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
 }
 
@@ -172,6 +191,18 @@ pub(super) fn predicted(robot: &ParametricModel, rows: &MotionRows, theta: &[f64
         torque
     };
     (0..robot.dof()).map(one).collect()
+}
+
+/// Base parameters without those of torque terms: what the bodies alone have.
+pub(super) fn without_terms(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
+    let of_body = |column: &Column| matches!(column, Column::Body { .. });
+    robot
+        .layout()
+        .columns()
+        .iter()
+        .zip(theta)
+        .map(|(column, value)| if of_body(column) { *value } else { 0.0 })
+        .collect()
 }
 
 fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {

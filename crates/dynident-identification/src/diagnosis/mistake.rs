@@ -122,7 +122,7 @@ impl Mistake {
     pub(super) fn is_free_factor(&self) -> bool {
         match self {
             Self::TorqueUnit { .. } => true,
-            Self::TimeUnit { factor } => !is_unit_of_time(*factor),
+            Self::TimeUnit { .. } => self.is_other_rate(),
             Self::Sign { .. }
             | Self::Order { .. }
             | Self::Offset { .. }
@@ -133,6 +133,11 @@ impl Mistake {
             | Self::Compensated
             | Self::Gravity { .. } => false,
         }
+    }
+
+    /// Whether it is another rate of the recorder, and no unit of time.
+    pub(super) fn is_other_rate(&self) -> bool {
+        matches!(self, Self::TimeUnit { factor } if !is_unit_of_time(*factor))
     }
 
     /// What a mistake is about, its numbers aside: of several with other numbers one is enough to go on from.
@@ -253,4 +258,18 @@ impl Mistake {
         let again = ParametricModel::new(model.ok()?, robot.terms().to_vec()).ok()?;
         again.with_nominal(robot.nominal().to_vec()).ok()
     }
+}
+
+/// Robot and rows with these mistakes corrected, one after the other.
+pub(super) fn without_mistakes(
+    mistakes: &[Mistake],
+    robot: &ParametricModel,
+    rows: &MotionRows,
+) -> (ParametricModel, MotionRows) {
+    let (mut robot, mut rows) = (robot.clone(), rows.clone());
+    for mistake in mistakes {
+        rows = mistake.corrected(&robot, &rows);
+        robot = mistake.corrected_robot(&robot).unwrap_or(robot);
+    }
+    (robot, rows)
 }

@@ -11,16 +11,23 @@
 //! | `mistake`, `candidates`, `units` | mistakes of studies, and which to try |
 //! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `step_width` | the step of dry friction that the rows have |
+//! | `beside_friction`, `usual_errors` | torque beside friction, drive inertia and offsets; descriptions as they err |
 //! | `reading`, `search` | their sum, and the reading with the best |
+//! | `confirmation` | that it is not what honest logs look like |
 //! | `torque_clock` | torque of another moment |
 //! | `description_fit`, `wrong_mass`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, one wrong mass, payloads |
-//! | `held_out_reading` | mistakes that a held-out log alone has |
+//! | `held_out_logs`, `held_out_reading` | loads and mistakes that a held-out log alone has |
 //! | `same_columns` | columns that stand for two joints, torques that lost their signs |
-//! | `stray_torque`, `noise_torque` | torques that do not belong to one robot with the others, beyond what noise makes |
+//! | `stray_torque` | torques that do not belong to one robot with the others |
+//! | `noise_torque`, `further_friction` | what noise and laws of friction beyond the study's make of these |
 
+mod beside_friction;
 mod candidates;
+mod confirmation;
 mod description_fit;
 mod explanation;
+mod further_friction;
+mod held_out_logs;
 mod held_out_reading;
 mod mistake;
 mod motion_rows;
@@ -35,6 +42,7 @@ mod stray_torque;
 mod torque_clock;
 mod units;
 mod unseen_load;
+mod usual_errors;
 mod wrong_mass;
 
 pub use description_fit::DescriptionFit;
@@ -49,15 +57,18 @@ pub use stray_torque::StrayTorque;
 pub use unseen_load::UnseenLoad;
 pub use wrong_mass::WrongMass;
 
+use crate::drive_inertia::with_drives_left_to_the_logs;
 use crate::logs::Logs;
-use crate::recording::{LogError, Role};
+use crate::recording::LogError;
+use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use candidates::Breadth;
-use dynident_dynamics::ParametricModel;
+use dynident_dynamics::{ParametricModel, ParametricModelError};
 use dynident_estimation::EstimationError;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
 use explanation::Explanation;
+use held_out_logs::HeldOutLogs;
 use motion_rows::MotionSamples;
 use reading::Corrected;
 use search::{CLEARLY_BETTER, rough_consistency};
@@ -111,6 +122,9 @@ pub enum DiagnosisError {
     /// Rows that carry no estimate.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
+    /// Drive inertia that the robot cannot have.
+    #[error(transparent)]
+    Model(#[from] ParametricModelError),
 }
 
 /// Whether an import report has a joint beyond its limits, or a rate that no recorder has.
@@ -164,15 +178,19 @@ fn diagnosed(
     training: &[usize],
     theta: Option<&[f64]>,
 ) -> Result<Diagnosis, DiagnosisError> {
-    let model = robot.clone().into();
+    let model = RegressorModel::from(robot.clone());
     let of_recording = |&index: &usize| MotionSamples::of_recording(logs, &model, index);
     let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
     let mut rows = MotionRows::empty(robot.dof());
     for samples in &samples {
         rows.append(&samples.instants(INSTANTS / training.len().max(1)));
     }
+    // Identification asks the logs for what the study leaves to them; no mistake has to explain it.
+    let stated = robot;
+    let mut robot = with_drives_left_to_the_logs(stated, settings)?;
     let consistency = rough_consistency(settings.consistency.as_ref());
     let as_written = Corrected::new(robot.clone(), rows.clone(), Vec::new());
+    let mut written = rows.clone();
     let as_read = as_written.reading(Some(&consistency))?;
     let taken_off_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
     let taken_off_s: Vec<f64> = (0..robot.dof()).map(taken_off_s).collect();
@@ -181,12 +199,13 @@ fn diagnosed(
         (usual, search::search(as_written.clone(), start, &consistency, Breadth::All))
     };
     // A torque of another moment hides every other mistake, and another mistake may look like one.
-    let clock = TorqueClock::new(robot, &samples, taken_off_s.clone());
-    let shifted = clock.and_then(|clock| clock.reading(robot, &as_read, &consistency, INSTANTS));
+    let clock = TorqueClock::new(&robot, &samples, taken_off_s.clone());
+    let shifted = clock.and_then(|clock| clock.reading(&robot, &as_read, &consistency, INSTANTS));
     let (mut search, further) = match shifted {
         // A fit takes it off by itself.
         Some(late) if late.corrected.mistakes.is_empty() => {
             rows.clone_from(&late.corrected.rows);
+            written.clone_from(&rows);
             searches(&late.reading.clone(), (late.corrected, late.reading))
         }
         Some(late) => {
@@ -208,48 +227,42 @@ fn diagnosed(
     // fewer limits, whatever the description's are worth, unless it travels far beyond all it can. Where most joints'
     // torques are in another unit still, the unit of one joint or another rate only makes the best of that.
     let has_free_factor = further.best.as_ref().is_some_and(|best| best.mistakes.iter().any(Mistake::is_free_factor));
-    let makes_the_best = has_free_factor
-        && description_fit_of(robot, &rows, &further).is_some_and(|fit| !fit.joints_in_another_unit().is_empty());
+    let is_in_another_unit = || {
+        let (robot, rows) = further.corrected(&robot, &rows);
+        let fit = description_fit::description_fit(&robot, &rows, &further.believed().left);
+        fit.is_some_and(|fit| !fit.joints_in_another_unit().is_empty())
+    };
+    let makes_the_best = has_free_factor && is_in_another_unit();
     search.tried = further.tried;
     let gains = |of: fn(&Reading) -> f64| of(further.believed()) < of(search.believed()) - CLEARLY_BETTER;
     let is_shown_by_torque = gains(Reading::torque_score) || further.believed().is_shown_by_travel();
     if gains(Reading::score) && is_shown_by_torque && !makes_the_best {
         search = further;
     }
-    // Slower motion has its steps of friction nearer to rest: another rate is none where wider steps explain as much.
-    let is_rate = |mistake: &Mistake| matches!(mistake, Mistake::TimeUnit { .. }) && mistake.is_free_factor();
-    if let Some(best) = search.best.as_ref().filter(|best| best.mistakes.iter().all(is_rate)) {
-        let wider = Corrected::new(step_width::with_steps_of(robot, &rows)?, rows.clone(), Vec::new());
-        let wider = wider.reading(Some(&consistency))?;
-        if best.score() > wider.score() - CLEARLY_BETTER {
-            search = Search { as_written: wider, best: None, alike: Vec::new(), tried: search.tried };
-        }
+    // What identification finds by itself, and what descriptions err by, is no mistake of the study.
+    let (of_best, rows_of_best) = search.corrected(&robot, &rows);
+    let again = confirmation::without_mistake((&robot, &written), (&of_best, &rows_of_best), &search, &consistency)?;
+    if let Some((own_steps, as_written)) = again {
+        search = Search { as_written, best: None, alike: Vec::new(), tried: search.tried };
+        (robot, rows) = (own_steps, written);
     }
+    let model = RegressorModel::from(robot.clone());
     // Units of torque are judged in the best reading, payloads only where the study is believed.
-    let as_read = rows;
-    let description_fit = description_fit_of(robot, &as_read, &search);
-    let (mut unseen_loads, mut held_out) = (Vec::new(), Vec::new());
+    let (believed, as_read) = (search.corrected(&robot, &rows), rows);
+    let description_fit = description_fit::description_fit(&believed.0, &believed.1, &search.believed().left);
     let is_explained = search.best.is_none() && search.as_written.left_of_all < MOSTLY_NOISE;
-    if let Some(theta) = theta.filter(|_| is_explained) {
-        for index in logs.of_role(Role::Validate) {
-            let samples = [MotionSamples::of_recording(logs, &model, index)?];
-            let rows = samples[0].instants(INSTANTS);
-            let load = unseen_load::unseen_load(robot, &rows, index, theta);
-            let known = (theta, &search.as_written.left[..]);
-            let clock = TorqueClock::new(robot, &samples, taken_off_s.clone());
-            let reading = held_out_reading::held_out_reading(robot, (&rows, clock.as_ref()), index, known);
-            // What leaves less explains it: a load has four free numbers, a mistake hardly any.
-            let (with, without) = (load.as_ref().map(|load| load.left_with), reading.as_ref().map(|r| r.left_without));
-            match with.zip(without) {
-                Some((with, without)) if with < without => unseen_loads.extend(load),
-                Some(_) => held_out.extend(reading),
-                None => {
-                    unseen_loads.extend(load);
-                    held_out.extend(reading);
-                }
-            }
+    let held_out = match theta.filter(|_| is_explained) {
+        Some(theta) => {
+            let known = (robot.terms() == stated.terms()).then_some(theta);
+            let (reading, rows, consistency) = (&search.as_written, &as_read, &consistency);
+            held_out_logs::held_out_logs(
+                (logs, &taken_off_s),
+                &model,
+                &held_out_logs::Trained { rows, reading, known, consistency },
+            )?
         }
-    }
+        None => HeldOutLogs::default(),
+    };
     let as_written = &search.as_written;
     let same_columns = same_columns::same_columns(&as_read, &as_written.left);
     let lost_signs = same_columns::has_lost_signs(&as_read, as_written.left_of_all);
@@ -258,21 +271,12 @@ fn diagnosed(
         if search.best.is_some() {
             return Ok(vec![0.0; robot.dof()]);
         }
-        let explained = Explanation::new(robot, &as_read, None)?;
+        let explained = Explanation::new(&robot, &as_read, None)?;
         let noise = noise_torque::torque_of_noise(logs, &model, training, &explained.free_parameters)?;
         let share = |(noise, torque): (&f64, &f64)| if *torque > 0.0 { noise / torque } else { 0.0 };
         Ok::<_, DiagnosisError>(noise.iter().zip(&explained.torque).map(share).collect())
     };
-    let stray_torques = stray_torque::stray_torques(search.believed(), noise)?;
+    let stray_torques = stray_torque::stray_torques(search.believed(), (&believed.0, &believed.1), noise)?;
+    let HeldOutLogs { unseen_loads, readings: held_out } = held_out;
     Ok(Diagnosis { search, description_fit, unseen_loads, held_out, same_columns, lost_signs, stray_torques })
-}
-
-/// What the description's bodies say in the reading that is believed.
-fn description_fit_of(robot: &ParametricModel, rows: &MotionRows, search: &Search) -> Option<DescriptionFit> {
-    let (mut robot, mut rows) = (robot.clone(), rows.clone());
-    for mistake in search.best.iter().flat_map(|best| &best.mistakes) {
-        rows = mistake.corrected(&robot, &rows);
-        robot = mistake.corrected_robot(&robot).unwrap_or(robot);
-    }
-    description_fit::description_fit(&robot, &rows, &search.believed().left)
 }

@@ -1,7 +1,9 @@
 //! What the description's own bodies leave of the torque, with friction fitted joint by joint.
 
+use super::beside_friction::step_of;
 use super::motion_rows::MotionRows;
 use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
+use dynident_model::terms::CoulombShape;
 use nalgebra::{DMatrix, DVector};
 
 /// The torque of the nominal bodies, one vector for each joint, Nm (N); `None` while a body's inertials are unknown.
@@ -35,23 +37,23 @@ fn torque_of(
     torque
 }
 
-/// Root mean square of what the nominal bodies leave of each joint's torque, Nm (N), beside viscous and Coulomb
-/// friction of at least zero and an offset that fit the rest best; `None` while a body's inertials are unknown.
-pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<f64>> {
-    let left = |(joint, nominal): (usize, Vec<f64>)| {
+/// Root mean square of what the torque `nominal` of the nominal bodies ([`nominal_torque`]) leaves of each joint's
+/// torque, Nm (N), beside viscous and Coulomb friction of at least zero and an offset that fit the rest best.
+pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
+    let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
-        left_by_friction(&rows.dq[joint], &rest)
+        left_by_friction((&rows.dq[joint], step_of(robot, joint)), &rest)
     };
-    Some(nominal_torque(robot, rows)?.into_iter().enumerate().map(left).collect())
+    nominal.iter().enumerate().map(left).collect()
 }
 
 /// Root mean square of `tau` beside an offset and friction of at least zero.
-fn left_by_friction(dq: &[f64], tau: &[f64]) -> f64 {
+fn left_by_friction((dq, step): (&[f64], CoulombShape), tau: &[f64]) -> f64 {
     let count = tau.len();
     let column = |which: usize, row: usize| match which {
         0 => 1.0,
         1 => dq[row],
-        _ => dq[row].signum(),
+        _ => step.step(dq[row]),
     };
     let tau = DVector::from_column_slice(tau);
     let mut kept = vec![0, 1, 2];

@@ -10,7 +10,7 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 
 /// Weight of what the description's own bodies leave beside what the best consistent ones leave: descriptions err.
-const NOMINAL_WEIGHT: f64 = 0.5;
+pub(super) const NOMINAL_WEIGHT: f64 = 0.5;
 /// Per joint: what a consistent robot leaves more than parameters of each joint's own do, as a logarithm, from which a
 /// reading explains nothing; real logs of arms with friction of their own reach 0.55.
 const UNEXPLAINED: f64 = 0.9;
@@ -49,6 +49,8 @@ pub struct Reading {
     pub alone_score: f64,
     /// The same by the description's own bodies; zero where it has none.
     pub nominal_score: f64,
+    /// The base parameters of the best consistent robot; those of `free` where there is none.
+    pub parameters: Vec<f64>,
     /// Logarithm of how much larger the torques became that columns were added to: shares of these fall by themselves.
     pub torque_growth: f64,
 }
@@ -148,6 +150,7 @@ impl Corrected {
             free_score: explained.free_score(),
             alone_score: explained.alone_score(),
             nominal_score: explained.nominal_score(),
+            parameters: explained.parameters().to_vec(),
             torque_growth: self.torque_growth,
         })
     }

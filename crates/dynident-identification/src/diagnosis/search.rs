@@ -5,11 +5,13 @@
 //! best are named beside it.
 
 use super::candidates::{Breadth, FAR, candidates};
-use super::mistake::{Channels, Mistake};
+use super::mistake::{Channels, Mistake, without_mistakes};
+use super::motion_rows::MotionRows;
 use super::reading::{Corrected, Reading};
 use super::units::{is_unit_of_position, is_unit_of_time, is_unit_of_torque};
 use crate::consistent::ConsistencySettings;
 use core::f64::consts::FRAC_PI_2;
+use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
 /// By how much a reading must score better before the study is doubted: as if one joint had less than 0.55 of what was
@@ -62,6 +64,11 @@ impl Search {
     /// The better reading, where there is one, or the study as it is.
     pub fn believed(&self) -> &Reading {
         self.best.as_ref().unwrap_or(&self.as_written)
+    }
+
+    /// Robot and rows of the reading that is believed.
+    pub(super) fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> (ParametricModel, MotionRows) {
+        without_mistakes(&self.believed().mistakes, robot, rows)
     }
 }
 
@@ -280,6 +287,8 @@ fn explains_its_joint(reading: &Reading, from: &Reading) -> bool {
         // A zero that is elsewhere shows in the torque: any does that brings a joint back between its stops, which the
         // description may have wrong as well.
         Some(Mistake::Offset { .. }) => return reading.torque_score() < from.torque_score() - ALIKE,
+        // What no base parameters make up for: bodies that could not be are no other length.
+        Some(Mistake::Length { .. }) => return reading.free_score < from.free_score - CLEARLY_BETTER,
         // Bodies that are described too heavy look so to the description, not to bodies that could be.
         Some(Mistake::Compensated) => {
             let score = |reading: &Reading| reading.consistent_score + reading.torque_growth;

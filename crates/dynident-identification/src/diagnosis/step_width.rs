@@ -9,30 +9,49 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 
-/// Times the width in force that are tried, narrower and wider.
-const TIMES: [f64; 4] = [0.4, 2.5, 6.0, 15.0];
+/// Times the width in force that are tried first, narrower and wider, then times the best of these.
+const TIMES: [f64; 7] = [0.4, 1.6, 2.5, 4.0, 6.0, 10.0, 15.0];
+const NEAR: [f64; 4] = [0.77, 1.3, 0.88, 1.14];
 /// Share of what is left of a joint's torque that another width leaves at most: less is its noise.
 const CLEARLY_LESS: f64 = 0.9;
 
-/// The robot with the widths of smooth steps at which parameters of each joint's own leave least of its torque
-/// ([`Explanation::alone`]); those in force where no other leaves clearly less.
+/// The robot with the widths of smooth steps at which one set of parameters ([`Explanation::free`]) leaves least of
+/// each joint's torque; those in force where no other leaves clearly less. Parameters of each joint's own would follow
+/// a wrong step.
 ///
 /// # Errors
 /// Too few rows.
 pub(super) fn with_steps_of(robot: &ParametricModel, rows: &MotionRows) -> Result<ParametricModel, EstimationError> {
-    let mut least =
-        Explanation::new(robot, rows, None)?.alone.iter().map(|left| CLEARLY_LESS * left).collect::<Vec<_>>();
+    let mut least: Vec<f64> =
+        Explanation::new(robot, rows, None)?.free.iter().map(|left| CLEARLY_LESS * left).collect();
     let mut times = vec![1.0; robot.dof()];
     for factor in TIMES {
-        let Some(other) = with_widths(robot, &vec![factor; robot.dof()]) else { continue };
-        for (joint, left) in Explanation::new(&other, rows, None)?.alone.iter().enumerate() {
-            if *left < least[joint] {
-                (least[joint], times[joint]) = (*left, factor);
-            }
+        narrow_down(robot, rows, &vec![factor; robot.dof()], (&mut least, &mut times))?;
+    }
+    if times.iter().all(|times| *times == 1.0) {
+        return Ok(robot.clone());
+    }
+    for factor in NEAR {
+        let near: Vec<f64> = times.iter().map(|best| if *best == 1.0 { 1.0 } else { factor * best }).collect();
+        narrow_down(robot, rows, &near, (&mut least, &mut times))?;
+    }
+    Ok(with_widths(robot, &times).unwrap_or_else(|| robot.clone()))
+}
+
+/// Takes for each joint whose torque these widths leave less of than any before its own.
+fn narrow_down(
+    robot: &ParametricModel,
+    rows: &MotionRows,
+    tried: &[f64],
+    (least, times): (&mut [f64], &mut [f64]),
+) -> Result<(), EstimationError> {
+    let Some(other) = with_widths(robot, tried) else { return Ok(()) };
+    for (joint, left) in Explanation::new(&other, rows, None)?.free.iter().enumerate() {
+        if *left < least[joint] {
+            (least[joint], times[joint]) = (*left, tried[joint]);
         }
     }
-    let is_other = times.iter().any(|factor| *factor != 1.0);
-    Ok(is_other.then(|| with_widths(robot, &times)).flatten().unwrap_or_else(|| robot.clone()))
+    Ok(())
 }
 
 /// The robot with each joint's smooth steps so many times as wide; none where it has none.

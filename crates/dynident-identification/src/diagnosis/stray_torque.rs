@@ -1,7 +1,12 @@
 //! Torques that do not belong to one robot and motion with the others: noise, another channel, a clock or a gain of
 //! their own that no reading mends.
 
+use super::DiagnosisError;
+use super::explanation::Explanation;
+use super::further_friction::left_beside_further_friction;
+use super::motion_rows::MotionRows;
 use super::reading::Reading;
+use dynident_dynamics::ParametricModel;
 
 /// Times what parameters of the joint's own leave of its torque that one robot for all joints leaves, from which the
 /// torque is doubted, and from which it is not this robot's. Of seven sets of real logs the most is 1.8, of single logs
@@ -19,7 +24,8 @@ const MOTIONLESS: [f64; 2] = [0.75, 1.0];
 pub struct StrayTorque {
     /// The joint's number.
     pub joint: usize,
-    /// Share of its torque that one set of base parameters for all joints leaves.
+    /// Share of its torque that one set of base parameters for all joints leaves, with laws of friction that the study
+    /// does not have where these leave less.
     pub left: f64,
     /// The same by parameters of its own.
     pub alone: f64,
@@ -53,14 +59,16 @@ impl StrayTorque {
 
 /// The torques of a reading that do not belong to one robot with the others: those that have nothing to do with the
 /// motion, else the one of which one robot leaves most beside its own parameters, for it spoils its neighbours'.
-/// `noise` tells the share of each joint's torque that noise of the positions makes; it is asked only where it matters.
+/// `robot` and `rows` are those of the reading. `noise` tells the share of each joint's torque that noise of the
+/// positions makes; it is asked only where it matters.
 ///
 /// # Errors
-/// Those of `noise`.
-pub(super) fn stray_torques<E>(
+/// Those of `noise`, too few rows.
+pub(super) fn stray_torques(
     reading: &Reading,
-    noise: impl FnOnce() -> Result<Vec<f64>, E>,
-) -> Result<Vec<StrayTorque>, E> {
+    (robot, rows): (&ParametricModel, &MotionRows),
+    noise: impl FnOnce() -> Result<Vec<f64>, DiagnosisError>,
+) -> Result<Vec<StrayTorque>, DiagnosisError> {
     let of = |joint: usize| StrayTorque { joint, left: reading.free[joint], alone: reading.alone[joint], noise: 0.0 };
     let mut all: Vec<StrayTorque> =
         (0..reading.free.len()).filter(|&joint| reading.own_parameters_tell[joint]).map(of).collect();
@@ -70,8 +78,13 @@ pub(super) fn stray_torques<E>(
     }
     if all.iter().any(StrayTorque::is_stray) {
         let noise = noise()?;
+        let explained = Explanation::new(robot, rows, None)?;
         for torque in &mut all {
             torque.noise = noise[torque.joint];
+            if torque.is_stray() {
+                let theta = &explained.free_parameters;
+                torque.left *= left_beside_further_friction(robot, rows, torque.joint, theta);
+            }
         }
     }
     Ok(all

@@ -85,7 +85,7 @@ fn a_result_is_a_prior_for_the_next_run() {
     let robot = first.robot();
     let model = robot.model().clone();
     let drive = vec![[0.0, 2.0, 1.5, 0.3]; 3];
-    let truth = Truth { model, drive, step_times: 1.0 };
+    let truth = Truth { model, drive };
     assert!(urdf.exists());
     let mut random = crate::common::Random(5);
     write_log(&folder.path().join("run.csv"), &truth, &Motion::new(3, 11), (100.0, 30.0), &header(3), |q, tau| {

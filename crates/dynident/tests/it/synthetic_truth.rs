@@ -107,11 +107,8 @@ fn locked_joints_and_a_tilted_base() {
     let mut truth = truth();
     truth.model = truth.model.clone().with_base_orientation(0.3, -0.4, 0.2).unwrap();
     let locked = ("wrist_3_joint".to_owned(), 0.7);
-    let five = Truth {
-        model: truth.model.locked(std::slice::from_ref(&locked)).unwrap(),
-        drive: truth.drive[..5].to_vec(),
-        ..truth
-    };
+    let five =
+        Truth { model: truth.model.locked(std::slice::from_ref(&locked)).unwrap(), drive: truth.drive[..5].to_vec() };
     // The log is simulated with all six joints, the last of which stands still: nothing of the lumping enters.
     let mut workspace = dynident::dynamics::Workspace::new(&truth.model);
     let (motion, mut text) = (Motion::new(5, 1), format!("{}\n", header(5)));

@@ -30,8 +30,6 @@ impl Random {
 pub(crate) struct Truth {
     pub(crate) model: Model,
     pub(crate) drive: Vec<[f64; 4]>,
-    /// Times the default width of the step of Coulomb friction.
-    pub(crate) step_times: f64,
 }
 
 impl Truth {
@@ -55,7 +53,7 @@ impl Truth {
                 [inertia, 2.0 + random.next(), 1.5 + random.next(), 0.5 * random.next()]
             })
             .collect();
-        Self { model: model.with_inertials(&inertials).unwrap(), drive, step_times: 1.0 }
+        Self { model: model.with_inertials(&inertials).unwrap(), drive }
     }
 
     /// A robot that can exist: masses up to 30 % from the description's, centres of mass up to a tenth nearer or
@@ -72,10 +70,10 @@ impl Truth {
         truth
     }
 
-    /// Width of the step of a joint's Coulomb friction: times the default of a study.
+    /// Width of the step of a joint's Coulomb friction: the default of a study.
     pub(crate) fn coulomb_width(&self, joint: usize) -> f64 {
         let turns = self.model.joints()[joint].turns();
-        self.step_times * self.model.own_scale().velocity(turns, CoulombShape::USUAL_WIDTH)
+        self.model.own_scale().velocity(turns, CoulombShape::USUAL_WIDTH)
     }
 
     pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
@@ -103,6 +101,7 @@ impl Truth {
 
 /// Sums of sines, different for every seed.
 pub(crate) struct Motion {
+    centre: Vec<f64>,
     amplitude: Vec<[f64; 5]>,
     phase: Vec<[f64; 5]>,
 }
@@ -116,7 +115,27 @@ impl Motion {
         let mut numbers = |scale: f64| -> Vec<[f64; 5]> {
             (0..dof).map(|_| core::array::from_fn(|_| scale * random.next())).collect()
         };
-        Self { amplitude: numbers(0.5), phase: numbers(3.1) }
+        Self { centre: vec![0.0; dof], amplitude: numbers(0.5), phase: numbers(3.1) }
+    }
+
+    /// A motion between the stops of `model` whose joints reach `velocity` (rad/s, m/s), or less where their own limits
+    /// or their range are.
+    pub(crate) fn within(model: &Model, velocity: f64, seed: u64) -> Self {
+        /// Share of limits that is used, and the range of a joint without stops, rad.
+        const SHARE: f64 = 0.9;
+        const RANGE: [f64; 2] = [-2.0, 2.0];
+        let mut motion = Self::new(model.dof(), seed);
+        let instants: Vec<[Vec<f64>; 3]> = (0..1000).map(|k| motion.at(f64::from(k) * 0.01)).collect();
+        for (j, joint) in model.joints().iter().enumerate() {
+            let peak = |order: usize| instants.iter().map(|at| at[order][j].abs()).fold(0.0, f64::max);
+            let low = joint.limits.lower.unwrap_or(RANGE[0]).max(RANGE[0]);
+            let high = joint.limits.upper.unwrap_or(RANGE[1]).min(RANGE[1]);
+            let limit = joint.limits.velocity.filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
+            let scale = (velocity.min(SHARE * limit) / peak(1)).min(SHARE * 0.5 * (high - low) / peak(0));
+            motion.centre[j] = 0.5 * (low + high);
+            motion.amplitude[j] = motion.amplitude[j].map(|amplitude| scale * amplitude);
+        }
+        motion
     }
 
     pub(crate) fn at(&self, t: f64) -> [Vec<f64>; 3] {
@@ -132,7 +151,8 @@ impl Motion {
             };
             self.amplitude.iter().zip(&self.phase).map(joint).collect()
         };
-        [sum(0), sum(1), sum(2)]
+        let q = self.centre.iter().zip(sum(0)).map(|(centre, q)| centre + q).collect();
+        [q, sum(1), sum(2)]
     }
 }
 

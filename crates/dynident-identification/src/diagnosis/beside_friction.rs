@@ -1,0 +1,55 @@
+//! What is left of each joint's torque beside what it may be without any body: friction, drive inertia, an offset.
+
+use super::motion_rows::MotionRows;
+use dynident_dynamics::ParametricModel;
+use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Stribeck, TorqueTerm};
+use nalgebra::{DMatrix, DVector};
+
+/// Share of the largest singular value below which a direction is none: a joint at rest has no friction to take off.
+const SINGULAR: f64 = 1.0e-9;
+
+/// For each joint an orthonormal basis of `1, q̇, s(q̇), q̈` over the rows, with the step `s` of the joint's terms.
+pub(super) struct BesideFriction(Vec<DMatrix<f64>>);
+
+impl BesideFriction {
+    /// Of these rows; none where there are none.
+    pub(super) fn new(robot: &ParametricModel, rows: &MotionRows) -> Option<Self> {
+        let of_joint = |joint: usize| {
+            let (dq, ddq) = (&rows.dq[joint], &rows.ddq[joint]);
+            let step = step_of(robot, joint);
+            let matrix = DMatrix::from_fn(rows.len(), 4, |row, k| match k {
+                0 => 1.0,
+                1 => dq[row],
+                2 => step.step(dq[row]),
+                _ => ddq[row],
+            });
+            let decomposition = matrix.svd(true, false);
+            let basis = decomposition.u?;
+            let most = decomposition.singular_values.max();
+            let kept: Vec<usize> =
+                (0..basis.ncols()).filter(|&k| decomposition.singular_values[k] > SINGULAR * most).collect();
+            Some(basis.select_columns(&kept))
+        };
+        (0..rows.dq.len()).map(of_joint).collect::<Option<_>>().map(Self)
+    }
+
+    /// What is left of a torque of this joint, Nm (N).
+    pub(super) fn of(&self, joint: usize, torque: &[f64]) -> DVector<f64> {
+        let torque = DVector::from_column_slice(torque);
+        let basis = &self.0[joint];
+        &torque - basis * basis.tr_mul(&torque)
+    }
+}
+
+/// The step of the joint's dry friction; that of the sign where its terms have none.
+pub(super) fn step_of(robot: &ParametricModel, joint: usize) -> CoulombShape {
+    let shape = |term: &TorqueTerm| match term {
+        TorqueTerm::Coulomb(Coulomb { shape, .. })
+        | TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape, .. })
+        | TorqueTerm::Stribeck(Stribeck { shape, .. })
+        | TorqueTerm::Load(LoadFriction { shape, .. }) => Some(*shape),
+        _ => None,
+    };
+    let mut own = robot.terms().iter().filter(|term| term.own_joint() == Some(joint));
+    own.find_map(shape).unwrap_or(CoulombShape::Sign { dead_band: 0.0 })
+}
