@@ -39,6 +39,9 @@ const STRAY: f64 = 1.8;
 /// Places at which a number is tried before it is narrowed down: what is left has several valleys between a gear and
 /// another.
 const PLACES: usize = 17;
+/// Logarithm of how far from a factor that is tried gears and counts of encoders are looked for, and in how many valleys.
+const REACH_OF_UNITS: f64 = 2.0;
+const MOST_VALLEYS: usize = 4;
 /// What one gain more explains of all joints' torque, as a logarithm, where no joint needs to tell: on real logs a
 /// wrong one reaches 0.83.
 const GAINS_MUCH: f64 = 2.0 * CLEARLY_BETTER;
@@ -335,9 +338,14 @@ fn refined(
     };
     let free =
         |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| value(&reading, mistake));
-    let mistake = between_those_tried(first.1.mistakes.last()?, free)?;
-    let corrected = at.without(&mistake);
-    let reading = corrected.reading(Some(consistency)).ok()?;
+    // Bodies that cannot be explain positions in a unit that is too small as well: of several valleys the one counts
+    // that a robot is in.
+    let read = |mistake: Mistake| {
+        let corrected = at.without(&mistake);
+        corrected.reading(Some(consistency)).ok().map(|reading| (mistake, corrected, reading))
+    };
+    let found = valleys(first.1.mistakes.last()?, free).into_iter().filter_map(read);
+    let (mistake, corrected, reading) = found.min_by(|a, b| a.2.score().total_cmp(&b.2.score()))?;
     // Free numbers follow the noise: the round one stays unless the exact one is clearly better. Gears and counts have
     // no round ones.
     let last = first.1.mistakes.last();
@@ -348,12 +356,25 @@ fn refined(
         Some(Mistake::Offset { offset_rad, .. }) => (offset_rad / FRAC_PI_2).fract() == 0.0,
         _ => true,
     };
-    let is_better = if is_round {
-        reading.score() < first.1.score() - WORTH_REFINING
-    } else {
-        value(&reading, &mistake) < value(&first.1, &mistake)
+    let is_better = match mistake {
+        _ if is_round => reading.score() < first.1.score() - WORTH_REFINING,
+        Mistake::PositionUnit { .. } => reading.score() < first.1.score(),
+        _ => value(&reading, &mistake) < value(&first.1, &mistake),
     };
     is_better.then_some((corrected, reading))
+}
+
+/// Mistakes of the same kind whose numbers have less `value` than those around them; of all but positions' units the
+/// one with the least.
+fn valleys(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Vec<Mistake> {
+    let Mistake::PositionUnit { joints, factor } = mistake else {
+        return between_those_tried(mistake, value).into_iter().collect();
+    };
+    if is_unit_of_position(*factor) {
+        return between_those_tried(mistake, value).into_iter().collect();
+    }
+    let with = |log: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() };
+    valleys_in(REACH_OF_UNITS, |log| value(&with(log))).into_iter().map(with).collect()
 }
 
 /// The mistake of the same kind whose number has the least `value`, near the one of `mistake`; `None` where it has no
@@ -388,7 +409,7 @@ pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) ->
         Mistake::PositionUnit { joints, factor } => {
             // A gear ratio may be near a unit.
             let with = |times: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * times };
-            let found = scaled(2.0, &with);
+            let found = scaled(REACH_OF_UNITS, &with);
             if !is_unit_of_position(*factor) {
                 return Some(found);
             }
@@ -423,6 +444,20 @@ fn least_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> f64 {
     let best = (0..PLACES).min_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(PLACES / 2);
     let [low, high] = [place(best.saturating_sub(1)), place((best + 1).min(PLACES - 1))];
     least_by_thirds([low, high], 0.02 * reach, value)
+}
+
+/// Where `value` is less than around it, within `reach` of zero, each to a hundredth of the reach; the deepest valleys,
+/// at most [`MOST_VALLEYS`].
+fn valleys_in(reach: f64, value: impl Fn(f64) -> f64) -> Vec<f64> {
+    let spacing = 2.0 * reach / (PLACES - 1) as f64;
+    let place = |k: usize| -reach + spacing * k as f64;
+    let values: Vec<f64> = (0..PLACES).map(|k| value(place(k))).collect();
+    let around = |k: usize| [k.saturating_sub(1), (k + 1).min(PLACES - 1)];
+    let is_valley = |k: &usize| around(*k).iter().all(|&other| values[*k] <= values[other]);
+    let mut deepest: Vec<usize> = (0..PLACES).filter(is_valley).collect();
+    deepest.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    deepest.truncate(MOST_VALLEYS);
+    deepest.into_iter().map(|k| least_by_thirds(around(k).map(place), 0.02 * reach, &value)).collect()
 }
 
 /// Where `value`, which has one valley between two places, is least, to within `width`.

@@ -568,6 +568,22 @@ fn a_fit_that_follows_its_noise_is_no_model() {
     assert_eq!(problems(2500), Vec::<String>::new());
 }
 
+/// Of twenty logs of ten seconds that were too short to `check`, `identify` had nothing to say against sixteen.
+#[test]
+fn rows_are_too_few_or_few() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let level = |rows: usize| {
+        let text = study
+            .replace("../robots/", &format!("{}/", repository("robots").display()))
+            .replace("train.csv\"", &format!("train.csv\"\nrows = [0, {rows}]"))
+            .replace("\"ur10_simulated/", &format!("\"{}/", repository("examples/ur10_simulated").display()));
+        let found = check_text(folder.path(), &text);
+        found.findings.iter().find(|finding| finding.kind == "rows").map(|finding| finding.level)
+    };
+    assert_eq!([level(300), level(2500)], [Some(Level::Problem), None]);
+}
+
 /// Of the seven sets of real logs only one has anything to be said of: TIAGo's dead channels.
 #[test]
 fn real_logs_raise_no_alarm() {
