@@ -18,14 +18,15 @@ use crate::between_logs::of_friction;
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
 use crate::friction_by_log::with_friction_by_log;
+use crate::left_to_the_logs::{joints_left_to_the_logs, with_drives};
 use crate::logs::Logs;
 use crate::payload::Payload;
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::training::{TrainingPasses, plain_estimate};
-use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
+use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::{CovarianceMethod, Estimate, EstimationError};
-use dynident_model::terms::{DriveInertia, TorqueTerm, sort_terms};
+use dynident_model::terms::{DriveInertia, TorqueTerm};
 use serde::{Deserialize, Serialize};
 
 /// Standard deviations from which drive inertia counts as seen: by chance once in some 740 studies. A drive that is not
@@ -103,7 +104,7 @@ pub fn choose_drive_inertia(
     robot: &ParametricModel,
     (training, payloads): (&[usize], &[Payload]),
 ) -> Result<(ParametricModel, Option<DriveInertiaChoice>), IdentificationError> {
-    let tested = left_to_the_logs(robot, settings);
+    let tested = joints_left_to_the_logs(robot, settings);
     if tested.is_empty() {
         return Ok((robot.clone(), None));
     }
@@ -161,32 +162,6 @@ pub fn choose_drive_inertia(
         drives: drives.collect(),
     };
     Ok((if seen { with_drives } else { robot.clone() }, Some(choice)))
-}
-
-/// The robot with every drive inertia that `settings.drive_inertia` leaves to the logs, before these are asked.
-///
-/// # Errors
-/// Terms that this robot cannot have.
-pub(crate) fn with_drives_left_to_the_logs(
-    robot: &ParametricModel,
-    settings: &IdentificationSettings,
-) -> Result<ParametricModel, ParametricModelError> {
-    with_drives(robot, &left_to_the_logs(robot, settings))
-}
-
-/// The joints whose drive inertia is left to the logs and none of the robot's terms yet.
-fn left_to_the_logs(robot: &ParametricModel, settings: &IdentificationSettings) -> Vec<usize> {
-    let known = |joint: &usize| robot.terms().contains(&TorqueTerm::DriveInertia(DriveInertia { joint: *joint }));
-    let named = settings.drive_inertia.iter().filter_map(|name| robot.model().joint_index(name));
-    named.filter(|joint| !known(joint)).collect()
-}
-
-/// The robot with the drive inertia of these joints.
-fn with_drives(robot: &ParametricModel, joints: &[usize]) -> Result<ParametricModel, ParametricModelError> {
-    let drives = joints.iter().map(|&joint| TorqueTerm::DriveInertia(DriveInertia { joint }));
-    let mut terms: Vec<TorqueTerm> = robot.terms().iter().cloned().chain(drives).collect();
-    sort_terms(&mut terms);
-    robot.with_terms(terms)
 }
 
 /// Those of the joints whose drive inertia is a base parameter by itself, with its column; about the first axes it

@@ -135,6 +135,7 @@ pub mod friction;
 mod friction_by_log;
 mod identify;
 mod lag;
+mod left_to_the_logs;
 mod less_noise;
 mod likelihood;
 mod log_noise;

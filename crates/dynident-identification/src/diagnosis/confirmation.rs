@@ -1,7 +1,7 @@
 //! A mistake that was found is looked at once more, for three things that are none look like one: another step of dry
 //! friction, a description with usual errors, and bodies of placeholders, which another rate makes up for.
 
-use super::DiagnosisError;
+use super::error::DiagnosisError;
 use super::explanation::score;
 use super::mistake::{Mistake, without_mistakes};
 use super::motion_rows::MotionRows;

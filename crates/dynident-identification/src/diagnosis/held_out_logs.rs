@@ -1,12 +1,12 @@
 //! What held-out logs alone have: a load, or a mistake.
 
+use super::error::DiagnosisError;
 use super::explanation::{Explanation, predicted};
 use super::held_out_reading::{HeldOutReading, held_out_reading};
-use super::motion_rows::{MotionRows, MotionSamples};
+use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
 use super::reading::Reading;
 use super::torque_clock::TorqueClock;
 use super::unseen_load::{UnseenLoad, unseen_load};
-use super::{DiagnosisError, INSTANTS};
 use crate::consistent::ConsistencySettings;
 use crate::logs::Logs;
 use crate::recording::Role;

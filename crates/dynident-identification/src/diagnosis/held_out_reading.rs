@@ -4,7 +4,7 @@
 use super::candidates::{Breadth, candidates};
 use super::explanation::predicted;
 use super::mistake::{Channels, Mistake};
-use super::motion_rows::MotionRows;
+use super::motion_rows::{INSTANTS, MotionRows};
 use super::plausibility::beyond_limits;
 use super::search::{ALIKE, CLEARLY_BETTER, between_those_tried};
 use super::torque_clock::TorqueClock;
@@ -24,8 +24,6 @@ const LIMIT_COST: f64 = 1.0;
 const LEAST_GAIN: f64 = 1.15;
 /// Zeros beside those that studies have wrong: with the parameters known small ones tell as well.
 const ZEROS_RAD: [f64; 6] = [-0.3, -0.15, -0.07, 0.07, 0.15, 0.3];
-/// Instants that are read with the torque of another moment.
-const INSTANTS: usize = 300;
 
 /// A reading of a held-out log that the training logs' parameters explain, where they do not explain the log as it is.
 #[derive(Clone, Debug, PartialEq)]

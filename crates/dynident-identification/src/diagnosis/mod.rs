@@ -25,6 +25,7 @@ mod beside_friction;
 mod candidates;
 mod confirmation;
 mod description_fit;
+mod error;
 mod explanation;
 mod further_friction;
 mod held_out_logs;
@@ -46,6 +47,7 @@ mod usual_errors;
 mod wrong_mass;
 
 pub use description_fit::DescriptionFit;
+pub use error::DiagnosisError;
 pub use held_out_reading::HeldOutReading;
 pub use mistake::{Channels, Mistake};
 pub use motion_rows::MotionRows;
@@ -57,26 +59,21 @@ pub use stray_torque::StrayTorque;
 pub use unseen_load::UnseenLoad;
 pub use wrong_mass::WrongMass;
 
-use crate::drive_inertia::with_drives_left_to_the_logs;
+use crate::left_to_the_logs::with_drives_left_to_the_logs;
 use crate::logs::Logs;
-use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use candidates::Breadth;
-use dynident_dynamics::{ParametricModel, ParametricModelError};
-use dynident_estimation::EstimationError;
+use dynident_dynamics::ParametricModel;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
 use explanation::Explanation;
 use held_out_logs::HeldOutLogs;
-use motion_rows::MotionSamples;
+use motion_rows::{INSTANTS, MotionSamples};
 use reading::Corrected;
 use search::{CLEARLY_BETTER, rough_consistency};
-use thiserror::Error;
 use torque_clock::TorqueClock;
 
-/// Instants that readings are compared on; more make it slower and not surer.
-const INSTANTS: usize = 300;
 /// Where even the believed reading leaves this share of the torque, positions may be noise more than motion.
 const MOSTLY_NOISE: f64 = 0.5;
 /// Parts of the cut-off that are tried then, where it was left to the data.
@@ -110,21 +107,6 @@ impl Diagnosis {
     pub fn is_unexplained(&self) -> bool {
         self.search.believed().is_unexplained()
     }
-}
-
-/// Why a diagnosis could not be made.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum DiagnosisError {
-    /// A recording that cannot be read.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// Rows that carry no estimate.
-    #[error(transparent)]
-    Estimation(#[from] EstimationError),
-    /// Drive inertia that the robot cannot have.
-    #[error(transparent)]
-    Model(#[from] ParametricModelError),
 }
 
 /// Whether an import report has a joint beyond its limits, or a rate that no recorder has.

@@ -8,6 +8,9 @@ use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 
+/// Instants that readings are compared on; more make it slower and not surer.
+pub(super) const INSTANTS: usize = 300;
+
 /// Instants of a motion with its torques, all in SI and in the model's order of joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionRows {

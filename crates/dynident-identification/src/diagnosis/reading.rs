@@ -31,6 +31,8 @@ pub struct Reading {
     pub free: Vec<f64>,
     /// The same by parameters of each joint's own, freed of what these follow of the noise.
     pub alone: Vec<f64>,
+    /// The same by the description's own bodies with friction fitted joint by joint; empty where it has none.
+    pub nominal: Vec<f64>,
     /// Whether what parameters of a joint's own leave says anything: there are instants enough.
     pub own_parameters_tell: Vec<bool>,
     /// Times as much as usual that another reading has to gain, for there are few instants to tell them apart.
@@ -141,6 +143,7 @@ impl Corrected {
             left: shares(best),
             free: shares(&explained.free),
             alone: shares(&explained.alone_of_noise_free()),
+            nominal: shares(&explained.nominal),
             own_parameters_tell: explained.own_parameters_tell(),
             margin: explained.margin(),
             left_of_all: if all > 0.0 { left_of_all / all } else { 0.0 },

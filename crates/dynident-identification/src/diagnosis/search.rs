@@ -39,7 +39,8 @@ const STRAY: f64 = 1.8;
 /// Places at which a number is tried before it is narrowed down: what is left has several valleys between a gear and
 /// another.
 const PLACES: usize = 17;
-/// Logarithm of how far from a factor that is tried gears and counts of encoders are looked for, and in how many valleys.
+/// Logarithm of how far from a factor that is tried gears and counts of encoders are looked for, and in how many
+/// valleys.
 const REACH_OF_UNITS: f64 = 2.0;
 const MOST_VALLEYS: usize = 4;
 /// What one gain more explains of all joints' torque, as a logarithm, where no joint needs to tell: on real logs a

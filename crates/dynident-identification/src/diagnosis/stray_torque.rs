@@ -1,7 +1,7 @@
 //! Torques that do not belong to one robot and motion with the others: noise, another channel, a clock or a gain of
 //! their own that no reading mends.
 
-use super::DiagnosisError;
+use super::error::DiagnosisError;
 use super::explanation::Explanation;
 use super::further_friction::left_beside_further_friction;
 use super::motion_rows::MotionRows;

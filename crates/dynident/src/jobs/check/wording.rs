@@ -141,9 +141,16 @@ pub(super) fn alternative(mistake: &Mistake, joints: &[String], format: Option<&
     format!("{} ({})", sentence(mistake, joints), write.join(", "))
 }
 
+/// Logarithm of how much less of a joint's torque is left that says something.
+const TELLS: f64 = 0.2;
+
 /// What speaks for a mistake: the joint whose torque it explains most, limits that then hold.
 pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
-    let gain = |joint: &usize| (before.left[*joint].max(1e-6) / after.left[*joint].max(1e-6)).ln();
+    let gain_of = |of: fn(&Reading) -> &[f64], joint: usize| {
+        let share = |reading| of(reading).get(joint).map_or(1.0, |share: &f64| share.max(1e-6));
+        (share(before) / share(after)).ln()
+    };
+    let gain = |joint: &usize| gain_of(|reading| &reading.left, *joint);
     let named: Vec<usize> = match mistake {
         Mistake::Sign { joints, .. } | Mistake::PositionUnit { joints, .. } | Mistake::Lag { joints, .. } => {
             joints.clone()
@@ -157,15 +164,27 @@ pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading),
         }
     };
     // The named joint's own torque where that tells; else the one that tells most.
-    let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > 0.2);
+    let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > TELLS);
     let most = (0..joints.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).unwrap_or(0);
     let joint = own.unwrap_or(most);
-    let mut text = format!(
-        "the best robot that can exist leaves {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected",
-        100.0 * before.left[joint],
-        joints[joint],
-        100.0 * after.left[joint]
-    );
+    // Where any bodies explain both alike, it is the description's that speak.
+    let by_bodies = |joint: &usize| gain_of(|reading| &reading.nominal, *joint);
+    let of_bodies = (0..joints.len()).max_by(|a, b| by_bodies(a).total_cmp(&by_bodies(b)));
+    let of_bodies = of_bodies.filter(|joint| gain(&most) <= TELLS && by_bodies(joint) > TELLS);
+    let mut text = match of_bodies {
+        Some(joint) => format!(
+            "the description's bodies, friction aside, leave {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected; bodies that could be explain both alike",
+            100.0 * before.nominal[joint],
+            joints[joint],
+            100.0 * after.nominal[joint]
+        ),
+        None => format!(
+            "the best robot that can exist leaves {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected",
+            100.0 * before.left[joint],
+            joints[joint],
+            100.0 * after.left[joint]
+        ),
+    };
     if before.beyond.len() > after.beyond.len() {
         let worst = &before.beyond[0];
         let _ = write!(
