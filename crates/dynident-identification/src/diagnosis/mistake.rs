@@ -256,7 +256,8 @@ impl Mistake {
             | Self::TimeUnit { .. } => return None,
         };
         let again = ParametricModel::new(model.ok()?, robot.terms().to_vec()).ok()?;
-        again.with_nominal(robot.nominal().to_vec()).ok()
+        // Bodies that nobody described stay unknown.
+        if robot.nominal_base().is_none() { Some(again) } else { again.with_nominal(robot.nominal().to_vec()).ok() }
     }
 }
 

@@ -8,10 +8,11 @@ use super::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
+use rayon::prelude::*;
 
 /// Times the width in force that are tried first, narrower and wider, then times the best of these.
 const TIMES: [f64; 7] = [0.4, 1.6, 2.5, 4.0, 6.0, 10.0, 15.0];
-const NEAR: [f64; 4] = [0.77, 1.3, 0.88, 1.14];
+const NEAR: [[f64; 2]; 2] = [[0.77, 1.3], [0.88, 1.14]];
 /// Share of what is left of a joint's torque that another width leaves at most: less is its noise.
 const CLEARLY_LESS: f64 = 0.9;
 
@@ -25,30 +26,35 @@ pub(super) fn with_steps_of(robot: &ParametricModel, rows: &MotionRows) -> Resul
     let mut least: Vec<f64> =
         Explanation::new(robot, rows, None)?.free.iter().map(|left| CLEARLY_LESS * left).collect();
     let mut times = vec![1.0; robot.dof()];
-    for factor in TIMES {
-        narrow_down(robot, rows, &vec![factor; robot.dof()], (&mut least, &mut times))?;
-    }
+    let first: Vec<Vec<f64>> = TIMES.iter().map(|factor| vec![*factor; robot.dof()]).collect();
+    narrow_down(robot, rows, &first, (&mut least, &mut times))?;
     if times.iter().all(|times| *times == 1.0) {
         return Ok(robot.clone());
     }
-    for factor in NEAR {
-        let near: Vec<f64> = times.iter().map(|best| if *best == 1.0 { 1.0 } else { factor * best }).collect();
+    for factors in NEAR {
+        let near = |factor: f64| times.iter().map(|best| if *best == 1.0 { 1.0 } else { factor * best }).collect();
+        let near: [Vec<f64>; 2] = factors.map(near);
         narrow_down(robot, rows, &near, (&mut least, &mut times))?;
     }
     Ok(with_widths(robot, &times).unwrap_or_else(|| robot.clone()))
 }
 
-/// Takes for each joint whose torque these widths leave less of than any before its own.
+/// Takes for each joint whose torque some of these widths leave less of than any before its own.
 fn narrow_down(
     robot: &ParametricModel,
     rows: &MotionRows,
-    tried: &[f64],
+    tried: &[Vec<f64>],
     (least, times): (&mut [f64], &mut [f64]),
 ) -> Result<(), EstimationError> {
-    let Some(other) = with_widths(robot, tried) else { return Ok(()) };
-    for (joint, left) in Explanation::new(&other, rows, None)?.free.iter().enumerate() {
-        if *left < least[joint] {
-            (least[joint], times[joint]) = (*left, tried[joint]);
+    let left = |times: &Vec<f64>| {
+        with_widths(robot, times).map(|other| Ok(Explanation::new(&other, rows, None)?.free)).transpose()
+    };
+    let all: Vec<Option<Vec<f64>>> = tried.par_iter().map(left).collect::<Result<_, EstimationError>>()?;
+    for (tried, left) in tried.iter().zip(all).filter_map(|(tried, left)| Some((tried, left?))) {
+        for joint in 0..left.len() {
+            if left[joint] < least[joint] {
+                (least[joint], times[joint]) = (left[joint], tried[joint]);
+            }
         }
     }
     Ok(())

@@ -170,7 +170,8 @@ pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading),
     // Where any bodies explain both alike, it is the description's that speak.
     let by_bodies = |joint: &usize| gain_of(|reading| &reading.nominal, *joint);
     let of_bodies = (0..joints.len()).max_by(|a, b| by_bodies(a).total_cmp(&by_bodies(b)));
-    let of_bodies = of_bodies.filter(|joint| gain(&most) <= TELLS && by_bodies(joint) > TELLS);
+    let are_described = before.nominal.len() == joints.len() && after.nominal.len() == joints.len();
+    let of_bodies = of_bodies.filter(|joint| are_described && gain(&most) <= TELLS && by_bodies(joint) > TELLS);
     let mut text = match of_bodies {
         Some(joint) => format!(
             "the description's bodies, friction aside, leave {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected; bodies that could be explain both alike",
