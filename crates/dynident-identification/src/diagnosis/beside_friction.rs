@@ -1,15 +1,14 @@
 //! What is left of each joint's torque beside what it may be without any body: friction, drive inertia, an offset.
 
 use super::motion_rows::MotionRows;
+use super::span::Span;
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Stribeck, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
-/// Share of the largest singular value below which a direction is none: a joint at rest has no friction to take off.
-const SINGULAR: f64 = 1.0e-9;
-
-/// For each joint an orthonormal basis of `1, q̇, s(q̇), q̈` over the rows, with the step `s` of the joint's terms.
-pub(super) struct BesideFriction(Vec<DMatrix<f64>>);
+/// For each joint what `1, q̇, s(q̇), q̈` span over the rows, with the step `s` of the joint's terms; of a joint at
+/// rest that is less.
+pub(super) struct BesideFriction(Vec<Span>);
 
 impl BesideFriction {
     /// Of these rows; none where there are none.
@@ -17,27 +16,19 @@ impl BesideFriction {
         let of_joint = |joint: usize| {
             let (dq, ddq) = (&rows.dq[joint], &rows.ddq[joint]);
             let step = step_of(robot, joint);
-            let matrix = DMatrix::from_fn(rows.len(), 4, |row, k| match k {
+            Span::new(DMatrix::from_fn(rows.len(), 4, |row, k| match k {
                 0 => 1.0,
                 1 => dq[row],
                 2 => step.step(dq[row]),
                 _ => ddq[row],
-            });
-            let decomposition = matrix.svd(true, false);
-            let basis = decomposition.u?;
-            let most = decomposition.singular_values.max();
-            let kept: Vec<usize> =
-                (0..basis.ncols()).filter(|&k| decomposition.singular_values[k] > SINGULAR * most).collect();
-            Some(basis.select_columns(&kept))
+            }))
         };
         (0..rows.dq.len()).map(of_joint).collect::<Option<_>>().map(Self)
     }
 
     /// What is left of a torque of this joint, Nm (N).
     pub(super) fn of(&self, joint: usize, torque: &[f64]) -> DVector<f64> {
-        let torque = DVector::from_column_slice(torque);
-        let basis = &self.0[joint];
-        &torque - basis * basis.tr_mul(&torque)
+        self.0[joint].outside(&DVector::from_column_slice(torque))
     }
 }
 

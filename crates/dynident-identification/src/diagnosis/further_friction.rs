@@ -3,15 +3,13 @@
 use super::beside_friction::step_of;
 use super::explanation::{predicted, without_terms};
 use super::motion_rows::MotionRows;
+use super::span::Span;
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Velocities from which friction rises toward rest, rad/s of a usual arm
 /// ([`OwnScale::velocity`](dynident_model::OwnScale::velocity)).
 const STRIBECK: [f64; 3] = [0.03, 0.1, 0.3];
-/// Share of the largest singular value below which a direction is none.
-const SINGULAR: f64 = 1.0e-9;
-
 /// Times what base parameters `theta` leave of a joint's torque that is left beside friction by the joint's load,
 /// `|τ_bodies| s(q̇)`, friction that rises toward rest, `s(q̇) e^(−(q̇/v)²)`, that differs with the direction,
 /// `|s(q̇)|` and `|q̇|`, and that grows less than the velocity, `s(q̇) √|q̇|`; at most one.
@@ -38,14 +36,7 @@ pub(super) fn left_beside_further_friction(
             _ => step * (-(dq / own_velocity(STRIBECK[k - 4])).powi(2)).exp(),
         }
     };
-    let matrix = DMatrix::from_fn(rows.len(), 4 + STRIBECK.len(), column);
-    // In columns of one size: each law has its own unit.
-    let sizes: Vec<f64> = matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
-    let matrix = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, k| matrix[(row, k)] / sizes[k]);
-    let decomposition = matrix.svd(true, false);
-    let (Some(basis), most) = (decomposition.u, decomposition.singular_values.max()) else { return 1.0 };
-    let kept: Vec<usize> = (0..basis.ncols()).filter(|&k| decomposition.singular_values[k] > SINGULAR * most).collect();
-    let basis = basis.select_columns(&kept);
+    let Some(laws) = Span::new(DMatrix::from_fn(rows.len(), 4 + STRIBECK.len(), column)) else { return 1.0 };
     let all = left.norm();
-    if all > 0.0 { (&left - &basis * basis.tr_mul(&left)).norm() / all } else { 1.0 }
+    if all > 0.0 { laws.outside(&left).norm() / all } else { 1.0 }
 }

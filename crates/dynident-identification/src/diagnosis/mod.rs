@@ -20,6 +20,7 @@
 //! | `same_columns` | columns that stand for two joints, torques that lost their signs |
 //! | `stray_torque` | torques that do not belong to one robot with the others |
 //! | `noise_torque`, `further_friction` | what noise and laws of friction beyond the study's make of these |
+//! | `span` | what of a torque lies outside some columns |
 
 mod beside_friction;
 mod candidates;
@@ -38,6 +39,7 @@ mod plausibility;
 mod reading;
 mod same_columns;
 mod search;
+mod span;
 mod step_width;
 mod stray_torque;
 mod torque_clock;
@@ -249,11 +251,10 @@ fn diagnosed(
     let same_columns = same_columns::same_columns(&as_read, &as_written.left);
     let lost_signs = same_columns::has_lost_signs(&as_read, as_written.left_of_all);
     // Of a reading that is corrected the noise is not known: its columns are other ones.
-    let noise = || {
+    let noise = |explained: &Explanation| {
         if search.best.is_some() {
             return Ok(vec![0.0; robot.dof()]);
         }
-        let explained = Explanation::new(&robot, &as_read, None)?;
         let noise = noise_torque::torque_of_noise(logs, &model, training, &explained.free_parameters)?;
         let share = |(noise, torque): (&f64, &f64)| if *torque > 0.0 { noise / torque } else { 0.0 };
         Ok::<_, DiagnosisError>(noise.iter().zip(&explained.torque).map(share).collect())

@@ -368,14 +368,13 @@ fn refined(
 /// Mistakes of the same kind whose numbers have less `value` than those around them; of all but positions' units the
 /// one with the least.
 fn valleys(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Vec<Mistake> {
-    let Mistake::PositionUnit { joints, factor } = mistake else {
-        return between_those_tried(mistake, value).into_iter().collect();
-    };
-    if is_unit_of_position(*factor) {
-        return between_those_tried(mistake, value).into_iter().collect();
+    match mistake {
+        Mistake::PositionUnit { joints, factor } if !is_unit_of_position(*factor) => {
+            let with = |log: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() };
+            valleys_in(0.0, REACH_OF_UNITS, |log| value(&with(log))).take(MOST_VALLEYS).map(with).collect()
+        }
+        _ => between_those_tried(mistake, value).into_iter().collect(),
     }
-    let with = |log: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() };
-    valleys_in(REACH_OF_UNITS, |log| value(&with(log))).into_iter().map(with).collect()
 }
 
 /// The mistake of the same kind whose number has the least `value`, near the one of `mistake`; `None` where it has no
@@ -436,29 +435,22 @@ pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) ->
     }
 }
 
-/// Where `value` is least within `reach` of `centre`: the best of [`PLACES`] places, then by thirds around it, to a
-/// hundredth of the reach.
+/// Where `value` is least within `reach` of `centre`, to a hundredth of the reach.
 fn least_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> f64 {
-    let spacing = 2.0 * reach / (PLACES - 1) as f64;
-    let place = |k: usize| centre - reach + spacing * k as f64;
-    let values: Vec<f64> = (0..PLACES).map(|k| value(place(k))).collect();
-    let best = (0..PLACES).min_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(PLACES / 2);
-    let [low, high] = [place(best.saturating_sub(1)), place((best + 1).min(PLACES - 1))];
-    least_by_thirds([low, high], 0.02 * reach, value)
+    valleys_in(centre, reach, value).next().unwrap_or(centre)
 }
 
-/// Where `value` is less than around it, within `reach` of zero, each to a hundredth of the reach; the deepest valleys,
-/// at most [`MOST_VALLEYS`].
-fn valleys_in(reach: f64, value: impl Fn(f64) -> f64) -> Vec<f64> {
+/// Where `value` is less than around it within `reach` of `centre`, the deepest first: of [`PLACES`] places those with
+/// less than their neighbours, then by thirds around each, to a hundredth of the reach.
+fn valleys_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
     let spacing = 2.0 * reach / (PLACES - 1) as f64;
-    let place = |k: usize| -reach + spacing * k as f64;
+    let place = move |k: usize| centre - reach + spacing * k as f64;
     let values: Vec<f64> = (0..PLACES).map(|k| value(place(k))).collect();
     let around = |k: usize| [k.saturating_sub(1), (k + 1).min(PLACES - 1)];
     let is_valley = |k: &usize| around(*k).iter().all(|&other| values[*k] <= values[other]);
     let mut deepest: Vec<usize> = (0..PLACES).filter(is_valley).collect();
     deepest.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    deepest.truncate(MOST_VALLEYS);
-    deepest.into_iter().map(|k| least_by_thirds(around(k).map(place), 0.02 * reach, &value)).collect()
+    deepest.into_iter().map(move |k| least_by_thirds(around(k).map(place), 0.02 * reach, &value))
 }
 
 /// Where `value`, which has one valley between two places, is least, to within `width`.

@@ -67,7 +67,7 @@ impl StrayTorque {
 pub(super) fn stray_torques(
     reading: &Reading,
     (robot, rows): (&ParametricModel, &MotionRows),
-    noise: impl FnOnce() -> Result<Vec<f64>, DiagnosisError>,
+    noise: impl FnOnce(&Explanation) -> Result<Vec<f64>, DiagnosisError>,
 ) -> Result<Vec<StrayTorque>, DiagnosisError> {
     let of = |joint: usize| StrayTorque { joint, left: reading.free[joint], alone: reading.alone[joint], noise: 0.0 };
     let mut all: Vec<StrayTorque> =
@@ -77,8 +77,8 @@ pub(super) fn stray_torques(
         return Ok(motionless);
     }
     if all.iter().any(StrayTorque::is_stray) {
-        let noise = noise()?;
         let explained = Explanation::new(robot, rows, None)?;
+        let noise = noise(&explained)?;
         for torque in &mut all {
             torque.noise = noise[torque.joint];
             if torque.is_stray() {
