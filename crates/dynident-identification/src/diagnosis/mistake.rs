@@ -274,3 +274,23 @@ pub(super) fn without_mistakes(
     }
     (robot, rows)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::read_urdf;
+
+    /// Bodies that nobody described had those of nothing in a reading with another gravity.
+    #[test]
+    fn bodies_that_nobody_described_stay_unknown() {
+        let urdf = include_str!("../../../../robots/planar2r.urdf");
+        let bare = urdf.split("<inertial>").map(|part| part.split_once("</inertial>").map_or(part, |(_, rest)| rest));
+        let model = read_urdf(&bare.collect::<String>()).unwrap().model;
+        let bare = ParametricModel::new(model, Vec::new()).unwrap();
+        assert!(bare.nominal_base().is_none());
+        let gravity = Mistake::Gravity { gravity_m_s2: [0.0, 0.0, 9.81] };
+        assert!(gravity.corrected_robot(&bare).unwrap().nominal_base().is_none());
+        let described = ParametricModel::new(read_urdf(urdf).unwrap().model, Vec::new()).unwrap();
+        assert!(gravity.corrected_robot(&described).unwrap().nominal_base().is_some());
+    }
+}

@@ -14,6 +14,9 @@ const WIDTHS: [f64; 5] = [0.002, 0.01, 0.03, 0.05, 0.1];
 const RATES_HZ: [f64; 4] = [50.0, 100.0, 125.0, 250.0];
 const SECONDS: [f64; 3] = [15.0, 20.0, 30.0];
 
+/// Numbers of honest logs whose description is replaced.
+const PLACEHOLDERS: [usize; 6] = [0, 1, 2, 5, 6, 7];
+
 /// Friction and drive of one joint.
 struct Drive {
     inertia: f64,
@@ -119,4 +122,34 @@ fn slow_logs_with_friction_of_their_own_raise_no_alarm() {
         }
     }
     assert!(alarms.is_empty(), "{alarms}");
+}
+
+/// Descriptions whose bodies all have one kilogram and one kilogram square metre: rates that make up for these were
+/// advised.
+#[test]
+fn placeholders_are_no_other_rate() {
+    for case in PLACEHOLDERS {
+        let folder = tempfile::tempdir().unwrap();
+        let study = honest(folder.path(), case);
+        let file = study.split("file = \"").nth(1).unwrap().split('"').next().unwrap();
+        let mut description = std::fs::read_to_string(file).unwrap();
+        for (attribute, value) in [("mass value=\"", "1.0"), ("ixx=\"", "1.0"), ("iyy=\"", "1.0"), ("izz=\"", "1.0")] {
+            description = with_all(&description, attribute, value);
+        }
+        for attribute in ["ixy=\"", "ixz=\"", "iyz=\""] {
+            description = with_all(&description, attribute, "0.0");
+        }
+        std::fs::write(folder.path().join("placeholders.urdf"), description).unwrap();
+        let check = check_text(folder.path(), &study.replace(file, "placeholders.urdf"));
+        let of_time =
+            check.findings.iter().flat_map(|finding| &finding.write).any(|change| change.table == "format.time");
+        assert!(!of_time, "{case}: {:?}", problems(&check));
+    }
+}
+
+/// A description with one value for every such attribute.
+fn with_all(description: &str, attribute: &str, value: &str) -> String {
+    let mut parts = description.split(attribute);
+    let first = parts.next().unwrap().to_owned();
+    parts.fold(first, |text, part| text + attribute + value + "\"" + part.split_once('"').unwrap().1)
 }
