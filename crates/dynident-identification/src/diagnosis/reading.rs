@@ -53,6 +53,9 @@ pub struct Reading {
     pub nominal_score: f64,
     /// The base parameters of the best consistent robot; those of `free` where there is none.
     pub parameters: Vec<f64>,
+    /// The least and the greatest factor of positions that explain the samples as well as that of the last mistake;
+    /// none where it has no such factor, or nothing between units was looked for.
+    pub factors_alike: Option<[f64; 2]>,
     /// Logarithm of how much larger the torques became that columns were added to: shares of these fall by themselves.
     pub torque_growth: f64,
 }
@@ -154,6 +157,7 @@ impl Corrected {
             alone_score: explained.alone_score(),
             nominal_score: explained.nominal_score(),
             parameters: explained.parameters().to_vec(),
+            factors_alike: None,
             torque_growth: self.torque_growth,
         })
     }

@@ -8,6 +8,7 @@ use super::candidates::{Breadth, FAR, candidates};
 use super::mistake::{Channels, Mistake, without_mistakes};
 use super::motion_rows::MotionRows;
 use super::reading::{Corrected, Reading};
+use super::step_width::with_steps_of;
 use super::units::{is_unit_of_position, is_unit_of_time, is_unit_of_torque};
 use crate::consistent::ConsistencySettings;
 use core::f64::consts::FRAC_PI_2;
@@ -43,6 +44,10 @@ const PLACES: usize = 17;
 /// valleys.
 const REACH_OF_UNITS: f64 = 2.0;
 const MOST_VALLEYS: usize = 4;
+/// Steps of a factor's logarithm in which it is followed to where it explains clearly less, and how exactly that is
+/// found.
+const EDGE_STEP: f64 = 0.2;
+const EDGE_WIDTH: f64 = 0.03;
 /// What one gain more explains of all joints' torque, as a logarithm, where no joint needs to tell: on real logs a
 /// wrong one reaches 0.83.
 const GAINS_MUCH: f64 = 2.0 * CLEARLY_BETTER;
@@ -331,6 +336,11 @@ fn refined(
     first: &(Corrected, Reading),
     consistency: &ConsistencySettings,
 ) -> Option<(Corrected, Reading)> {
+    let last = first.1.mistakes.last()?;
+    // A smaller unit of all positions makes a wide step of dry friction narrow: each is read with its own steps.
+    if matches!(last, Mistake::PositionUnit { joints, .. } if joints.len() > 1) {
+        return refined_with_own_steps(at, last, consistency);
+    }
     // By the fit without physical limits: smooth, and cheap.
     // Of a torque's gain the description's masses say as much as these err.
     let value = |reading: &Reading, mistake: &Mistake| match mistake {
@@ -339,22 +349,16 @@ fn refined(
     };
     let free =
         |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| value(&reading, mistake));
-    // Bodies that cannot be explain positions in a unit that is too small as well: of several valleys the one counts
-    // that a robot is in.
-    let read = |mistake: Mistake| {
-        let corrected = at.without(&mistake);
-        corrected.reading(Some(consistency)).ok().map(|reading| (mistake, corrected, reading))
-    };
-    let found = valleys(first.1.mistakes.last()?, free).into_iter().filter_map(read);
-    let (mistake, corrected, reading) = found.min_by(|a, b| a.2.score().total_cmp(&b.2.score()))?;
+    let mistake = between_those_tried(last, free)?;
+    let corrected = at.without(&mistake);
+    let reading = corrected.reading(Some(consistency)).ok()?;
     // Free numbers follow the noise: the round one stays unless the exact one is clearly better. Gears and counts have
     // no round ones.
-    let last = first.1.mistakes.last();
     let is_round = match last {
-        Some(Mistake::PositionUnit { factor, .. }) => is_unit_of_position(*factor),
-        Some(Mistake::TorqueUnit { factor, .. }) => is_unit_of_torque(*factor),
+        Mistake::PositionUnit { factor, .. } => is_unit_of_position(*factor),
+        Mistake::TorqueUnit { factor, .. } => is_unit_of_torque(*factor),
         // Zeros are mistaken by quarters of a turn, or by anything.
-        Some(Mistake::Offset { offset_rad, .. }) => (offset_rad / FRAC_PI_2).fract() == 0.0,
+        Mistake::Offset { offset_rad, .. } => (offset_rad / FRAC_PI_2).fract() == 0.0,
         _ => true,
     };
     let is_better = match mistake {
@@ -363,6 +367,53 @@ fn refined(
         _ => value(&reading, &mistake) < value(&first.1, &mistake),
     };
     is_better.then_some((corrected, reading))
+}
+
+/// The reading of all positions in the unit that explains most where each unit is read with the steps of dry friction
+/// that its own rows ask for.
+fn refined_with_own_steps(
+    at: &Corrected,
+    first: &Mistake,
+    consistency: &ConsistencySettings,
+) -> Option<(Corrected, Reading)> {
+    let read = |mistake: &Mistake, consistency: Option<&ConsistencySettings>| {
+        let corrected = at.without(mistake);
+        let robot = with_steps_of(&corrected.robot, &corrected.rows).ok()?;
+        let corrected = Corrected { robot, ..corrected };
+        corrected.reading(consistency).ok().map(|reading| (corrected, reading))
+    };
+    let free = |mistake: &Mistake| read(mistake, None).map_or(f64::INFINITY, |(_, reading)| reading.lower_bound());
+    let as_tried = read(first, Some(consistency))?;
+    // Bodies that cannot be explain positions in a unit that is too small as well: of several valleys the one counts
+    // that a robot is in.
+    let found = valleys(first, free).into_iter().filter_map(|mistake| read(&mistake, Some(consistency)));
+    let best = found.min_by(|a, b| a.1.score().total_cmp(&b.1.score()));
+    let is_round = matches!(first, Mistake::PositionUnit { factor, .. } if is_unit_of_position(*factor));
+    let has_to_gain = if is_round { WORTH_REFINING } else { 0.0 };
+    let is_better = |best: &(Corrected, Reading)| best.1.score() < as_tried.1.score() - has_to_gain;
+    let (corrected, mut reading) = best.filter(is_better).unwrap_or(as_tried);
+    reading.factors_alike = factors_alike(reading.mistakes.last()?, free);
+    Some((corrected, reading))
+}
+
+/// The least and the greatest factor of positions around that of `mistake` that explain not clearly worse. A robot
+/// that rubs otherwise, or is described with usual errors, moves the best one by more than [`CLEARLY_BETTER`] does.
+fn factors_alike(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
+    let Mistake::PositionUnit { joints, factor } = mistake else { return None };
+    let at = |log: f64| value(&Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() });
+    let limit = at(0.0) + 2.0 * CLEARLY_BETTER;
+    let edge = |direction: f64| {
+        let [mut inside, mut outside] = [0.0, EDGE_STEP];
+        while outside < REACH_OF_UNITS && at(direction * outside) <= limit {
+            [inside, outside] = [outside, outside + EDGE_STEP];
+        }
+        while outside - inside > EDGE_WIDTH {
+            let middle = 0.5 * (inside + outside);
+            if at(direction * middle) <= limit { inside = middle } else { outside = middle }
+        }
+        factor * (direction * inside).exp()
+    };
+    Some([edge(-1.0), edge(1.0)])
 }
 
 /// Mistakes of the same kind whose numbers have less `value` than those around them; of all but positions' units the

@@ -282,7 +282,7 @@ fn number(value: f64, decimals: usize) -> String {
 }
 
 /// Three significant digits; nine of a unit's factor, which is known and not found.
-fn significant(value: f64) -> String {
+pub(super) fn significant(value: f64) -> String {
     let units = [PI / 180.0, 180.0 / PI, TAU, TAU.recip(), PI, PI.recip()];
     let places = if units.iter().any(|unit| (value / unit - 1.0).abs() < 1e-9) { 8.0 } else { 2.0 };
     let mut text = String::new();

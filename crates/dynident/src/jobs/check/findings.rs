@@ -1,13 +1,13 @@
 //! What a diagnosis says to the person who wrote the study.
 
 use super::changes::StudyFormat;
-use super::wording::{alternative, channels_text, evidence, kind, sentence};
+use super::wording::{alternative, channels_text, evidence, kind, other_factors, sentence};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
-    BeyondLimit, Channels, DescriptionFit, Diagnosis, HeldOutReading, Reading, SameColumn, StrayTorque, UnseenLoad,
-    WrongMass,
+    BeyondLimit, Channels, DescriptionFit, Diagnosis, HeldOutReading, Mistake, Reading, SameColumn, StrayTorque,
+    UnseenLoad, WrongMass,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_model::{AuditFinding, Model, audit};
@@ -54,8 +54,11 @@ pub(super) fn study_check(
     } else if let Some(fit) = foreign {
         let mut found = another_robot(fit, &joints);
         // Some mistake of the study always makes a little less of it.
-        let others = best.iter().flat_map(|best| &best.mistakes);
-        found.or = others.map(|mistake| alternative(mistake, &joints, format.as_ref())).collect();
+        let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, *best)));
+        let text = |(mistake, best): (&Mistake, &Reading)| {
+            alternative(mistake, &joints, format.as_ref()) + &other_factors(mistake, best)
+        };
+        found.or = others.map(text).collect();
         findings.push(found);
     } else if let Some(best) = best {
         for (number, mistake) in best.mistakes.iter().enumerate() {

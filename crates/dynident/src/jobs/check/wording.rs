@@ -1,6 +1,6 @@
 //! A mistake in words: its kind, a sentence that names joints, what else it could be, and what speaks for it.
 
-use super::changes::StudyFormat;
+use super::changes::{StudyFormat, significant};
 use core::f64::consts::PI;
 use core::fmt::Write;
 use dynident_identification::diagnosis::{Channels, Mistake, Reading};
@@ -144,6 +144,9 @@ pub(super) fn alternative(mistake: &Mistake, joints: &[String], format: Option<&
 /// Logarithm of how much less of a joint's torque is left that says something.
 const TELLS: f64 = 0.2;
 
+/// Times a factor that another one has to be to be told from it in words.
+const SAME_FACTOR: f64 = 1.1;
+
 /// What speaks for a mistake: the joint whose torque it explains most, limits that then hold.
 pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
     let gain_of = |of: fn(&Reading) -> &[f64], joint: usize| {
@@ -197,7 +200,21 @@ pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading),
     if !before.plausible_rate && after.plausible_rate {
         text += "; as written, no recorder has such a rate";
     }
-    text
+    text + &other_factors(mistake, after)
+}
+
+/// Which other factors of positions a reading cannot tell from its own; empty where there are none.
+pub(super) fn other_factors(mistake: &Mistake, reading: &Reading) -> String {
+    let alike = reading.factors_alike.filter(|[least, greatest]| *greatest > SAME_FACTOR * least);
+    match (mistake, alike) {
+        (Mistake::PositionUnit { .. }, Some(alike)) => {
+            let [least, greatest] = alike.map(significant);
+            format!(
+                "; these logs cannot tell it from any between {least} and {greatest}: take gear ratios, or counts of encoders, from the data sheet"
+            )
+        }
+        _ => String::new(),
+    }
 }
 
 fn is_power_of_a_thousand(factor: f64) -> bool {

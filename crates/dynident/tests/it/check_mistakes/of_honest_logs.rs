@@ -17,6 +17,9 @@ const SECONDS: [f64; 3] = [15.0, 20.0, 30.0];
 /// Numbers of honest logs whose description is replaced.
 const PLACEHOLDERS: [usize; 6] = [0, 1, 2, 5, 6, 7];
 
+/// Of motors whose positions are logged.
+const GEAR_RATIO: f64 = 101.0;
+
 /// Friction and drive of one joint.
 struct Drive {
     inertia: f64,
@@ -145,6 +148,51 @@ fn placeholders_are_no_other_rate() {
             check.findings.iter().flat_map(|finding| &finding.write).any(|change| change.table == "format.time");
         assert!(!of_time, "{case}: {:?}", problems(&check));
     }
+}
+
+/// Positions of the motors' side of a slow UR10: a smaller scale makes a wide step of friction narrow, so half of the
+/// scale was advised, without a word that the logs hardly tell.
+#[test]
+fn positions_of_the_motors_side_have_their_gear_ratio() {
+    for case in (0..dynident_testing::count(3, 40)).map(|number| number * ROBOTS.len()) {
+        let folder = tempfile::tempdir().unwrap();
+        let study = honest(folder.path(), case);
+        for log in ["train.csv", "test.csv"] {
+            let path = folder.path().join(log);
+            std::fs::write(&path, of_motors_side(&std::fs::read_to_string(&path).unwrap())).unwrap();
+        }
+        let check = check_text(folder.path(), &study);
+        let found =
+            check.findings.iter().find(|finding| finding.write.iter().any(|line| line.table == "format.position"));
+        let found = found.unwrap_or_else(|| panic!("{case}: {:?}", problems(&check)));
+        let scale: f64 = found.write[0].line.rsplit(' ').next().unwrap().parse().unwrap();
+        let [least, greatest] = numbers_between(&found.evidence).unwrap_or([0.9 * scale, 1.1 * scale]);
+        assert!((least..=greatest).contains(&GEAR_RATIO.recip()), "{case}: {scale}, {}", found.evidence);
+        assert!((0.6..1.6).contains(&(GEAR_RATIO * scale)), "{case}: {scale}");
+    }
+}
+
+/// The two numbers of `between 0.008 and 0.012`.
+fn numbers_between(text: &str) -> Option<[f64; 2]> {
+    let (_, rest) = text.split_once("between ")?;
+    let (least, rest) = rest.split_once(" and ")?;
+    Some([least, rest.split(':').next()?].map(|number| number.parse().unwrap()))
+}
+
+/// A log whose positions are those of motors with gears of [`GEAR_RATIO`].
+fn of_motors_side(log: &str) -> String {
+    let mut lines = log.lines();
+    let header = lines.next().unwrap();
+    let is_position: Vec<bool> = header.split(',').map(|name| name.starts_with('q')).collect();
+    let mut text = header.to_owned() + "\n";
+    for line in lines {
+        let value = |(text, is_position): (&str, &bool)| {
+            if *is_position { format!("{:.7}", GEAR_RATIO * text.parse::<f64>().unwrap()) } else { text.to_owned() }
+        };
+        let values: Vec<String> = line.split(',').zip(&is_position).map(value).collect();
+        text += &(values.join(",") + "\n");
+    }
+    text
 }
 
 /// A description with one value for every such attribute.
