@@ -22,8 +22,12 @@ use std::path::{Path, PathBuf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let default = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schemas");
-    let folder = std::env::args_os().nth(1).map_or_else(default, PathBuf::from);
-    std::fs::create_dir_all(&folder)?;
+    write_all(&std::env::args_os().nth(1).map_or_else(default, PathBuf::from))
+}
+
+/// Writes all schemas into a folder, which is made where there is none.
+pub(crate) fn write_all(folder: &Path) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(folder)?;
     let files = [
         (BENCHMARK_SCHEMA, written::<BenchmarkFile>()),
         (CHECK_SCHEMA, written::<CheckFile>()),
@@ -52,9 +56,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             .ok_or_else(|| format!("{name}: no key `schema`"))?
             .insert("const".to_owned(), name.into());
         let file = name.split('/').nth(1).ok_or_else(|| format!("{name} is not dynident/NAME/VERSION"))?;
-        write(&folder, file, &schema)?;
+        write(folder, file, &schema)?;
     }
-    write(&folder, "study", &settings().into_generator().into_root_schema_for::<dynident::Study>())
+    write(folder, "study", &settings().into_generator().into_root_schema_for::<dynident::Study>())
 }
 
 /// Draft 7 is what editors of TOML read.

@@ -18,4 +18,5 @@ mod iterate_again;
 mod packing;
 mod reproduce;
 mod robots_outside;
+mod schemas;
 mod verdict;

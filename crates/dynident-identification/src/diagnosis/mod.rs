@@ -13,6 +13,7 @@
 //! | `step_width` | the step of dry friction that the rows have |
 //! | `beside_friction`, `usual_errors` | torque beside friction, drive inertia and offsets; descriptions as they err |
 //! | `reading`, `search` | their sum, and the reading with the best |
+//! | `numbers`, `refinement` | the number of a mistake between those tried |
 //! | `confirmation` | that it is not what honest logs look like |
 //! | `torque_clock` | torque of another moment |
 //! | `description_fit`, `wrong_mass`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, one wrong mass, payloads |
@@ -35,8 +36,10 @@ mod mistake;
 mod motion_rows;
 mod noise_torque;
 mod nominal;
+mod numbers;
 mod plausibility;
 mod reading;
+mod refinement;
 mod same_columns;
 mod search;
 mod span;
@@ -72,8 +75,8 @@ use dynident_recording::ImportReport;
 use explanation::Explanation;
 use held_out_logs::HeldOutLogs;
 use motion_rows::{INSTANTS, MotionSamples};
-use reading::Corrected;
-use search::{CLEARLY_BETTER, rough_consistency};
+use reading::{CLEARLY_BETTER, Corrected};
+use search::rough_consistency;
 use torque_clock::TorqueClock;
 
 /// Where even the believed reading leaves this share of the torque, positions may be noise more than motion.

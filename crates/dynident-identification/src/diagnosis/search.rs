@@ -7,17 +7,13 @@
 use super::candidates::{Breadth, FAR, candidates};
 use super::mistake::{Channels, Mistake, without_mistakes};
 use super::motion_rows::MotionRows;
-use super::reading::{Corrected, Reading};
-use super::step_width::with_steps_of;
-use super::units::{is_unit_of_position, is_unit_of_time, is_unit_of_torque};
+use super::numbers::between_those_tried;
+use super::reading::{ALIKE, CLEARLY_BETTER, Corrected, Reading};
+use super::refinement::refined;
 use crate::consistent::ConsistencySettings;
-use core::f64::consts::FRAC_PI_2;
 use dynident_dynamics::ParametricModel;
 use rayon::prelude::*;
 
-/// By how much a reading must score better before the study is doubted: as if one joint had less than 0.55 of what was
-/// left of its torque. On seven sets of real logs the best wrong reading gains 0.41.
-pub(super) const CLEARLY_BETTER: f64 = 0.6;
 /// Times what the study as written leaves of all torque that a better reading may leave.
 const NO_WORSE: f64 = 1.05;
 /// Times what was left of a joint's torque, and a share of it, that a better reading may leave; more only where its
@@ -25,10 +21,6 @@ const NO_WORSE: f64 = 1.05;
 const SACRIFICED: f64 = 1.25;
 const LITTLE: f64 = 0.02;
 const SHARE_OF_GAIN: f64 = 0.1;
-/// Readings this close to the best cannot be told from it.
-pub(super) const ALIKE: f64 = 0.2;
-/// By how much a number between those tried must be better than the nearest of these: as much as a mistake.
-const WORTH_REFINING: f64 = CLEARLY_BETTER;
 /// Readings beside the best from which a second mistake is looked for, once there is one.
 const RUNNERS_UP: usize = 8;
 /// Share of a joint's torque that is left where its columns say nothing.
@@ -37,17 +29,6 @@ const MOSTLY_NOISE: f64 = 0.5;
 const EXPLAINS: f64 = 0.8;
 /// Times what parameters of its own leave of a joint's torque that one robot leaves where it is another's.
 const STRAY: f64 = 1.8;
-/// Places at which a number is tried before it is narrowed down: what is left has several valleys between a gear and
-/// another.
-const PLACES: usize = 17;
-/// Logarithm of how far from a factor that is tried gears and counts of encoders are looked for, and in how many
-/// valleys.
-const REACH_OF_UNITS: f64 = 2.0;
-const MOST_VALLEYS: usize = 4;
-/// Steps of a factor's logarithm in which it is followed to where it explains clearly less, and how exactly that is
-/// found.
-const EDGE_STEP: f64 = 0.2;
-const EDGE_WIDTH: f64 = 0.03;
 /// What one gain more explains of all joints' torque, as a logarithm, where no joint needs to tell: on real logs a
 /// wrong one reaches 0.83.
 const GAINS_MUCH: f64 = 2.0 * CLEARLY_BETTER;
@@ -328,215 +309,4 @@ fn sacrifices(reading: &Reading, from: &Reading) -> bool {
         let before = last.map_or(joint, |mistake| mistake.torque_from(joint));
         reading.left[joint] > factor * from.left[before] + LITTLE
     })
-}
-
-/// A reading whose number lies between those tried.
-fn refined(
-    at: &Corrected,
-    first: &(Corrected, Reading),
-    consistency: &ConsistencySettings,
-) -> Option<(Corrected, Reading)> {
-    let last = first.1.mistakes.last()?;
-    // A smaller unit of all positions makes a wide step of dry friction narrow: each is read with its own steps.
-    if matches!(last, Mistake::PositionUnit { joints, .. } if joints.len() > 1) {
-        return refined_with_own_steps(at, last, consistency);
-    }
-    // By the fit without physical limits: smooth, and cheap.
-    // Of a torque's gain the description's masses say as much as these err.
-    let value = |reading: &Reading, mistake: &Mistake| match mistake {
-        Mistake::TorqueUnit { .. } => reading.free_score,
-        _ => reading.lower_bound(),
-    };
-    let free =
-        |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| value(&reading, mistake));
-    let mistake = between_those_tried(last, free)?;
-    let corrected = at.without(&mistake);
-    let reading = corrected.reading(Some(consistency)).ok()?;
-    // Free numbers follow the noise: the round one stays unless the exact one is clearly better. Gears and counts have
-    // no round ones.
-    let is_round = match last {
-        Mistake::PositionUnit { factor, .. } => is_unit_of_position(*factor),
-        Mistake::TorqueUnit { factor, .. } => is_unit_of_torque(*factor),
-        // Zeros are mistaken by quarters of a turn, or by anything.
-        Mistake::Offset { offset_rad, .. } => (offset_rad / FRAC_PI_2).fract() == 0.0,
-        _ => true,
-    };
-    let is_better = match mistake {
-        _ if is_round => reading.score() < first.1.score() - WORTH_REFINING,
-        Mistake::PositionUnit { .. } => reading.score() < first.1.score(),
-        _ => value(&reading, &mistake) < value(&first.1, &mistake),
-    };
-    is_better.then_some((corrected, reading))
-}
-
-/// The reading of all positions in the unit that explains most where each unit is read with the steps of dry friction
-/// that its own rows ask for.
-fn refined_with_own_steps(
-    at: &Corrected,
-    first: &Mistake,
-    consistency: &ConsistencySettings,
-) -> Option<(Corrected, Reading)> {
-    let read = |mistake: &Mistake, consistency: Option<&ConsistencySettings>| {
-        let corrected = at.without(mistake);
-        let robot = with_steps_of(&corrected.robot, &corrected.rows).ok()?;
-        let corrected = Corrected { robot, ..corrected };
-        corrected.reading(consistency).ok().map(|reading| (corrected, reading))
-    };
-    let free = |mistake: &Mistake| read(mistake, None).map_or(f64::INFINITY, |(_, reading)| reading.lower_bound());
-    let as_tried = read(first, Some(consistency))?;
-    // Bodies that cannot be explain positions in a unit that is too small as well: of several valleys the one counts
-    // that a robot is in.
-    let found = valleys(first, free).into_iter().filter_map(|mistake| read(&mistake, Some(consistency)));
-    let best = found.min_by(|a, b| a.1.score().total_cmp(&b.1.score()));
-    let is_round = matches!(first, Mistake::PositionUnit { factor, .. } if is_unit_of_position(*factor));
-    let has_to_gain = if is_round { WORTH_REFINING } else { 0.0 };
-    let is_better = |best: &(Corrected, Reading)| best.1.score() < as_tried.1.score() - has_to_gain;
-    let (corrected, mut reading) = best.filter(is_better).unwrap_or(as_tried);
-    reading.factors_alike = factors_alike(reading.mistakes.last()?, free);
-    Some((corrected, reading))
-}
-
-/// The least and the greatest factor of positions around that of `mistake` that explain not clearly worse. A robot
-/// that rubs otherwise, or is described with usual errors, moves the best one by more than [`CLEARLY_BETTER`] does.
-fn factors_alike(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
-    let Mistake::PositionUnit { joints, factor } = mistake else { return None };
-    let at = |log: f64| value(&Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() });
-    let limit = at(0.0) + 2.0 * CLEARLY_BETTER;
-    let edge = |direction: f64| {
-        let [mut inside, mut outside] = [0.0, EDGE_STEP];
-        while outside < REACH_OF_UNITS && at(direction * outside) <= limit {
-            [inside, outside] = [outside, outside + EDGE_STEP];
-        }
-        while outside - inside > EDGE_WIDTH {
-            let middle = 0.5 * (inside + outside);
-            if at(direction * middle) <= limit { inside = middle } else { outside = middle }
-        }
-        factor * (direction * inside).exp()
-    };
-    Some([edge(-1.0), edge(1.0)])
-}
-
-/// Mistakes of the same kind whose numbers have less `value` than those around them; of all but positions' units the
-/// one with the least.
-fn valleys(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Vec<Mistake> {
-    match mistake {
-        Mistake::PositionUnit { joints, factor } if !is_unit_of_position(*factor) => {
-            let with = |log: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() };
-            valleys_in(0.0, REACH_OF_UNITS, |log| value(&with(log))).take(MOST_VALLEYS).map(with).collect()
-        }
-        _ => between_those_tried(mistake, value).into_iter().collect(),
-    }
-}
-
-/// The mistake of the same kind whose number has the least `value`, near the one of `mistake`; `None` where it has no
-/// number, or a unit's.
-pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Option<Mistake> {
-    // A factor, within e^±reach.
-    let scaled =
-        |reach: f64, with: &dyn Fn(f64) -> Mistake| with(least_in(0.0, reach, |log| value(&with(log.exp()))).exp());
-    match mistake {
-        Mistake::Offset { joint, offset_rad } => {
-            let at = |offset_rad: f64| Mistake::Offset { joint: *joint, offset_rad };
-            Some(at(least_in(*offset_rad, 0.5, |offset| value(&at(offset)))))
-        }
-        Mistake::Gravity { gravity_m_s2 } => {
-            let mut gravity = *gravity_m_s2;
-            if gravity == [0.0; 3] {
-                return None;
-            }
-            // Turned about two axes across it, twice over.
-            for round in 0..2 {
-                for axis in across(gravity) {
-                    let start = gravity;
-                    let reach = if round == 0 { 0.5 } else { 0.1 };
-                    let turn = least_in(0.0, reach, |angle| {
-                        value(&Mistake::Gravity { gravity_m_s2: turned(start, axis, angle) })
-                    });
-                    gravity = turned(start, axis, turn);
-                }
-            }
-            Some(Mistake::Gravity { gravity_m_s2: gravity })
-        }
-        Mistake::PositionUnit { joints, factor } => {
-            // A gear ratio may be near a unit.
-            let with = |times: f64| Mistake::PositionUnit { joints: joints.clone(), factor: factor * times };
-            let found = scaled(REACH_OF_UNITS, &with);
-            if !is_unit_of_position(*factor) {
-                return Some(found);
-            }
-            let is_a_unit =
-                matches!(&found, Mistake::PositionUnit { factor: found, .. } if (found / factor).ln().abs() < 0.1);
-            (!is_a_unit).then_some(found)
-        }
-        Mistake::TorqueUnit { joint, factor } => {
-            Some(scaled(1.2, &|times| Mistake::TorqueUnit { joint: *joint, factor: factor * times }))
-        }
-        Mistake::Length { joint, factor } => {
-            Some(scaled(0.7, &|times| Mistake::Length { joint: *joint, factor: factor * times }))
-        }
-        Mistake::TimeUnit { factor } if !is_unit_of_time(*factor) => {
-            Some(scaled(0.4, &|times| Mistake::TimeUnit { factor: factor * times }))
-        }
-        Mistake::Sign { .. }
-        | Mistake::Order { .. }
-        | Mistake::TimeUnit { .. }
-        | Mistake::Coupled { .. }
-        | Mistake::Compensated
-        | Mistake::Lag { .. } => None,
-    }
-}
-
-/// Where `value` is least within `reach` of `centre`, to a hundredth of the reach.
-fn least_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> f64 {
-    valleys_in(centre, reach, value).next().unwrap_or(centre)
-}
-
-/// Where `value` is less than around it within `reach` of `centre`, the deepest first: of [`PLACES`] places those with
-/// less than their neighbours, then by thirds around each, to a hundredth of the reach.
-fn valleys_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
-    let spacing = 2.0 * reach / (PLACES - 1) as f64;
-    let place = move |k: usize| centre - reach + spacing * k as f64;
-    let values: Vec<f64> = (0..PLACES).map(|k| value(place(k))).collect();
-    let around = |k: usize| [k.saturating_sub(1), (k + 1).min(PLACES - 1)];
-    let is_valley = |k: &usize| around(*k).iter().all(|&other| values[*k] <= values[other]);
-    let mut deepest: Vec<usize> = (0..PLACES).filter(is_valley).collect();
-    deepest.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    deepest.into_iter().map(move |k| least_by_thirds(around(k).map(place), 0.02 * reach, &value))
-}
-
-/// Where `value`, which has one valley between two places, is least, to within `width`.
-pub(super) fn least_by_thirds([mut low, mut high]: [f64; 2], width: f64, value: impl Fn(f64) -> f64) -> f64 {
-    while high - low > width {
-        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        if value(a) < value(b) {
-            high = b;
-        } else {
-            low = a;
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// Two unit vectors across `v`.
-fn across(v: [f64; 3]) -> [[f64; 3]; 2] {
-    let least = (0..3).min_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs())).unwrap_or(0);
-    let mut other = [0.0; 3];
-    other[least] = 1.0;
-    let first = unit(cross(v, other));
-    [first, unit(cross(v, first))]
-}
-
-/// `v` turned about the unit vector `axis`, across it, by `angle` rad.
-fn turned(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
-    let side = cross(axis, v);
-    core::array::from_fn(|k| v[k] * angle.cos() + side[k] * angle.sin())
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    v.map(|x| x / length)
 }

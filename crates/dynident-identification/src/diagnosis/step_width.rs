@@ -61,7 +61,7 @@ fn narrow_down(
 }
 
 /// The robot with each joint's smooth steps so many times as wide; none where it has none.
-fn with_widths(robot: &ParametricModel, times: &[f64]) -> Option<ParametricModel> {
+pub(super) fn with_widths(robot: &ParametricModel, times: &[f64]) -> Option<ParametricModel> {
     let widened = |term: &TorqueTerm| match term.joints()[..] {
         [joint] => term.clone().with_step(|step| match step {
             CoulombShape::Smooth { width } => CoulombShape::Smooth { width: times[joint] * width },

@@ -4,8 +4,8 @@
 use super::explanation::Explanation;
 use super::mistake::{Channels, Mistake};
 use super::motion_rows::{MotionRows, MotionSamples};
-use super::reading::{Corrected, Reading};
-use super::search::{CLEARLY_BETTER, least_by_thirds};
+use super::numbers::least_by_thirds;
+use super::reading::{CLEARLY_BETTER, Corrected, Reading};
 use crate::consistent::ConsistencySettings;
 use crate::lag::LONGEST_DELAY_S;
 use dynident_dynamics::ParametricModel;
