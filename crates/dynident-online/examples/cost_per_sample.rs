@@ -6,7 +6,7 @@
 //!
 //! Prints the median and the 99.9th percentile of single samples, and the mean of all.
 
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout, reason = "a program that prints a table")]
 
 use dynident_dynamics::{
     Panels, ParametricModel, TermHistory, Workspace, inverse_dynamics, regressor_panels_of_sample,
