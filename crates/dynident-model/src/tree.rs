@@ -2,6 +2,7 @@
 
 use crate::collision::CollisionShape;
 use crate::coupling::JointCoupling;
+use crate::dh_convention::DhConvention;
 use crate::error::ModelError;
 use crate::inertial::InertialParameters;
 use crate::joint::{Joint, JointMap, Mimic};
@@ -67,6 +68,14 @@ pub struct Model {
     maps: Vec<JointMap>,
     inertials: Vec<InertialParameters>,
     steps: Vec<JointStep>,
+    other_convention: Option<Box<OtherConvention>>,
+}
+
+/// What a D-H table is in the other convention.
+#[derive(Clone, Debug, PartialEq)]
+struct OtherConvention {
+    convention: DhConvention,
+    model: Model,
 }
 
 impl Model {
@@ -116,7 +125,8 @@ impl Model {
             |coupling| coupling.driving().iter().map(|&joint| tree[joint].clone()).collect(),
         );
         let gravity = STANDARD_GRAVITY;
-        Ok(Self { name: name.to_owned(), gravity, tree, joints, coupling, bodies, base, maps, inertials, steps })
+        let (name, other_convention) = (name.to_owned(), None);
+        Ok(Self { name, gravity, tree, joints, coupling, bodies, base, maps, inertials, steps, other_convention })
     }
 
     /// The robot's name.
@@ -258,7 +268,23 @@ impl Model {
             return Err(ModelError::NotFinite { what: "gravity".to_owned() });
         }
         self.gravity = gravity;
+        if let Some(other) = &mut self.other_convention {
+            other.model.gravity = gravity;
+        }
         Ok(self)
+    }
+
+    /// The robot that a Denavit-Hartenberg table describes if it is meant in the other convention than the one that it
+    /// states, and that convention; none for other descriptions. Gravity and held joints are as here; every other
+    /// change of the model ends it.
+    pub fn other_convention(&self) -> Option<(DhConvention, &Self)> {
+        self.other_convention.as_ref().map(|other| (other.convention, &other.model))
+    }
+
+    /// The same robot, which `model` is in this other convention.
+    pub(crate) fn with_other_convention(mut self, convention: DhConvention, model: Self) -> Self {
+        self.other_convention = Some(Box::new(OtherConvention { convention, model }));
+        self
     }
 
     /// The same robot with these joints of the tree (numbers from 0, as in [`tree_joints`](Model::tree_joints))
@@ -321,6 +347,9 @@ impl Model {
         if links.is_empty() {
             return Ok(self.clone());
         }
+        if links.is_empty() {
+            return Ok(self.clone());
+        }
         // The base keeps the link that all others hang on.
         let all = || self.bodies.iter().flat_map(|body| &body.links).chain(self.base.links.iter().skip(1));
         if let Some(link) = links.iter().find(|name| all().all(|link| link.name != **name)) {
@@ -370,6 +399,9 @@ impl Model {
     /// # Errors
     /// If a name is unknown, joints follow each other in a circle, or a number is not finite.
     pub fn with_followers(self, followers: &[(String, Mimic)]) -> Result<Self, ModelError> {
+        if followers.is_empty() {
+            return Ok(self);
+        }
         let Self { name, gravity, mut tree, bodies, base, .. } = self;
         let known = || tree.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
         let unknown = |joint: &str| ModelError::UnknownJoint { joint: joint.to_owned(), known: known() };
@@ -428,7 +460,11 @@ impl Model {
                 went.push((Some(joints.len() - 1), Transform::IDENTITY));
             }
         }
-        Self::new(&self.name, base, joints, bodies)?.with_gravity(self.gravity)
+        let held = Self::new(&self.name, base, joints, bodies)?.with_gravity(self.gravity)?;
+        Ok(match self.other_convention() {
+            Some((convention, other)) => held.with_other_convention(convention, other.locked(positions)?),
+            None => held,
+        })
     }
 
     /// The joints of the tree once those with a position are held: what is followed and held becomes an offset, and a

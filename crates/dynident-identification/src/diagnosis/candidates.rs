@@ -36,6 +36,8 @@ pub(super) fn candidates(robot: &ParametricModel, rows: &MotionRows, breadth: Br
     let model = robot.model();
     let mut all =
         [units(model, rows), signs(model.dof()), orders(model.dof()), zeros(model), mountings(model)].concat();
+    // No key of tables is mistaken more often.
+    all.extend(model.other_convention().map(|(convention, _)| Mistake::Convention { convention }));
     if breadth == Breadth::All {
         all.extend(
             [units_of_one(model, rows), other_rates(model, rows), couplings(model), gravities(model), lengths(model)]

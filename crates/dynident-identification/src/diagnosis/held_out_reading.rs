@@ -68,8 +68,12 @@ pub(super) fn held_out_reading(
         return None;
     }
     // All logs are of one robot at one place.
-    let is_of_log =
-        |mistake: &Mistake| !matches!(mistake, Mistake::Gravity { .. } | Mistake::Length { .. } | Mistake::Compensated);
+    let is_of_log = |mistake: &Mistake| {
+        !matches!(
+            mistake,
+            Mistake::Gravity { .. } | Mistake::Convention { .. } | Mistake::Length { .. } | Mistake::Compensated
+        )
+    };
     let mut all: Vec<Mistake> = candidates(robot, rows, Breadth::All).into_iter().filter(is_of_log).collect();
     all.extend(gains(robot, rows, theta));
     let turning = (0..robot.dof()).filter(|&joint| robot.model().joints()[joint].turns());

@@ -4,7 +4,7 @@ use super::motion_rows::MotionRows;
 use super::nominal::gravity_torque;
 use super::units::is_unit_of_time;
 use dynident_dynamics::ParametricModel;
-use dynident_model::Vec3;
+use dynident_model::{DhConvention, Vec3};
 
 /// Which columns of a log a mistake is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,6 +85,11 @@ pub enum Mistake {
     /// The torques lack the gravity of the description's bodies: a controller that compensates it logs what it adds to
     /// that.
     Compensated,
+    /// The description is a Denavit-Hartenberg table in the other convention than the one that it states.
+    Convention {
+        /// The one that it is in.
+        convention: DhConvention,
+    },
     /// The description has a joint at another distance from the one before it.
     Length {
         /// The joint.
@@ -106,7 +111,7 @@ impl Mistake {
         match self {
             // A unit of one joint alone is rarer than one of all, or than another rate.
             Self::PositionUnit { joints, .. } if joints.len() == 1 => 0.15,
-            Self::Sign { .. } | Self::TimeUnit { .. } | Self::PositionUnit { .. } => 0.0,
+            Self::Sign { .. } | Self::TimeUnit { .. } | Self::PositionUnit { .. } | Self::Convention { .. } => 0.0,
             Self::Order { .. } => 0.05,
             Self::Offset { .. }
             | Self::Gravity { .. }
@@ -129,6 +134,7 @@ impl Mistake {
             | Self::PositionUnit { .. }
             | Self::Coupled { .. }
             | Self::Lag { .. }
+            | Self::Convention { .. }
             | Self::Length { .. }
             | Self::Compensated
             | Self::Gravity { .. } => false,
@@ -164,6 +170,7 @@ impl Mistake {
             | Self::Coupled { .. }
             | Self::TimeUnit { .. }
             | Self::Lag { .. }
+            | Self::Convention { .. }
             | Self::Length { .. }
             | Self::Compensated
             | Self::Gravity { .. } => joint,
@@ -234,7 +241,7 @@ impl Mistake {
                     tau.iter_mut().zip(gravity).for_each(|(tau, gravity)| *tau += gravity);
                 }
             }
-            Self::Lag { .. } | Self::Length { .. } | Self::Gravity { .. } => {}
+            Self::Lag { .. } | Self::Convention { .. } | Self::Length { .. } | Self::Gravity { .. } => {}
         }
         out
     }
@@ -243,6 +250,11 @@ impl Mistake {
     pub fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
         let model = robot.model().clone();
         let model = match self {
+            // Its bodies are described in frames of their own.
+            Self::Convention { convention } => {
+                let (_, meant) = model.other_convention().filter(|(other, _)| other == convention)?;
+                return ParametricModel::new(meant.clone(), robot.terms().to_vec()).ok();
+            }
             Self::Gravity { gravity_m_s2 } => model.with_gravity(Vec3(*gravity_m_s2)),
             Self::Length { joint, factor } => model.with_joint_distances(&[*joint], *factor),
             Self::Sign { .. }

@@ -76,6 +76,7 @@ pub(super) fn between_those_tried(mistake: &Mistake, value: impl Fn(&Mistake) ->
         | Mistake::Order { .. }
         | Mistake::TimeUnit { .. }
         | Mistake::Coupled { .. }
+        | Mistake::Convention { .. }
         | Mistake::Compensated
         | Mistake::Lag { .. } => None,
     }

@@ -212,6 +212,7 @@ fn twin(mistake: &Mistake) -> Option<Mistake> {
         | Mistake::Coupled { .. }
         | Mistake::TimeUnit { .. }
         | Mistake::Lag { .. }
+        | Mistake::Convention { .. }
         | Mistake::Length { .. }
         | Mistake::Compensated
         | Mistake::Gravity { .. } => None,

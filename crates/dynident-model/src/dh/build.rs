@@ -1,7 +1,8 @@
 //! From the keys of a D-H table to the link tree.
 
-use super::table::{Base, Convention, Dynamics, Inertial, Limits, Number, Row, Table};
+use super::table::{Base, Dynamics, Inertial, Limits, Number, Row, Table};
 use super::{DhError, DhFault};
+use crate::dh_convention::DhConvention;
 use crate::inertial::InertialParameters;
 use crate::joint::{Joint, JointKind, JointLimits};
 use crate::place::Located;
@@ -11,8 +12,15 @@ use crate::urdf::{MAX_MAGNITUDE, MAX_MOVING_JOINTS};
 use std::collections::{HashMap, HashSet};
 use toml::Spanned;
 
-/// The model that `table`, read from `text`, describes.
+/// The model that `table`, read from `text`, describes, with what it is in the other convention.
 pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
+    let other = table.convention.other();
+    let model_in_other = model_in(text, table, other)?;
+    Ok(model_in(text, table, table.convention)?.with_other_convention(other, model_in_other))
+}
+
+/// The model that `table` describes in this convention.
+fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model, DhError> {
     let source = Source { text };
     let gravity = table.gravity_m_s2.as_ref().map(|gravity| source.finite("gravity_m_s2", gravity)).transpose()?;
     let base_name = match &table.base.link {
@@ -56,7 +64,7 @@ pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
             return Err(source.fault(at, DhFault::UnknownParent { parent: parent.to_owned(), known }));
         };
 
-        let frames = source.frames(table.convention, row)?;
+        let frames = source.frames(convention, row)?;
         let kind = JointKind::from(row.kind);
         let sign = row.sign.as_ref().map_or(1.0, |sign| *sign.get_ref());
         if sign.abs() != 1.0 {
@@ -196,7 +204,7 @@ impl Source<'_> {
         Ok(Transform { rotation: about_z(yaw).mul_mat(&about_y).mul_mat(&about_x(roll)), translation })
     }
 
-    fn frames(&self, convention: Convention, row: &Row) -> Result<Frames, DhError> {
+    fn frames(&self, convention: DhConvention, row: &Row) -> Result<Frames, DhError> {
         let alpha = self.angle(["alpha_rad", "alpha_deg"], [&row.alpha_rad, &row.alpha_deg])?;
         let theta = self.angle(["theta_rad", "theta_deg"], [&row.theta_rad, &row.theta_deg])?;
         let a = self.number("a_m", &row.a_m)?.unwrap_or(0.0);
@@ -205,10 +213,10 @@ impl Source<'_> {
         let turn_z = Transform { rotation: about_z(theta), translation: Vec3::ZERO };
         let along_z = Transform { rotation: Mat3::IDENTITY, translation: Vec3([0.0, 0.0, d]) };
         Ok(match convention {
-            Convention::Modified => {
+            DhConvention::Modified => {
                 Frames { placement: turn_x.then(&along_z).then(&turn_z), body_from_dh: Transform::IDENTITY }
             }
-            Convention::Standard => Frames { placement: turn_z, body_from_dh: along_z.then(&turn_x) },
+            DhConvention::Standard => Frames { placement: turn_z, body_from_dh: along_z.then(&turn_x) },
         })
     }
 

@@ -1,18 +1,12 @@
 //! The keys of a D-H table, as they stand in the file.
 
+use crate::dh_convention::DhConvention;
 use crate::joint::JointKind;
 use serde::Deserialize;
 use toml::Spanned;
 
 /// A number with its place.
 pub(super) type Number = Option<Spanned<f64>>;
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Convention {
-    Standard,
-    Modified,
-}
 
 #[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -38,7 +32,7 @@ impl From<Kind> for JointKind {
 pub(super) struct Table {
     #[serde(default = "default_name")]
     pub(super) name: String,
-    pub(super) convention: Convention,
+    pub(super) convention: DhConvention,
     pub(super) gravity_m_s2: Option<Spanned<[f64; 3]>>,
     #[serde(default)]
     pub(super) base: Base,

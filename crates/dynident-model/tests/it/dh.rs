@@ -1,6 +1,6 @@
 //! D-H tables: forward kinematics against products of textbook matrices, inertials, trees, the paper's arm.
 
-use dynident_model::{Model, Transform, Vec3, load_robot, read_dh, read_urdf};
+use dynident_model::{DhConvention, Model, Transform, Vec3, load_robot, read_dh, read_urdf};
 use nalgebra::{Matrix4, Vector4};
 use proptest::prelude::*;
 
@@ -105,6 +105,25 @@ proptest! {
     ) {
         let (rows, q): (Vec<Row>, Vec<f64>) = rows.into_iter().unzip();
         assert_like_textbook(if standard { "standard" } else { "modified" }, &rows, &q);
+    }
+
+    /// As if it stated that one, with the same gravity and the same joint held.
+    #[test]
+    fn a_table_is_known_in_the_other_convention(rows in proptest::collection::vec(row(), 2..5)) {
+        let mounted = |convention: &str| {
+            let model = read_dh(&table(convention, &rows)).unwrap().with_gravity(Vec3([1.0, -2.0, 3.0])).unwrap();
+            model.locked(&[("j1".to_owned(), 0.3)]).unwrap()
+        };
+        let [standard, modified] = ["standard", "modified"].map(mounted);
+        for (one, other, convention) in
+            [(&standard, &modified, DhConvention::Modified), (&modified, &standard, DhConvention::Standard)]
+        {
+            let (found, model) = one.other_convention().unwrap();
+            prop_assert_eq!(found, convention);
+            prop_assert_eq!(model.tree_joints(), other.tree_joints());
+            prop_assert_eq!(model.inertials(), other.inertials());
+            prop_assert_eq!(model.gravity(), other.gravity());
+        }
     }
 }
 

@@ -65,7 +65,9 @@ impl<'a> StudyFormat<'a> {
                 vec![self.lag(joints, *lag_s)]
             }
             // The description's own, or what only another log has.
-            Mistake::Lag { .. } | Mistake::Length { .. } | Mistake::Compensated => Vec::new(),
+            Mistake::Lag { .. } | Mistake::Convention { .. } | Mistake::Length { .. } | Mistake::Compensated => {
+                Vec::new()
+            }
             Mistake::Gravity { gravity_m_s2 } => {
                 let line = format!("gravity_m_s2 = {}", list(&gravity_m_s2.map(|g| number(g, 4))));
                 let mut changes = vec![StudyChange { table: "robot".to_owned(), line }];

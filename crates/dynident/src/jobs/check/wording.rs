@@ -17,7 +17,7 @@ pub(super) fn kind(mistake: &Mistake) -> &'static str {
         Mistake::PositionUnit { .. } | Mistake::TorqueUnit { .. } | Mistake::TimeUnit { .. } => "unit",
         Mistake::Coupled { .. } => "coupling",
         Mistake::Lag { .. } => "lag",
-        Mistake::Length { .. } => "description",
+        Mistake::Convention { .. } | Mistake::Length { .. } => "description",
         Mistake::Gravity { .. } | Mistake::Compensated => "mounting",
     }
 }
@@ -108,6 +108,10 @@ pub(super) fn sentence(mistake: &Mistake, joints: &[String]) -> String {
             if *lag_s > 0.0 { "later" } else { "earlier" },
             if *channels == Channels::Torque { "the motion" } else { "all else" }
         ),
+        Mistake::Convention { convention } => format!(
+            "the Denavit-Hartenberg table is in the other convention: write `convention = \"{}\"` in its file",
+            convention.name()
+        ),
         Mistake::Length { joint, factor } if *factor < 0.0 => format!(
             "the description has joint `{}` on the other side of the joint before it: `xyz` of its origin has to be times {factor:.3}",
             joints[*joint]
@@ -162,9 +166,11 @@ pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading),
         | Mistake::TorqueUnit { joint, .. }
         | Mistake::Coupled { joint, .. }
         | Mistake::Length { joint, .. } => vec![*joint],
-        Mistake::Order { .. } | Mistake::TimeUnit { .. } | Mistake::Compensated | Mistake::Gravity { .. } => {
-            (0..joints.len()).collect()
-        }
+        Mistake::Order { .. }
+        | Mistake::TimeUnit { .. }
+        | Mistake::Convention { .. }
+        | Mistake::Compensated
+        | Mistake::Gravity { .. } => (0..joints.len()).collect(),
     };
     // The named joint's own torque where that tells; else the one that tells most.
     let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > TELLS);

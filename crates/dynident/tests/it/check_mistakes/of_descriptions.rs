@@ -4,6 +4,7 @@ use super::{Row, check_text, problems, read};
 use crate::common::repository;
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::{Model, read_urdf};
+use std::fmt::Write;
 use std::path::Path;
 
 /// The README's example with another description and other rows.
@@ -84,4 +85,48 @@ fn with_bodies_times(factor: f64, urdf: &str) -> String {
         text = std::iter::once(pieces[0].to_owned()).chain(scaled).collect();
     }
     text
+}
+
+/// Rows of the UR10's table: a, alpha, d of the standard convention (its maker's), metres and degrees.
+const UR10_ROWS: [[f64; 3]; 6] = [
+    [0.0, 90.0, 0.1273],
+    [-0.612, 0.0, 0.0],
+    [-0.5723, 0.0, 0.0],
+    [0.0, 90.0, 0.163941],
+    [0.0, -90.0, 0.1157],
+    [0.0, 0.0, 0.0922],
+];
+
+/// The UR10's Denavit-Hartenberg table, with rows of one convention and the name of one.
+fn table(rows: &str, stated: &str) -> String {
+    let mut text = format!("name = \"ur10\"\nconvention = \"{stated}\"\n");
+    for (joint, name) in super::JOINTS.iter().enumerate() {
+        // The modified convention has in row i what the standard one has in row i - 1.
+        let before = if rows == "standard" { Some(joint) } else { joint.checked_sub(1) };
+        let [a, alpha, _] = before.map_or([0.0; 3], |row| UR10_ROWS[row]);
+        let d = UR10_ROWS[joint][2];
+        write!(text, "\n[[joint]]\nname = \"{name}\"\na_m = {a:?}\nalpha_deg = {alpha:?}\nd_m = {d:?}\n").unwrap();
+    }
+    text
+}
+
+/// A table in the other convention was another order of the columns, with keys to write, or one joint's torque that
+/// belongs to no robot.
+#[test]
+fn a_table_in_the_other_convention_is_named() {
+    for rows in ["standard", "modified"] {
+        for stated in ["standard", "modified"] {
+            let folder = tempfile::tempdir().unwrap();
+            let study = study_with(folder.path(), "", |_| {}).replace("robot.urdf", "ur10.toml");
+            std::fs::write(folder.path().join("ur10.toml"), table(rows, stated)).unwrap();
+            let found = problems(&check_text(folder.path(), &study));
+            if rows == stated {
+                assert!(found.is_empty(), "{rows}: {found:?}");
+                continue;
+            }
+            let [(kind, sentence)] = &found[..] else { panic!("{rows} as {stated}: {found:?}") };
+            let is_named = sentence.contains(&format!("write `convention = \"{rows}\"`"));
+            assert!(kind == "description" && is_named, "{rows} as {stated}: {found:?}");
+        }
+    }
 }

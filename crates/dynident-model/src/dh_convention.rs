@@ -1,0 +1,32 @@
+//! The two conventions of Denavit-Hartenberg tables.
+
+use serde::Deserialize;
+
+/// The frames that the rows of a D-H table are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DhConvention {
+    /// `Rz(θ) Tz(d) Tx(a) Rx(α)` (Denavit and Hartenberg 1955; Paul 1981).
+    Standard,
+    /// `Rx(α) Tx(a) Rz(θ) Tz(d)` (Craig 1986; Khalil and Kleinfinger 1986).
+    Modified,
+}
+
+impl DhConvention {
+    /// The one that is not this.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Standard => Self::Modified,
+            Self::Modified => Self::Standard,
+        }
+    }
+
+    /// As tables have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Standard => "standard",
+            Self::Modified => "modified",
+        }
+    }
+}
