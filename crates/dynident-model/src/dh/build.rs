@@ -14,9 +14,13 @@ use toml::Spanned;
 
 /// The model that `table`, read from `text`, describes, with what it is in the other convention.
 pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
+    let stated = model_in(text, table, table.convention)?;
     let other = table.convention.other();
-    let model_in_other = model_in(text, table, other)?;
-    Ok(model_in(text, table, table.convention)?.with_other_convention(other, model_in_other))
+    // What the table is not meant to be is no reason to refuse it.
+    Ok(match model_in(text, table, other) {
+        Ok(model) => stated.with_other_convention(other, model),
+        Err(_) => stated,
+    })
 }
 
 /// The model that `table` describes in this convention.
