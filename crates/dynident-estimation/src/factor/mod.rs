@@ -15,6 +15,7 @@ mod rank;
 mod recursive;
 mod reflect;
 mod segmented;
+mod sparse_map;
 mod stored;
 mod triangular;
 

@@ -267,11 +267,11 @@ impl LinearProblem {
 
     /// The totals of all equations, ready to be weighted again and again.
     pub(crate) fn stacked(&self) -> StackedProblem<'_> {
-        let totals: Vec<TriangularFactor> = self.equations.par_iter().map(|e| e.factor.total()).collect();
+        let totals: Vec<&TriangularFactor> = self.equations.par_iter().map(|e| e.factor.total()).collect();
         let stack = |alike: Vec<usize>| {
             let mut total = totals[alike[0]].clone();
             let mut workspace = FactorWorkspace::default();
-            alike[1..].iter().for_each(|&equation| total.absorb_factor(&mut workspace, &totals[equation]));
+            alike[1..].iter().for_each(|&equation| total.absorb_factor(&mut workspace, totals[equation]));
             (alike[0], total)
         };
         let stacks = self.alike().into_par_iter().map(stack).collect();
@@ -300,7 +300,7 @@ impl LinearProblem {
 pub(crate) struct StackedProblem<'a> {
     pub(crate) problem: &'a LinearProblem,
     /// One per equation.
-    pub(crate) totals: Vec<TriangularFactor>,
+    pub(crate) totals: Vec<&'a TriangularFactor>,
     /// Of equations that are [alike](LinearProblem::alike) the number of the first one and all of their rows: with many
     /// logs far fewer triangles over all columns.
     stacks: Vec<(usize, TriangularFactor)>,

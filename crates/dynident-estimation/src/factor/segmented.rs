@@ -1,10 +1,12 @@
 //! A factor that remembers when: the rows of one joint in one log as at most K factors of consecutive time segments.
 
+use super::sparse_map::SparseMap;
 use super::triangular::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
 use crate::error::{EstimationError, expect, require};
 use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// How a log is cut into segments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,6 +88,8 @@ pub struct SegmentedFactor {
     length_rows: usize,
     rows: usize,
     segments: Vec<Segment>,
+    /// The factor of all rows, once somebody asked for it: estimators ask again and again.
+    total: OnceLock<TriangularFactor>,
     workspace: FactorWorkspace,
 }
 
@@ -102,6 +106,7 @@ impl SegmentedFactor {
             length_rows: settings.first_length_rows,
             rows: 0,
             segments: Vec::new(),
+            total: OnceLock::new(),
             workspace: FactorWorkspace::default(),
         })
     }
@@ -112,7 +117,8 @@ impl SegmentedFactor {
         (max_segments, length_rows): (usize, usize),
         segments: Vec<Segment>,
     ) -> Self {
-        Self { columns, max_segments, length_rows, rows, segments, workspace: FactorWorkspace::default() }
+        let (total, workspace) = (OnceLock::new(), FactorWorkspace::default());
+        Self { columns, max_segments, length_rows, rows, segments, total, workspace }
     }
 
     pub(super) fn segments(&self) -> &[Segment] {
@@ -149,6 +155,7 @@ impl SegmentedFactor {
     /// As [`TriangularFactor::absorb`]; nothing is absorbed then.
     pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
         check_panel(self.columns, panel, rows)?;
+        self.total = OnceLock::new();
         let mut start = 0;
         while start < rows {
             let room = self.length_rows - self.segments.last().map_or(self.length_rows, |last| last.rows(self.columns));
@@ -200,7 +207,8 @@ impl SegmentedFactor {
             }
         };
         let segments = self.segments.iter().map(segment).collect::<Result<_, _>>()?;
-        Ok(Self { columns: columns.len(), segments, workspace: FactorWorkspace::default(), ..*self })
+        let total = OnceLock::from(self.total().selected(columns)?);
+        Ok(Self { columns: columns.len(), segments, total, workspace: FactorWorkspace::default(), ..*self })
     }
 
     /// The factor of every segment, in order of time.
@@ -209,14 +217,17 @@ impl SegmentedFactor {
         self.segments.iter().map(|segment| segment.factor(self.columns, &mut workspace)).collect()
     }
 
-    /// The factor of all rows.
-    pub fn total(&self) -> TriangularFactor {
-        let mut workspace = FactorWorkspace::default();
-        let mut total = Segment::Rows(Vec::new());
-        for segment in &self.segments {
-            total.append(self.columns, &mut workspace, segment);
-        }
-        total.factor(self.columns, &mut workspace)
+    /// The factor of all rows; made once and kept, and of a [selection](Self::selected) or a [map](Self::mapped) made
+    /// of this one.
+    pub fn total(&self) -> &TriangularFactor {
+        self.total.get_or_init(|| {
+            let mut workspace = FactorWorkspace::default();
+            let mut total = Segment::Rows(Vec::new());
+            for segment in &self.segments {
+                total.append(self.columns, &mut workspace, segment);
+            }
+            total.factor(self.columns, &mut workspace)
+        })
     }
 
     /// The rows `[W | τ] C` in the same segments: other columns, and another torque, made of these. C has shape
@@ -249,19 +260,25 @@ impl SegmentedFactor {
         if let Some(&value) = map.iter().find(|value| !value.is_finite()) {
             return Err(EstimationError::Setting { setting: "map of columns", value, fix: "give finite numbers" });
         }
-        Ok(self.transformed(core::slice::from_ref(map)))
+        let (columns, map) = (map.ncols() - 1, SparseMap::new(map));
+        let mut workspace = FactorWorkspace::default();
+        let segments = self.segments.iter().map(|segment| segment.mapped(&mut workspace, &map)).collect();
+        let total = OnceLock::from(self.total().mapped(&mut workspace, &map));
+        Ok(Self { columns, segments, total, workspace, ..*self })
     }
 
     /// The same rows as one segment: all that values need, and little work for those who solve again and again.
     #[must_use]
     pub fn as_one_segment(&self) -> Self {
-        let segments = vec![Segment::Factor(self.total())];
-        Self { segments, length_rows: self.rows.max(1), workspace: FactorWorkspace::default(), ..*self }
+        let segments = vec![Segment::Factor(self.total().clone())];
+        let (total, workspace) = (self.total.clone(), FactorWorkspace::default());
+        Self { segments, length_rows: self.rows.max(1), total, workspace, ..*self }
     }
 
     /// The same columns and segments without their rows, for another pass over the same log.
     pub(crate) fn emptied(&self) -> Self {
-        Self { rows: 0, segments: Vec::new(), workspace: FactorWorkspace::default(), ..*self }
+        let (total, workspace) = (OnceLock::new(), FactorWorkspace::default());
+        Self { rows: 0, segments: Vec::new(), total, workspace, ..*self }
     }
 
     /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1),
@@ -289,6 +306,7 @@ impl SegmentedFactor {
             length_rows: self.length_rows * blocks.len().max(1),
             rows: self.rows * blocks.len(),
             segments,
+            total: OnceLock::new(),
             workspace: FactorWorkspace::default(),
         }
     }
@@ -375,6 +393,18 @@ impl Segment {
     fn condense(&mut self, columns: usize, workspace: &mut FactorWorkspace) {
         if let Self::Rows(_) = self {
             *self = Self::Factor(self.factor(columns, workspace));
+        }
+    }
+
+    fn mapped(&self, workspace: &mut FactorWorkspace, map: &SparseMap) -> Self {
+        match self {
+            Self::Factor(factor) => Self::Factor(factor.mapped(workspace, map)),
+            Self::Rows(values) => {
+                let rows: Vec<f64> = values.chunks_exact(map.size()).flat_map(|row| map.of_row(row)).collect();
+                let mut factor = TriangularFactor::new(map.columns());
+                factor.absorb_row_by_row(workspace, &rows);
+                Self::Factor(factor)
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
 
 use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
+use super::sparse_map::SparseMap;
 use crate::error::{EstimationError, expect, require};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -352,6 +353,28 @@ impl TriangularFactor {
         selected.absorb_columns(&mut FactorWorkspace::default(), (self, self.filled_rows(), 1.0), place);
         selected.rows = self.rows;
         Ok(selected)
+    }
+
+    /// The factor of the rows `[W | τ] C`.
+    pub(super) fn mapped(&self, workspace: &mut FactorWorkspace, map: &SparseMap) -> Self {
+        let (rows, size) = (self.filled_rows(), self.columns + 1);
+        let mut mapped = Self::new(map.columns());
+        let chunks = rows.div_ceil(CHUNK_ROWS);
+        let block = workspace.block(rows, mapped.columns + 1);
+        block.fill(Chunk::ZERO);
+        for (out, entries) in block.chunks_exact_mut(chunks.max(1)).zip(map.of_columns()) {
+            for &(from, weight) in entries {
+                // From a row to the next of a packed triangle.
+                let mut at = from;
+                for row in 0..rows.min(from + 1) {
+                    out[row / CHUNK_ROWS].0[row % CHUNK_ROWS] += weight * self.triangle[at];
+                    at += size - row - 1;
+                }
+            }
+        }
+        mapped.reflect(workspace, rows);
+        mapped.rows = self.rows;
+        mapped
     }
 
     /// The norm of every column of W over all rows.

@@ -124,7 +124,7 @@ pub(crate) fn covariances(
 /// Each segment by the change that leaving it out makes: `(G − 1)/G Σ_g Δ_g Δ_gᵀ`.
 fn jackknife(scores: &Scores<'_>) -> Result<Moment, EstimationError> {
     let of_joint = |joint: &JointScores<'_>| -> Vec<DVector<f64>> {
-        joint.rows.factor.segment_factors().iter().map(|segment| joint.change_without(segment)).collect()
+        joint.segments().iter().map(|segment| joint.change_without(segment)).collect()
     };
     let changes = scores.joints.par_iter().map(of_joint).collect::<Vec<_>>().concat();
     let g = at_least_two(changes.len())? as f64;
@@ -192,8 +192,8 @@ fn bootstrap(scores: &Scores<'_>, prior: &DMatrix<f64>) -> Result<Moment, Estima
         .joints
         .iter()
         .map(|joint| {
-            let informations = joint.rows.factor.segment_factors().into_iter().map(|segment| {
-                let whitened = joint.whitened(&segment);
+            let informations = joint.segments().iter().map(|segment| {
+                let whitened = joint.whitened(segment);
                 whitened.tr_mul(&whitened)
             });
             informations.zip(joint.scores.iter().cloned()).collect()

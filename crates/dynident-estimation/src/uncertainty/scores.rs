@@ -6,6 +6,8 @@
 use crate::error::EstimationError;
 use crate::factor::{JointRows, Solution, Split, StackedProblem, TriangularFactor};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// What a covariance needs to know about the fit.
 pub(crate) struct Fit<'a> {
@@ -43,6 +45,8 @@ pub(super) struct JointScores<'a> {
     pub(super) scores: Vec<DVector<f64>>,
     /// `‖w W R⁻¹‖²`: what the squared scores sum up to under unit white noise.
     information: f64,
+    /// The factor of every segment, once a method asks for it.
+    segments: OnceLock<Vec<TriangularFactor>>,
 }
 
 impl<'a> Scores<'a> {
@@ -66,7 +70,7 @@ impl<'a> Scores<'a> {
             let theta = rows.local(&fit.solution.values);
             let whitened = |score: &DVector<f64>| local_inverse.tr_mul(score) * (weight * weight);
             let scores = rows.factor.scores(&theta)?.iter().map(whitened).collect();
-            Ok(JointScores { rows, weight, theta, local_inverse, scores, information })
+            Ok(JointScores { rows, weight, theta, local_inverse, scores, information, segments: OnceLock::new() })
         });
         Ok(Self { joints: joints.collect::<Result<_, EstimationError>>()?, free, inverse, place })
     }
@@ -110,7 +114,7 @@ impl<'a> Scores<'a> {
     /// noise; infinite for fixed columns.
     pub(super) fn degrees_of_freedom(&self, independent: f64) -> Vec<f64> {
         // What share of each estimate's variance comes from each cluster.
-        let shares: Vec<Vec<f64>> = self.joints.iter().flat_map(|joint| joint.shares(self.inverse)).collect();
+        let shares: Vec<Vec<f64>> = self.joints.par_iter().flat_map_iter(|joint| joint.shares(self.inverse)).collect();
         let degrees_of_freedom =
             |place: &Option<usize>| place.map_or(f64::INFINITY, |k| (independent * satterthwaite(&shares, k)).max(1.0));
         self.place.iter().map(degrees_of_freedom).collect()
@@ -118,6 +122,11 @@ impl<'a> Scores<'a> {
 }
 
 impl JointScores<'_> {
+    /// The factor of every segment, in order of time.
+    pub(super) fn segments(&self) -> &[TriangularFactor] {
+        self.segments.get_or_init(|| self.rows.factor.segment_factors())
+    }
+
     /// `w R_g R⁻¹`: the rows of a segment in whitened coordinates.
     pub(super) fn whitened(&self, segment: &TriangularFactor) -> DMatrix<f64> {
         segment.regressor_triangle() * &self.local_inverse * self.weight
@@ -137,12 +146,15 @@ impl JointScores<'_> {
         whitened.tr_mul(&without)
     }
 
-    /// For every segment its share in the variance of every free column under white noise.
-    fn shares<'b>(&'b self, inverse: &'b DMatrix<f64>) -> impl Iterator<Item = Vec<f64>> + 'b {
-        self.rows.factor.segment_factors().into_iter().map(move |segment| {
-            let part = self.whitened(&segment) * inverse.transpose();
+    /// For every segment its share in the variance of every free column under white noise, `‖w R_g R⁻¹ R⁻ᵀ‖²` column
+    /// by column.
+    fn shares(&self, inverse: &DMatrix<f64>) -> Vec<Vec<f64>> {
+        let local_covariance = &self.local_inverse * inverse.transpose() * self.weight;
+        let share = |segment: &TriangularFactor| {
+            let part = segment.regressor_triangle() * &local_covariance;
             part.column_iter().map(|column| column.norm_squared()).collect()
-        })
+        };
+        self.segments().iter().map(share).collect()
     }
 }
 

@@ -119,7 +119,7 @@ proptest! {
             all.rows_mut(before, count).copy_from(&block);
         }
         prop_assert_eq!(segmented.rows(), all.nrows());
-        prop_assert!(gram_difference(&triangle(&segmented.total()), &all) < TOLERANCE);
+        prop_assert!(gram_difference(&triangle(segmented.total()), &all) < TOLERANCE);
         let lengths = segmented.segment_rows();
         prop_assert!(lengths.len() <= most);
         prop_assert_eq!(lengths.iter().sum::<usize>(), all.nrows());
