@@ -105,6 +105,36 @@ proptest! {
         }
     }
 
+    /// The total is kept once somebody asked: rows that come later are in it, and what is made of the factor has its own.
+    #[test]
+    fn a_kept_total_is_that_of_all_rows(seed in 0_u64..1_000_000, columns in 1_usize..9, counts in prop::array::uniform2(1_usize..90)) {
+        let mut random = Random::new(seed);
+        let settings = SegmentSettings { max_segments: 4, first_length_rows: 3 };
+        let mut segmented = SegmentedFactor::new(columns, settings).unwrap();
+        let mut all = DMatrix::zeros(0, columns + 1);
+        for count in counts {
+            let block = rows(&mut random, count, columns);
+            segmented.absorb(block.as_slice(), count).unwrap();
+            let before = all.nrows();
+            all = all.resize_vertically(before + count, 0.0);
+            all.rows_mut(before, count).copy_from(&block);
+            prop_assert_eq!(segmented.total().rows(), all.nrows());
+            prop_assert!(gram_difference(&triangle(segmented.total()), &all) < TOLERANCE);
+        }
+
+        // The first column alone; then twice the first, and the torque less the last.
+        let first = segmented.selected(&[0]).unwrap();
+        let mut map = DMatrix::zeros(columns + 1, 2);
+        (map[(0, 0)], map[(columns, 1)], map[(columns - 1, 1)]) = (2.0, 1.0, -1.0);
+        let other = segmented.mapped(&map).unwrap();
+        for (made, of) in [(&first, all.select_columns(&[0, columns])), (&other, &all * &map)] {
+            prop_assert!(gram_difference(&triangle(made.total()), &of) < TOLERANCE);
+            let mut of_segments = TriangularFactor::new(1);
+            made.segment_factors().iter().for_each(|segment| of_segments.merge(segment).unwrap());
+            prop_assert!(gram_difference(&triangle(&of_segments), &of) < TOLERANCE);
+        }
+    }
+
     #[test]
     fn segments_hold_the_same_rows(seed in 0_u64..1_000_000, columns in 0_usize..12, most in 2_usize..9, first in 1_usize..20, calls in prop::collection::vec(0_usize..70, 0..12)) {
         let mut random = Random::new(seed);
