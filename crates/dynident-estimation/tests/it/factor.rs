@@ -105,7 +105,8 @@ proptest! {
         }
     }
 
-    /// The total is kept once somebody asked: rows that come later are in it, and what is made of the factor has its own.
+    /// The total is kept once somebody asked: rows that come later are in it, and what is made of the factor has its
+    /// own.
     #[test]
     fn a_kept_total_is_that_of_all_rows(seed in 0_u64..1_000_000, columns in 1_usize..9, counts in prop::array::uniform2(1_usize..90)) {
         let mut random = Random::new(seed);
