@@ -1,103 +1,18 @@
-//! From recordings to an estimate: drives, cut-off, friction, factors, parameters, with the torque's lag among the
-//! unknowns.
+//! From recordings to an estimate, with the torque's lag among the unknowns: fits until the rows show none.
 
-use crate::bandwidth::{CutoffByError, choose_cutoff};
-use crate::between_logs::{BetweenLogs, with_variation};
-use crate::chosen_friction::{
-    ChosenFriction, choose_friction, constants_of_all_rows, friction_by_cutoffs, friction_of_less_noise,
-};
-use crate::drive_inertia::{DriveInertiaChoice, choose_drive_inertia};
+use crate::between_logs::with_variation;
+use crate::chosen_friction::{ChosenFriction, GridTerms, OtherFriction, friction_of_other_cutoff};
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::excerpt::excerpts;
 use crate::execution::Execution;
-use crate::friction::{ConstantsError, JointFriction};
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
-use crate::less_noise::{Estimated, with_less_noise};
 use crate::likelihood::schwarz;
-use crate::logs::Logs;
-use crate::payload::{KnownArm, Payload, free_gains};
-use crate::regressor_model::RegressorModel;
+use crate::one_fit::{Choices, Fitted, Job, Known, StageTimes, fitted_once};
+use crate::payload::{Payload, free_gains};
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
-use crate::training::{Training, training_rows};
-use dynident_dynamics::ParametricModel;
-use dynident_estimation::Estimate;
-use dynident_recording::MotionSettings;
 use dynident_recording::log::OneOrMany;
 use std::time::Instant;
-
-/// Where the time went, seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageTimes {
-    /// From logs to factors.
-    pub logs_s: f64,
-    /// From factors to parameters.
-    pub estimation_s: f64,
-    /// Delays, traces and held-out recordings.
-    pub examination_s: f64,
-}
-
-impl StageTimes {
-    /// The sum of both.
-    fn and(&self, other: &Self) -> Self {
-        Self {
-            logs_s: self.logs_s + other.logs_s,
-            estimation_s: self.estimation_s + other.estimation_s,
-            examination_s: self.examination_s + other.examination_s,
-        }
-    }
-}
-
-/// What is looked for.
-pub(crate) enum Job<'a, 's> {
-    Model(Option<&'s mut dyn InstrumentSource>),
-    Payload(&'a KnownArm),
-}
-
-impl Job<'_, '_> {
-    pub(crate) fn arm(&self) -> Option<&KnownArm> {
-        match self {
-            Self::Model(_) => None,
-            Self::Payload(arm) => Some(arm),
-        }
-    }
-
-    /// A model without instruments from outside, which can be fitted more than once.
-    fn is_plain(&self) -> bool {
-        matches!(self, Self::Model(None))
-    }
-}
-
-/// Rows and estimate, and what was chosen on the way.
-pub(crate) struct Fitted<'a> {
-    pub(crate) logs: Logs<'a>,
-    pub(crate) training: Training,
-    pub(crate) estimation: Estimation,
-    /// The task's, with the estimator that `auto` took and the lag that was taken off.
-    pub(crate) settings: IdentificationSettings,
-    pub(crate) cutoff: Option<CutoffByError>,
-    /// The task's robot, with the drive inertia that was seen and friction as stated.
-    pub(crate) robot: ParametricModel,
-    /// Whether drive inertia was seen; none where terms state it.
-    pub(crate) drive_inertia: Option<DriveInertiaChoice>,
-    /// Rows and fit with friction as stated, where it was chosen.
-    pub(crate) stated_friction: Option<(Training, Estimate)>,
-    /// The model with the friction that was chosen, whatever noise made of it afterwards, and how it was chosen.
-    friction: (RegressorModel, Vec<JointFriction>),
-    /// The cut-off at which it was chosen, where the data chose both.
-    friction_hz: Option<f64>,
-    /// The cut-off that was chosen here before friction.
-    before_friction: Option<CutoffByError>,
-    /// What the constants of chosen friction add to the bars.
-    constants_error: Option<ConstantsError>,
-    pub(crate) lag: LagChoice,
-    /// None for a single log.
-    pub(crate) between_logs: Option<BetweenLogs>,
-    /// Halves of the 95 % intervals before lag, logs and constants of friction have widened them.
-    pub(crate) noise_half_width_95: Vec<f64>,
-    pub(crate) times: StageTimes,
-}
 
 /// Rows and estimate, with the lag of the torque, what varies between logs and the constants of chosen friction in its
 /// error bars.
@@ -124,19 +39,6 @@ pub(crate) fn fitted<'a>(
         found.estimation.estimate = error.added_to(found.training.problem.columns(), &found.estimation.estimate);
     }
     Ok(found)
-}
-
-/// What was chosen: everything that takes more than one pass over the recordings.
-struct Choices {
-    robot: ParametricModel,
-    drive_inertia: Option<DriveInertiaChoice>,
-    cutoff: Option<CutoffByError>,
-    /// The cut-off of the torque's motion band, where the fit has another.
-    motion_hz: Option<f64>,
-    friction: ChosenFriction,
-    lag: LagChoice,
-    /// How long it took.
-    times: StageTimes,
 }
 
 /// What an [excerpt](crate::excerpt) of long recordings chooses; none where they are not long, and where instruments
@@ -170,6 +72,7 @@ fn choices_of_excerpt(
             stated: found.stated_friction,
             constants_error: found.constants_error,
         },
+        is_of_excerpt: true,
         lag: found.lag,
         times: StageTimes { logs_s: found.times.logs_s + read_s, ..found.times },
     }))
@@ -189,16 +92,13 @@ fn with_choices<'a>(
         settings.motion.torque_lag_s = choices.lag.taken_off();
         rounds = rounds.after(choices.lag.clone());
     }
-    let mut found = lag_rounds((task, settings, rounds), (chosen, Some(choices)), execution, &mut Job::Model(None))?;
+    let start = LagStart::of(settings, rounds);
+    let mut found = lag_rounds((task, start), (chosen, Some(choices)), execution, &mut Job::Model(None))?;
     found.times = found.times.and(&choices.times);
     Ok(found)
 }
 
 /// Rows and estimate; where the rows show a lag of the torque that moves parameters, again without it.
-///
-/// Friction that is chosen with a lag in the rows can make up for it, so that no lag is seen any more; and friction
-/// that no stated term has looks like a lag. So where chosen friction leaves no common lag but the stated terms alone
-/// show one, both are fitted, and the one counts that says most of the rows with the fewest parameters ([`schwarz`]).
 fn without_lag<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
@@ -207,87 +107,175 @@ fn without_lag<'a>(
 ) -> Result<Fitted<'a>, IdentificationError> {
     let settings = &task.settings;
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
-    let mut found = lag_rounds((task, settings.clone(), LagRounds::of(settings.lags)), (chosen, None), execution, job)?;
-    if !is_free || settings.friction.is_empty() || found.lag.kind == LagKind::Common {
-        return Ok(found);
-    }
-    let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-    let mut of_stated = fitted_like(&found, (task, &stated), chosen, execution, job)?;
-    let mut first = LagRounds::of(LagCandidates::Common);
-    let mut times = found.times.and(&of_stated.times);
-    if first.again(free_lag(&of_stated, chosen)?.as_ref(), &mut of_stated.estimation.estimate) {
-        let motion = MotionSettings { torque_lag_s: first.torque_lag_s(), ..settings.motion.clone() };
-        let settings = IdentificationSettings { motion, ..settings.clone() };
-        let rounds = LagRounds::of(settings.lags).after(first.choice());
-        let other = lag_rounds((task, settings, rounds), (chosen, None), execution, job)?;
-        times = times.and(&other.times);
-        if schwarz(&other.training.problem, &other.estimation.estimate)
-            < schwarz(&found.training.problem, &found.estimation.estimate)
-        {
-            found = other;
-        }
-    }
-    found.times = times;
-    Ok(found)
+    let start = if is_free && !settings.friction.is_empty() {
+        best_start(task, chosen, execution, job)?
+    } else {
+        LagStart::of(settings.clone(), LagRounds::of(settings.lags))
+    };
+    lag_rounds((task, start), (chosen, None), execution, job)
 }
 
-/// Fits from these rounds on, until the rows show no lag that moves parameters; with choices where they are made.
+/// Where the rounds begin that take off the lag.
+struct LagStart<'a> {
+    /// With the lag that is taken off from the beginning.
+    settings: IdentificationSettings,
+    rounds: LagRounds,
+    /// A fit with friction of a grid to rows with that lag taken off, where there was one.
+    first_look: Option<Fitted<'a>>,
+    times: StageTimes,
+}
+
+impl<'a> LagStart<'a> {
+    fn of(settings: IdentificationSettings, rounds: LagRounds) -> Self {
+        Self { settings, rounds, first_look: None, times: StageTimes::default() }
+    }
+
+    /// The start after looks for a common lag beside friction without memory, until there is none that moves
+    /// parameters: lags of single joints are told only beside friction that is chosen whole.
+    fn looked(
+        task: &'a IdentificationTask,
+        chosen: &[usize],
+        execution: Execution<'a>,
+        job: &mut Job<'_, '_>,
+    ) -> Result<Self, IdentificationError> {
+        let mut settings = task.settings.clone();
+        let mut rounds = LagRounds::of(LagCandidates::Common);
+        let mut times = StageTimes::default();
+        let known = Known::Look(GridTerms::WithoutMemory);
+        loop {
+            let mut found = fitted_once((task, &settings), (chosen, known), execution, job)?;
+            times = times.and(&found.times);
+            if !rounds.again(free_lag(&found, chosen)?.as_ref(), &mut found.estimation.estimate) {
+                let rounds = LagRounds::of(task.settings.lags).after(rounds.choice());
+                return Ok(Self { settings, rounds, first_look: Some(found), times });
+            }
+            settings.motion.torque_lag_s = rounds.torque_lag_s();
+        }
+    }
+
+    /// The same start after a look beside friction of all terms.
+    fn with_memory(
+        self,
+        task: &'a IdentificationTask,
+        chosen: &[usize],
+        execution: Execution<'a>,
+        job: &mut Job<'_, '_>,
+    ) -> Result<Self, IdentificationError> {
+        let known = Known::Look(GridTerms::All);
+        let found = fitted_once((task, &self.settings), (chosen, known), execution, job)?;
+        let times = self.times.and(&found.times);
+        Ok(Self { first_look: Some(found), times, ..self })
+    }
+
+    /// What the look says of the rows, the less the better.
+    fn criterion(&self) -> f64 {
+        let of = |found: &Fitted<'_>| schwarz(&found.training.problem, &found.estimation.estimate);
+        self.first_look.as_ref().map_or(f64::INFINITY, of)
+    }
+}
+
+/// Where to begin. Choosing friction is what takes time, so the lag is first looked for beside friction of a grid.
+///
+/// Friction that is chosen with a lag in the rows can make up for it, above all what remembers (Maxwell-slip), which is
+/// late by itself; and friction that no stated term has looks like a lag. So a lag that is seen beside friction of all
+/// terms counts as it is beside friction without memory. One that only the stated terms show counts where the rows say
+/// more with it and friction of all terms than without it, with the fewest parameters ([`schwarz`]).
+fn best_start<'a>(
+    task: &'a IdentificationTask,
+    chosen: &[usize],
+    execution: Execution<'a>,
+    job: &mut Job<'_, '_>,
+) -> Result<LagStart<'a>, IdentificationError> {
+    let settings = &task.settings;
+    let none = LagStart::of(settings.clone(), LagRounds::of(settings.lags));
+    let none = none.with_memory(task, chosen, execution, job)?;
+    let Some(found) = &none.first_look else { return Ok(none) };
+    let shows_lag = |found: &Fitted<'_>| -> Result<bool, IdentificationError> {
+        let fit = free_lag(found, chosen)?;
+        Ok(LagRounds::of(LagCandidates::Common).again(fit.as_ref(), &mut found.estimation.estimate.clone()))
+    };
+    let is_seen = shows_lag(found)?;
+    let mut times = none.times;
+    if !is_seen {
+        let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
+        let of_stated = fitted_like(found, (task, &stated), chosen, execution, job)?;
+        times = times.and(&of_stated.times);
+        if !shows_lag(&of_stated)? {
+            return Ok(LagStart { times, ..none });
+        }
+    }
+    let mut late = LagStart::looked(task, chosen, execution, job)?;
+    if !is_seen {
+        late = late.with_memory(task, chosen, execution, job)?;
+    }
+    let times = times.and(&late.times);
+    let best = if is_seen || late.criterion() < none.criterion() { late } else { none };
+    Ok(LagStart { times, ..best })
+}
+
+/// Fits from this start on, until the rows show no lag that moves parameters; with choices where they are made.
+/// Friction is chosen at another cut-off only once the lag is off; then the lag is looked for once more.
 fn lag_rounds<'a>(
-    (task, mut settings, mut rounds): (&'a IdentificationTask, IdentificationSettings, LagRounds),
+    (task, start): (&'a IdentificationTask, LagStart<'a>),
     (chosen, choices): (&[usize], Option<&Choices>),
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
+    let LagStart { mut settings, mut rounds, mut first_look, mut times } = start;
     let is_free = task.settings.motion.torque_lag_s.is_none() && job.is_plain();
-    let mut times = StageTimes::default();
-    // Friction by rows of less noise, once the lag is off; then the lag once more.
-    let mut of_less_noise: Option<Choices> = None;
-    let mut is_asked = choices.is_some() || !job.is_plain();
+    let mut is_other_cutoff_asked = choices.is_some() || !job.is_plain();
+    let mut of_other_cutoff: Option<Choices> = None;
     loop {
-        let choices = choices.or(of_less_noise.as_ref());
-        let mut found = fitted_once((task, &settings), (chosen, Known::from(choices)), execution, job)?;
+        let known = match (choices.or(of_other_cutoff.as_ref()), &first_look) {
+            (Some(choices), _) => Known::Choices(choices),
+            (None, Some(found)) => Known::FirstLook(found),
+            (None, None) => Known::Nothing,
+        };
+        let mut found = fitted_once((task, &settings), (chosen, known), execution, job)?;
+        first_look = None;
         times = times.and(&found.times);
         let started = Instant::now();
         let fit = if is_free { free_lag(&found, chosen)? } else { None };
         found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);
         let again = rounds.again(fit.as_ref(), &mut found.estimation.estimate);
         times.estimation_s += started.elapsed().as_secs_f64();
-        if !again && !core::mem::replace(&mut is_asked, true) {
+        if again {
+            settings.motion.torque_lag_s = rounds.torque_lag_s();
+            continue;
+        }
+        if !core::mem::replace(&mut is_other_cutoff_asked, true) {
             let started = Instant::now();
-            of_less_noise = choices_of_less_noise((&found, &task.payloads), chosen)?;
+            of_other_cutoff = choices_of_other_cutoff((&found, &task.payloads), chosen)?;
             times.estimation_s += started.elapsed().as_secs_f64();
-            if of_less_noise.is_some() {
+            if of_other_cutoff.is_some() {
                 continue;
             }
         }
-        if !again {
-            found.times = times;
-            found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
-            if let (Some(fit), Some((_, gains))) = (&fit, &mut found.training.gains) {
-                for (joint, share) in free_gains(gains).into_iter().zip(gain_errors(fit, &found.lag)) {
-                    gains[joint].widen(share);
-                }
+        found.times = times;
+        found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
+        if let (Some(fit), Some((_, gains))) = (&fit, &mut found.training.gains) {
+            for (joint, share) in free_gains(gains).into_iter().zip(gain_errors(fit, &found.lag)) {
+                gains[joint].widen(share);
             }
-            return Ok(found);
         }
-        settings.motion.torque_lag_s = rounds.torque_lag_s();
+        return Ok(found);
     }
 }
 
-/// The same choices with friction by rows of less noise; none where they stay.
-fn choices_of_less_noise(
+/// The same choices with friction of another cut-off; none where they stay.
+fn choices_of_other_cutoff(
     (found, payloads): (&Fitted<'_>, &[Payload]),
     chosen: &[usize],
 ) -> Result<Option<Choices>, IdentificationError> {
     let Fitted { logs, settings, robot, cutoff, friction: (model, joints), friction_hz, .. } = found;
-    let (Some(cutoff), Some(high_hz)) = (cutoff, *friction_hz) else { return Ok(None) };
+    let (Some(cutoff), Some(chosen_hz)) = (cutoff, *friction_hz) else { return Ok(None) };
     let (model, joints) = (model.clone(), joints.clone());
     let friction = ChosenFriction { model, joints, ..ChosenFriction::as_stated(robot.clone().into()) };
-    let places = (chosen, payloads);
-    let compared = (&friction, cutoff.cutoff_hz, high_hz);
-    let Some((own, friction)) = friction_of_less_noise((logs, settings), robot, places, compared)? else {
+    let compared = (&friction, cutoff, chosen_hz);
+    let Some(other) = friction_of_other_cutoff((logs, settings), robot, (chosen, payloads), compared)? else {
         return Ok(None);
     };
+    let OtherFriction { friction, cutoff: own } = other;
     let cutoff = own.unwrap_or_else(|| cutoff.clone());
     Ok(Some(Choices {
         robot: robot.clone(),
@@ -295,6 +283,7 @@ fn choices_of_less_noise(
         motion_hz: Some(cutoff.motion_hz).filter(|motion_hz| *motion_hz != cutoff.cutoff_hz),
         cutoff: Some(cutoff),
         friction,
+        is_of_excerpt: false,
         lag: LagChoice::default(),
         times: StageTimes::default(),
     }))
@@ -328,22 +317,6 @@ fn has_free_lag(found: &Fitted<'_>) -> bool {
         && found.settings.estimation.estimator.reads_filtered_rows()
 }
 
-/// What is known before logs are read.
-#[derive(Clone, Copy)]
-enum Known<'k, 'a> {
-    Nothing,
-    /// Choices that were made by an excerpt, or by rows of less noise.
-    Choices(&'k Choices),
-    /// A fit to the same recordings that differs only in how its friction was chosen.
-    Alike(&'k Fitted<'a>),
-}
-
-impl<'k> From<Option<&'k Choices>> for Known<'k, '_> {
-    fn from(choices: Option<&'k Choices>) -> Self {
-        choices.map_or(Self::Nothing, Self::Choices)
-    }
-}
-
 /// [`fitted_once`] with other friction than `found`: where that has no lag taken off, drives and first cut-off are its.
 fn fitted_like<'a>(
     found: &Fitted<'a>,
@@ -355,143 +328,4 @@ fn fitted_like<'a>(
     let is_alike = found.settings.motion.torque_lag_s == settings.motion.torque_lag_s;
     let known = if is_alike { Known::Alike(found) } else { Known::Nothing };
     fitted_once((task, settings), (chosen, known), execution, job)
-}
-
-/// One way from logs to an estimate, with the lag of the settings taken off; with choices where they are made.
-fn fitted_once<'a>(
-    (task, settings): (&'a IdentificationTask, &IdentificationSettings),
-    (chosen, known): (&[usize], Known<'_, 'a>),
-    execution: Execution<'a>,
-    job: &mut Job<'_, '_>,
-) -> Result<Fitted<'a>, IdentificationError> {
-    let IdentificationTask { robot, recordings, payloads, .. } = task;
-    let filters = (&settings.motion, &task.settings.parallel_filter);
-    let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
-    let logs = Logs::new(robot.model(), recordings, filters, chosen, cutoff_hz, execution)?;
-
-    // Drives, filters and friction, by the logs where they are left to them.
-    let started = Instant::now();
-    let Chosen { robot, drive_inertia, logs, before_friction, cutoff, friction, friction_hz } = match known {
-        Known::Choices(choices) => chosen_before((logs, settings), choices, (chosen, payloads))?,
-        Known::Alike(found) => chosen_here((logs, settings), robot, (chosen, payloads), (job, Some(found)))?,
-        Known::Nothing => chosen_here((logs, settings), robot, (chosen, payloads), (job, None))?,
-    };
-    let choice_s = started.elapsed().as_secs_f64();
-
-    // Factors, then the estimate. Where noise in the regressor biases least squares, both once more with less of it.
-    let refit = job.arm().map(KnownArm::refit);
-    let mut training = training_rows((&logs, settings), friction.model.clone(), chosen, payloads, refit)?;
-    training.friction_choice.clone_from(&friction.joints);
-    let logs_s = training.timings_s[0];
-    let before_s = training.timings_s[1] + choice_s;
-    let started = Instant::now();
-    let estimation = match job {
-        Job::Payload(arm) => {
-            let (model, columns) = (&training.model, &training.columns);
-            Estimation::plain(arm.estimate(model, columns, &training.problem, &settings.estimation)?)
-        }
-        Job::Model(source) => match &training.gains {
-            Some((found, _)) => Estimation::plain(found.clone()),
-            None => estimate(&training.rows((&logs, settings), chosen), source.take())?,
-        },
-    };
-    let found = Estimated { logs, training, estimation, settings: settings.clone() };
-    let Estimated { logs, training, estimation, settings } = with_less_noise(task, &robot, chosen, found)?;
-    let estimation_s = before_s + started.elapsed().as_secs_f64();
-    Ok(Fitted {
-        logs,
-        training,
-        estimation,
-        settings,
-        cutoff,
-        robot,
-        drive_inertia,
-        stated_friction: friction.stated,
-        friction: (friction.model, friction.joints),
-        friction_hz,
-        before_friction,
-        constants_error: friction.constants_error,
-        lag: LagChoice::default(),
-        between_logs: None,
-        noise_half_width_95: Vec::new(),
-        times: StageTimes { logs_s, estimation_s, examination_s: 0.0 },
-    })
-}
-
-/// Drives, filters and friction.
-struct Chosen<'a> {
-    robot: ParametricModel,
-    drive_inertia: Option<DriveInertiaChoice>,
-    logs: Logs<'a>,
-    /// The cut-off before friction was chosen, where it was chosen here.
-    before_friction: Option<CutoffByError>,
-    cutoff: Option<CutoffByError>,
-    friction: ChosenFriction,
-    /// The cut-off at which friction was chosen, where the data chose both.
-    friction_hz: Option<f64>,
-}
-
-/// Drives, filters and friction by the logs where they are left to them; drives and the first cut-off as a fit that is
-/// alike chose them.
-fn chosen_here<'a>(
-    (logs, settings): (Logs<'a>, &IdentificationSettings),
-    robot: &ParametricModel,
-    (chosen, payloads): (&[usize], &[Payload]),
-    (job, alike): (&Job<'_, '_>, Option<&Fitted<'a>>),
-) -> Result<Chosen<'a>, IdentificationError> {
-    let (robot, drive_inertia) = match (job.arm(), alike) {
-        (Some(_), _) => (robot.clone(), None),
-        (None, Some(alike)) => (alike.robot.clone(), alike.drive_inertia.clone()),
-        (None, None) => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
-    };
-    let first = RegressorModel::from(robot.clone());
-    let cutoff = match alike.and_then(|alike| alike.before_friction.clone()) {
-        Some(cutoff) => Some(cutoff),
-        None => choose_cutoff((&logs, settings), &first, chosen)?,
-    };
-    let before_friction = cutoff.clone();
-    let mut friction_hz = None;
-    let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
-        let friction = if settings.friction_before.is_empty() {
-            ChosenFriction::as_stated(first)
-        } else {
-            choose_friction((&logs, settings), &robot, (chosen, payloads))?
-        };
-        (logs, cutoff, friction)
-    } else {
-        let places = (chosen, payloads);
-        let (at_hz, of_friction, friction) = friction_by_cutoffs((&logs, settings), &robot, places, cutoff.as_ref())?;
-        friction_hz = at_hz;
-        let cutoff = of_friction.or(cutoff);
-        (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
-    };
-    let logs = match alike {
-        Some(alike) => logs.with_motion_of(&alike.logs),
-        None => logs,
-    };
-    Ok(Chosen { robot, drive_inertia, logs, before_friction, cutoff, friction, friction_hz })
-}
-
-/// The same as an excerpt chose it, the constants of friction by all rows.
-fn chosen_before<'a>(
-    (logs, settings): (Logs<'a>, &IdentificationSettings),
-    choices: &Choices,
-    (chosen, payloads): (&[usize], &[Payload]),
-) -> Result<Chosen<'a>, IdentificationError> {
-    let Choices { robot, drive_inertia, cutoff, motion_hz, friction, .. } = choices;
-    let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
-    let logs = logs.with_motion_band(*motion_hz);
-    let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
-    let friction = constants_of_all_rows((&of_constants, settings), robot, friction, (chosen, payloads))?;
-    let (robot, drive_inertia) = (robot.clone(), drive_inertia.clone());
-    Ok(Chosen {
-        robot,
-        drive_inertia,
-        logs,
-        before_friction: None,
-        cutoff: cutoff.clone(),
-        friction,
-        friction_hz: None,
-    })
 }

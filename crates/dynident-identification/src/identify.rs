@@ -16,9 +16,10 @@ use crate::examination::{
     TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
-use crate::fitted::{Fitted, Job, StageTimes, fitted};
+use crate::fitted::fitted;
 use crate::lag::LagChoice;
 use crate::logs::{Logs, of_role};
+use crate::one_fit::{Fitted, Job, StageTimes};
 use crate::payload::{KnownArm, PayloadError, PayloadResult, payload_results, with_gain_error};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;

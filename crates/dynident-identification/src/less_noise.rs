@@ -1,7 +1,7 @@
 //! Where `auto` took instruments: the cut-off of the motion follows them down.
 
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, Estimator, InstrumentSettings, estimate};
+use crate::estimators::{Estimation, Estimator, InstrumentSettings, NoiseInRegressor, estimate};
 use crate::friction::JointFriction;
 use crate::logs::Logs;
 use crate::settings::IdentificationSettings;
@@ -36,15 +36,7 @@ pub(crate) fn with_less_noise<'a>(
     chosen: &[usize],
     mut found: Estimated<'a>,
 ) -> Result<Estimated<'a>, IdentificationError> {
-    let Estimator::Auto(own) = found.settings.estimation.estimator.clone() else { return Ok(found) };
-    let noise = found.estimation.noise_in_regressor.as_ref().filter(|noise| noise.instruments_taken);
-    let Some(([_, cutoff_hz], noise)) = noise.and_then(|noise| Some((noise.instrument_cutoff_hz?, noise.clone())))
-    else {
-        found.settings.estimation.estimator = Estimator::Weighted;
-        return Ok(found);
-    };
-    let own = InstrumentSettings { cutoff_hz: Some(cutoff_hz), ..own };
-    found.settings.estimation.estimator = Estimator::Instrumental(own);
+    let Some((cutoff_hz, noise)) = take_estimator(&mut found) else { return Ok(found) };
     let IdentificationTask { recordings, payloads, .. } = task;
     let filters = (&found.settings.motion, &task.settings.parallel_filter);
     let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
@@ -78,4 +70,17 @@ pub(crate) fn with_less_noise<'a>(
         again.cutoff_before_hz = before_hz.filter(|_| is_lower);
     }
     Ok(Estimated { logs, training, estimation, settings: found.settings })
+}
+
+/// Puts the estimator that `auto` took into the settings; the cut-off of the instruments, hertz, and what was found of
+/// the noise, where it took them.
+pub(crate) fn take_estimator(found: &mut Estimated<'_>) -> Option<(f64, NoiseInRegressor)> {
+    let Estimator::Auto(own) = found.settings.estimation.estimator.clone() else { return None };
+    let noise = found.estimation.noise_in_regressor.as_ref().filter(|noise| noise.instruments_taken);
+    let taken = noise.and_then(|noise| Some((noise.instrument_cutoff_hz?[1], noise.clone())));
+    found.settings.estimation.estimator = match &taken {
+        Some((cutoff_hz, _)) => Estimator::Instrumental(InstrumentSettings { cutoff_hz: Some(*cutoff_hz), ..own }),
+        None => Estimator::Weighted,
+    };
+    taken
 }

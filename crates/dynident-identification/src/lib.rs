@@ -140,6 +140,7 @@ mod less_noise;
 mod likelihood;
 mod log_noise;
 mod logs;
+mod one_fit;
 pub mod payload;
 mod progress;
 mod recording;
@@ -160,7 +161,6 @@ pub use drive_inertia::{DriveInertiaChoice, DriveInertiaEstimate, choose_drive_i
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;
-pub use fitted::StageTimes;
 pub use identify::{
     ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify, identify_payload,
     identify_with_instruments,
@@ -168,6 +168,7 @@ pub use identify::{
 pub use likelihood::schwarz;
 pub use log_noise::LogNoise;
 pub use logs::Logs;
+pub use one_fit::StageTimes;
 pub use progress::{Progress, Silent};
 pub use recording::{LogError, MotionRecord, Recording, Role, Samples};
 pub use reduced::{ReducedLog, identify_reduced, reduce, reduced_errors};

@@ -13,9 +13,24 @@ fn deviance_of_joint(rows: usize, sigma: f64) -> f64 {
     rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln()
 }
 
-/// Schwarz's criterion of one joint whose n rows leave noise of `sigma`, with k numbers that are its own.
-pub(crate) fn schwarz_of_joint(rows: usize, sigma: f64, own: usize) -> f64 {
-    deviance_of_joint(rows, sigma) + own as f64 * (rows.max(1) as f64).ln()
+/// How well one joint's rows are explained, and by how many numbers that are its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct JointScore {
+    pub(crate) rows: usize,
+    /// What they leave, in units of the torque.
+    pub(crate) sigma: f64,
+    pub(crate) own: usize,
+}
+
+impl JointScore {
+    /// Schwarz's criterion of a joint whose rows say as much as `1 / design_effect` of them would that were independent
+    /// (Kish, *Survey Sampling*, 1965, 8.2); the less the better, 0 for a joint without rows.
+    ///
+    /// Source of the correction: Rao and Scott, Annals of Statistics 12 (1984) 46.
+    pub(crate) fn schwarz(&self, design_effect: f64) -> f64 {
+        let independent = (self.rows as f64 / design_effect).max(1.0);
+        deviance_of_joint(self.rows, self.sigma) / design_effect + self.own as f64 * independent.ln()
+    }
 }
 
 /// Schwarz's criterion of a fit with k free parameters and n rows: the deviance and `k ln n`; the less the better.

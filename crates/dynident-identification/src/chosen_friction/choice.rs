@@ -1,6 +1,8 @@
 //! The friction of the joints as their recordings choose it: which terms, then their constants.
 
-use super::constants::{best_constants, error_of_constants, friction_scores, one_step, with_constants};
+use super::constants::{
+    best_constants, better_of_joints, error_of_constants, friction_evidence, one_step, with_constants,
+};
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
@@ -56,23 +58,25 @@ pub fn choose_friction(
     robot: &ParametricModel,
     (training, payloads): (&[usize], &[Payload]),
 ) -> Result<ChosenFriction, IdentificationError> {
-    friction_of_logs((logs, logs), settings, robot, (training, payloads))
+    friction_of_logs((logs, logs), settings, robot, (training, payloads), None)
 }
 
 /// The same with other filters for the constants: terms from the rows of `logs`, constants from those of
-/// `of_constants`. Where the first are too few to choose from, terms come from the second as well.
+/// `of_constants`; terms of all that may be were found [before](friction_by_grid) or not. Where the first are too few
+/// to choose from, terms come from the second as well.
 pub(crate) fn friction_of_logs(
     (logs, of_constants): (&Logs<'_>, &Logs<'_>),
     settings: &IdentificationSettings,
     robot: &ParametricModel,
     (training, payloads): (&[usize], &[Payload]),
+    of_grid: Option<GridFriction>,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let found = friction_by_terms((logs, of_constants), settings, robot, (training, payloads))?;
+    let found = friction_by_terms((logs, of_constants), settings, robot, (training, payloads), of_grid)?;
     let is_nothing = |one: &JointFriction| one.terms.is_none();
     if core::ptr::eq(logs, of_constants) || found.joints.is_empty() || !found.joints.iter().all(is_nothing) {
         return Ok(found);
     }
-    friction_by_terms((of_constants, of_constants), settings, robot, (training, payloads))
+    friction_by_terms((of_constants, of_constants), settings, robot, (training, payloads), None)
 }
 
 fn friction_by_terms(
@@ -80,24 +84,109 @@ fn friction_by_terms(
     settings: &IdentificationSettings,
     robot: &ParametricModel,
     (training, payloads): (&[usize], &[Payload]),
+    of_grid: Option<GridFriction>,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let stated = RegressorModel::from(robot.clone());
-    let searches: Vec<(usize, &FrictionSearch)> = settings
-        .friction
-        .iter()
-        .filter_map(|search| Some((stated.model().joint_index(&search.joint)?, search)))
-        .collect();
+    let (passes, searches) = (passes_over(logs, settings, (training, payloads)), searches_of(settings, robot));
+    let of_constants = passes_over(of_constants, settings, (training, payloads));
     if searches.is_empty() {
-        let passes = TrainingPasses { logs: of_constants, settings, training, payloads, known_arm: None };
-        let constants_error = error_of_constants(&passes, &settings.friction_before, &stated)?;
+        let stated = RegressorModel::from(robot.clone());
+        let constants_error = error_of_constants(&of_constants, &settings.friction_before, &stated)?;
         return Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) });
     }
-    let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
+    let of_grid = match of_grid {
+        Some(found) => found,
+        None => friction_of_grid(&passes, robot, &searches, GridTerms::All)?,
+    };
+    let GridFriction { model, mut joints, stated, gains } = of_grid;
+    let near_rest: Vec<&str> =
+        searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
+    let (mut model, constants_error) =
+        best_constants(&of_constants, robot, (&mut joints, &near_rest), (model, &gains))?;
+    // What follows finds the gains with the friction that was chosen.
+    model.torque_gains.clear();
+    Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
+}
+
+/// Which terms friction of a grid may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum GridTerms {
+    /// All that the search has.
+    All,
+    /// None that remembers where the joint came from (Maxwell-slip): such a term is late by itself, and would take a
+    /// lag for its own.
+    WithoutMemory,
+}
+
+impl GridTerms {
+    fn may_be(self, term: &TorqueTerm) -> bool {
+        self == Self::All || !matches!(term, TorqueTerm::MaxwellSlip(_))
+    }
+}
+
+/// The friction that the recordings choose among the terms and constants of a grid, at the cut-off of `logs`: enough to
+/// tell a lag beside it, in a third of the time. None where no joint's is to be chosen.
+///
+/// # Errors
+/// As [`choose_friction`].
+pub(crate) fn friction_by_grid(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    places: (&[usize], &[Payload]),
+    terms: GridTerms,
+) -> Result<Option<GridFriction>, IdentificationError> {
+    let searches = searches_of(settings, robot);
+    if searches.is_empty() {
+        return Ok(None);
+    }
+    friction_of_grid(&passes_over(logs, settings, places), robot, &searches, terms).map(Some)
+}
+
+fn passes_over<'a>(
+    logs: &'a Logs<'a>,
+    settings: &'a IdentificationSettings,
+    (training, payloads): (&'a [usize], &'a [Payload]),
+) -> TrainingPasses<'a> {
+    TrainingPasses { logs, settings, training, payloads, known_arm: None }
+}
+
+/// The joints whose friction is to be chosen.
+fn searches_of<'a>(settings: &'a IdentificationSettings, robot: &ParametricModel) -> Vec<(usize, &'a FrictionSearch)> {
+    let of = |search: &'a FrictionSearch| Some((robot.model().joint_index(&search.joint)?, search));
+    settings.friction.iter().filter_map(of).collect()
+}
+
+/// Friction with the constants of a grid.
+#[derive(Clone)]
+pub(crate) struct GridFriction {
+    model: RegressorModel,
+    joints: Vec<JointFriction>,
+    /// Rows and fit with the terms as stated.
+    stated: (Training, Estimate),
+    /// Joints whose gains are unknowns.
+    gains: Vec<usize>,
+}
+
+impl GridFriction {
+    /// As it is, for a fit that tells a lag.
+    pub(crate) fn as_chosen(&self) -> ChosenFriction {
+        let Self { mut model, joints, stated, .. } = self.clone();
+        model.torque_gains.clear();
+        ChosenFriction { model, joints, stated: Some(stated), constants_error: None }
+    }
+}
+
+fn friction_of_grid(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    searches: &[(usize, &FrictionSearch)],
+    terms: GridTerms,
+) -> Result<GridFriction, IdentificationError> {
+    let TrainingPasses { logs, settings, .. } = passes;
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
 
     // The stated terms first: the load, the noise of every joint, what is excited; with gains that nobody knows the
     // torque in newton metres.
-    let first = passes.with_gains(passes.rows_once(stated)?)?;
+    let first = passes.with_gains(passes.rows_once(RegressorModel::from(robot.clone()))?)?;
     let plain = match &first.gains {
         Some((with_gains, _)) => with_gains.clone(),
         None => plain_estimate(&without_bars(settings), &first.problem)?,
@@ -118,36 +207,57 @@ fn friction_by_terms(
     let is_loaded = logs.recordings.iter().any(|recording| recording.payload.is_some());
     let all = |((joint, search), width): (&(usize, &FrictionSearch), &Option<f64>)| {
         let mut columns = candidate_columns(search, scale(*joint), *width);
-        columns.retain(|column| !(is_loaded && column.term.needs_load()));
+        columns.retain(|column| terms.may_be(&column.term) && !(is_loaded && column.term.needs_load()));
         (*joint, columns)
     };
     let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
-    let mut joints = chosen_among(&candidates)?;
+    let joints = chosen_among(&candidates)?;
     let model = with_friction_of(robot, &joints, (&first.model, &plain))?;
-    let passes = TrainingPasses { logs: of_constants, ..passes };
-    let near_rest: Vec<&str> =
-        searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
-    let (mut model, constants_error) = best_constants(&passes, robot, (&mut joints, &near_rest), (model, &gains))?;
-    // What follows finds the gains with the friction that was chosen.
-    model.torque_gains.clear();
-    Ok(ChosenFriction { model, joints, stated: Some((first, plain)), constants_error })
+    Ok(GridFriction { model, joints, stated: (first, plain), gains })
 }
 
-/// What friction that other rows have chosen says of these, with constants that suit them: the sum of Schwarz's
-/// criterion over joints.
+/// Friction that other rows of the same motion chose, with the constants that suit these; at joints where `other`,
+/// which these chose, says more of them with fewer numbers, that of `other`.
+///
+/// A second look shows what the first could not where its cut-off is higher. Where it is lower, `shows_less`: where
+/// noise of the motion is what rows have left, they hang together for as long as the cut-off has it, and say far less
+/// than as many independent ones would; where it is friction that no term has, bars count too few of them. So the other
+/// friction then has to be the better one both ways, by all rows and by as many as the bars have. And a term that it
+/// adds has to be seen more clearly than at a first look.
 ///
 /// # Errors
 /// As [`choose_friction`].
-pub(crate) fn friction_score(
+pub(crate) fn better_friction(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     robot: &ParametricModel,
-    chosen: &ChosenFriction,
+    (chosen, other, shows_less): (&ChosenFriction, ChosenFriction, bool),
     (training, payloads): (&[usize], &[Payload]),
-) -> Result<f64, IdentificationError> {
-    let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
+) -> Result<ChosenFriction, IdentificationError> {
+    let passes = passes_over(logs, settings, (training, payloads));
     let mut joints = chosen.joints.clone();
-    let (model, _) = with_constants(&passes, robot, &mut joints, (chosen.model.clone(), &[]))?;
-    Ok(friction_scores(&passes, &model, &joints)?.into_iter().sum())
+    let (model, constants_error) = with_constants(&passes, robot, &mut joints, (chosen.model.clone(), &[]))?;
+    let (mut may_be, mut effects) = (vec![true; joints.len()], vec![1.0; joints.len()]);
+    if shows_less {
+        let evidence = friction_evidence(&passes, (&other.joints, &other.model), &joints)?;
+        may_be = evidence.iter().map(|one| !one.is_doubtful).collect();
+        effects = evidence.iter().map(|one| one.design_effect).collect();
+    }
+    let taken = better_of_joints(&passes, (&joints, &model), (&other.joints, &other.model), (&may_be, &effects))?;
+    if !taken.contains(&false) {
+        return Ok(other);
+    }
+    let stated = other.stated;
+    if !taken.contains(&true) {
+        return Ok(ChosenFriction { model, joints, stated, constants_error });
+    }
+
+    // A mixture, each joint with the constants that it has beside its own others.
+    for ((one, other), _) in joints.iter_mut().zip(other.joints).zip(&taken).filter(|(_, taken)| **taken) {
+        *one = other;
+    }
+    let model = passes.with_friction(robot, &joints, &model)?;
+    let constants_error = error_of_constants(&passes, &joints, &model)?;
+    Ok(ChosenFriction { model, joints, stated, constants_error })
 }
 
 /// Friction that an excerpt of the recordings `training` chose, with constants by all of their rows: one step from
@@ -160,7 +270,7 @@ pub(crate) fn constants_of_all_rows(
     (training, payloads): (&[usize], &[Payload]),
 ) -> Result<ChosenFriction, IdentificationError> {
     let mut found = chosen.clone();
-    let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
+    let passes = passes_over(logs, settings, (training, payloads));
     if let Some((model, error)) = one_step(&passes, robot, &mut found.joints, &chosen.model)? {
         (found.model, found.constants_error) = (model, Some(error));
     }

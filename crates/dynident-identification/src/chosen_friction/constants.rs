@@ -7,7 +7,7 @@ use crate::estimators::Estimator;
 use crate::friction::{
     ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, is_one_friction, second_start,
 };
-use crate::likelihood::{deviance, schwarz_of_joint};
+use crate::likelihood::{JointScore, deviance};
 use crate::regressor_model::RegressorModel;
 use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::ParametricModel;
@@ -66,6 +66,42 @@ fn take_intervals(
     }
 }
 
+/// What the rows say of a joint's friction.
+pub(crate) struct FrictionEvidence {
+    /// How many rows say what one independent row would ([`FrictionConstants::design_effect`]).
+    pub(crate) design_effect: f64,
+    /// Whether it has terms that may be chance, of which a first look at the same motion had none.
+    pub(crate) is_doubtful: bool,
+}
+
+/// What the rows of `passes` say of the friction of every joint, with the constants that suit them; a first look at the
+/// same motion had the friction `before`. Where no friction has constants every row is taken for independent.
+pub(crate) fn friction_evidence(
+    passes: &TrainingPasses<'_>,
+    (joints, model): (&[JointFriction], &RegressorModel),
+    before: &[JointFriction],
+) -> Result<Vec<FrictionEvidence>, IdentificationError> {
+    let constants = FrictionConstants::new(model, joints);
+    if constants.is_empty() {
+        let nothing = |_| FrictionEvidence { design_effect: 1.0, is_doubtful: false };
+        return Ok(joints.iter().map(nothing).collect());
+    }
+    let measured = passes.constants_pass(&constants, model)?;
+    let step = measured.step(passes, (&constants, model), &[])?;
+    let norms = measured.problem.column_norms();
+    let of_joint = |(one, before): (&JointFriction, &JointFriction)| {
+        let place = model.model().joint_index(&one.joint);
+        let is_doubtful = |(joint, before): (usize, &Vec<TorqueTerm>)| {
+            constants.has_doubtful_term((joint, before), (model, &norms), &step)
+        };
+        FrictionEvidence {
+            design_effect: place.map_or(1.0, |joint| constants.design_effect(joint, model, &step)),
+            is_doubtful: place.zip(before.terms.as_ref()).is_some_and(is_doubtful),
+        }
+    };
+    Ok(joints.iter().zip(before).map(of_joint).collect())
+}
+
 /// The best constants from where the terms were found and, for joints of which rows near rest count, from a
 /// [second start](second_start); joint by joint the friction that says most of the rows with the fewest numbers
 /// (Schwarz). Gains of some joints are unknowns, too.
@@ -95,33 +131,44 @@ pub(crate) fn best_constants(
     // From the other start; then of both what is better.
     let start = passes.with_friction(robot, &others, &first.0)?;
     let second = with_constants(passes, robot, &mut others, (start, gains))?;
-    let of_joints = |model: &RegressorModel, joints: &[JointFriction]| -> Result<Vec<f64>, IdentificationError> {
-        let scores = friction_scores(passes, model, joints)?;
-        let place = |one: &JointFriction| model.model().joint_index(&one.joint);
-        Ok(joints.iter().map(|one| place(one).map_or(0.0, |place| scores[place])).collect())
-    };
-    let (of_first, of_second) = (of_joints(&first.0, joints)?, of_joints(&second.0, &others)?);
-    let is_possible = |one: &JointFriction| one.terms.as_deref().is_none_or(is_one_friction);
-    let is_better: Vec<bool> = is_moved
-        .iter()
-        .zip(&others)
-        .zip(of_first.iter().zip(&of_second))
-        .map(|((moved, other), (first, second))| *moved && second < first && is_possible(other))
-        .collect();
-    if !is_better.contains(&true) {
+    let as_counted = vec![1.0; joints.len()];
+    let taken = better_of_joints(passes, (joints, &first.0), (&others, &second.0), (&is_moved, &as_counted))?;
+    if !taken.contains(&true) {
         return Ok(first);
     }
-    let is_all = is_better == is_moved;
-    for ((one, other), _) in
-        joints.iter_mut().zip(others).zip(&is_better).filter(|(_, is_better)| is_all || **is_better)
-    {
-        *one = other;
-    }
-    if is_all {
+    if taken == is_moved {
+        *joints = others;
         return Ok(second);
+    }
+    for ((one, other), _) in joints.iter_mut().zip(others).zip(&taken).filter(|(_, taken)| **taken) {
+        *one = other;
     }
     let start = passes.with_friction(robot, joints, &first.0)?;
     with_constants(passes, robot, joints, (start, gains))
+}
+
+/// Of two frictions with the constants that suit the rows of `passes` whether, joint by joint, the second says more of
+/// them with fewer numbers (Schwarz, Annals of Statistics 6 (1978) 461), both if all rows count and if they count as
+/// their `design_effects` have it. Only joints count whose friction `is_other`.
+pub(crate) fn better_of_joints(
+    passes: &TrainingPasses<'_>,
+    (joints, model): (&[JointFriction], &RegressorModel),
+    (others, of_others): (&[JointFriction], &RegressorModel),
+    (is_other, design_effects): (&[bool], &[f64]),
+) -> Result<Vec<bool>, IdentificationError> {
+    let of_joints =
+        |model: &RegressorModel, joints: &[JointFriction]| -> Result<Vec<JointScore>, IdentificationError> {
+            let scores = friction_scores(passes, model, joints)?;
+            let place = |one: &JointFriction| model.model().joint_index(&one.joint);
+            Ok(joints.iter().map(|one| place(one).map_or(JointScore::default(), |joint| scores[joint])).collect())
+        };
+    let (first, second) = (of_joints(model, joints)?, of_joints(of_others, others)?);
+    let is_possible = |one: &JointFriction| one.terms.as_deref().is_none_or(is_one_friction);
+    let is_better = |place: usize| {
+        let counted = |effect: f64| second[place].schwarz(effect) < first[place].schwarz(effect);
+        is_other[place] && is_possible(&others[place]) && counted(1.0) && counted(design_effects[place])
+    };
+    Ok((0..joints.len()).map(is_better).collect())
 }
 
 /// What is unknown of the constants of friction that `model` has and other rows chose, by these rows; none where there
@@ -159,20 +206,20 @@ pub(crate) fn one_step(
     Ok(Some((with_chosen(robot, joints, &terms, (model, &measured.fit))?, error)))
 }
 
-/// Schwarz's criterion of every joint of a model, with the terms and the constants of its friction as its own numbers;
-/// 0 for a joint without rows.
-pub(crate) fn friction_scores(
+/// How well every joint's rows are explained by a model, with the terms and the constants of its friction as its own
+/// numbers.
+fn friction_scores(
     passes: &TrainingPasses<'_>,
     model: &RegressorModel,
     joints: &[JointFriction],
-) -> Result<Vec<f64>, IdentificationError> {
+) -> Result<Vec<JointScore>, IdentificationError> {
     let (rows, fit) = passes.rows_and_fit(model)?;
     let constants = FrictionConstants::new(model, joints);
-    let mut scores = vec![0.0; model.dof()];
-    for ((&joint, count), sigma) in rows.joints.iter().zip(rows.problem.joint_rows()).zip(&fit.joint_sigma) {
+    let mut scores = vec![JointScore::default(); model.dof()];
+    for ((&joint, count), &sigma) in rows.joints.iter().zip(rows.problem.joint_rows()).zip(&fit.joint_sigma) {
         let is_own = |term: &&TorqueTerm| term.is_joint_friction() && term.own_joint() == Some(joint);
         let terms = model.parametric.terms().iter().filter(is_own).count();
-        scores[joint] = schwarz_of_joint(count, *sigma, terms + constants.count(joint));
+        scores[joint] = JointScore { rows: count, sigma, own: terms + constants.count(joint) };
     }
     Ok(scores)
 }
@@ -254,7 +301,7 @@ fn with_chosen(
 
 impl TrainingPasses<'_> {
     /// The robot with this friction, and the load of a fit with the friction of `before`.
-    fn with_friction(
+    pub(super) fn with_friction(
         &self,
         robot: &ParametricModel,
         joints: &[JointFriction],

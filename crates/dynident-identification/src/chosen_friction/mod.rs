@@ -1,7 +1,7 @@
 //! The friction that recordings choose: which terms, with which constants, at which cut-off.
 //!
 //! From below: `passes` are the rows that all of it rests on, `constants` finds the best constants of given terms,
-//! `choice` the terms, and `cutoff` tries the fit's own cut-off where noise smears what a higher one shows. Columns,
+//! `choice` the terms, and `cutoff` tries another cut-off where friction is told better there. Columns,
 //! candidates and the search among them, which know of no recording, are [`friction`](crate::friction)'s.
 
 mod choice;
@@ -11,5 +11,5 @@ mod passes;
 
 pub use choice::{ChosenFriction, choose_friction};
 
-pub(crate) use choice::constants_of_all_rows;
-pub(crate) use cutoff::{friction_by_cutoffs, friction_of_less_noise};
+pub(crate) use choice::{GridFriction, GridTerms, constants_of_all_rows, friction_by_grid};
+pub(crate) use cutoff::{OtherFriction, friction_of_other_cutoff, friction_with_cutoff};

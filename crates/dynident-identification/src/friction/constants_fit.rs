@@ -12,7 +12,7 @@
 use super::candidates::JointScale;
 use super::choice::{FrictionConstant, JointFriction};
 use super::constants::{at, coordinates, step_of, value_at};
-use super::weak_terms::without_weakest;
+use super::weak_terms::{has_doubtful_term, without_weakest};
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, LinearProblem};
@@ -142,16 +142,55 @@ impl FrictionConstants {
         let columns = model.layout().columns();
         let first = last.estimate.values.len() - self.axes.len();
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
-            // A constant that several terms share stays with the others.
-            let own_constants = |term: &TorqueTerm| {
-                let is_own =
-                    |axis: &Axis| axis.joint == place && matches!(axis.terms[..], [only] if terms[only] == *term);
-                let own = self.axes.iter().enumerate().filter(|(_, axis)| is_own(axis));
-                own.map(|(number, _)| first + number).collect()
-            };
+            let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
             Some((*joint, without_weakest(terms, (columns, norms), &last.estimate, own_constants)?))
         };
         self.joints.iter().enumerate().filter_map(of_joint).collect()
+    }
+
+    /// Whether a joint has further terms that may be chance, of which a first look at the same motion had none: its
+    /// terms were `before`. The rest is as in [`without_weakest`](Self::without_weakest).
+    pub(crate) fn has_doubtful_term(
+        &self,
+        (joint, before): (usize, &[TorqueTerm]),
+        (model, norms): (&RegressorModel, &[f64]),
+        last: &ConstantsStep,
+    ) -> bool {
+        let first = last.estimate.values.len() - self.axes.len();
+        let Some(place) = self.joints.iter().position(|(own, _)| *own == joint) else { return false };
+        let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
+        let columns = (model.layout().columns(), norms);
+        has_doubtful_term((&self.joints[place].1, before), columns, &last.estimate, own_constants)
+    }
+
+    /// Where the constants of a term of the joint at `place` stand among the columns of a step, whose axes begin at
+    /// `first`. One that several terms share stays with the others.
+    fn own_constants(&self, place: usize, term: &TorqueTerm, first: usize) -> Vec<usize> {
+        let terms = &self.joints[place].1;
+        let is_own = |axis: &Axis| axis.joint == place && matches!(axis.terms[..], [only] if terms[only] == *term);
+        let own = self.axes.iter().enumerate().filter(|(_, axis)| is_own(axis));
+        own.map(|(number, _)| first + number).collect()
+    }
+
+    /// How many rows that hang together say what one independent row would, of the friction of a joint: the mean ratio
+    /// of variances `tr(Σ_w⁻¹ Σ) / p` of its p coefficients and constants, by the covariance that bars are made of and
+    /// by that for white noise (Rao and Scott, Annals of Statistics 12 (1984) 46); 1 at least, and where nothing is
+    /// known.
+    pub(crate) fn design_effect(&self, joint: usize, model: &RegressorModel, last: &ConstantsStep) -> f64 {
+        let Some(place) = self.joints.iter().position(|(own, _)| *own == joint) else { return 1.0 };
+        let estimate = &last.estimate;
+        let first = estimate.values.len() - self.axes.len();
+        let is_term = |column: &Column| matches!(column, Column::Term(own) if self.joints[place].1.contains(own));
+        let terms = model.layout().columns().iter().enumerate().filter(|(_, column)| is_term(column));
+        let axes = self.axes.iter().enumerate().filter(|(_, axis)| axis.joint == place);
+        let columns = terms.map(|(column, _)| column).chain(axes.map(|(number, _)| first + number));
+        let known: Vec<usize> = columns.filter(|&column| estimate.covariance_white[(column, column)] > 0.0).collect();
+        let block = |of: &DMatrix<f64>| {
+            DMatrix::from_fn(known.len(), known.len(), |row, column| of[(known[row], known[column])])
+        };
+        let Some(white) = block(&estimate.covariance_white).cholesky() else { return 1.0 };
+        let ratio = white.solve(&block(&estimate.covariance)).trace() / known.len() as f64;
+        if ratio.is_finite() { ratio.max(1.0) } else { 1.0 }
     }
 
     /// The term on one side of the centre along an axis.
