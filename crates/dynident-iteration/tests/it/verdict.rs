@@ -76,6 +76,26 @@ fn a_lag_is_taken_off_and_the_arm_is_found() {
     }
 }
 
+/// Stiff drives close their own loop and log 8 ms late. With that delay in the loop they would swing, so it is not in
+/// it; what could be reached was "not known", and no run was good enough.
+#[test]
+fn the_delay_of_a_log_is_none_of_a_loop_that_could_not_bear_it() {
+    let delay_s = 8e-3;
+    let sensors = SensorSettings { position_delay_s: delay_s.into(), ..Simulated::default().sensors };
+    let simulated = Simulated { sensors, ..Simulated::default() };
+    let drives: ControllerSettings = toml::from_str("kind = \"position-loop\"\nkp = 6000.0\nkd = 250.0").unwrap();
+    let mut settings = settings();
+    (settings.first, settings.controller) = (Some(drives.clone()), drives);
+    settings.settled.tracking_tolerance = 1e-6;
+    let (_, outcome) = iterated(&simulated, settings);
+    let words = words(&outcome);
+    assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
+    for joint in &outcome.runs.last().unwrap().evidence.as_ref().unwrap().joints {
+        // What the log shows late: at most the delay times a velocity of 1 rad/s or so, and what the drives leave.
+        assert!(joint.tracking_floor_rad.is_some_and(|floor| (1e-3..0.02).contains(&floor)), "{joint:?}");
+    }
+}
+
 /// A controller that sees its joints some samples late pushes them ahead. No log shows that delay but by the tracking
 /// error; it is found, explains the error, and is said.
 #[test]
