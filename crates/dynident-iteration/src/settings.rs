@@ -147,8 +147,8 @@ pub struct SettledSettings {
     /// torque (root mean squares). Default 5.
     pub most_unexplained_percent: f64,
     /// Longest lag between torque and motion that is taken off and still lets the iteration converge, seconds: with a
-    /// longer one the robot is not where its log says, whatever the tracking is. By default 10 ms, and for an arm longer
-    /// than 1.2 m a hundredth of its own second: a bus is no faster because the arm is short.
+    /// longer one the robot is not where its log says, whatever the tracking is. By default 10 ms, and for an arm
+    /// longer than 1.2 m a hundredth of its own second: a bus is no faster because the arm is short.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_lag_s: Option<f64>,
 }
