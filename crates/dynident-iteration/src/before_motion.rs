@@ -26,7 +26,13 @@ pub(crate) struct Commanded<'a> {
     pub(crate) purpose: RunPurpose,
 }
 
-impl Commanded<'_> {
+impl<'a> Commanded<'a> {
+    /// What the robot is to follow: the leg's reference at its share of the speed.
+    pub(crate) fn reference(&self) -> Result<Cow<'a, Reference>, SimulationError> {
+        let reference = self.leg.reference();
+        if self.speed < 1.0 { reference.slowed(self.speed).map(Cow::Owned) } else { Ok(Cow::Borrowed(reference)) }
+    }
+
     /// Whether it is what the run is made for.
     pub(crate) fn is_run(&self) -> bool {
         self.speed == 1.0 && !matches!(self.purpose, RunPurpose::WarmUp { .. })

@@ -72,12 +72,11 @@ impl Iteration {
         supervisor: &mut dyn Supervisor,
         last_motion: &mut Option<Instant>,
     ) -> Result<Came, IterationError> {
-        let Commanded { place, leg, speed, purpose, .. } = *motion;
+        let Commanded { place, speed, purpose, .. } = *motion;
         let Prepared { controller, model, ways, rehearsal } = prepared;
         // Numbers of runs differ from leg to leg: noise and folders go by them.
         let run = (plan.run - 1) * task.legs.len() + place + 1;
-        let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
-        let reference = slow.as_ref().unwrap_or(leg.reference());
+        let reference = &*motion.reference()?;
         let found = ways[place].as_ref();
         let own = found.map(|found| if speed < 1.0 { found.ways.slowed(speed) } else { Ok(found.ways.clone()) });
         let own = own.transpose()?;

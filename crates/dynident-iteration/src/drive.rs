@@ -131,7 +131,7 @@ impl Iteration {
                         "{} run {} ended early: {}. Look at the robot; the same command begins it anew",
                         motion.words(),
                         plan.run,
-                        came.status
+                        came.ending(&*motion.reference()?)
                     );
                     return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
                 }
@@ -259,7 +259,11 @@ impl Iteration {
                 stiffness: plan.stiffness,
             },
             done,
-            outcome: runs.last().map_or_else(String::new, |run| run.status.to_string()),
+            outcome: runs
+                .iter()
+                .zip(legs)
+                .next_back()
+                .map_or_else(String::new, |(run, leg)| run.ending(leg.reference())),
             max_tracking_error_rad: worst,
             accepted: false,
             reason: None,

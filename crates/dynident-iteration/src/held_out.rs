@@ -102,7 +102,7 @@ impl Iteration {
         };
         let found = HeldOutRun {
             done: came.status.is_done(),
-            outcome: came.status.to_string(),
+            outcome: came.ending(held_out.leg.reference()),
             max_tracking_error_rad,
             evidence,
             reason,

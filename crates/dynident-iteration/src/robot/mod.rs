@@ -7,6 +7,7 @@ mod envelope;
 mod folder;
 mod function;
 mod handover;
+mod held_torque;
 mod log_table;
 mod process;
 mod process_group;
@@ -34,11 +35,8 @@ pub use stop_signal::StopSignal;
 pub use ways::{RunPart, WayRecords, Ways};
 pub use workspace::{WatchedPoint, WorkspaceBox, WorkspaceSettings};
 
-use dynident_simulation::Record;
-use dynident_simulation::Reference;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
-use dynident_simulation::{Run, RunStatus};
-use dynident_simulation::{SimulationError, require_length};
+use dynident_simulation::{LimitedQuantity, Record, Reference, Run, RunStatus, SimulationError, require_length};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -164,6 +162,13 @@ impl RobotRun {
         Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None }
     }
 
+    /// How it ended, in words, and what its record shows of why it left its envelope.
+    pub fn ending(&self, reference: &Reference) -> String {
+        let of_joint = |at| held_torque::held_torque(reference, &self.record, at);
+        let held = self.status.too_far().and_then(of_joint);
+        held.map_or_else(|| self.status.to_string(), |held| format!("{}; {held}", self.status))
+    }
+
     /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
     /// reference between its samples by straight lines.
     pub fn max_error(&self, reference: &Reference) -> Vec<f64> {
@@ -228,6 +233,19 @@ impl RobotStatus {
     /// Whether the whole trajectory was run.
     pub fn is_done(&self) -> bool {
         *self == Self::Done
+    }
+
+    /// The joint that was stopped for its distance from the trajectory, and when, s.
+    fn too_far(&self) -> Option<(&str, f64)> {
+        match self {
+            Self::Simulated { verdict: RunStatus::LimitBroken { time_s, joint, quantity, .. } } => {
+                (*quantity == LimitedQuantity::TrackingError).then_some((joint, *time_s))
+            }
+            Self::LeftEnvelope { breach, .. } => (breach.quantity == EnvelopeQuantity::TrackingError
+                && breach.part.is_motion())
+            .then_some((&breach.joint, breach.time_s)),
+            _ => None,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 
 use crate::simulated_arm::{Simulated, described, friction, iterated, settings, strokes_in_turn};
 use dynident_dynamics::ParametricModel;
+use dynident_iteration::robot::EnvelopeSettings;
 use dynident_iteration::{Iteration, IterationOutcome, IterationStatus, IterationTask, Shortfall, iterate};
 use dynident_model::terms::CoulombShape;
 use dynident_simulation::controllers::JointPdSettings;
@@ -43,6 +44,25 @@ fn a_robot_that_clips_never_converges() {
     let most = shown.reduce(|a, b| if a.share > b.share { a } else { b }).unwrap();
     assert!((most.torque - 8.0).abs() < 0.3 && most.share > 0.1 && !most.stated, "{most:?}");
     assert!(words.contains("torque of joint joint2"), "{words}");
+}
+
+/// A drive that gives so little that its joint leaves the envelope in the slow motion before the first run: too short a
+/// log for a verdict of clipping, and "a first controller that holds the robot" was all that was advised.
+#[test]
+fn a_drive_at_its_limit_is_named_where_the_envelope_stops_it_first() {
+    let torque = Some(vec![1e3, 1.2].into());
+    let clipping = Simulated { limits: RunLimits { torque, ..RunLimits::default() }, ..Simulated::default() };
+    let stated = EnvelopeSettings { tracking_error: Some(0.2.into()), ..EnvelopeSettings::default() };
+    let mut settings = settings();
+    settings.safety.envelope = Some(stated.envelope(described().model()).unwrap());
+    settings.safety.speed_steps = vec![0.5];
+    let (_, outcome) = iterated(&clipping, settings);
+    let words = words(&outcome);
+    // Noise of 0.05 Nm in its mean over a few samples.
+    let held = [" stayed at 1.1", " stayed at 1.2"].iter().any(|held| words.contains(held));
+    assert!(words.contains("the torque of joint2 stayed at") && held, "{words}");
+    // Beside the slowed trajectory, to which the distance is the envelope's.
+    assert!(words.contains(" to 0.200: its drive gives no more"), "{words}");
 }
 
 fn logged_late(delay_s: f64) -> (Simulated, IterationOutcome) {
