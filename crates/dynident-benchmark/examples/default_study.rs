@@ -2,7 +2,7 @@
 //! by name: robots × motions × friction × noise × lag.
 //!
 //! ```text
-//! cargo run --release -p dynident-benchmark --example default_study -- --runs 2 --out DIR
+//! cargo run --release -p dynident-benchmark --example default_study -- --runs 4 --out DIR
 //! ```
 //!
 //! The table goes to the screen, line by line, then what was to be reached; `DIR/default.csv` has all figures.
