@@ -198,7 +198,7 @@ fn best_start<'a>(
     let mut times = none.times;
     if !is_seen {
         let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-        let of_stated = fitted_like(found, (task, &stated), chosen, execution, job)?;
+        let of_stated = fitted_once((task, &stated), (chosen, Known::Alike(found)), execution, job)?;
         times = times.and(&of_stated.times);
         if !shows_lag(&of_stated)? {
             return Ok(LagStart { times, ..none });
@@ -228,7 +228,7 @@ fn lag_rounds<'a>(
     loop {
         let known = match (choices.or(of_other_cutoff.as_ref()), &first_look) {
             (Some(choices), _) => Known::Choices(choices),
-            (None, Some(found)) => Known::FirstLook(found),
+            (None, Some(found)) => Known::Alike(found),
             (None, None) => Known::Nothing,
         };
         let mut found = fitted_once((task, &settings), (chosen, known), execution, job)?;
@@ -315,17 +315,4 @@ fn stated_lag(settings: &IdentificationSettings, dof: usize) -> LagChoice {
 fn has_free_lag(found: &Fitted<'_>) -> bool {
     found.training.joints.len() == found.training.model.dof()
         && found.settings.estimation.estimator.reads_filtered_rows()
-}
-
-/// [`fitted_once`] with other friction than `found`: where that has no lag taken off, drives and first cut-off are its.
-fn fitted_like<'a>(
-    found: &Fitted<'a>,
-    (task, settings): (&'a IdentificationTask, &IdentificationSettings),
-    chosen: &[usize],
-    execution: Execution<'a>,
-    job: &mut Job<'_, '_>,
-) -> Result<Fitted<'a>, IdentificationError> {
-    let is_alike = found.settings.motion.torque_lag_s == settings.motion.torque_lag_s;
-    let known = if is_alike { Known::Alike(found) } else { Known::Nothing };
-    fitted_once((task, settings), (chosen, known), execution, job)
 }

@@ -40,3 +40,19 @@ pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
     let free = (fit.values.len() - fit.rank.fixed.len()) as f64;
     deviance(problem, fit) + free * rows.ln()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every row four times says what it says once.
+    #[test]
+    fn rows_that_say_the_same_count_once() {
+        let score = |rows: usize| JointScore { rows, sigma: 0.3, own: 5 };
+        let (once, repeated) = (score(250).schwarz(1.0), score(1000).schwarz(4.0));
+        assert!((once - repeated).abs() < 1e-9 * once.abs(), "{once} {repeated}");
+        // Without it four times as much evidence speaks of the same noise.
+        assert!(score(1000).schwarz(1.0) < 3.0 * once);
+        assert_eq!(JointScore::default().schwarz(1.0), 0.0);
+    }
+}

@@ -121,9 +121,7 @@ pub(crate) enum Known<'k, 'a> {
     Look(GridTerms),
     /// Choices that were made by an excerpt, or with friction of another cut-off.
     Choices(&'k Choices),
-    /// A first look at the same rows, which found no lag any more.
-    FirstLook(&'k Fitted<'a>),
-    /// A fit to the same recordings that differs only in how its friction was chosen.
+    /// A fit to the same recordings with the same lag taken off, which differs only in how its friction was chosen.
     Alike(&'k Fitted<'a>),
 }
 
@@ -216,7 +214,7 @@ fn chosen_here<'a>(
     (chosen, payloads): (&[usize], &[Payload]),
     (job, known): (&Job<'_, '_>, Known<'_, 'a>),
 ) -> Result<Chosen<'a>, IdentificationError> {
-    let alike = if let Known::Alike(found) | Known::FirstLook(found) = known { Some(found) } else { None };
+    let alike = if let Known::Alike(found) = known { Some(found) } else { None };
     let (robot, drive_inertia) = match (job.arm(), alike) {
         (Some(_), _) => (robot.clone(), None),
         (None, Some(alike)) => (alike.robot.clone(), alike.drive_inertia.clone()),
@@ -253,9 +251,9 @@ fn chosen_here<'a>(
         let cutoff = of_friction.or(cutoff);
         (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
-    let logs = match known {
-        Known::Alike(alike) => logs.with_motion_of(&alike.logs),
-        _ => logs,
+    let logs = match alike {
+        Some(alike) => logs.with_motion_of(&alike.logs),
+        None => logs,
     };
     Ok(Chosen { robot, drive_inertia, logs, before_friction, cutoff, friction, friction_hz, of_grid })
 }

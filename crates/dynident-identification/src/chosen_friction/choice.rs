@@ -1,7 +1,7 @@
 //! The friction of the joints as their recordings choose it: which terms, then their constants.
 
 use super::constants::{
-    best_constants, better_of_joints, error_of_constants, friction_evidence, one_step, with_constants,
+    best_constants, better_of_joints, error_of_constants, friction_evidence, one_step, take, with_constants,
 };
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
@@ -252,9 +252,7 @@ pub(crate) fn better_friction(
     }
 
     // A mixture, each joint with the constants that it has beside its own others.
-    for ((one, other), _) in joints.iter_mut().zip(other.joints).zip(&taken).filter(|(_, taken)| **taken) {
-        *one = other;
-    }
+    take(&mut joints, other.joints, &taken);
     let model = passes.with_friction(robot, &joints, &model)?;
     let constants_error = error_of_constants(&passes, &joints, &model)?;
     Ok(ChosenFriction { model, joints, stated, constants_error })

@@ -140,9 +140,7 @@ pub(crate) fn best_constants(
         *joints = others;
         return Ok(second);
     }
-    for ((one, other), _) in joints.iter_mut().zip(others).zip(&taken).filter(|(_, taken)| **taken) {
-        *one = other;
-    }
+    take(joints, others, &taken);
     let start = passes.with_friction(robot, joints, &first.0)?;
     with_constants(passes, robot, joints, (start, gains))
 }
@@ -169,6 +167,13 @@ pub(crate) fn better_of_joints(
         is_other[place] && is_possible(&others[place]) && counted(1.0) && counted(design_effects[place])
     };
     Ok((0..joints.len()).map(is_better).collect())
+}
+
+/// The friction of `others` to the joints that have `taken` it.
+pub(crate) fn take(joints: &mut [JointFriction], others: Vec<JointFriction>, taken: &[bool]) {
+    for ((one, other), _) in joints.iter_mut().zip(others).zip(taken).filter(|(_, taken)| **taken) {
+        *one = other;
+    }
 }
 
 /// What is unknown of the constants of friction that `model` has and other rows chose, by these rows; none where there

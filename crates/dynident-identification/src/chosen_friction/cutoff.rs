@@ -77,7 +77,7 @@ pub(crate) fn friction_of_other_cutoff(
     Ok(Some(OtherFriction { friction, cutoff }))
 }
 
-/// Friction that another cut-off tells better.
+/// Friction by the rows of another cut-off.
 pub(crate) struct OtherFriction {
     pub(crate) friction: ChosenFriction,
     /// For a fit with it.

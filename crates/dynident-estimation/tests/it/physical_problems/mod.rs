@@ -28,14 +28,11 @@ fn points(random: &mut Random, count: usize) -> [f64; 10] {
 
 pub(crate) struct Case {
     pub(crate) problem: PhysicalProblem,
-    #[allow(dead_code, reason = "not every test asks for it")]
     pub(crate) settings: PhysicalSettings,
-    #[allow(dead_code, reason = "not every test asks for it")]
-    pub(crate) truth: Vec<f64>,
     /// R of the data, column by column, and ρ: what the problem was made from, for other solvers.
-    #[allow(dead_code, reason = "not every test asks for it")]
+    #[allow(dead_code, reason = "the benchmark asks for it")]
     pub(crate) rows: (DMatrix<f64>, DVector<f64>),
-    #[allow(dead_code, reason = "not every test asks for it")]
+    #[allow(dead_code, reason = "the benchmark asks for it")]
     pub(crate) total_mass_kg: Option<[f64; 2]>,
 }
 
@@ -125,5 +122,5 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
         prior_weight: [1.0e-2, 1.0, 1.0e-3][below(&mut random, 3)],
         ..PhysicalSettings::default()
     };
-    Case { problem, settings, truth, rows: (triangle, right), total_mass_kg }
+    Case { problem, settings, rows: (triangle, right), total_mass_kg }
 }
