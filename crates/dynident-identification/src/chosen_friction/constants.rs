@@ -14,7 +14,7 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_model::terms::TorqueTerm;
 
-/// Passes over the recordings for the constants of chosen friction, at most.
+/// Passes over the recordings for the constants of chosen friction, at most, and one more where the last went too far.
 const MOST_PASSES: usize = 8;
 /// Passes after which terms that are not seen are dropped although constants still move.
 const DROP_PASSES: usize = 3;
@@ -239,8 +239,8 @@ pub(crate) fn with_constants(
 ) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
     let equal_weights = matches!(passes.settings.estimation.estimator, Estimator::Ordinary);
     let mut last: Option<LastPass> = None;
-    let mut error = None;
-    for pass in 1..=MOST_PASSES {
+    let (mut are_found, mut error) = (false, None);
+    for pass in 1.. {
         let constants = FrictionConstants::new(&model, joints);
         if !model.needs_load() && constants.is_empty() {
             break;
@@ -248,28 +248,33 @@ pub(crate) fn with_constants(
         let measured = passes.constants_pass(&constants, &model)?;
         let fit = &measured.fit;
 
-        // A step that made the fit worse was too long; where no length makes it better the constants are found.
+        // A step that made the fit worse was too long; where no length makes it better the constants are found, and one
+        // more pass there says which terms no row shows.
         let misfit = misfit(&measured.problem, fit, equal_weights);
         if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit) {
             before.halvings += 1;
-            let is_over = before.halvings > MOST_HALVINGS;
-            before.steps.iter_mut().for_each(|step| *step *= if is_over { 0.0 } else { 0.5 });
+            are_found = before.halvings > MOST_HALVINGS || pass >= MOST_PASSES;
+            before.steps.iter_mut().for_each(|step| *step *= if are_found { 0.0 } else { 0.5 });
             let terms = before.constants.moved(&before.steps);
             model = with_chosen(robot, joints, &terms, (&model, fit))?;
-            if is_over {
-                break;
-            }
+            last = last.filter(|_| !are_found);
             continue;
         }
 
         let step = measured.step(passes, (&constants, &model), gains)?;
         take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
-        let has_settled = step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
+        let has_settled = are_found || step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
 
-        // Terms that are not seen once constants are free: the weakest of every joint, then again.
-        let fewer = constants.without_weakest((&model, &measured.problem.column_norms()), &step);
-        if pass == MOST_PASSES {
+        // Terms that are not seen once constants are free: the weakest of every joint, then again. Where the passes got
+        // no further terms may say something together that none of them says alone; what no row shows says nothing.
+        let norms = measured.problem.column_norms();
+        let fewer = if are_found {
+            constants.without_unshown((&model, &norms), &step)
+        } else {
+            constants.without_weakest((&model, &norms), &step)
+        };
+        if pass >= MOST_PASSES {
             if !fewer.is_empty() {
                 model = with_chosen(robot, joints, &fewer, (&model, fit))?;
             }
@@ -278,6 +283,7 @@ pub(crate) fn with_constants(
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
             model = with_chosen(robot, joints, &fewer, (&model, fit))?;
             last = None;
+            are_found = false;
             continue;
         }
         if has_settled {

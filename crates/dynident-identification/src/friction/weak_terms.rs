@@ -104,6 +104,18 @@ pub(super) fn without_weakest(
     (weakest.0 < 1.0).then_some(weakest.1)
 }
 
+/// The terms of a joint without a further one that drives the joint or that no row shows; `None` where there is none.
+/// The estimate, its columns and the constants are as in [`further_terms`].
+pub(super) fn without_unshown(
+    terms: &[TorqueTerm],
+    columns: (&[Column], &[f64]),
+    estimate: &Estimate,
+    own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
+) -> Option<Vec<TorqueTerm>> {
+    let further = further_terms(terms, columns, estimate, own_constants);
+    further.into_iter().find(|further| further.square == 0.0).map(|further| further.left)
+}
+
 /// Whether further terms of a joint of which a first look at the same motion had none, whose terms are `before`, may
 /// be chance. The estimate, its columns and the constants are as in [`further_terms`].
 pub(super) fn has_doubtful_term(
@@ -168,7 +180,10 @@ mod tests {
         let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();
         // Far beyond its own bar, both times.
         assert!(estimate.values[1] > 5.0 * estimate.std[1], "{} +- {}", estimate.values[1], estimate.std[1]);
-        without_weakest(&terms, (&columns, &problem.column_norms()), &estimate, |_| Vec::new())
+        let norms = problem.column_norms();
+        let left = without_weakest(&terms, (&columns, &norms), &estimate, |_| Vec::new());
+        assert_eq!(without_unshown(&terms, (&columns, &norms), &estimate, |_| Vec::new()), left);
+        left
     }
 
     /// Steps of Coulomb friction of 5.0 and 5.085 Nm by direction in rows that know the difference to 0.035: two and a
@@ -204,6 +219,10 @@ mod tests {
         let is_doubtful =
             |before: &[TorqueTerm]| has_doubtful_term((&terms, before), (&columns, &norms), &estimate, |_| Vec::new());
         assert_eq!(without_weakest(&terms, (&columns, &norms), &estimate, |_| Vec::new()), None);
+        // What is too weak is shown all the same.
+        let weak = estimate.with_further_error(&DMatrix::from_diagonal_element(2, 2, 1.0));
+        assert_eq!(without_weakest(&terms, (&columns, &norms), &weak, |_| Vec::new()).as_deref(), Some(&plain[..]));
+        assert_eq!(without_unshown(&terms, (&columns, &norms), &weak, |_| Vec::new()), None);
         assert!(is_doubtful(&plain) && !is_doubtful(&terms));
     }
 
