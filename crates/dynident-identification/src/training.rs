@@ -142,7 +142,7 @@ pub(crate) struct TrainingPasses<'a> {
 impl TrainingPasses<'_> {
     /// The rows of this model; where friction depends on a load that is not known yet, again and again with the load
     /// of the fit before, until it settles.
-    fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
+    pub(crate) fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let load_is_known = model.load_parameters.is_some();
         let mut found = self.rows_once(model)?;
         if load_is_known || !found.model.needs_load() {
