@@ -7,6 +7,7 @@ use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};
 use crate::forecast::MotionForecast;
+use crate::friction_chosen::friction_chosen;
 use crate::good_log::GoodLog;
 use crate::held_out::HeldOutCame;
 use crate::identify_run::identify_run;
@@ -214,7 +215,8 @@ impl Iteration {
         // The first good run is not judged, whatever it was under.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
-            add_tracking_floors(evidence, &task, records, &self.settings, after, errors);
+            let known = (after, &friction_chosen(&all)[..]);
+            add_tracking_floors(evidence, &task, records, &self.settings, known, errors);
             evidence.other_length = other_length(&task, &runs, &settings, after)?;
         }
         Ok(())

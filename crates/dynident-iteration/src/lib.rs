@@ -72,6 +72,7 @@ mod convergence;
 mod cut_short;
 mod differentiator_choice;
 mod drive;
+mod dry_steps;
 mod error;
 mod estimate;
 mod evidence;

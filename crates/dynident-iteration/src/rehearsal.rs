@@ -1,8 +1,9 @@
 //! A motion is rehearsed before it is commanded: its torque, the mass matrix of the controller's model, and the closed
 //! loop in simulation with robots that are not quite the model.
 
+use crate::dry_steps::with_dry_steps;
 use crate::posture::{at_sample, inertia_matrix};
-use crate::rests::{highest_speeds, with_dry_steps};
+use crate::rests::highest_speeds;
 use crate::robot::{Breach, Envelope};
 use dynident_dynamics::ParametricModel;
 use dynident_model::sample::Random;

@@ -4,7 +4,7 @@
 use core::ops::Range;
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::FrictionSearch;
-use dynident_model::terms::{CoulombShape, TermAction, TorqueTerm};
+use dynident_model::terms::TermAction;
 use dynident_simulation::Reference;
 use serde::{Deserialize, Serialize};
 
@@ -106,20 +106,6 @@ pub(crate) fn highest_speeds<'a>(references: impl IntoIterator<Item = &'a Refere
     fastest
 }
 
-/// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
-/// than the speed below which a joint rests is dry friction with stiction. Runs cannot tell it from one, it holds a
-/// joint that the controller does not move, and it needs no short steps of the integrator.
-pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<TorqueTerm> {
-    let dry = |term: &TorqueTerm| {
-        let fastest = term.joints().into_iter().map(|joint| fastest[joint]).fold(0.0, f64::max);
-        term.clone().with_step(|step| match step {
-            CoulombShape::Smooth { width } if width > MOVING * fastest => step,
-            CoulombShape::Smooth { .. } | CoulombShape::Sign { .. } => CoulombShape::Sign { dead_band: 0.0 },
-        })
-    };
-    terms.iter().map(dry).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,19 +135,5 @@ mod tests {
         // Neighbours whose surroundings meet are one.
         let two = [1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0];
         assert_eq!(margin(0.1, 1.0).samples(&two, 1), one(0..6));
-    }
-
-    #[test]
-    fn a_step_that_no_run_can_tell_from_dry_friction_is_dry() {
-        use dynident_model::terms::{Coulomb, Stribeck, Viscous};
-        let sign = CoulombShape::Sign { dead_band: 0.0 };
-        let (narrow, wide) = (CoulombShape::Smooth { width: 0.02 }, CoulombShape::Smooth { width: 0.05 });
-        let coulomb = |joint, shape| TorqueTerm::Coulomb(Coulomb { joint, shape });
-        let stribeck = |shape| TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 2.0, shape });
-        let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
-        // The first joint reaches 2 rad/s and rests below 0.04, the second 0.5 and below 0.01.
-        let terms = [coulomb(0, narrow), coulomb(0, wide), coulomb(1, narrow), stribeck(narrow), viscous.clone()];
-        let simulated = with_dry_steps(&terms, &[2.0, 0.5]);
-        assert_eq!(simulated, [coulomb(0, sign), coulomb(0, wide), coulomb(1, narrow), stribeck(sign), viscous]);
     }
 }

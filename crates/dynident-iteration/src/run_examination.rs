@@ -10,6 +10,7 @@ use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::tracking_floor::{KnownLoop, tracking_floor};
+use dynident_identification::friction::JointFriction;
 use dynident_identification::payload::known_payloads;
 use dynident_identification::{Execution, Logs, RegressorModel};
 use dynident_recording::{cutoff, position_noise};
@@ -141,13 +142,13 @@ fn predict(
 }
 
 /// Adds what noise, friction and delay explain of each joint's tracking error, where one is beyond the tolerance.
-/// `known` is what is known after the run.
+/// `known` is what is known after the run, `friction` what runs so far chose.
 pub(crate) fn add_tracking_floors(
     evidence: &mut RunEvidence,
     task: &IterationTask,
     records: &[Record],
     settings: &IterationSettings,
-    known: &RunEstimate,
+    (known, friction): (&RunEstimate, &[JointFriction]),
     errors_rad: &[f64],
 ) {
     let Some(parameters) = &known.possible else { return };
@@ -161,7 +162,7 @@ pub(crate) fn add_tracking_floors(
         let q: Vec<&[f64]> = record.q.chunks_exact(record.samples.max(1)).collect();
         let position_noise = &position_noise(&q, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz)[..];
         let (robot, controller) = (&task.robot, &settings.controller);
-        let known = KnownLoop { robot, parameters, controller, position_noise, delay_s };
+        let known = KnownLoop { robot, parameters, friction, controller, position_noise, delay_s };
         let Some(of_leg) = tracking_floor(leg.reference(), record, &known) else { return };
         floors.iter_mut().zip(of_leg.floor).for_each(|(most, floor)| *most = most.max(floor));
         // The longest of several legs.

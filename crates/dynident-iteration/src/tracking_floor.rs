@@ -4,9 +4,12 @@
 //! show none. The tracking error does: a controller that sees the joint `d` seconds late takes it for being behind and
 //! pushes it ahead by about `d q̇`. So the delay is what brings the simulated errors nearest to those of the run.
 
-use crate::rests::{highest_speeds, with_dry_steps};
+use crate::dry_steps::{with_dry_steps, with_sticking_joints};
+use crate::rests::highest_speeds;
 use dynident_dynamics::ParametricModel;
+use dynident_identification::friction::JointFriction;
 use dynident_model::InertialParameters;
+use dynident_model::terms::TorqueTerm;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Integrator, LoopSettings, Plant, Record, Reference, Run, SensorSettings, closed_loop};
 
@@ -26,6 +29,8 @@ pub(crate) struct KnownLoop<'a> {
     pub(crate) robot: &'a ParametricModel,
     /// All parameters of the robot that was found.
     pub(crate) parameters: &'a [f64],
+    /// The friction that runs chose, with what is known of its constants; empty where it was stated.
+    pub(crate) friction: &'a [JointFriction],
     pub(crate) controller: &'a ControllerSettings,
     /// Noise of each position, rad (m).
     pub(crate) position_noise: &'a [f64],
@@ -43,31 +48,54 @@ pub(crate) struct TrackingFloor {
 
 /// Per joint the largest distance from the reference in a simulated run of the robot that was found, under the same
 /// controller with that very robot as its model, with the log's noise of positions, their measured delay and the
-/// feedback's, and with narrow steps of friction as dry friction. `None` where it cannot be simulated, or does not get
-/// to its end.
+/// feedback's, and with narrow steps of friction as dry friction; where joints may [stick](with_sticking_joints) with
+/// more of it, the larger one of both. `None` where it cannot be simulated, or does not get to its end.
 pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &KnownLoop<'_>) -> Option<TrackingFloor> {
     let fastest = highest_speeds([reference]);
+    let terms = known.robot.terms();
+    let parameters = &known.parameters[known.robot.model().inertial_count()..];
+    let names = known.robot.joint_names();
+    let sticking = with_sticking_joints((terms, parameters), (&names, known.friction), &fastest);
+    let found = floor_with((&with_dry_steps(terms, &fastest), parameters), (reference, record), known, &fastest)?;
+    let sticking = sticking
+        .and_then(|(terms, parameters)| floor_with((&terms, &parameters), (reference, record), known, &fastest));
+    Some(match sticking {
+        None => found,
+        Some(sticking) => TrackingFloor {
+            floor: found.floor.iter().zip(&sticking.floor).map(|(one, other)| one.max(*other)).collect(),
+            feedback_delay_s: found.feedback_delay_s.or(sticking.feedback_delay_s),
+        },
+    })
+}
+
+/// The floor of a robot that has these terms with their parameters.
+fn floor_with(
+    friction: (&[TorqueTerm], &[f64]),
+    (reference, record): (&Reference, &Record),
+    known: &KnownLoop<'_>,
+    fastest: &[f64],
+) -> Option<TrackingFloor> {
     let samples = |delay_s: f64| (delay_s * reference.rate_hz()).round() as usize;
     let explained = |run: &Run| -> Vec<f64> {
         // What the log shows late, it shows beside the trajectory.
-        run.max_error.iter().zip(&fastest).map(|(error, fastest)| error + known.delay_s * fastest).collect()
+        run.max_error.iter().zip(fastest).map(|(error, fastest)| error + known.delay_s * fastest).collect()
     };
     // What the log shows late the controller may see late, too. Drives that close their own loop do not: where it could
     // not bear that delay, the run that was made did not have it.
     let late_by_log = samples(known.delay_s);
-    let (of_log, plain) = match simulated(reference, known, &fastest, late_by_log) {
+    let (of_log, plain) = match simulated(reference, known, friction, late_by_log) {
         Some(run) => (late_by_log, run),
-        None if late_by_log > 0 => (0, simulated(reference, known, &fastest, 0)?),
+        None if late_by_log > 0 => (0, simulated(reference, known, friction, 0)?),
         None => return None,
     };
-    let one_late = || simulated(reference, known, &fastest, of_log + 1);
+    let one_late = || simulated(reference, known, friction, of_log + 1);
     let late = has_same_clock(reference, record)
         .then(one_late)
         .flatten()
         .and_then(|one_late| delay_in_samples(record, &plain, &one_late))
         .filter(|late| *late <= samples(known.robot.model().own_scale().seconds(LONGEST_S)));
     if let Some(late) = late
-        && let Some(run) = simulated(reference, known, &fastest, of_log + late)
+        && let Some(run) = simulated(reference, known, friction, of_log + late)
         && left(record, &run) <= LEFT * left(record, &plain)
     {
         let feedback_delay_s = Some(late as f64 / reference.rate_hz());
@@ -77,14 +105,18 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
 }
 
 /// A run of the robot that was found with a feedback that is so many samples late.
-fn simulated(reference: &Reference, known: &KnownLoop<'_>, fastest: &[f64], late: usize) -> Option<Run> {
+fn simulated(
+    reference: &Reference,
+    known: &KnownLoop<'_>,
+    (terms, of_terms): (&[TorqueTerm], &[f64]),
+    late: usize,
+) -> Option<Run> {
     let robot = known.robot;
-    let (of_bodies, of_terms) = known.parameters.split_at(robot.model().inertial_count());
+    let of_bodies = &known.parameters[..robot.model().inertial_count()];
     let bodies: Vec<InertialParameters> =
         of_bodies.chunks_exact(10).map(|own| InertialParameters(core::array::from_fn(|k| own[k]))).collect();
     let model = robot.model().with_inertials(&bodies).ok()?;
-    let terms = with_dry_steps(robot.terms(), fastest);
-    let mut plant = Plant::new(&model, &terms, of_terms).ok()?;
+    let mut plant = Plant::new(&model, terms, of_terms).ok()?;
     let sensors = SensorSettings {
         position_std: known.position_noise.to_vec().into(),
         feedback_delay_samples: late,

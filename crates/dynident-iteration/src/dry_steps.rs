@@ -1,0 +1,137 @@
+//! Friction of a simulated robot whose step at rest is narrower than runs can tell: it is dry friction.
+
+use crate::rests::MOVING;
+use core::cell::Cell;
+use dynident_identification::friction::JointFriction;
+use dynident_model::terms::{Coulomb, CoulombShape, Sigmoid, TorqueTerm};
+
+/// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
+/// than the speed below which a joint rests is dry friction with stiction. Runs cannot tell it from one, it holds a
+/// joint that the controller does not move, and it needs no short steps of the integrator.
+pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<TorqueTerm> {
+    let dry = |term: &TorqueTerm| {
+        let fastest = term.joints().into_iter().map(|joint| fastest[joint]).fold(0.0, f64::max);
+        term.clone().with_step(|step| match step {
+            CoulombShape::Smooth { width } if width > MOVING * fastest => step,
+            CoulombShape::Smooth { .. } | CoulombShape::Sign { .. } => CoulombShape::Sign { dead_band: 0.0 },
+        })
+    };
+    terms.iter().map(dry).collect()
+}
+
+/// The same terms with their parameters where joints stick with all of their friction: those whose narrowest step may
+/// be that of dry friction, by its width or by the 95 % interval of the width that runs `chose` for the joint of this
+/// name. One joint has one friction, and of a step that smoothing hides its terms tell widths of their own. `None`
+/// where no joint sticks with more than by [`with_dry_steps`].
+pub(crate) fn with_sticking_joints(
+    (terms, parameters): (&[TorqueTerm], &[f64]),
+    (names, chose): (&[String], &[JointFriction]),
+    fastest: &[f64],
+) -> Option<(Vec<TorqueTerm>, Vec<f64>)> {
+    let sticks = |joint: usize| {
+        let own = terms.iter().filter(|term| term.is_joint_friction() && term.own_joint() == Some(joint));
+        let of_model = own.filter_map(width_of_step);
+        let of_choice = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| {
+            one.constants.iter().filter_map(|constant| match &constant.constant[..] {
+                "width" => Some(constant.interval_95[0]),
+                "steepness" => Some(width_of_sigmoid(constant.interval_95[1])),
+                _ => None,
+            })
+        });
+        of_model.chain(of_choice).fold(f64::INFINITY, f64::min) <= MOVING * fastest[joint]
+    };
+    let sticking: Vec<bool> = (0..fastest.len()).map(sticks).collect();
+    let dry = |(term, &parameter): (&TorqueTerm, &f64)| match term {
+        TorqueTerm::Sigmoid(own) if sticking[own.joint] && own.offset_speed.abs() <= MOVING * fastest[own.joint] => {
+            let shape = CoulombShape::Sign { dead_band: 0.0 };
+            (TorqueTerm::Coulomb(Coulomb { joint: own.joint, shape }), 0.5 * parameter)
+        }
+        term if term.own_joint().is_some_and(|joint| sticking[joint]) => {
+            (term.clone().with_step(|_| CoulombShape::Sign { dead_band: 0.0 }), parameter)
+        }
+        term => (term.clone(), parameter),
+    };
+    let (found, parameters): (Vec<TorqueTerm>, Vec<f64>) = terms.iter().zip(parameters).map(dry).unzip();
+    let found = with_dry_steps(&found, fastest);
+    (found != with_dry_steps(terms, fastest)).then_some((found, parameters))
+}
+
+/// The width of the step of a term that has one.
+fn width_of_step(term: &TorqueTerm) -> Option<f64> {
+    if let TorqueTerm::Sigmoid(Sigmoid { steepness, .. }) = term {
+        return Some(width_of_sigmoid(*steepness));
+    }
+    let width = Cell::new(None);
+    // `with_step` alone knows which terms have a step.
+    let _ = term.clone().with_step(|step| {
+        width.set(Some(if let CoulombShape::Smooth { width } = step { width } else { 0.0 }));
+        step
+    });
+    width.get()
+}
+
+/// A sigmoid that has no offset is half a Coulomb step of this width.
+fn width_of_sigmoid(steepness: f64) -> f64 {
+    2.0 / steepness
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_identification::friction::FrictionConstant;
+    use dynident_model::terms::{Stribeck, Viscous};
+
+    const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
+
+    fn coulomb(joint: usize, shape: CoulombShape) -> TorqueTerm {
+        TorqueTerm::Coulomb(Coulomb { joint, shape })
+    }
+
+    fn stribeck(shape: CoulombShape) -> TorqueTerm {
+        TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 2.0, shape })
+    }
+
+    #[test]
+    fn a_step_that_no_run_can_tell_from_dry_friction_is_dry() {
+        let (narrow, wide) = (CoulombShape::Smooth { width: 0.02 }, CoulombShape::Smooth { width: 0.05 });
+        let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
+        // The first joint reaches 2 rad/s and rests below 0.04, the second 0.5 and below 0.01.
+        let terms = [coulomb(0, narrow), coulomb(0, wide), coulomb(1, narrow), stribeck(narrow), viscous.clone()];
+        let simulated = with_dry_steps(&terms, &[2.0, 0.5]);
+        assert_eq!(simulated, [coulomb(0, SIGN), coulomb(0, wide), coulomb(1, narrow), stribeck(SIGN), viscous]);
+    }
+
+    #[test]
+    fn a_joint_that_may_stick_sticks_with_all_of_its_friction() {
+        let smooth = |width| CoulombShape::Smooth { width };
+        let names = ["a", "b"].map(str::to_owned);
+        let sigmoid = TorqueTerm::Sigmoid(Sigmoid { joint: 1, steepness: 50.0, offset_speed: 0.0 });
+        let terms = [coulomb(0, smooth(0.005)), stribeck(smooth(0.02)), sigmoid.clone()];
+        let parameters = [1.0, 0.5, 3.0];
+        let fastest = [0.5, 0.5];
+        let sticking = |chose: &[JointFriction]| with_sticking_joints((&terms, &parameters), (&names, chose), &fastest);
+
+        // The first joint's Coulomb friction is dry by its width, and so is the rest of its friction then.
+        let of_width = (vec![coulomb(0, SIGN), stribeck(SIGN), sigmoid], parameters.to_vec());
+        assert_eq!(sticking(&[]), Some(of_width));
+
+        // The second's may be by the interval of its steepness: half a step of both directions together.
+        let steepness = FrictionConstant {
+            term: "sigmoid".to_owned(),
+            constant: "steepness".to_owned(),
+            value: 50.0,
+            interval_95: [10.0, 250.0],
+        };
+        let chosen = |interval_95| {
+            let constants = vec![FrictionConstant { interval_95, ..steepness.clone() }];
+            [JointFriction { constants, ..JointFriction::as_stated("b", "a test") }]
+        };
+        let of_interval = (vec![coulomb(0, SIGN), stribeck(SIGN), coulomb(1, SIGN)], vec![1.0, 0.5, 1.5]);
+        assert_eq!(sticking(&chosen([10.0, 250.0])), Some(of_interval));
+        assert_ne!(sticking(&chosen([10.0, 150.0])), sticking(&chosen([10.0, 250.0])));
+
+        // Wide steps are no dry friction, and one that is dry in any case is nothing more.
+        let plain = [coulomb(0, smooth(0.02)), coulomb(1, smooth(0.005))];
+        assert_eq!(with_sticking_joints((&plain, &[1.0, 1.0]), (&names, &[]), &fastest), None);
+    }
+}
