@@ -7,7 +7,6 @@ use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};
 use crate::forecast::MotionForecast;
-use crate::friction_chosen::friction_chosen;
 use crate::good_log::GoodLog;
 use crate::held_out::HeldOutCame;
 use crate::identify_run::identify_run;
@@ -208,14 +207,14 @@ impl Iteration {
             record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
         }
         let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
-        let (task, _) = self.in_force(&all)?;
+        let (task, in_force) = self.in_force(&all)?;
         let task = IterationTask { legs: legs.clone(), ..task.into_owned() };
         let after = record.pooled.as_ref().unwrap_or(&own);
         let errors = &record.max_tracking_error_rad;
         // The first good run is not judged, whatever it was under.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
-            let known = (after, &friction_chosen(&all)[..]);
+            let known = (after, &in_force.friction_before[..]);
             add_tracking_floors(evidence, &task, records, &self.settings, known, errors);
             evidence.other_length = other_length(&task, &runs, &settings, after)?;
         }

@@ -1,9 +1,8 @@
 //! Friction of a simulated robot whose step at rest is narrower than runs can tell: it is dry friction.
 
 use crate::rests::MOVING;
-use core::cell::Cell;
-use dynident_identification::friction::JointFriction;
-use dynident_model::terms::{Coulomb, CoulombShape, Sigmoid, TorqueTerm};
+use dynident_identification::friction::{FrictionConstant, JointFriction};
+use dynident_model::terms::{Coulomb, CoulombShape, Sigmoid, TermConstant, TorqueTerm};
 
 /// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
 /// than the speed below which a joint rests is dry friction with stiction. Runs cannot tell it from one, it holds a
@@ -31,13 +30,8 @@ pub(crate) fn with_sticking_joints(
     let sticks = |joint: usize| {
         let own = terms.iter().filter(|term| term.is_joint_friction() && term.own_joint() == Some(joint));
         let of_model = own.filter_map(width_of_step);
-        let of_choice = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| {
-            one.constants.iter().filter_map(|constant| match &constant.constant[..] {
-                "width" => Some(constant.interval_95[0]),
-                "steepness" => Some(width_of_sigmoid(constant.interval_95[1])),
-                _ => None,
-            })
-        });
+        let of_choice = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| &one.constants);
+        let of_choice = of_choice.filter_map(FrictionConstant::narrowest_step);
         of_model.chain(of_choice).fold(f64::INFINITY, f64::min) <= MOVING * fastest[joint]
     };
     let sticking: Vec<bool> = (0..fastest.len()).map(sticks).collect();
@@ -56,29 +50,21 @@ pub(crate) fn with_sticking_joints(
     (found != with_dry_steps(terms, fastest)).then_some((found, parameters))
 }
 
-/// The width of the step of a term that has one.
+/// The width of the step of a term that has one, 0 for dry friction. A sigmoid without offset is half a Coulomb step.
 fn width_of_step(term: &TorqueTerm) -> Option<f64> {
     if let TorqueTerm::Sigmoid(Sigmoid { steepness, .. }) = term {
-        return Some(width_of_sigmoid(*steepness));
+        return Some(2.0 / steepness);
     }
-    let width = Cell::new(None);
-    // `with_step` alone knows which terms have a step.
-    let _ = term.clone().with_step(|step| {
-        width.set(Some(if let CoulombShape::Smooth { width } = step { width } else { 0.0 }));
-        step
-    });
-    width.get()
-}
-
-/// A sigmoid that has no offset is half a Coulomb step of this width.
-fn width_of_sigmoid(steepness: f64) -> f64 {
-    2.0 / steepness
+    term.constants().into_iter().find_map(|(_, constant)| match constant {
+        TermConstant::Step(CoulombShape::Smooth { width }) => Some(width),
+        TermConstant::Step(CoulombShape::Sign { .. }) => Some(0.0),
+        _ => None,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_identification::friction::FrictionConstant;
     use dynident_model::terms::{Stribeck, Viscous};
 
     const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };

@@ -74,6 +74,19 @@ pub struct FrictionConstant {
     pub interval_95: [f64; 2],
 }
 
+impl FrictionConstant {
+    /// The narrowest step at rest that its 95 % interval leaves, rad/s (m/s): the lower end of a `width`; of a
+    /// `steepness` `φ₂` what half a Coulomb step of width `2/φ₂` has at the upper end. `None` for other constants.
+    pub fn narrowest_step(&self) -> Option<f64> {
+        let [least, most] = self.interval_95;
+        match &self.constant[..] {
+            "width" => Some(least),
+            "steepness" => Some(2.0 / most),
+            _ => None,
+        }
+    }
+}
+
 /// One model of a joint's friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
