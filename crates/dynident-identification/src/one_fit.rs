@@ -229,11 +229,7 @@ fn chosen_here<'a>(
     let (mut friction_hz, mut of_grid) = (None, None);
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
         let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
-        let friction = if settings.friction_before.is_empty() {
-            ChosenFriction::as_stated(first)
-        } else {
-            choose_friction((&logs, settings), &robot, (chosen, payloads))?
-        };
+        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
         (logs, cutoff, friction)
     } else {
         let places = (chosen, payloads);

@@ -89,11 +89,12 @@ fn friction_by_terms(
     let (passes, searches) = (passes_over(logs, settings, (training, payloads)), searches_of(settings, robot));
     let of_constants = passes_over(of_constants, settings, (training, payloads));
     if searches.is_empty() {
-        let mut stated = RegressorModel::from(robot.clone());
-        // Without the load that friction depends on, what it does would pass for noise.
-        if stated.needs_load() {
-            stated = of_constants.fit(stated)?.model;
+        let stated = RegressorModel::from(robot.clone());
+        if settings.friction_before.is_empty() {
+            return Ok(ChosenFriction::as_stated(stated));
         }
+        // Without the load that friction depends on, what it does would pass for noise.
+        let stated = if stated.needs_load() { of_constants.fit(stated)?.model } else { stated };
         let constants_error = error_of_constants(&of_constants, &settings.friction_before, &stated)?;
         return Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) });
     }

@@ -5,7 +5,7 @@ use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{
-    ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, is_one_friction, second_start,
+    ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, Weak, is_one_friction, second_start,
 };
 use crate::likelihood::{JointScore, deviance};
 use crate::regressor_model::RegressorModel;
@@ -268,12 +268,8 @@ pub(crate) fn with_constants(
 
         // Terms that are not seen once constants are free: the weakest of every joint, then again. Where the passes got
         // no further terms may say something together that none of them says alone; what no row shows says nothing.
-        let norms = measured.problem.column_norms();
-        let fewer = if are_found {
-            constants.without_unshown((&model, &norms), &step)
-        } else {
-            constants.without_weakest((&model, &norms), &step)
-        };
+        let weak = if are_found { Weak::Unshown } else { Weak::Unseen };
+        let fewer = constants.without_weakest(weak, (&model, &measured.problem.column_norms()), &step);
         if pass >= MOST_PASSES {
             if !fewer.is_empty() {
                 model = with_chosen(robot, joints, &fewer, (&model, fit))?;

@@ -12,7 +12,7 @@
 use super::candidates::JointScale;
 use super::choice::{FrictionConstant, JointFriction};
 use super::constants::{at, coordinates, step_of, value_at};
-use super::weak_terms::{has_doubtful_term, without_unshown, without_weakest};
+use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, LinearProblem};
@@ -132,38 +132,19 @@ impl FrictionConstants {
         moved
     }
 
-    /// The joints with a further term that is not seen with the constants free, and their terms without it. `norms` are
+    /// The joints with a further term that is `weak` with the constants free, and their terms without it. `norms` are
     /// those of the model's columns over all rows.
     pub(crate) fn without_weakest(
         &self,
-        model: (&RegressorModel, &[f64]),
-        last: &ConstantsStep,
-    ) -> Vec<(usize, Vec<TorqueTerm>)> {
-        self.with_fewer(model, last, |terms, columns, own| without_weakest(terms, columns, &last.estimate, own))
-    }
-
-    /// The same for a further term that drives the joint or that no row shows, however well the others may be found.
-    pub(crate) fn without_unshown(
-        &self,
-        model: (&RegressorModel, &[f64]),
-        last: &ConstantsStep,
-    ) -> Vec<(usize, Vec<TorqueTerm>)> {
-        self.with_fewer(model, last, |terms, columns, own| without_unshown(terms, columns, &last.estimate, own))
-    }
-
-    /// The joints that have `fewer` terms, by their terms, the model's columns with their norms, and where constants of
-    /// a term stand.
-    fn with_fewer(
-        &self,
+        weak: Weak,
         (model, norms): (&RegressorModel, &[f64]),
         last: &ConstantsStep,
-        fewer: impl Fn(&[TorqueTerm], (&[Column], &[f64]), &dyn Fn(&TorqueTerm) -> Vec<usize>) -> Option<Vec<TorqueTerm>>,
     ) -> Vec<(usize, Vec<TorqueTerm>)> {
         let columns = model.layout().columns();
         let first = last.estimate.values.len() - self.axes.len();
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
             let own_constants = |term: &TorqueTerm| self.own_constants(place, term, first);
-            Some((*joint, fewer(terms, (columns, norms), &own_constants)?))
+            Some((*joint, without_weakest((terms, weak), (columns, norms), &last.estimate, own_constants)?))
         };
         self.joints.iter().enumerate().filter_map(of_joint).collect()
     }

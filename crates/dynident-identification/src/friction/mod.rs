@@ -16,3 +16,4 @@ pub(crate) use choice::choose_friction;
 pub(crate) use constants::smooth_width;
 pub(crate) use constants_fit::{ConstantsError, ConstantsStep, FrictionConstants};
 pub(crate) use second_start::{is_one_friction, second_start};
+pub(crate) use weak_terms::Weak;

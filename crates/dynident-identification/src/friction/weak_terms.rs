@@ -90,30 +90,31 @@ fn further_terms(
     terms.iter().filter_map(of).collect()
 }
 
-/// The terms of a joint without the further one that is seen least; `None` where all of them are seen. The estimate,
-/// its columns and the constants are as in [`further_terms`].
+/// Which further terms are weak.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Weak {
+    /// Those that are not seen: chance would make as much.
+    Unseen,
+    /// Those alone that drive the joint or that no row shows.
+    Unshown,
+}
+
+/// The terms of a joint without the further one that is seen least; `None` where none is `weak`. The estimate, its
+/// columns and the constants are as in [`further_terms`].
 pub(super) fn without_weakest(
-    terms: &[TorqueTerm],
+    (terms, weak): (&[TorqueTerm], Weak),
     columns: (&[Column], &[f64]),
     estimate: &Estimate,
     own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
 ) -> Option<Vec<TorqueTerm>> {
     let of = |further: Further| (further.in_units_of(&SEEN), further.left);
     let further = further_terms(terms, columns, estimate, own_constants).into_iter().map(of);
-    let weakest = further.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (weakest.0 < 1.0).then_some(weakest.1)
-}
-
-/// The terms of a joint without a further one that drives the joint or that no row shows; `None` where there is none.
-/// The estimate, its columns and the constants are as in [`further_terms`].
-pub(super) fn without_unshown(
-    terms: &[TorqueTerm],
-    columns: (&[Column], &[f64]),
-    estimate: &Estimate,
-    own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
-) -> Option<Vec<TorqueTerm>> {
-    let further = further_terms(terms, columns, estimate, own_constants);
-    further.into_iter().find(|further| further.square == 0.0).map(|further| further.left)
+    let (seen, left) = further.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let is_weak = match weak {
+        Weak::Unseen => seen < 1.0,
+        Weak::Unshown => seen <= 0.0,
+    };
+    is_weak.then_some(left)
 }
 
 /// Whether further terms of a joint of which a first look at the same motion had none, whose terms are `before`, may
@@ -181,9 +182,9 @@ mod tests {
         // Far beyond its own bar, both times.
         assert!(estimate.values[1] > 5.0 * estimate.std[1], "{} +- {}", estimate.values[1], estimate.std[1]);
         let norms = problem.column_norms();
-        let left = without_weakest(&terms, (&columns, &norms), &estimate, |_| Vec::new());
-        assert_eq!(without_unshown(&terms, (&columns, &norms), &estimate, |_| Vec::new()), left);
-        left
+        let without = |weak| without_weakest((&terms, weak), (&columns, &norms), &estimate, |_| Vec::new());
+        assert_eq!(without(Weak::Unshown), without(Weak::Unseen));
+        without(Weak::Unseen)
     }
 
     /// Steps of Coulomb friction of 5.0 and 5.085 Nm by direction in rows that know the difference to 0.035: two and a
@@ -218,11 +219,13 @@ mod tests {
         let plain = [TorqueTerm::Coulomb(Coulomb { joint: 0, shape })];
         let is_doubtful =
             |before: &[TorqueTerm]| has_doubtful_term((&terms, before), (&columns, &norms), &estimate, |_| Vec::new());
-        assert_eq!(without_weakest(&terms, (&columns, &norms), &estimate, |_| Vec::new()), None);
+        let without =
+            |weak, estimate: &_| without_weakest((&terms, weak), (&columns, &norms), estimate, |_| Vec::new());
+        assert_eq!(without(Weak::Unseen, &estimate), None);
         // What is too weak is shown all the same.
-        let weak = estimate.with_further_error(&DMatrix::from_diagonal_element(2, 2, 1.0));
-        assert_eq!(without_weakest(&terms, (&columns, &norms), &weak, |_| Vec::new()).as_deref(), Some(&plain[..]));
-        assert_eq!(without_unshown(&terms, (&columns, &norms), &weak, |_| Vec::new()), None);
+        let blurred = estimate.with_further_error(&DMatrix::from_diagonal_element(2, 2, 1.0));
+        assert_eq!(without(Weak::Unseen, &blurred).as_deref(), Some(&plain[..]));
+        assert_eq!(without(Weak::Unshown, &blurred), None);
         assert!(is_doubtful(&plain) && !is_doubtful(&terms));
     }
 
