@@ -89,6 +89,7 @@ pub use regressor::torque_regressor;
 pub use regressor_adjoint::{MotionGradient, regressor_panels_adjoint};
 pub use regressor_panels::{
     Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following, regressor_panels_of_sample,
+    term_panels_following,
 };
 pub use term_history::TermHistory;
 pub use workspace::{BatchWorkspace, Workspace};

@@ -348,6 +348,25 @@ pub fn regressor_panels_following(
     fill_terms(layout, motion, history, panels);
 }
 
+/// Fills nothing but the columns of terms, as [`regressor_panels_following`] does; those of bodies are left as they
+/// were. Load-dependent terms need the load that bodies' columns make, and have columns of zeros here.
+///
+/// # Panics
+/// If an array's length is not joints × samples.
+pub fn term_panels_following(
+    layout: &PanelLayout,
+    motion: &JointMotion<'_>,
+    history: &mut TermHistory,
+    panels: &mut Panels,
+) {
+    let numbers = layout.dof() * motion.samples;
+    assert!([motion.q, motion.dq, motion.ddq].iter().all(|x| x.len() == numbers), "joints x samples numbers each");
+    panels.resize(layout, motion.samples);
+    let load_parameters = history.load_parameters.take();
+    fill_terms(layout, motion, history, panels);
+    history.load_parameters = load_parameters;
+}
+
 /// [`regressor_panels_following`] for one sample at a time: the same panels to rounding, in less than half the time
 /// that a block of one sample takes.
 ///

@@ -418,6 +418,10 @@ struct FactorConsumer<'a> {
 }
 
 impl RowConsumer for FactorConsumer<'_> {
+    fn reads_samples(&self) -> bool {
+        false
+    }
+
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);

@@ -82,6 +82,10 @@ struct VisitorConsumer<'a, 'b> {
 }
 
 impl RowConsumer for VisitorConsumer<'_, '_> {
+    fn reads_samples(&self) -> bool {
+        false
+    }
+
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if self.refused.is_none() {
             let rows = rows.counted(&mut self.counted);

@@ -1,49 +1,32 @@
-//! Blocks of a motion into rows of regressor and torque.
+//! Blocks of a motion into rows of regressor and torque, filtered alike.
 
-use super::coverage::set_aside;
+use super::RowConsumer;
 use super::joint_filters::JointFilters;
 use super::mask::RowMask;
+use super::samples::{PanelMaker, SamplePanels};
 use super::velocities::VelocityHistogram;
-use super::{PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
-use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
-use dynident_model::terms::JointMotion;
+use dynident_dynamics::Column;
 use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
-
-/// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
-pub(crate) fn in_model_order(
-    block: &MotionBlock,
-    places: &[usize],
-    from: usize,
-    samples: usize,
-    motion: &mut [Vec<f64>; 3],
-) {
-    for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
-        to.clear();
-        for &place in places {
-            to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
-        }
-    }
-}
 
 /// Turns blocks of a motion into rows of regressor and torque, filtered alike.
 #[derive(Debug)]
 pub struct RowBuilder<'a> {
-    model: &'a RegressorModel,
-    places: Vec<usize>,
-    workspace: BatchWorkspace,
-    panels: Panels,
-    history: TermHistory,
+    maker: PanelMaker<'a>,
+    filter: PanelFilter<'a>,
+    panels: SamplePanels,
+}
+
+/// Makes panels of samples into rows.
+#[derive(Debug)]
+pub(super) struct PanelFilter<'a> {
+    /// Of every joint the first columns that are not made into rows: bodies that only tell the load.
+    unfiltered: Vec<usize>,
     filters: JointFilters,
     mask: Option<RowMask<'a>>,
-    set_aside: Vec<Vec<bool>>,
-    temperature_c: Vec<f64>,
     segment: usize,
-    motion: [Vec<f64>; 3],
-    velocities: Vec<VelocityHistogram>,
     filtered_rows: u64,
-    samples: u64,
 }
 
 impl<'a> RowBuilder<'a> {
@@ -57,60 +40,79 @@ impl<'a> RowBuilder<'a> {
         rate_hz: f64,
         filter: Option<&DecimationSettings>,
     ) -> Result<Self, FilterError> {
-        let layout = model.layout();
-        let columns: Vec<usize> = (0..model.dof()).map(|joint| layout.joint_columns(joint).len() + 1).collect();
-        Ok(Self {
-            model,
-            places: places.to_vec(),
-            workspace: BatchWorkspace::new(model.model()),
-            panels: Panels::default(),
-            history: TermHistory::new(model.load_parameters.clone()),
-            filters: JointFilters::new(&columns, rate_hz, filter)?,
-            mask: None,
-            set_aside: Vec::new(),
-            temperature_c: Vec::new(),
-            segment: 0,
-            motion: [Vec::new(), Vec::new(), Vec::new()],
-            velocities: vec![VelocityHistogram::default(); places.len()],
-            filtered_rows: 0,
-            samples: 0,
-        })
+        Self::of(PanelMaker::new(model, places), vec![0; model.dof()], rate_hz, filter)
+    }
+
+    /// The same of nothing but some `terms` of the model: each joint's rows have those that it feels, in their order,
+    /// and its torque.
+    pub(super) fn of_terms(
+        model: &'a RegressorModel,
+        terms: &[Column],
+        places: &[usize],
+        rate_hz: f64,
+        filter: Option<&DecimationSettings>,
+    ) -> Result<Self, FilterError> {
+        let maker = PanelMaker::of_terms(model, terms, places);
+        let layout = maker.layout();
+        let is_body = |&&column: &&usize| matches!(layout.columns()[column], Column::Body { .. });
+        let bodies_of = |joint: usize| layout.joint_columns(joint).iter().filter(is_body).count();
+        let unfiltered = (0..model.dof()).map(bodies_of).collect();
+        Self::of(maker, unfiltered, rate_hz, filter)
+    }
+
+    fn of(
+        maker: PanelMaker<'a>,
+        unfiltered: Vec<usize>,
+        rate_hz: f64,
+        filter: Option<&DecimationSettings>,
+    ) -> Result<Self, FilterError> {
+        let layout = maker.layout();
+        let of_joint = |(joint, unfiltered): (usize, &usize)| layout.joint_columns(joint).len() + 1 - unfiltered;
+        let columns: Vec<usize> = unfiltered.iter().enumerate().map(of_joint).collect();
+        let filters = JointFilters::new(&columns, rate_hz, filter)?;
+        let filter = PanelFilter { unfiltered, filters, mask: None, segment: 0, filtered_rows: 0 };
+        Ok(Self { maker, filter, panels: SamplePanels::default() })
     }
 
     /// The same that leaves out rows that do not count.
     pub(crate) fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
-        self.mask = mask;
+        self.filter.mask = mask;
         self
     }
 
     /// Where the model's joints stand in the motion.
     pub(crate) fn places(&self) -> &[usize] {
-        &self.places
+        self.maker.places()
     }
 
     /// Samples to either side of a filtered row that it is made from.
     pub(crate) fn reach(&self) -> usize {
-        self.filters.reach()
+        self.filter.filters.reach()
     }
 
     /// Samples that the first filtered row needs.
     pub(crate) fn needed(&self) -> usize {
-        self.filters.needed()
+        self.filter.filters.needed()
     }
 
     /// Filtered rows of each joint so far, whether they counted or not.
     pub(crate) fn filtered_rows(&self) -> u64 {
-        self.filtered_rows
+        self.filter.filtered_rows
     }
 
     /// Samples so far.
     pub(crate) fn samples(&self) -> u64 {
-        self.samples
+        self.maker.samples()
     }
 
     /// How often each joint moved at which velocity so far.
     pub(crate) fn into_velocities(self) -> Vec<VelocityHistogram> {
-        self.velocities
+        self.maker.into_velocities()
+    }
+
+    /// What makes panels of samples, and what makes rows of panels.
+    pub(super) fn halves(&mut self) -> (&mut PanelMaker<'a>, &mut PanelFilter<'a>) {
+        (&mut self.maker, &mut self.filter)
     }
 
     /// Makes the rows of the next samples.
@@ -118,84 +120,41 @@ impl<'a> RowBuilder<'a> {
     /// # Errors
     /// What the consumer returns.
     pub fn take(&mut self, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
-        if block.segment != self.segment {
-            self.segment = block.segment;
-            self.history.restart();
-            self.filters.restart();
-        }
-        let (model, layout) = (self.model.model(), self.model.layout());
-        for from in (0..block.rows).step_by(PANEL_SAMPLES) {
-            let samples = PANEL_SAMPLES.min(block.rows - from);
-            in_model_order(block, &self.places, from, samples, &mut self.motion);
-            let [q, dq, ddq] = &self.motion;
-            let motion = JointMotion { samples, q, dq, ddq };
-            let known = settled(block, from, samples);
-            for (velocities, dq) in self.velocities.iter_mut().zip(dq.chunks_exact(samples)) {
-                velocities.add(&dq[known.clone()]);
-            }
-            if !block.temperature_c.is_empty() {
-                self.temperature_c.clear();
-                for &place in &self.places {
-                    let temperature = block.joint(&block.temperature_c, place);
-                    self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
-                }
-                self.history.set_temperature(&self.temperature_c);
-            }
-            regressor_panels_following(
-                model,
-                &mut self.workspace,
-                layout,
-                &motion,
-                &mut self.history,
-                &mut self.panels,
-            );
-            for (joint, &place) in self.places.iter().enumerate() {
-                let tau = &block.joint(block.fitted_tau(), place)[from..from + samples];
-                let torque = self.panels.torque_mut(joint);
-                torque.copy_from_slice(tau);
-                if let Some(gain) = self.model.torque_gains.get(joint) {
-                    for torque in torque {
-                        *torque *= gain;
-                    }
-                }
-            }
-            self.set_aside.clear();
-            if !block.set_aside.is_empty() {
-                let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
-                self.set_aside.extend(of_joints);
-            }
-            consumer.raw(&RawSamples {
-                segment: block.segment,
-                rate_hz: block.rate_hz,
-                panels: &self.panels,
-                set_aside: &self.set_aside,
-                settled: known,
-            })?;
-            let mut rows = samples;
-            for joint in 0..model.dof() {
-                let left_out = self.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
-                let all = self.filters.push(joint, self.panels.joint(joint), samples, left_out);
-                rows = all.rows;
-                let counted = match &mut self.mask {
-                    Some(mask) if rows > 0 => mask.apply(&all),
-                    _ => all,
-                };
-                if counted.rows > 0 {
-                    consumer.filtered(&counted)?;
-                }
-            }
-            self.filters.advance(samples);
-            self.filtered_rows += rows as u64;
-            self.samples += samples as u64;
+        let Self { maker, filter, panels } = self;
+        let mut from = 0;
+        while from < block.rows {
+            from = maker.make(block, from, panels);
+            filter.take(panels, consumer)?;
         }
         Ok(())
     }
 }
 
-/// The samples of a panel whose motion does not rest on samples invented at the ends of a piece.
-fn settled(block: &MotionBlock, from: usize, samples: usize) -> core::ops::Range<usize> {
-    let [begin, end] = block.unsettled;
-    let inside = begin..block.rows.saturating_sub(end);
-    let clamped = |row: usize| row.clamp(from, from + samples) - from;
-    clamped(inside.start)..clamped(inside.end).max(clamped(inside.start))
+impl PanelFilter<'_> {
+    /// Makes the rows of the next panels.
+    pub(super) fn take(&mut self, samples: &SamplePanels, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
+        let raw = samples.as_raw();
+        if raw.segment != self.segment {
+            self.segment = raw.segment;
+            self.filters.restart();
+        }
+        consumer.raw(&raw)?;
+        let mut rows = samples.samples;
+        for (joint, unfiltered) in self.unfiltered.iter().enumerate() {
+            let left_out = raw.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
+            let panel = &samples.panels.joint(joint)[unfiltered * samples.samples..];
+            let all = self.filters.push(joint, panel, samples.samples, left_out);
+            rows = all.rows;
+            let counted = match &mut self.mask {
+                Some(mask) if rows > 0 => mask.apply(&all),
+                _ => all,
+            };
+            if counted.rows > 0 {
+                consumer.filtered(&counted)?;
+            }
+        }
+        self.filters.advance(samples.samples);
+        self.filtered_rows += rows as u64;
+        Ok(())
+    }
 }

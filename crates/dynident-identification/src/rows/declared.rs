@@ -1,6 +1,6 @@
 //! Logs that go where a declared torque says nothing.
 
-use super::builder::in_model_order;
+use super::samples::in_model_order;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use dynident_model::terms::{JointMotion, TorqueTerm};

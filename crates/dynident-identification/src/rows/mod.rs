@@ -1,8 +1,10 @@
 //! From samples to rows of regressor and torque, filtered alike: what every estimator and every examination reads.
 //!
 //! Samples flow in blocks: positions to motion, motion to regressor blocks, regressor and torque through the same
-//! low-pass and decimation, then to a [`RowConsumer`]. The whole regressor is never stored.
+//! low-pass and decimation, then to a [`RowConsumer`]. The regressor of samples is never stored; filtered rows are,
+//! while they are few.
 
+mod beside;
 mod builder;
 mod coverage;
 mod declared;
@@ -11,16 +13,17 @@ mod joint_filters;
 mod mask;
 mod motion_noise;
 mod pass;
-mod reader;
+mod row_store;
+mod samples;
 mod velocities;
 
 pub use builder::RowBuilder;
-pub(crate) use builder::in_model_order;
 pub(crate) use coverage::{divide_by_coverage, set_aside};
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub(crate) use joint_filters::JointFilters;
 pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
+pub(crate) use samples::in_model_order;
 pub use velocities::VelocityHistogram;
 
 use crate::recording::LogError;
@@ -76,6 +79,12 @@ pub trait RowConsumer {
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
         let _ = samples;
         Ok(())
+    }
+
+    /// Whether [`raw`](Self::raw) has to be called: true by default. Rows that nobody wants the samples of need not be
+    /// made of them anew where an earlier pass over the same motion has left them.
+    fn reads_samples(&self) -> bool {
+        true
     }
 }
 

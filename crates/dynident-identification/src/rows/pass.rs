@@ -1,16 +1,20 @@
 //! One pass over a recording: its rows to a consumer.
 
 use super::RowConsumer;
+use super::beside::panels_beside;
 use super::builder::RowBuilder;
 use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
 use super::mask::RowMask;
-use super::reader::read_beside;
+use super::row_store::{Collector, Keeping, Passed, RowStore};
+use super::samples::SamplePanels;
 use super::velocities::VelocityHistogram;
 use crate::progress::Progress;
 use crate::recording::{LogError, MotionRecord, Recording, Samples};
 use crate::regressor_model::RegressorModel;
-use dynident_recording::{ImportReport, MotionBlock, MotionSettings, MotionStream};
+use core::borrow::Borrow;
+use dynident_dynamics::Column;
+use dynident_recording::{DecimationSettings, ImportReport, MotionBlock, MotionSettings, MotionStream};
 use std::sync::OnceLock;
 
 /// Numbers of all logs' motions together would be too many; of one log at most so many are kept, 256 MiB.
@@ -22,6 +26,18 @@ pub struct KeptLog {
     blocks: Vec<MotionBlock>,
     rate_hz: f64,
     report: ImportReport,
+    /// What filters have made of it.
+    pub(super) rows: RowStore,
+}
+
+impl KeptLog {
+    fn new(blocks: Vec<MotionBlock>, rate_hz: f64, report: ImportReport) -> Self {
+        Self { blocks, rate_hz, report, rows: RowStore::default() }
+    }
+
+    fn samples(&self) -> usize {
+        self.blocks.iter().map(|block| block.rows).sum()
+    }
 }
 
 /// What is known of a recording once its rows have passed.
@@ -110,9 +126,16 @@ impl LogPass<'_> {
             Motion::Record(record) => record.motion.rate_hz,
         };
         let filter = self.filter.decimation(rate_hz, self.torque_hz.or_else(|| motion_band_hz(self.motion)));
+        if let (Motion::Kept(kept), Some(filter)) = (&motion, &filter)
+            && self.may_keep_rows(filter, consumer)
+            && RowStore::has_room(self.model, filter, kept.samples())
+        {
+            return self.kept_rows(kept, (filter, &places), consumer);
+        }
         let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let mut builder = RowBuilder::new(self.model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
         let factor = filter.as_ref().map_or(1, |settings| settings.factor);
+        let mut made = None;
         if let Motion::Record(record) = &motion {
             let reach = builder.reach();
             builder = builder.with_mask(RowMask::of(record, reach, factor));
@@ -121,37 +144,91 @@ impl LogPass<'_> {
         match &mut motion {
             Motion::Record(record) => self.take(&record.motion, &mut builder, consumer)?,
             Motion::Kept(kept) => {
-                for block in &kept.blocks {
-                    if self.is_enough(&builder) {
-                        break;
-                    }
-                    self.take(block, &mut builder, consumer)?;
-                }
+                self.take_all(&kept.blocks, &mut builder, consumer)?;
                 report = Some(kept.report.clone());
             }
             Motion::Stream(stream) => {
-                let blocks = self.stream(stream, &mut builder, consumer)?;
+                let keeps = self.kept.is_some() && filter.as_ref().is_some_and(|one| self.may_keep_rows(one, consumer));
+                let blocks = if keeps {
+                    let mut keeping = Keeping { consumer, rows: Collector::new(self.model.dof()) };
+                    let blocks = self.stream(stream, &mut builder, &mut keeping)?;
+                    made = Some(keeping.rows);
+                    blocks
+                } else {
+                    self.stream(stream, &mut builder, consumer)?
+                };
                 report = Some(stream.report());
                 if let (Some(kept), Some(blocks)) = (self.kept, blocks) {
                     // Another thread may have kept the same meanwhile.
-                    let _ = kept.set(KeptLog { blocks, rate_hz, report: stream.report() });
+                    let _ = kept.set(KeptLog::new(blocks, rate_hz, stream.report()));
                 }
             }
         }
-        let filtered_rows = builder.filtered_rows();
-        if filtered_rows == 0 {
-            let (rows, needed) = (builder.samples(), builder.needed());
-            return Err(LogError::NothingLeft { log: name.clone(), rows, needed });
+        let (rows, needed) = (builder.filtered_rows(), builder.needed());
+        let passed = Passed::from(builder);
+        if let (Some(made), Some(kept), Some(filter)) = (made, self.kept.and_then(OnceLock::get), &filter) {
+            kept.rows.keep(self.model, filter, made, passed.clone());
         }
-        let filtered_rate_hz = rate_hz / factor as f64;
+        self.statistics(report, (rate_hz, filter.as_ref()), (rows, needed), passed)
+    }
+
+    /// What is known of a recording that has passed.
+    fn statistics(
+        &self,
+        report: Option<ImportReport>,
+        (rate_hz, filter): (f64, Option<&DecimationSettings>),
+        (filtered_rows, needed): (u64, usize),
+        passed: Passed,
+    ) -> Result<LogStatistics, LogError> {
+        if filtered_rows == 0 {
+            let log = self.recording.name.clone();
+            return Err(LogError::NothingLeft { log, rows: passed.samples, needed });
+        }
+        let filtered_rate_hz = rate_hz / filter.map_or(1, |settings| settings.factor) as f64;
         Ok(LogStatistics {
             report,
             motion_cutoff_hz: self.motion.differentiator.cutoff_hz(),
             filtered_rate_hz,
             filter_cutoff_hz: filter.map(|settings| settings.cutoff_hz.unwrap_or(0.4 * filtered_rate_hz)),
             filtered_rows,
-            velocities: builder.into_velocities(),
+            velocities: passed.velocities,
         })
+    }
+
+    /// Whether this pass may take rows that others have filtered, and leave its own.
+    fn may_keep_rows(&self, filter: &DecimationSettings, consumer: &dyn RowConsumer) -> bool {
+        !consumer.reads_samples()
+            && self.most_samples.is_none()
+            && self.model.torque_gains.is_empty()
+            && filter.factor > 1
+    }
+
+    /// Sends the rows of a log that is kept to `consumer`; only those columns are made that no pass has left.
+    fn kept_rows(
+        &self,
+        kept: &KeptLog,
+        (filter, places): (&DecimationSettings, &[usize]),
+        consumer: &mut dyn RowConsumer,
+    ) -> Result<LogStatistics, LogError> {
+        let name = &self.recording.name;
+        let in_filter = |source| LogError::Filter { log: name.clone(), source };
+        let mut needed = 0;
+        let mut made = 0;
+        let mut pass = |terms: Option<&[Column]>, consumer: &mut dyn RowConsumer| -> Result<Passed, LogError> {
+            let mut builder = match terms {
+                None => RowBuilder::new(self.model, places, kept.rate_hz, Some(filter)),
+                Some(terms) => RowBuilder::of_terms(self.model, terms, places, kept.rate_hz, Some(filter)),
+            }
+            .map_err(in_filter)?;
+            self.take_all(&kept.blocks, &mut builder, consumer)?;
+            (needed, made) = (builder.needed(), builder.samples());
+            Ok(builder.into())
+        };
+        let rows = kept.rows.rows(self.model, filter, &mut pass)?;
+        self.progress.advance(rows.samples() - made);
+        rows.give(self.model, consumer)?;
+        let passed = Passed { samples: rows.samples(), velocities: rows.velocities().to_vec() };
+        self.statistics(Some(kept.report.clone()), (kept.rate_hz, Some(filter)), (rows.count(), needed), passed)
     }
 
     /// Gives the motion to `take`, block by block and without its regressor: as it was kept, or read once and kept if
@@ -170,7 +247,7 @@ impl LogPass<'_> {
             _ => {
                 let stream = self.recording.open(self.model.model(), self.motion)?;
                 let mut stream = stream.ok_or_else(|| LogError::NoSamples { log: name.clone() })?;
-                let mut keeper = BlockCache { blocks: self.kept.is_some().then(Vec::new), numbers: 0 };
+                let mut keeper = self.block_cache();
                 let mut block = MotionBlock::default();
                 while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
                     take(&block)?;
@@ -180,7 +257,7 @@ impl LogPass<'_> {
                 let report = stream.report();
                 if let (Some(kept), Some(blocks)) = (self.kept, keeper.blocks) {
                     // Another thread may have kept the same meanwhile.
-                    let _ = kept.set(KeptLog { blocks, rate_hz: stream.rate_hz(), report: report.clone() });
+                    let _ = kept.set(KeptLog::new(blocks, stream.rate_hz(), report.clone()));
                 }
                 Ok(Some(report))
             }
@@ -237,8 +314,58 @@ impl LogPass<'_> {
         Ok(())
     }
 
+    /// Sends the rows of blocks that are kept to `consumer`, all of them or as many as are asked for.
+    fn take_all(
+        &self,
+        blocks: &[MotionBlock],
+        builder: &mut RowBuilder<'_>,
+        consumer: &mut dyn RowConsumer,
+    ) -> Result<(), LogError> {
+        if self.reader_thread && self.most_samples.is_none() {
+            let mut blocks = blocks.iter();
+            return self.beside(builder, consumer, move |_| Ok(blocks.next()), |_| None);
+        }
+        for block in blocks {
+            if self.is_enough(builder) {
+                break;
+            }
+            self.take(block, builder, consumer)?;
+        }
+        Ok(())
+    }
+
+    /// Sends the rows of blocks to `consumer`, with a second thread that gets them and makes their panels.
+    fn beside<B: Borrow<MotionBlock> + Send>(
+        &self,
+        builder: &mut RowBuilder<'_>,
+        consumer: &mut dyn RowConsumer,
+        next: impl FnMut(Option<B>) -> Result<Option<B>, LogError> + Send,
+        mut keep: impl FnMut(B) -> Option<B>,
+    ) -> Result<(), LogError> {
+        let (maker, filter) = builder.halves();
+        let make = |block: &MotionBlock, from: usize, panels: &mut SamplePanels| {
+            if from == 0 {
+                require_declared(self.model, &self.recording.name, block, maker.places())?;
+            }
+            Ok(maker.make(block, from, panels))
+        };
+        let filter = |panels: &SamplePanels| filter.take(panels, consumer);
+        panels_beside(next, make, filter, |block| {
+            self.progress.advance(block.borrow().rows as u64);
+            keep(block)
+        })
+    }
+
     fn is_enough(&self, builder: &RowBuilder<'_>) -> bool {
         self.most_samples.is_some_and(|most| builder.samples() >= most)
+    }
+
+    /// Where the blocks of a log go that is read whole and seems to fit.
+    fn block_cache(&self) -> BlockCache {
+        let rows = self.recording.estimated_rows().unwrap_or(0) as usize;
+        let seems_to_fit = rows.saturating_mul(4 * self.model.dof()) <= MOST_KEPT_NUMBERS;
+        let keeps = self.kept.is_some() && self.most_samples.is_none() && seems_to_fit;
+        BlockCache { blocks: keeps.then(Vec::new), numbers: 0 }
     }
 
     /// Reads a log to its end, or to as many samples as are asked for; returns its blocks if it was read whole and they
@@ -250,14 +377,14 @@ impl LogPass<'_> {
         consumer: &mut dyn RowConsumer,
     ) -> Result<Option<Vec<MotionBlock>>, LogError> {
         let name = &self.recording.name;
-        let mut keeper =
-            BlockCache { blocks: (self.kept.is_some() && self.most_samples.is_none()).then(Vec::new), numbers: 0 };
+        let mut keeper = self.block_cache();
         if self.reader_thread && self.most_samples.is_none() {
-            let take = |block: MotionBlock| {
-                self.take(&block, builder, consumer)?;
-                Ok(keeper.keep(block))
+            let next = |block: Option<MotionBlock>| {
+                let mut block = block.unwrap_or_default();
+                let is_block = stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))?;
+                Ok(is_block.then_some(block))
             };
-            read_beside(stream, take).map_err(|error| error.named(name))?;
+            self.beside(builder, consumer, next, |block| keeper.keep(block))?;
         } else {
             let mut block = MotionBlock::default();
             while !self.is_enough(builder)

@@ -1,0 +1,466 @@
+//! Rows that passes over a log have filtered before.
+//!
+//! Passes over one motion differ in few columns: friction whose constants move, candidates, terms that know another
+//! load. All others come out of the same filter with the same numbers, so they are kept while they are few, and a pass
+//! makes only the columns that it does not find. What a consumer sees is what it would see without, bit for bit.
+
+use super::builder::RowBuilder;
+use super::velocities::VelocityHistogram;
+use super::{JointRows, RowConsumer};
+use crate::recording::LogError;
+use crate::regressor_model::RegressorModel;
+use dynident_dynamics::Column;
+use dynident_model::Model;
+use dynident_recording::DecimationSettings;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Numbers that are kept of one log, at most: 64 MiB.
+const MOST_NUMBERS: usize = 1 << 23;
+
+/// A column of one joint as it left the filter.
+type Filtered = Arc<Vec<f64>>;
+
+/// The filtered rows of one log, by filter.
+#[derive(Debug, Default)]
+pub(super) struct RowStore(Mutex<Vec<Arc<FilteredRows>>>);
+
+/// What one filter has made of a log: the same rows for any model of the same bodies.
+#[derive(Clone, Debug)]
+pub(super) struct FilteredRows {
+    filter: DecimationSettings,
+    model: Model,
+    /// Rows of every panel of samples, as they go to a consumer.
+    pieces: Vec<usize>,
+    joints: Vec<FilteredJoint>,
+    samples: u64,
+    velocities: Vec<VelocityHistogram>,
+}
+
+/// All rows of one joint.
+#[derive(Clone, Debug, Default)]
+struct FilteredJoint {
+    columns: Vec<(Column, Filtered)>,
+    torque: Filtered,
+    /// The rows' coverage, one where all samples count.
+    coverage: Filtered,
+}
+
+impl RowStore {
+    /// Whether the rows that this filter makes of `samples` samples are few enough to be kept.
+    pub(super) fn has_room(model: &RegressorModel, filter: &DecimationSettings, samples: usize) -> bool {
+        let columns: usize = (0..model.dof()).map(|joint| model.layout().joint_columns(joint).len() + 2).sum();
+        filter.factor > 1 && samples / filter.factor * columns <= MOST_NUMBERS
+    }
+
+    /// The rows of `model` behind `filter`: what is kept of them, and the rest of what `pass` sends to its consumer
+    /// from a builder of all columns or of some terms.
+    pub(super) fn rows(
+        &self,
+        model: &RegressorModel,
+        filter: &DecimationSettings,
+        pass: &mut dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<Passed, LogError>,
+    ) -> Result<Arc<FilteredRows>, LogError> {
+        let kept = self.lock().iter().find(|kept| kept.is_of(model.model(), filter)).cloned();
+        let missing = kept.as_ref().and_then(|kept| kept.missing_terms(model));
+        let rows = match (kept, missing) {
+            (Some(kept), Some(missing)) if missing.is_empty() => return Ok(kept),
+            (Some(kept), Some(missing)) => {
+                let mut made = Collector::new(model.dof());
+                pass(Some(&missing), &mut made)?;
+                kept.with_terms(model, &missing, made)
+            }
+            _ => {
+                let mut made = Collector::new(model.dof());
+                let passed = pass(None, &mut made)?;
+                FilteredRows::new(model, filter, made, passed)
+            }
+        };
+        self.put(rows.fewer(model));
+        Ok(Arc::new(rows))
+    }
+
+    /// Keeps all rows of a pass over samples that were read for it.
+    pub(super) fn keep(&self, model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) {
+        if let Some(made) = made.all() {
+            self.put(FilteredRows::new(model, filter, made, passed).fewer(model));
+        }
+    }
+
+    /// Keeps rows in place of those of the same filter; of other filters the oldest go first.
+    fn put(&self, rows: FilteredRows) {
+        let mut all = self.lock();
+        all.retain(|kept| !kept.is_of(&rows.model, &rows.filter));
+        all.push(Arc::new(rows));
+        while all.len() > 1 && all.iter().map(|kept| kept.numbers()).sum::<usize>() > MOST_NUMBERS {
+            all.remove(0);
+        }
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Arc<FilteredRows>>> {
+        // What is kept is whole at any time.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What a pass has seen beside its rows.
+#[derive(Clone)]
+pub(super) struct Passed {
+    pub(super) samples: u64,
+    pub(super) velocities: Vec<VelocityHistogram>,
+}
+
+impl From<RowBuilder<'_>> for Passed {
+    fn from(builder: RowBuilder<'_>) -> Self {
+        Self { samples: builder.samples(), velocities: builder.into_velocities() }
+    }
+}
+
+impl FilteredRows {
+    fn new(model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) -> Self {
+        let layout = model.layout();
+        let of_joint = |(joint, made): (usize, CollectedJoint)| {
+            let columns = layout.joint_columns(joint).iter().map(|&column| layout.columns()[column].clone());
+            let (mut values, coverage) = (made.columns, Arc::new(made.coverage));
+            let torque = Arc::new(values.pop().unwrap_or_default());
+            FilteredJoint { columns: columns.zip(values.into_iter().map(Arc::new)).collect(), torque, coverage }
+        };
+        Self {
+            filter: filter.clone(),
+            model: model.model().clone(),
+            pieces: made.pieces,
+            joints: made.joints.into_iter().enumerate().map(of_joint).collect(),
+            samples: passed.samples,
+            velocities: passed.velocities,
+        }
+    }
+
+    fn is_of(&self, model: &Model, filter: &DecimationSettings) -> bool {
+        self.filter == *filter && self.model == *model
+    }
+
+    /// The terms of the model that are not here, in its order; `None` where bodies are not.
+    fn missing_terms(&self, model: &RegressorModel) -> Option<Vec<Column>> {
+        let layout = model.layout();
+        let mut missing = vec![false; layout.columns().len()];
+        for (joint, kept) in self.joints.iter().enumerate() {
+            for &column in layout.joint_columns(joint) {
+                missing[column] |= kept.column(model, &layout.columns()[column]).is_none();
+            }
+        }
+        let missing = layout.columns().iter().zip(missing).filter(|(_, missing)| *missing);
+        let missing: Vec<Column> = missing.map(|(column, _)| column.clone()).collect();
+        missing.iter().all(|column| matches!(column, Column::Term(_))).then_some(missing)
+    }
+
+    /// The same with further terms, or other columns of the same terms, which the collector has in their order.
+    fn with_terms(&self, model: &RegressorModel, terms: &[Column], made: Collector) -> Self {
+        let mut all = self.clone();
+        for (joint, (kept, made)) in all.joints.iter_mut().zip(made.joints).enumerate() {
+            let feels = |column: &&Column| matches!(column, Column::Term(term) if term.joints().contains(&joint));
+            let own = terms.iter().filter(feels).cloned();
+            kept.columns.retain(|(column, _)| !terms.contains(column));
+            kept.columns.extend(own.zip(made.columns.into_iter().map(Arc::new)));
+        }
+        debug_assert!(all.missing_of_any(model).is_none());
+        all
+    }
+
+    /// A column of the model that is not here although it was to be made.
+    fn missing_of_any(&self, model: &RegressorModel) -> Option<Column> {
+        let layout = model.layout();
+        (0..self.joints.len()).find_map(|joint| {
+            let mut columns = layout.joint_columns(joint).iter().map(|&column| &layout.columns()[column]);
+            columns.find(|column| self.joints[joint].values(column).is_none()).cloned()
+        })
+    }
+
+    /// What is worth being kept for other models: no columns that know a load, which changes with every fit, and of
+    /// those that this model does not have as many as there is room for.
+    fn fewer(&self, model: &RegressorModel) -> Self {
+        let layout = model.layout();
+        let mut fewer = self.clone();
+        for (joint, kept) in fewer.joints.iter_mut().enumerate() {
+            kept.columns.retain(|(column, _)| !matches!(column, Column::Term(term) if term.needs_load()));
+            let is_own =
+                |column: &Column| layout.joint_columns(joint).iter().any(|&own| layout.columns()[own] == *column);
+            // The model's own first; of equals the order stays.
+            kept.columns.sort_by_key(|(column, _)| !is_own(column));
+        }
+        let rows: usize = fewer.pieces.iter().sum();
+        let most = (MOST_NUMBERS / (rows.max(1) * fewer.joints.len().max(1))).saturating_sub(2);
+        let bodies = |kept: &FilteredJoint| {
+            kept.columns.iter().filter(|(column, _)| matches!(column, Column::Body { .. })).count()
+        };
+        let spare: usize = fewer.joints.iter().map(|kept| most.saturating_sub(bodies(kept))).sum();
+        let each = spare / fewer.joints.len().max(1);
+        for kept in &mut fewer.joints {
+            let room = bodies(kept) + each;
+            kept.columns.truncate(room.max(bodies(kept)));
+        }
+        fewer
+    }
+
+    fn numbers(&self) -> usize {
+        let rows: usize = self.pieces.iter().sum();
+        rows * self.joints.iter().map(|joint| joint.columns.len() + 2).sum::<usize>()
+    }
+
+    /// Filtered rows of each joint.
+    pub(super) fn count(&self) -> u64 {
+        self.pieces.iter().sum::<usize>() as u64
+    }
+
+    /// Samples that they were made of.
+    pub(super) fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// How often each joint moved at which velocity.
+    pub(super) fn velocities(&self) -> &[VelocityHistogram] {
+        &self.velocities
+    }
+
+    /// Sends the rows of the model to a consumer, in the pieces in which a pass over samples would.
+    pub(super) fn give(&self, model: &RegressorModel, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
+        let layout = model.layout();
+        let of_joint = |(joint, kept): (usize, &FilteredJoint)| -> Vec<Filtered> {
+            let columns = layout.joint_columns(joint).iter();
+            let found = columns.filter_map(|&column| kept.values(&layout.columns()[column]));
+            found.chain([&kept.torque]).map(Arc::clone).collect()
+        };
+        let columns: Vec<Vec<Filtered>> = self.joints.iter().enumerate().map(of_joint).collect();
+        let (mut from, mut panel) = (0, Vec::new());
+        for &rows in self.pieces.iter().filter(|rows| **rows > 0) {
+            for (joint, (columns, kept)) in columns.iter().zip(&self.joints).enumerate() {
+                panel.clear();
+                for column in columns {
+                    panel.extend_from_slice(&column[from..from + rows]);
+                }
+                let coverage = &kept.coverage[from..from + rows];
+                let coverage = if coverage.iter().all(|share| *share == 1.0) { &[] } else { coverage };
+                consumer.filtered(&JointRows { joint, rows, panel: &panel, coverage })?;
+            }
+            from += rows;
+        }
+        Ok(())
+    }
+}
+
+impl FilteredJoint {
+    /// The values of a column that do not depend on more than the motion.
+    fn column(&self, model: &RegressorModel, wanted: &Column) -> Option<&Filtered> {
+        let is_loaded = |term: &dynident_model::terms::TorqueTerm| term.needs_load() && model.load_parameters.is_some();
+        if matches!(wanted, Column::Term(term) if is_loaded(term)) {
+            return None;
+        }
+        self.values(wanted)
+    }
+
+    fn values(&self, wanted: &Column) -> Option<&Filtered> {
+        self.columns.iter().find(|(column, _)| column == wanted).map(|(_, values)| values)
+    }
+}
+
+/// Takes all rows of a pass together, until they are too many.
+pub(super) struct Collector {
+    pieces: Vec<usize>,
+    joints: Vec<CollectedJoint>,
+    numbers: usize,
+}
+
+#[derive(Clone, Default)]
+struct CollectedJoint {
+    columns: Vec<Vec<f64>>,
+    coverage: Vec<f64>,
+}
+
+impl Collector {
+    pub(super) fn new(dof: usize) -> Self {
+        Self { pieces: Vec::new(), joints: vec![CollectedJoint::default(); dof], numbers: 0 }
+    }
+
+    fn has_room(&self) -> bool {
+        self.numbers <= MOST_NUMBERS
+    }
+
+    /// All rows; none where they were too many.
+    fn all(self) -> Option<Self> {
+        self.has_room().then_some(self)
+    }
+
+    fn take(&mut self, rows: &JointRows<'_>) {
+        self.numbers += rows.panel.len() + rows.rows;
+        if !self.has_room() {
+            self.joints.iter_mut().for_each(|joint| *joint = CollectedJoint::default());
+            return;
+        }
+        if rows.joint == 0 {
+            self.pieces.push(rows.rows);
+        }
+        let joint = &mut self.joints[rows.joint];
+        joint.columns.resize_with(rows.panel.len() / rows.rows, Vec::new);
+        for (column, values) in joint.columns.iter_mut().zip(rows.panel.chunks_exact(rows.rows)) {
+            column.extend_from_slice(values);
+        }
+        if rows.coverage.is_empty() {
+            joint.coverage.resize(joint.coverage.len() + rows.rows, 1.0);
+        } else {
+            joint.coverage.extend_from_slice(rows.coverage);
+        }
+    }
+}
+
+impl RowConsumer for Collector {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+        self.take(rows);
+        Ok(())
+    }
+
+    fn reads_samples(&self) -> bool {
+        false
+    }
+}
+
+/// Sends rows on to a consumer and keeps them.
+pub(super) struct Keeping<'c> {
+    pub(super) consumer: &'c mut dyn RowConsumer,
+    pub(super) rows: Collector,
+}
+
+impl RowConsumer for Keeping<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+        self.rows.take(rows);
+        self.consumer.filtered(rows)
+    }
+
+    fn reads_samples(&self) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{KeptLog, LogPass, LogStatistics, ParallelFilterSettings, RawSamples};
+    use super::*;
+    use crate::progress::Silent;
+    use crate::recording::Recording;
+    use dynident_dynamics::ParametricModel;
+    use dynident_model::terms::{
+        Coulomb, CoulombShape, DriveChoice, LoadFriction, MaxwellSlip, Stribeck, TorqueTerm, terms_per_joint,
+    };
+    use dynident_recording::derivative::DifferentiatorSettings;
+    use dynident_recording::{JointSamples, MotionSettings};
+    use std::sync::OnceLock;
+
+    /// All rows to the last bit; with samples in hand a pass makes every column itself.
+    #[derive(Default)]
+    struct Bits {
+        rows: Vec<(usize, usize, Vec<u64>, Vec<u64>)>,
+        samples: usize,
+        reads_samples: bool,
+    }
+
+    impl RowConsumer for Bits {
+        fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+            let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+            // Where all samples count, ones say so as well as nothing.
+            let covered = if rows.coverage.is_empty() { &vec![1.0; rows.rows][..] } else { rows.coverage };
+            self.rows.push((rows.joint, rows.rows, bits(rows.panel), bits(covered)));
+            Ok(())
+        }
+
+        fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
+            self.samples += samples.panels.samples();
+            Ok(())
+        }
+
+        fn reads_samples(&self) -> bool {
+            self.reads_samples
+        }
+    }
+
+    /// Two holes and some torques that are none, at 500 Hz.
+    fn recording(joints: &[String]) -> Recording {
+        let rows = (0..20_000).filter(|row| !(7_000..7_300).contains(row) && !(15_000..15_500).contains(row));
+        let time_s: Vec<f64> = rows.map(|row| f64::from(row) / 500.0).collect();
+        let wave = |joint: usize, t: f64| (0.9 * t + joint as f64).sin() + 0.2 * (2.3 * t).cos();
+        let columns = |of: &dyn Fn(usize, f64) -> f64| {
+            (0..joints.len()).map(|joint| time_s.iter().map(|t| of(joint, *t)).collect()).collect::<Vec<Vec<f64>>>()
+        };
+        let q = columns(&wave);
+        let mut tau = columns(&|joint, t| 10.0 * wave(joint, t + 0.3));
+        for (joint, tau) in tau.iter_mut().enumerate() {
+            tau[2_000 + 37 * joint] = 1e4;
+        }
+        let samples = JointSamples::at_times(time_s.clone(), q, tau);
+        Recording::training("log", samples.into_log("log", joints).unwrap())
+    }
+
+    #[test]
+    fn a_pass_over_rows_that_are_kept_sees_what_a_pass_over_samples_sees() {
+        let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+        let model = dynident_model::load_robot(robot).unwrap().model;
+        let smooth = CoulombShape::Smooth { width: 0.02 };
+        let choice = DriveChoice { viscous: true, coulomb: Some(smooth), offset: true, ..DriveChoice::default() };
+        let plain =
+            RegressorModel::from(ParametricModel::new(model.clone(), terms_per_joint(&model, |_| choice)).unwrap());
+        let coulomb = |width: f64| {
+            (0..6).map(move |joint| TorqueTerm::Coulomb(Coulomb { joint, shape: CoulombShape::Smooth { width } }))
+        };
+        let stribeck = |joint| TorqueTerm::Stribeck(Stribeck { joint, speed: 0.1, exponent: 2.0, shape: smooth });
+        let slip = |joint| TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement: 0.01 });
+        let load = |joint| TorqueTerm::Load(LoadFriction { joint, shape: smooth });
+        let loaded = |values: f64| {
+            let wide = plain.with_further_columns([2, 4].map(load).into_iter().chain([slip(1)]));
+            let of_bodies: Vec<f64> = (0..plain.layout().columns().len()).map(|k| values + 0.1 * k as f64).collect();
+            wide.with_load_of(&plain, &of_bodies)
+        };
+        // One after another: what is kept grows, loads change, and columns are asked for again.
+        let models = [
+            plain.clone(),
+            plain.with_further_columns(coulomb(0.05).chain([stribeck(0), slip(3)])),
+            loaded(1.0),
+            loaded(-2.0),
+            plain.with_further_columns([slip(3)].into_iter().chain(coulomb(0.07))),
+            plain.with_further_columns([2, 4].map(load)),
+            plain.clone(),
+        ];
+
+        let names = plain.joint_names();
+        let recording = recording(&names);
+        let motion = MotionSettings {
+            differentiator: DifferentiatorSettings::default().with_cutoff(4.0),
+            ..MotionSettings::default()
+        };
+        let kept: OnceLock<KeptLog> = OnceLock::new();
+        let filter = ParallelFilterSettings::default();
+        let pass = |model: &RegressorModel, threads: bool, consumer: &mut Bits| -> LogStatistics {
+            let pass = LogPass {
+                recording: &recording,
+                model,
+                motion: &motion,
+                filter: &filter,
+                torque_hz: Some(12.0),
+                reader_thread: threads,
+                most_samples: None,
+                progress: &Silent,
+                kept: Some(&kept),
+            };
+            pass.run(consumer).unwrap()
+        };
+        for (number, model) in models.iter().enumerate() {
+            for threads in [false, true] {
+                let (mut found, mut plain) = (Bits::default(), Bits { reads_samples: true, ..Bits::default() });
+                let of_kept = pass(model, threads, &mut found);
+                let of_samples = pass(model, threads, &mut plain);
+                assert!(plain.samples > 18_000 && !plain.rows.is_empty());
+                assert!(plain.rows.iter().any(|rows| rows.3.iter().any(|share| *share != 1.0_f64.to_bits())));
+                assert_eq!(found.samples, 0, "rows come without their samples");
+                assert!(found.rows == plain.rows, "model {number}, threads {threads}");
+                assert_eq!(of_kept.filtered_rows, of_samples.filtered_rows);
+                assert_eq!(of_kept.velocities, of_samples.velocities);
+            }
+        }
+        assert!(kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MOST_NUMBERS);
+    }
+}

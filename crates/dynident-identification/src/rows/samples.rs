@@ -1,0 +1,189 @@
+//! Samples of a motion as panels of regressor and torque, before any filter.
+
+use super::coverage::set_aside;
+use super::velocities::VelocityHistogram;
+use super::{PANEL_SAMPLES, RawSamples};
+use crate::regressor_model::RegressorModel;
+use core::ops::Range;
+use dynident_dynamics::{
+    BatchWorkspace, Column, PanelLayout, Panels, TermHistory, regressor_panels_following, term_panels_following,
+};
+use dynident_model::terms::JointMotion;
+use dynident_recording::MotionBlock;
+use std::borrow::Cow;
+
+/// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
+pub(crate) fn in_model_order(
+    block: &MotionBlock,
+    places: &[usize],
+    from: usize,
+    samples: usize,
+    motion: &mut [Vec<f64>; 3],
+) {
+    for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
+        to.clear();
+        for &place in places {
+            to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
+        }
+    }
+}
+
+/// Makes the panels of a motion, some hundred samples after the other.
+#[derive(Debug)]
+pub(super) struct PanelMaker<'a> {
+    model: &'a RegressorModel,
+    layout: Cow<'a, PanelLayout>,
+    /// Whether bodies' columns are made: some columns of terms need none.
+    has_bodies: bool,
+    places: Vec<usize>,
+    workspace: BatchWorkspace,
+    history: TermHistory,
+    temperature_c: Vec<f64>,
+    segment: usize,
+    motion: [Vec<f64>; 3],
+    velocities: Vec<VelocityHistogram>,
+    samples: u64,
+}
+
+/// Some samples of all joints, with the torque as logged.
+#[derive(Debug, Default)]
+pub(super) struct SamplePanels {
+    pub(super) panels: Panels,
+    pub(super) samples: usize,
+    segment: usize,
+    rate_hz: f64,
+    set_aside: Vec<Vec<bool>>,
+    settled: Range<usize>,
+}
+
+impl SamplePanels {
+    pub(super) fn as_raw(&self) -> RawSamples<'_> {
+        RawSamples {
+            segment: self.segment,
+            rate_hz: self.rate_hz,
+            panels: &self.panels,
+            set_aside: &self.set_aside,
+            settled: self.settled.clone(),
+        }
+    }
+}
+
+impl<'a> PanelMaker<'a> {
+    /// All columns of a model, joint `j` of which stands at place `places[j]` of the motion.
+    pub(super) fn new(model: &'a RegressorModel, places: &[usize]) -> Self {
+        let (layout, load) = (Cow::Borrowed(model.layout()), model.load_parameters.clone());
+        Self::of_layout(model, (layout, true), load, places)
+    }
+
+    /// Nothing but some `terms` of the model and what they need: where they know the load, bodies stand before them.
+    pub(super) fn of_terms(model: &'a RegressorModel, terms: &[Column], places: &[usize]) -> Self {
+        let needs_load = terms.iter().any(|column| matches!(column, Column::Term(term) if term.needs_load()));
+        let known = model.layout().columns();
+        let bodies = known.iter().filter(|column| needs_load && matches!(column, Column::Body { .. }));
+        let columns: Vec<Column> = bodies.chain(terms).cloned().collect();
+        let load = model.load_parameters.as_ref().filter(|_| needs_load).map(|parameters| {
+            // One for every column, those of terms unread.
+            let of_column =
+                |column: &Column| known.iter().position(|known| known == column).map_or(0.0, |place| parameters[place]);
+            columns.iter().map(of_column).collect()
+        });
+        let layout = PanelLayout::new(model.model(), columns);
+        Self::of_layout(model, (Cow::Owned(layout), needs_load), load, places)
+    }
+
+    fn of_layout(
+        model: &'a RegressorModel,
+        (layout, has_bodies): (Cow<'a, PanelLayout>, bool),
+        load: Option<Vec<f64>>,
+        places: &[usize],
+    ) -> Self {
+        Self {
+            model,
+            layout,
+            has_bodies,
+            places: places.to_vec(),
+            workspace: BatchWorkspace::new(model.model()),
+            history: TermHistory::new(load),
+            temperature_c: Vec::new(),
+            segment: 0,
+            motion: [Vec::new(), Vec::new(), Vec::new()],
+            velocities: vec![VelocityHistogram::default(); places.len()],
+            samples: 0,
+        }
+    }
+
+    /// Which columns the panels have.
+    pub(super) fn layout(&self) -> &PanelLayout {
+        &self.layout
+    }
+
+    /// Where the model's joints stand in the motion.
+    pub(super) fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Samples so far.
+    pub(super) fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// How often each joint moved at which velocity so far.
+    pub(super) fn into_velocities(self) -> Vec<VelocityHistogram> {
+        self.velocities
+    }
+
+    /// Makes the panels of a block's samples from `from` on, as many as a panel has; returns where the next begin.
+    pub(super) fn make(&mut self, block: &MotionBlock, from: usize, out: &mut SamplePanels) -> usize {
+        if block.segment != self.segment {
+            self.segment = block.segment;
+            self.history.restart();
+        }
+        let samples = PANEL_SAMPLES.min(block.rows - from);
+        in_model_order(block, &self.places, from, samples, &mut self.motion);
+        let [q, dq, ddq] = &self.motion;
+        let motion = JointMotion { samples, q, dq, ddq };
+        let settled = settled(block, from, samples);
+        for (velocities, dq) in self.velocities.iter_mut().zip(dq.chunks_exact(samples)) {
+            velocities.add(&dq[settled.clone()]);
+        }
+        if !block.temperature_c.is_empty() {
+            self.temperature_c.clear();
+            for &place in &self.places {
+                let temperature = block.joint(&block.temperature_c, place);
+                self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
+            }
+            self.history.set_temperature(&self.temperature_c);
+        }
+        let Self { workspace, layout, history, .. } = self;
+        if self.has_bodies {
+            regressor_panels_following(self.model.model(), workspace, layout, &motion, history, &mut out.panels);
+        } else {
+            term_panels_following(layout, &motion, history, &mut out.panels);
+        }
+        for (joint, &place) in self.places.iter().enumerate() {
+            let torque = out.panels.torque_mut(joint);
+            torque.copy_from_slice(&block.joint(block.fitted_tau(), place)[from..from + samples]);
+            if let Some(gain) = self.model.torque_gains.get(joint) {
+                for torque in torque {
+                    *torque *= gain;
+                }
+            }
+        }
+        out.set_aside.clear();
+        if !block.set_aside.is_empty() {
+            let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
+            out.set_aside.extend(of_joints);
+        }
+        (out.samples, out.segment, out.rate_hz, out.settled) = (samples, block.segment, block.rate_hz, settled);
+        self.samples += samples as u64;
+        from + samples
+    }
+}
+
+/// The samples of a panel whose motion does not rest on samples invented at the ends of a piece.
+fn settled(block: &MotionBlock, from: usize, samples: usize) -> Range<usize> {
+    let [begin, end] = block.unsettled;
+    let inside = begin..block.rows.saturating_sub(end);
+    let clamped = |row: usize| row.clamp(from, from + samples) - from;
+    clamped(inside.start)..clamped(inside.end).max(clamped(inside.start))
+}
