@@ -11,7 +11,7 @@ use crate::logs::Logs;
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
 use crate::recording::{LogError, MotionRecord, Recording};
 use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, LogStatistics, ParallelFilterSettings, RowConsumer, noise_factors};
+use crate::rows::{JointRows, LogPass, LogStatistics, ParallelFilterSettings, RowBlock, RowConsumer, noise_factors};
 use crate::settings::{GainChoice, IdentificationSettings};
 use dynident_dynamics::Column;
 use dynident_estimation::{
@@ -412,6 +412,7 @@ impl LogFactors {
 struct FactorConsumer<'a> {
     log: String,
     factors: Vec<SegmentedFactor>,
+    blocks: Vec<RowBlock>,
     evidence: Option<Evidence<'a>>,
     buffer: Vec<f64>,
     counted: Vec<f64>,
@@ -427,8 +428,9 @@ impl RowConsumer for FactorConsumer<'_> {
             evidence.filtered(rows, &mut self.buffer);
         }
         let rows = rows.counted(&mut self.counted);
-        self.factors[rows.joint]
-            .absorb(rows.panel, rows.rows)
+        let factor = &mut self.factors[rows.joint];
+        self.blocks[rows.joint]
+            .push(rows.panel, rows.rows, |panel, rows| factor.absorb(panel, rows))
             .map_err(|source| LogError::Rows { log: self.log.clone(), source })
     }
 }
@@ -453,9 +455,14 @@ pub fn log_factors(
     // Torque in a unit that nobody knows says nothing about the description.
     let nominal = model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated);
     let evidence = nominal.map(|nominal| Evidence::new(columns, nominal));
-    let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new(), counted: Vec::new() };
+    let blocks = (0..model.dof()).map(|joint| RowBlock::new(model.layout().joint_columns(joint).len() + 1)).collect();
+    let mut consumer = FactorConsumer { log, factors, blocks, evidence, buffer: Vec::new(), counted: Vec::new() };
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
     let statistics = pass.run(&mut consumer)?;
+    let in_rows = |source| LogError::Rows { log: consumer.log.clone(), source };
+    for (factor, block) in consumer.factors.iter_mut().zip(consumer.blocks) {
+        block.finish(|panel, rows| factor.absorb(panel, rows)).map_err(in_rows)?;
+    }
     let nominal_agreement = consumer.evidence.as_ref().map(|evidence| evidence.agreement(&model.joint_names()));
     Ok(LogFactors { index, factors: consumer.factors, statistics, noise: None, nominal_agreement })
 }

@@ -13,6 +13,7 @@ mod joint_filters;
 mod mask;
 mod motion_noise;
 mod pass;
+mod row_block;
 mod row_store;
 mod samples;
 mod velocities;
@@ -23,6 +24,7 @@ pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub(crate) use joint_filters::JointFilters;
 pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
+pub(crate) use row_block::RowBlock;
 pub(crate) use samples::in_model_order;
 pub use velocities::VelocityHistogram;
 
