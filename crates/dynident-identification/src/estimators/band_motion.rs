@@ -4,6 +4,7 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::LogError;
+use crate::rows::LogPass;
 use dynident_recording::derivative::ButterworthZeroPhase;
 use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
 use rayon::prelude::*;
@@ -18,6 +19,8 @@ type Piece = Vec<[Vec<f64>; 3]>;
 pub(super) struct BandMotion<'r, 'a> {
     rows: &'r TrainingRows<'a>,
     cutoff_hz: f64,
+    /// Samples of a log, at most; `None` for all.
+    most_samples: Option<u64>,
     log: usize,
     /// Numbers of the pieces of the log begun, and their motion.
     pieces: Vec<(usize, Piece)>,
@@ -26,8 +29,8 @@ pub(super) struct BandMotion<'r, 'a> {
 }
 
 impl<'r, 'a> BandMotion<'r, 'a> {
-    pub(super) fn new(rows: &'r TrainingRows<'a>, cutoff_hz: f64) -> Self {
-        Self { rows, cutoff_hz, log: 0, pieces: Vec::new(), next: (0, 0) }
+    pub(super) fn new(rows: &'r TrainingRows<'a>, cutoff_hz: f64, most_samples: Option<u64>) -> Self {
+        Self { rows, cutoff_hz, most_samples, log: 0, pieces: Vec::new(), next: (0, 0) }
     }
 
     fn refused(&self, message: String) -> EstimatorError {
@@ -46,7 +49,7 @@ impl<'r, 'a> BandMotion<'r, 'a> {
 impl InstrumentSource for BandMotion<'_, '_> {
     fn begin(&mut self, log: usize) -> Result<(), EstimatorError> {
         (self.log, self.next) = (log, (0, 0));
-        let (rate_hz, pieces) = positions(self.rows, log)?;
+        let (rate_hz, pieces) = positions(self.rows, log, self.most_samples)?;
         self.pieces.clear();
         for (segment, q) in pieces {
             let one = |q: &Vec<f64>| self.smoothed(rate_hz, q);
@@ -88,9 +91,10 @@ impl InstrumentSource for BandMotion<'_, '_> {
 /// Positions of a log by uninterrupted piece and joint, and their rate.
 type Positions = (f64, Vec<(usize, Vec<Vec<f64>>)>);
 
-fn positions(rows: &TrainingRows<'_>, log: usize) -> Result<Positions, LogError> {
+fn positions(rows: &TrainingRows<'_>, log: usize, most_samples: Option<u64>) -> Result<Positions, LogError> {
     let (mut rate_hz, mut pieces) = (0.0, Vec::<(usize, Vec<Vec<f64>>)>::new());
-    rows.logs.pass(rows.model, log).each_block(&mut |block| {
+    let pass = LogPass { most_samples, ..rows.logs.pass(rows.model, log) };
+    pass.each_block(&mut |block| {
         rate_hz = block.rate_hz;
         if pieces.last().is_none_or(|(segment, _)| *segment != block.segment) {
             pieces.push((block.segment, vec![Vec::new(); block.joints]));
@@ -113,7 +117,7 @@ pub(super) fn regressor_cutoff_hz(rows: &TrainingRows<'_>) -> Result<f64, LogErr
     }
     let mut highest = 0.0_f64;
     for &log in rows.training {
-        let (rate_hz, pieces) = positions(rows, log)?;
+        let (rate_hz, pieces) = positions(rows, log, None)?;
         let longest = pieces.iter().max_by_key(|(_, joints)| joints.first().map_or(0, Vec::len));
         highest = longest.map_or(highest, |(_, joints)| highest.max(cutoff(joints, rate_hz).cutoff_hz));
     }

@@ -4,7 +4,7 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::{LogError, Samples};
-use crate::rows::{JointFilters, PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque, set_aside};
+use crate::rows::{JointFilters, LogPass, PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque, set_aside};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_model::terms::JointMotion;
@@ -16,23 +16,24 @@ pub(super) fn instrumented_factors(
     index: usize,
     source: &mut dyn InstrumentSource,
 ) -> Result<Vec<SegmentedFactor>, EstimatorError> {
-    made_rows(rows, index, None, source).map(|made| made.factors)
+    made_rows(rows, index, (None, None), source).map(|made| made.factors)
 }
 
-/// The factors of one log's `[(W − Z) θ | τ − Z θ]`, one for each joint, and each joint's `‖(W − Z) θ‖²`.
+/// The factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's
+/// `‖(W − Z) θ‖²`.
 pub(super) fn fast_motion_factors(
     rows: &TrainingRows<'_>,
     index: usize,
-    theta: &[f64],
+    (theta, most_samples): (&[f64], Option<u64>),
     source: &mut dyn InstrumentSource,
 ) -> Result<(Vec<SegmentedFactor>, Vec<f64>), EstimatorError> {
-    made_rows(rows, index, Some(theta), source).map(|made| (made.factors, made.squares))
+    made_rows(rows, index, (Some(theta), most_samples), source).map(|made| (made.factors, made.squares))
 }
 
 fn made_rows<'r, 'a>(
     rows: &'r TrainingRows<'a>,
     index: usize,
-    theta: Option<&'r [f64]>,
+    (theta, most_samples): (Option<&'r [f64]>, Option<u64>),
     source: &mut dyn InstrumentSource,
 ) -> Result<InstrumentedRows<'r, 'a>, EstimatorError> {
     let (logs, recording) = (rows.logs, &rows.logs.recordings[index]);
@@ -51,7 +52,8 @@ fn made_rows<'r, 'a>(
         return Ok(builder);
     }
     let mut refused = None;
-    logs.pass(rows.model, index).each_block(&mut |block| {
+    let pass = LogPass { most_samples, ..logs.pass(rows.model, index) };
+    pass.each_block(&mut |block| {
         if refused.is_none() {
             refused = builder.take(block, source).err();
         }

@@ -61,9 +61,13 @@ pub(super) struct BandEstimate {
 }
 
 /// A log's own motion below `cutoff_hz`.
-fn band_source<'r>(rows: &'r TrainingRows<'_>, index: usize, cutoff_hz: f64) -> Box<dyn InstrumentSource + 'r> {
+fn band_source<'r>(
+    rows: &'r TrainingRows<'_>,
+    index: usize,
+    (cutoff_hz, most_samples): (f64, Option<u64>),
+) -> Box<dyn InstrumentSource + 'r> {
     match rows.logs.recordings[index].samples {
-        Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz)),
+        Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz, most_samples)),
         // Its raw samples, where they are at hand.
         Samples::Motion(_) => Box::new(SmoothedMotion::new(rows.logs, rows.model.model(), cutoff_hz)),
     }
@@ -84,14 +88,22 @@ fn of_every_log<T: Send>(
     of_logs
 }
 
-/// `τ − Z θ = κ (W − Z) θ` with one κ, Z of the logs' own motion below `cutoff_hz`; and each joint's `‖(W − Z) θ‖²`.
+/// Samples of all logs together that say whether torque follows the fast motion, and of each at least: it is one
+/// number, and its bar is narrow long before an hour of recording has passed. Memory then does not grow with a log.
+const FAST_MOTION_SAMPLES: [u64; 2] = [200_000, 20_000];
+
+/// `τ − Z θ = κ (W − Z) θ` with one κ, Z of the logs' own motion below `cutoff_hz`; and each joint's `‖(W − Z) θ‖²`. Of
+/// long logs their beginnings count, and the squares are those of as many rows as the problem has.
 pub(super) fn fast_motion_problem(
     rows: &TrainingRows<'_>,
     cutoff_hz: f64,
     theta: &[f64],
 ) -> Result<(LinearProblem, Vec<f64>), EstimatorError> {
-    let logs =
-        of_every_log(rows, |index| fast_motion_factors(rows, index, theta, &mut *band_source(rows, index, cutoff_hz)))?;
+    let most = (FAST_MOTION_SAMPLES[0] / rows.training.len().max(1) as u64).max(FAST_MOTION_SAMPLES[1]);
+    let logs = of_every_log(rows, |index| {
+        let source = &mut *band_source(rows, index, (cutoff_hz, Some(most)));
+        fast_motion_factors(rows, index, (theta, Some(most)), source)
+    })?;
     let mut problem = LinearProblem::new(vec!["fast motion".to_owned()], rows.problem.joints().to_vec());
     let mut squares = vec![0.0; rows.problem.joints().len()];
     for (log, (factors, of_log)) in rows.problem.logs().iter().zip(logs) {
@@ -99,6 +111,10 @@ pub(super) fn fast_motion_problem(
         for (joint, factor) in factors.into_iter().enumerate() {
             problem.add(log, joint, vec![0], factor)?;
         }
+    }
+    let counts = rows.problem.joint_rows().into_iter().zip(problem.joint_rows());
+    for (square, (all, counted)) in squares.iter_mut().zip(counts).filter(|(_, (all, counted))| counted < all) {
+        *square *= all as f64 / counted.max(1) as f64;
     }
     Ok((problem, squares))
 }
@@ -109,8 +125,9 @@ pub(super) fn with_band(
     settings: &InstrumentSettings,
     cutoff_hz: f64,
 ) -> Result<BandEstimate, EstimatorError> {
-    let factors =
-        of_every_log(rows, |index| instrumented_factors(rows, index, &mut *band_source(rows, index, cutoff_hz)))?;
+    let factors = of_every_log(rows, |index| {
+        instrumented_factors(rows, index, &mut *band_source(rows, index, (cutoff_hz, None)))
+    })?;
     let problem = instrumented_problem(rows, factors)?;
     let found = instrumental_variables(&problem, &settings.instrumental(rows.settings))?;
     Ok(BandEstimate { cutoff_hz, problem, found })

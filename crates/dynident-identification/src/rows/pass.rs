@@ -231,17 +231,27 @@ impl LogPass<'_> {
         self.statistics(Some(kept.report.clone()), (kept.rate_hz, Some(filter)), (rows.count(), needed), passed)
     }
 
-    /// Gives the motion to `take`, block by block and without its regressor: as it was kept, or read once and kept if
-    /// it fits. Returns what the importer found; `None` for a motion that was made already.
-    pub(crate) fn each_block(
+    /// Gives the motion to `take`, block by block and without its regressor, all of it or as many samples as are asked
+    /// for: as it was kept, or read once and kept if it fits. Returns what the importer found; `None` for a motion that
+    /// was made already.
         &self,
         take: &mut dyn FnMut(&MotionBlock) -> Result<(), LogError>,
     ) -> Result<Option<ImportReport>, LogError> {
         let Recording { name, samples, .. } = self.recording;
+        let mut passed = 0;
+        let mut is_enough = |block: &MotionBlock| {
+            passed += block.rows as u64;
+            self.most_samples.is_some_and(|most| passed >= most)
+        };
         match (samples, self.kept.and_then(OnceLock::get)) {
             (Samples::Motion(record), _) => take(&record.as_set(self.motion).motion).map(|()| None),
             (_, Some(kept)) => {
-                kept.blocks.iter().try_for_each(take)?;
+                for block in &kept.blocks {
+                    take(block)?;
+                    if is_enough(block) {
+                        break;
+                    }
+                }
                 Ok(Some(kept.report.clone()))
             }
             _ => {
@@ -252,6 +262,9 @@ impl LogPass<'_> {
                 while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
                     take(&block)?;
                     self.progress.advance(block.rows as u64);
+                    if is_enough(&block) {
+                        break;
+                    }
                     block = keeper.keep(block).unwrap_or_default();
                 }
                 let report = stream.report();
