@@ -86,6 +86,9 @@ impl<const N: usize> Register for Counted<N> {
         count(|all| all.divisions += N as u64);
         Self(self.0.div(other.0))
     }
+    fn neg(self) -> Self {
+        Self(self.0.neg())
+    }
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         Self::fused(self.0.mul_add(factor.0, addend.0))
     }

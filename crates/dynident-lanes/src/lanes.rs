@@ -119,7 +119,7 @@ impl<R: Register, B> Neg for Wide<R, B> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self::of(self.0.xor(R::splat(-0.0)))
+        Self::of(self.0.neg())
     }
 }
 impl<R: Register, B> AddAssign for Wide<R, B> {

@@ -71,6 +71,13 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
         self.zip(other, |a, b| a / b)
     }
     #[inline(always)]
+    fn neg(mut self) -> Self {
+        for i in 0..N {
+            self.0[i] = -self.0[i];
+        }
+        self
+    }
+    #[inline(always)]
     fn mul_add(mut self, factor: Self, addend: Self) -> Self {
         for i in 0..N {
             self.0[i] =

@@ -18,6 +18,8 @@ pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
+    /// The other sign. As the compiler knows it, which makes it part of the next sum or product where it can.
+    fn neg(self) -> Self;
     /// `self * factor + addend`, fused where the level has it.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
     /// `addend - self * factor`, fused where the level has it.

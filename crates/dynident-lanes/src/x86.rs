@@ -39,11 +39,6 @@ impl HasAvx512 {
         .then_some(Self(()))
     }
 
-    /// AVX-512 processors here have AVX2 as well.
-    #[allow(clippy::unused_self, reason = "taken as the proof")]
-    pub(crate) fn avx2(self) -> HasAvx2 {
-        HasAvx2(())
-    }
 }
 
 #[target_feature(enable = "avx2,fma")]
@@ -123,6 +118,10 @@ impl Register for Avx2 {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         Self(intrinsic!(_mm256_div_pd(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(intrinsic!(_mm256_sub_pd(_mm256_set1_pd(-0.0), self.0)))
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -209,6 +208,10 @@ impl Register for Avx512 {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         Self(intrinsic!(_mm512_div_pd(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(intrinsic!(_mm512_sub_pd(_mm512_set1_pd(-0.0), self.0)))
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {

@@ -27,6 +27,21 @@ pub enum StepRotation {
     General(Mat3),
 }
 
+/// Where an origin stands in the parent's frame, by the entries that are not zero: what is zero needs no product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shift {
+    /// At the parent's origin.
+    None,
+    /// On the x axis.
+    X,
+    /// On the y axis.
+    Y,
+    /// On the z axis.
+    Z,
+    /// Anywhere, or moving with the joint.
+    Any,
+}
+
 /// One joint and its body in inner frames. Its torque is the same as that of the [`Joint`] and body which it stands
 /// for; its body's inertial parameters alone are not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +56,8 @@ pub struct JointStep {
     pub rotation: StepRotation,
     /// Origin in the parent's inner frame, m; of a sliding joint at `q = 0`.
     pub translation: Vec3,
+    /// Which entries of the origin are not zero.
+    pub shift: Shift,
     /// Axis of a sliding joint in the parent's inner frame; zero for one that turns.
     pub slide: Vec3,
     /// Mass, kg; zero for a turning body, whose mass has gone to its parent.
@@ -56,6 +73,24 @@ pub struct JointStep {
     /// True when no body with a higher index hangs on the same parent: from the tips to the base it is the first that
     /// gives its parent something.
     pub is_last_child: bool,
+    /// True when the parent is the body before this one: its state need not be looked up.
+    pub follows: bool,
+    /// True when a body other than the next one hangs on this one, and its state is needed later.
+    pub branches: bool,
+    /// True when the parent turns about an axis that rests in the base: only what acts about that axis counts there.
+    pub on_resting_axis: bool,
+}
+
+impl Shift {
+    fn of(Vec3([x, y, z]): Vec3) -> Self {
+        match (x != 0.0, y != 0.0, z != 0.0) {
+            (false, false, false) => Self::None,
+            (true, false, false) => Self::X,
+            (false, true, false) => Self::Y,
+            (false, false, true) => Self::Z,
+            _ => Self::Any,
+        }
+    }
 }
 
 /// Axes are taken for parallel or at a right angle within this, rad: what rounding leaves of rotations by multiples of
@@ -90,6 +125,7 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             (StepRotation::General(w.mul_mat(&about_z(turns[index]))), 0.0)
         };
         let slide = if joint.turns() { Vec3::ZERO } else { column(&w, 2) };
+        let translation = parent_frame.transpose_mul_vec(joint.placement.translation);
         let frame = &frames[index];
         let [mass, _, _, _, xx, xy, xz, yy, yz, zz] = inertials[index].0;
         let half = 0.5 * (xx + yy + zz);
@@ -100,7 +136,8 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             turns: joint.turns(),
             offset,
             rotation,
-            translation: parent_frame.transpose_mul_vec(joint.placement.translation),
+            translation,
+            shift: if joint.turns() { Shift::of(translation) } else { Shift::Any },
             slide,
             mass,
             first: frame.transpose_mul_vec(inertials[index].first_moment()),
@@ -108,6 +145,9 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             subtree_mass: 0.0,
             is_tip: tree.iter().all(|other| other.parent != Some(index)),
             is_last_child: tree[index + 1..].iter().all(|other| other.parent != joint.parent),
+            follows: index > 0 && joint.parent == Some(index - 1),
+            branches: tree.iter().skip(index + 2).any(|other| other.parent == Some(index)),
+            on_resting_axis: joint.parent.is_some_and(|parent| tree[parent].parent.is_none() && tree[parent].turns()),
         });
     }
     regroup(&mut steps);
