@@ -239,6 +239,19 @@ pub(crate) fn cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, adden
     }
 }
 
+/// `v × t + addend` with the origin `t` of a body, of which `shift` says what is zero.
+#[inline(always)]
+pub(crate) fn minus_cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, addend: Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = addend.0;
+    match shift {
+        Shift::None => addend,
+        Shift::X => Vec3([x, t[0].mul_add(v[2], y), t[0].neg_mul_add(v[1], z)]),
+        Shift::Y => Vec3([t[1].neg_mul_add(v[2], x), y, t[1].mul_add(v[0], z)]),
+        Shift::Z => Vec3([t[2].mul_add(v[1], x), t[2].neg_mul_add(v[0], y), z]),
+        Shift::Any => v.cross_add(t, addend),
+    }
+}
+
 /// The same hinges for bundles: what they turn stands in several lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct BundledHinges<'a, T>(pub(crate) PlacedHinges<'a, T>);

@@ -62,6 +62,7 @@ mod kinematics;
 mod mass_matrix;
 mod motion_equation;
 mod over_scalar;
+mod own_turn;
 mod parametric_model;
 mod regressor;
 mod regressor_adjoint;

@@ -3,7 +3,7 @@
 //! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its
 //! own narrow panel: columns after one another, each with one value per sample. The whole regressor is never stored.
 
-use crate::regressor::{BlockSink, Work, regressor_blocks, torque_regressor};
+use crate::regressor::{BlockSink, Entries, regressor_blocks, torque_regressor};
 use crate::term_history::TermHistory;
 use crate::tree_scratch::{TreeBatch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, Workspace, parents, put_lanes, same_tree, take_lanes};
@@ -460,13 +460,7 @@ struct IntoPanels<'a> {
 
 impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
     #[inline(always)]
-    fn put<const TURNING: bool>(
-        &mut self,
-        body: usize,
-        path: &[u32],
-        bundle: usize,
-        work: &Work<'_, T::Bundle, TURNING>,
-    ) {
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
         // Lanes are samples here, so a bundle is one joint.
         let samples = self.panels.samples;
         let present = self.layout.parameters[body];

@@ -15,6 +15,7 @@
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
 use crate::spatial::{Mat3, Vec3};
+use crate::structure::{EXACT, Shift};
 
 /// The constant part of the rotation from a body's inner frame to its parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,21 +26,6 @@ pub enum StepRotation {
     Quarter,
     /// Any other.
     General(Mat3),
-}
-
-/// Where an origin stands in the parent's frame, by the entries that are not zero: what is zero needs no product.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shift {
-    /// At the parent's origin.
-    None,
-    /// On the x axis.
-    X,
-    /// On the y axis.
-    Y,
-    /// On the z axis.
-    Z,
-    /// Anywhere, or moving with the joint.
-    Any,
 }
 
 /// One joint and its body in inner frames. Its torque is the same as that of the [`Joint`] and body which it stands
@@ -80,22 +66,6 @@ pub struct JointStep {
     /// True when the parent turns about an axis that rests in the base: only what acts about that axis counts there.
     pub on_resting_axis: bool,
 }
-
-impl Shift {
-    fn of(Vec3([x, y, z]): Vec3) -> Self {
-        match (x != 0.0, y != 0.0, z != 0.0) {
-            (false, false, false) => Self::None,
-            (true, false, false) => Self::X,
-            (false, true, false) => Self::Y,
-            (false, false, true) => Self::Z,
-            _ => Self::Any,
-        }
-    }
-}
-
-/// Axes are taken for parallel or at a right angle within this, rad: what rounding leaves of rotations by multiples of
-/// 90° that were written as roll, pitch and yaw. It moves no result by more than its own rounding.
-const EXACT: f64 = 1e-15;
 
 /// The steps of a tree, in its order.
 pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<JointStep> {
