@@ -74,14 +74,9 @@ impl<T: Scalar> CompositeMoments<T> {
             Shift::X => along!(0: 0, 1, 1, 2, 2),
             Shift::Y => along!(1: 3, 0, 1, 2, 4),
             Shift::Z => along!(2: 5, 0, 2, 1, 4),
-            Shift::Any => [
-                entry!(0, 0, 0),
-                entry!(1, 0, 1),
-                entry!(2, 0, 2),
-                entry!(3, 1, 1),
-                entry!(4, 1, 2),
-                entry!(5, 2, 2),
-            ],
+            Shift::Any => {
+                [entry!(0, 0, 0), entry!(1, 0, 1), entry!(2, 0, 2), entry!(3, 1, 1), entry!(4, 1, 2), entry!(5, 2, 2)]
+            }
         };
         Self { first: h, second }
     }

@@ -210,7 +210,8 @@ fn about_resting_axis<T: Scalar>(
     let inward = -(dq * dq);
     let spin = Mat3([[inward, -ddq, T::ZERO], [ddq, inward, T::ZERO], [T::ZERO; 3]]);
     let [hx, hy, _] = step.first.splat::<T>().0;
-    let moment = hx.mul_add(acceleration[1], hy.neg_mul_add(acceleration[0], T::splat(step.second[0] + step.second[3]) * ddq));
+    let moment =
+        hx.mul_add(acceleration[1], hy.neg_mul_add(acceleration[0], T::splat(step.second[0] + step.second[3]) * ddq));
     let motion = LinkMotion { omega: about(dq), alpha: about(ddq), acceleration, spin };
     (motion, LinkWrench { force: Vec3::ZERO, moment: about(moment) })
 }

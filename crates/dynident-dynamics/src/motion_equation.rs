@@ -1,7 +1,7 @@
 //! Both sides of the equation of motion at once, for simulation.
 
 use crate::inverse_dynamics::newton_euler_placed;
-use crate::mass_matrix::{matrix_of_sample};
+use crate::mass_matrix::matrix_of_sample;
 use crate::tree_scratch::TreeScratch;
 use crate::workspace::{AnyScratch, Scratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};

@@ -84,13 +84,33 @@ struct DenseRows<'a> {
 impl<T: Lane> BlockSink<T> for DenseRows<'_> {
     #[inline(always)]
     fn put(&mut self, body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
-        let first = bundle * T::PER_BUNDLE;
+        let joints = &path[bundle * T::PER_BUNDLE..];
+        if T::PER_BUNDLE == 4 {
+            // Rows of four: two, and two that overlap.
+            let first = T::Bundle::transposed([work.of::<0>(), work.of::<1>(), work.of::<2>(), work.of::<3>()]);
+            let (w6, w7) = (work.of::<6>(), work.of::<7>());
+            let middle = T::Bundle::transposed([work.of::<4>(), work.of::<5>(), w6, w7]);
+            let last = T::Bundle::transposed([w6, w7, work.of::<8>(), work.of::<9>()]);
+            // Written out, because a loop would first put all of them into memory.
+            macro_rules! rows {
+                ($($place:literal)*) => {
+                    $(if let Some(&joint) = joints.get($place) {
+                        let row = &mut self.out[joint as usize * self.columns + 10 * body..][..10];
+                        first[$place].store(&mut row[..4]);
+                        middle[$place].store(&mut row[4..8]);
+                        last[$place].store(&mut row[6..]);
+                    })*
+                };
+            }
+            rows!(0 1 2 3);
+            return;
+        }
         let mut lanes = [[0.0; 8]; 10];
         macro_rules! store {
             ($($parameter:literal)*) => { $(work.of::<$parameter>().store(&mut lanes[$parameter]);)* };
         }
         store!(0 1 2 3 4 5 6 7 8 9);
-        for (place, &joint) in path[first..].iter().take(T::PER_BUNDLE).enumerate() {
+        for (place, &joint) in joints.iter().take(T::PER_BUNDLE).enumerate() {
             let row = &mut self.out[joint as usize * self.columns + 10 * body..][..10];
             for (to, column) in row.iter_mut().zip(&lanes) {
                 *to = column[place];
@@ -124,16 +144,23 @@ pub(crate) fn regressor_blocks<T: Lane>(
         let path = &axes.path[axes.path_start[index]..axes.path_start[index + 1]];
         let start = axes.bundle_start[index];
         let inherited = map.parent.map_or(0..0, |parent| axes.bundle_start[parent]..axes.bundle_start[parent + 1]);
-        let translation =
-            if map.turns { map.translation.splat() } else { map.slide.splat().scale_add(q[index], map.translation.splat()) };
+        let translation = if map.turns {
+            map.translation.splat()
+        } else {
+            map.slide.splat().scale_add(q[index], map.translation.splat())
+        };
         let origin = times_shift(map.shift, translation, &motion.spin, motion.acceleration);
         let bundled_translation = Vec3(bundles(translation.0));
+        // Axes of the bodies before this one, its parent among them, and its own.
+        let (angular, own_angular) = axes.angular.split_at_mut(start);
+        let (linear, own_linear) = axes.linear.split_at_mut(start);
+        let above = angular[inherited.clone()].iter().zip(&linear[inherited]);
+        let below = own_angular.iter_mut().zip(own_linear);
         let (omega, alpha, acceleration) = with_own_turn!(map, q[index], sine[index], cosine[index], |turn| {
             let bundled = turn.bundled();
-            for (k, from) in inherited.enumerate() {
-                let (angular, linear) = (axes.angular[from], axes.linear[from]);
-                let linear = minus_cross_shift(map.shift, bundled_translation, angular, linear);
-                (axes.angular[start + k], axes.linear[start + k]) = (bundled.down(angular), bundled.down(linear));
+            for ((angular, linear), (to_angular, to_linear)) in above.zip(below) {
+                let linear = minus_cross_shift(map.shift, bundled_translation, *angular, *linear);
+                (*to_angular, *to_linear) = (bundled.down(*angular), bundled.down(linear));
             }
             let arriving = (turn.down(motion.omega), turn.down(motion.alpha), turn.down(origin));
             if map.turns {

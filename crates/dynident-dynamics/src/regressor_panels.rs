@@ -465,24 +465,25 @@ impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
         let samples = self.panels.samples;
         let present = self.layout.parameters[body];
         let start = self.layout.places[self.layout.place_start[body] + bundle] * samples;
-        let panel = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
-        let mut at = self.at;
+        let mut rest = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
+        let at = self.at;
         let full = samples >= T::LANES;
         // Written out, because a loop over the entries would first put all of them into memory.
         macro_rules! store {
             ($($parameter:literal)*) => {
                 $(if present & (1 << $parameter) != 0 {
                     let value = work.of::<$parameter>();
+                    let (column, behind) = core::mem::take(&mut rest).split_at_mut(samples);
+                    rest = behind;
                     if full {
-                        value.store(&mut panel[at..at + T::LANES]);
+                        value.store(&mut column[at..at + T::LANES]);
                     } else {
-                        put_lanes(value, &mut panel[at..at + samples], 0);
+                        put_lanes(value, column, at);
                     }
-                    at += samples;
                 })*
             };
         }
         store!(0 1 2 3 4 5 6 7 8 9);
-        debug_assert_eq!(at, self.at + present.count_ones() as usize * samples);
+        let _ = rest;
     }
 }

@@ -71,6 +71,17 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
         self.zip(other, |a, b| a / b)
     }
     #[inline(always)]
+    fn transposed(mut rows: [Self; 4]) -> [Self; 4] {
+        if N == 4 {
+            for i in 0..4 {
+                for k in 0..i {
+                    (rows[i].0[k], rows[k].0[i]) = (rows[k].0[i], rows[i].0[k]);
+                }
+            }
+        }
+        rows
+    }
+    #[inline(always)]
     fn neg(mut self) -> Self {
         for i in 0..N {
             self.0[i] = -self.0[i];

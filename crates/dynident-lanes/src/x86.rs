@@ -38,7 +38,6 @@ impl HasAvx512 {
             && std::is_x86_feature_detected!("avx512vl"))
         .then_some(Self(()))
     }
-
 }
 
 #[target_feature(enable = "avx2,fma")]
@@ -118,6 +117,17 @@ impl Register for Avx2 {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         Self(intrinsic!(_mm256_div_pd(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        let low = intrinsic!((_mm256_unpacklo_pd(a.0, b.0), _mm256_unpacklo_pd(c.0, d.0)));
+        let high = intrinsic!((_mm256_unpackhi_pd(a.0, b.0), _mm256_unpackhi_pd(c.0, d.0)));
+        [
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x20>(low.0, low.1))),
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x20>(high.0, high.1))),
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x31>(low.0, low.1))),
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x31>(high.0, high.1))),
+        ]
     }
     #[inline(always)]
     fn neg(self) -> Self {
@@ -208,6 +218,10 @@ impl Register for Avx512 {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         Self(intrinsic!(_mm512_div_pd(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn transposed(rows: [Self; 4]) -> [Self; 4] {
+        rows
     }
     #[inline(always)]
     fn neg(self) -> Self {
