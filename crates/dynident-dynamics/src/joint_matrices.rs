@@ -1,6 +1,6 @@
 //! Square matrices over the joints, of many samples: where their entries go.
 
-use crate::workspace::{parents, put_lanes};
+use crate::workspace::{parents, put_lanes, same_tree};
 use dynident_lanes::{AlignedBuffer, Lane};
 use dynident_model::Model;
 
@@ -67,7 +67,7 @@ impl JointMatrices {
 
     /// Where `samples` samples go. Memory is kept while the number stays; all of it is zero where nothing was written.
     pub(crate) fn resize(&mut self, model: &Model, samples: usize) -> MatrixRows<'_> {
-        let same = self.parents == parents(model) && self.is_coupled == model.coupling().is_some();
+        let same = same_tree(&self.parents, model) && self.is_coupled == model.coupling().is_some();
         assert!(same && self.dof == model.dof(), "the matrices were made for a model with another tree");
         // Whole lanes, and an odd number of cache lines: entries do not fall on the same few sets of a cache.
         let stride = 8 * (samples.div_ceil(8) | 1);
