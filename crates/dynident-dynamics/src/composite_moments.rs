@@ -36,7 +36,7 @@ impl<T: Scalar> CompositeMoments<T> {
         let (first, second) =
             with_hinge!(hinges, *step, index, |hinge| (hinge.up(self.first), hinge.up_symmetric(&self.second)));
         let moved = Self { first, second }.about_shifted(step, hinges.translation(step, index));
-        if step.on_resting_axis {
+        if step.hang.on_resting_axis {
             let mut polar = Self::ZERO;
             polar.second[0] = moved.second[0] + moved.second[3];
             polar
@@ -106,14 +106,14 @@ pub(crate) fn handed_on<T: Scalar>(
     kept: &mut [CompositeMoments<T>],
     next: &mut CompositeMoments<T>,
 ) {
-    if step.follows {
+    if step.hang.follows {
         *next = moved;
         return;
     }
     *next = CompositeMoments::ZERO;
     let Some(parent) = step.parent else { return };
     // A body takes its own moments when the first of its children comes.
-    let mut sum = if step.is_last_child { CompositeMoments::own(&steps[parent]) } else { kept[parent] };
+    let mut sum = if step.hang.is_last_child { CompositeMoments::own(&steps[parent]) } else { kept[parent] };
     sum.add(&moved);
     kept[parent] = sum;
 }

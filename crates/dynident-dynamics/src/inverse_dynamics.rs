@@ -136,9 +136,9 @@ pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreSc
         let Some(parent) = step.parent else { continue };
         let (force, moment) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(force), hinge.up(moment)));
         let translation = hinges.translation(step, index);
-        if step.on_resting_axis {
+        if step.hang.on_resting_axis {
             let about = cross_shift(step.shift, translation, force, moment)[2];
-            if step.follows {
+            if step.hang.follows {
                 next.moment.0[2] = about;
             } else {
                 inner[parent].moment.0[2] += about;
@@ -146,7 +146,7 @@ pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreSc
             continue;
         }
         let moment = cross_shift(step.shift, translation, force, moment);
-        if step.follows {
+        if step.hang.follows {
             next = LinkWrench { force, moment };
         } else {
             inner[parent].force += force;
@@ -179,7 +179,7 @@ pub(crate) fn outward<T: Scalar>(
                 (motion, wrenches[index]) = about_resting_axis(step, arriving, dq[index], ddq[index]);
             }
             parent => {
-                if !step.follows {
+                if !step.hang.follows {
                     motion = parent.map_or(base, |parent| motions[parent]);
                 }
                 let translation = hinges.translation(step, index);

@@ -177,7 +177,7 @@ fn composite_rigid_bodies<T: Lane>(model: &Model, core: &mut CoreScratch<T>, out
             let translation = hinges.translation(below, link);
             let (force, moment) = with_hinge!(hinges, *below, link, |hinge| (hinge.up(f), hinge.up(n)));
             let (upper, lower) = (parent * joints + index, index * joints + parent);
-            if below.on_resting_axis {
+            if below.hang.on_resting_axis {
                 let work = cross_shift(below.shift, translation, force, moment)[2];
                 out.put(upper, at, work);
                 out.put(lower, at, work);

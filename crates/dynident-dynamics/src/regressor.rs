@@ -72,6 +72,10 @@ impl Kernel for Single<'_> {
 /// Where the blocks of the regressor go. A trait and not a closure, because only a method can be determined to be
 /// inlined into the code of each processor level.
 pub(crate) trait BlockSink<T: Lane> {
+    /// Before the entries of body `body`.
+    #[inline(always)]
+    fn begin(&mut self, _body: usize) {}
+
     /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.
     fn put(&mut self, body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>);
 }
@@ -138,7 +142,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
     let mut motion = base;
     for index in 0..joints {
         let (map, step) = (&maps[index], &steps[index]);
-        if !step.follows {
+        if !step.hang.follows {
             motion = map.parent.map_or(base, |parent| motions[parent]);
         }
         let path = &axes.path[axes.path_start[index]..axes.path_start[index + 1]];
@@ -190,6 +194,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
             axis[k].add_at(&mut own[start + bundle].0[k], place);
         }
         let wrench = WrenchBasis::new(&motion);
+        sink.begin(index);
         let mut rest = axes.bundle_start[index + 1] - start;
         if T::PER_BUNDLE == 1 && map.turns {
             // The joint's own axis goes through the frame's origin: no linear part.
@@ -222,34 +227,59 @@ fn spin<T: Scalar>(omega: Vec3<T>, alpha: Vec3<T>) -> Mat3<T> {
     Mat3([[-(yy + zz), xy - az, xz + ay], [xy + az, -(xx + zz), yz - ax], [xz - ay, yz + ax, -(xx + yy)]])
 }
 
-/// A body's wrench as a function of its ten parameters, at one motion.
+/// A body's wrench as a function of its ten parameters, at one motion, by as few numbers as hold it: in a batch they
+/// stay in registers from joint to joint.
 struct WrenchBasis<B> {
     /// Acceleration of the origin minus gravity: the force of a unit mass.
     acceleration: Vec3<B>,
+    alpha: Vec3<B>,
     /// `[α]× + [ω]× [ω]×`: force of a first moment.
-    force_of_moment: Mat3<B>,
-    /// Moment of the six inertia entries: 3 rows of (xx, xy, xz), (yy, yz, zz).
-    moment_of_inertia: [[[B; 3]; 2]; 3],
+    spin: Mat3<B>,
+    /// `ω_y ω_z, ω_x ω_z, ω_x ω_y`.
+    products: Vec3<B>,
+    /// `ω_y² - ω_z², ω_z² - ω_x², ω_x² - ω_y²`.
+    squares: Vec3<B>,
 }
 
 impl<B: Lane> WrenchBasis<B> {
     #[inline(always)]
     fn new<T: Lane<Bundle = B>>(motion: &LinkMotion<T>) -> Self {
         let LinkMotion { omega, alpha, acceleration, spin } = motion;
-        let ([wx, wy, wz], [ax, ay, az]) = (omega.0, alpha.0);
+        let [wx, wy, wz] = omega.0;
         // The same products as in the spin: they are taken once.
         let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
-        let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
-        let g = &spin.0;
         Self {
             acceleration: Vec3(bundles(acceleration.0)),
-            force_of_moment: Mat3([bundles(g[0]), bundles(g[1]), bundles(g[2])]),
-            // I α + ω × I ω, entry by entry of I: xx, xy, xz, then yy, yz, zz.
-            moment_of_inertia: [
-                [bundles([ax, ay - xz, az + xy]), bundles([-yz, yy - zz, yz])],
-                [bundles([xz, ax + yz, zz - xx]), bundles([ay, az - xy, -xz])],
-                [bundles([-xy, xx - yy, ax - yz]), bundles([xy, ay + xz, az])],
-            ],
+            alpha: Vec3(bundles(alpha.0)),
+            spin: Mat3([bundles(spin.0[0]), bundles(spin.0[1]), bundles(spin.0[2])]),
+            products: Vec3(bundles([wy * wz, wx * wz, wx * wy])),
+            squares: Vec3(bundles([yy - zz, zz - xx, xx - yy])),
+        }
+    }
+
+    /// Entry `AXIS` of `I α + ω × I ω` for a unit of inertia entry `ENTRY`, upper triangle by rows.
+    #[inline(always)]
+    fn moment<const AXIS: usize, const ENTRY: usize>(&self) -> B {
+        let Self { alpha, spin: Mat3(g), products: p, squares, .. } = self;
+        match (AXIS, ENTRY) {
+            (0, 0) => alpha[0],
+            (0, 1) => -g[2][0],
+            (0, 2) => g[1][0],
+            (0, 3) => -p[0],
+            (0, 4) => squares[0],
+            (0, _) => p[0],
+            (1, 0) => p[1],
+            (1, 1) => g[2][1],
+            (1, 2) => squares[1],
+            (1, 3) => alpha[1],
+            (1, 4) => -g[0][1],
+            (1, _) => -p[1],
+            (_, 0) => -p[2],
+            (_, 1) => squares[2],
+            (_, 2) => -g[1][2],
+            (_, 3) => p[2],
+            (_, 4) => g[0][2],
+            _ => alpha[2],
         }
     }
 }
@@ -283,14 +313,21 @@ impl<B: Lane> Entries<B> for Work<'_, B> {
         match PARAMETER {
             0 => wrench.acceleration.dot(*linear),
             1..=3 => {
-                let (k, force) = (PARAMETER - 1, &wrench.force_of_moment.0);
+                let (k, force) = (PARAMETER - 1, &wrench.spin.0);
                 let addend = force[0][k].mul_add(linear[0], turned[k]);
                 force[2][k].mul_add(linear[2], force[1][k].mul_add(linear[1], addend))
             }
+            // The rows of `moment` times the axis, with signs where they cost nothing.
             _ => {
-                let (half, k, moment) = ((PARAMETER - 4) / 3, (PARAMETER - 4) % 3, &wrench.moment_of_inertia);
-                let first = moment[1][half][k].mul_add(angular[1], moment[0][half][k] * angular[0]);
-                moment[2][half][k].mul_add(angular[2], first)
+                let ([x, y, z], WrenchBasis { alpha, spin: Mat3(g), products: p, squares, .. }) = (angular.0, *wrench);
+                match PARAMETER {
+                    4 => z.neg_mul_add(p[2], y.mul_add(p[1], x * alpha[0])),
+                    5 => x.neg_mul_add(g[2][0], z.mul_add(squares[2], y * g[2][1])),
+                    6 => z.neg_mul_add(g[1][2], y.mul_add(squares[1], x * g[1][0])),
+                    7 => x.neg_mul_add(p[0], z.mul_add(p[2], y * alpha[1])),
+                    8 => y.neg_mul_add(g[0][1], z.mul_add(g[0][2], x * squares[0])),
+                    _ => y.neg_mul_add(p[1], z.mul_add(alpha[2], x * p[0])),
+                }
             }
         }
     }
@@ -312,7 +349,12 @@ impl<B: Lane, const AXIS: usize> Entries<B> for OwnWork<'_, B, AXIS> {
             1..=3 if PARAMETER - 1 == (AXIS + 1) % 3 => a[(AXIS + 2) % 3] * *axis,
             1..=3 if PARAMETER - 1 == (AXIS + 2) % 3 => -(a[(AXIS + 1) % 3] * *axis),
             0..=3 => B::ZERO,
-            _ => wrench.moment_of_inertia[AXIS][(PARAMETER - 4) / 3][(PARAMETER - 4) % 3] * *axis,
+            4 => wrench.moment::<AXIS, 0>() * *axis,
+            5 => wrench.moment::<AXIS, 1>() * *axis,
+            6 => wrench.moment::<AXIS, 2>() * *axis,
+            7 => wrench.moment::<AXIS, 3>() * *axis,
+            8 => wrench.moment::<AXIS, 4>() * *axis,
+            _ => wrench.moment::<AXIS, 5>() * *axis,
         }
     }
 }

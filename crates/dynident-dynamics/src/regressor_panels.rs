@@ -446,7 +446,7 @@ impl Kernel for Fill<'_> {
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, motion.dq, samples, at);
             take_lanes(&mut scratch.core.ddq, motion.ddq, samples, at);
-            let mut sink = IntoPanels { layout, panels, at };
+            let mut sink = IntoPanels { layout, panels, at, present: 0, places: &[] };
             regressor_blocks(model, &mut scratch.core, &mut scratch.axes, &mut sink);
         }
     }
@@ -456,31 +456,40 @@ struct IntoPanels<'a> {
     layout: &'a PanelLayout,
     panels: &'a mut Panels,
     at: usize,
+    /// Which parameters of the body have columns, and where these begin in the panels of the joints on the way to it.
+    present: u16,
+    places: &'a [usize],
 }
 
 impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
     #[inline(always)]
-    fn put(&mut self, body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
+    fn begin(&mut self, body: usize) {
+        self.present = self.layout.parameters[body];
+        self.places = &self.layout.places[self.layout.place_start[body]..];
+    }
+
+    #[inline(always)]
+    fn put(&mut self, _body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
         // Lanes are samples here, so a bundle is one joint.
         let samples = self.panels.samples;
-        let present = self.layout.parameters[body];
-        let start = self.layout.places[self.layout.place_start[body] + bundle] * samples;
+        let present = self.present;
+        let start = self.places[bundle] * samples + self.at;
         let mut rest = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
-        let at = self.at;
-        let full = samples >= T::LANES;
-        // Written out, because a loop over the entries would first put all of them into memory.
+        // Written out, because a loop over the entries would first put all of them into memory. Behind the last column
+        // stands that of the torque.
         macro_rules! store {
             ($($parameter:literal)*) => {
-                $(if present & (1 << $parameter) != 0 {
-                    let value = work.of::<$parameter>();
-                    let (column, behind) = core::mem::take(&mut rest).split_at_mut(samples);
-                    rest = behind;
-                    if full {
-                        value.store(&mut column[at..at + T::LANES]);
-                    } else {
-                        put_lanes(value, column, at);
-                    }
-                })*
+                if samples >= T::LANES {
+                    $(if present & (1 << $parameter) != 0 {
+                        work.of::<$parameter>().store(rest);
+                        rest = core::mem::take(&mut rest).get_mut(samples..).unwrap_or_default();
+                    })*
+                } else {
+                    $(if present & (1 << $parameter) != 0 {
+                        put_lanes(work.of::<$parameter>(), &mut rest[..samples], 0);
+                        rest = core::mem::take(&mut rest).get_mut(samples..).unwrap_or_default();
+                    })*
+                }
             };
         }
         store!(0 1 2 3 4 5 6 7 8 9);

@@ -143,7 +143,6 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::dispatch::{Level, dispatch_single};
     use crate::kernel::Kernel;
     use crate::lanes::Lane;

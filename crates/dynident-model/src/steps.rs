@@ -56,13 +56,20 @@ pub struct JointStep {
     pub subtree_mass: f64,
     /// True when nothing hangs on the body.
     pub is_tip: bool,
+    /// True when a body other than the next one hangs on this one, and its state is needed later.
+    pub branches: bool,
+    /// How it hangs on its parent.
+    pub hang: Hang,
+}
+
+/// How a body hangs on its parent; all false at the base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hang {
     /// True when no body with a higher index hangs on the same parent: from the tips to the base it is the first that
     /// gives its parent something.
     pub is_last_child: bool,
     /// True when the parent is the body before this one: its state need not be looked up.
     pub follows: bool,
-    /// True when a body other than the next one hangs on this one, and its state is needed later.
-    pub branches: bool,
     /// True when the parent turns about an axis that rests in the base: only what acts about that axis counts there.
     pub on_resting_axis: bool,
 }
@@ -114,10 +121,15 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             second: [second[0][0], second[0][1], second[0][2], second[1][1], second[1][2], second[2][2]],
             subtree_mass: 0.0,
             is_tip: tree.iter().all(|other| other.parent != Some(index)),
-            is_last_child: tree[index + 1..].iter().all(|other| other.parent != joint.parent),
-            follows: index > 0 && joint.parent == Some(index - 1),
             branches: tree.iter().skip(index + 2).any(|other| other.parent == Some(index)),
-            on_resting_axis: joint.parent.is_some_and(|parent| tree[parent].parent.is_none() && tree[parent].turns()),
+            hang: joint.parent.map_or(
+                Hang { is_last_child: false, follows: false, on_resting_axis: false },
+                |parent| Hang {
+                    is_last_child: tree[index + 1..].iter().all(|other| other.parent != Some(parent)),
+                    follows: parent + 1 == index,
+                    on_resting_axis: tree[parent].parent.is_none() && tree[parent].turns(),
+                },
+            ),
         });
     }
     regroup(&mut steps);

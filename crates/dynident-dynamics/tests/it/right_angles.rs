@@ -28,7 +28,7 @@ fn robot(seed: u64) -> Model {
     let general = [0.0, 0.0, 0.2, 1.0][seed as usize % 4];
     let mut joints = plain.tree_joints().to_vec();
     for (index, joint) in joints.iter_mut().enumerate() {
-        if seed % 3 != 0 {
+        if !seed.is_multiple_of(3) {
             joint.parent = index.checked_sub(1);
         }
         if random.uniform(0.0, 1.0) < 0.5 {
@@ -59,7 +59,7 @@ fn robot(seed: u64) -> Model {
             joint.placement.rotation = joint.placement.rotation.mul_mat(&turn);
         }
     }
-    let gravity = if seed % 2 == 0 { Vec3([0.0, 0.0, -9.81]) } else { plain.gravity() };
+    let gravity = if seed.is_multiple_of(2) { Vec3([0.0, 0.0, -9.81]) } else { plain.gravity() };
     let model = Model::new("right angles", plain.base().clone(), joints, plain.bodies().to_vec()).unwrap();
     let model = model.with_gravity(gravity).unwrap();
     if seed % 5 == 4 && model.dof() > 2 {
