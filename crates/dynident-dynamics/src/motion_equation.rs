@@ -1,7 +1,7 @@
 //! Both sides of the equation of motion at once, for simulation.
 
 use crate::inverse_dynamics::newton_euler_placed;
-use crate::mass_matrix::{composite_rigid_bodies, put_matrix};
+use crate::mass_matrix::matrix_of_sample;
 use crate::tree_scratch::TreeScratch;
 use crate::workspace::{AnyScratch, Scratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
@@ -62,7 +62,6 @@ impl Kernel for Single<'_> {
         for (to, from) in self.bias.iter_mut().zip(&core.tau) {
             *to = from.lane(0);
         }
-        composite_rigid_bodies(self.model, core, columns);
-        put_matrix(columns, self.matrix);
+        matrix_of_sample(self.model, core, columns, self.matrix);
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::columns::ColumnScratch;
 use crate::composite::Composite;
+use crate::composite_moments::CompositeMoments;
 use crate::hinge::Hinges;
-use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkState, VariedBody};
+use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkMotion, LinkWrench, VariedBody};
 use crate::tree_scratch::{TreeBatch, TreeScratch};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
@@ -34,12 +35,14 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) composites: Vec<Composite<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia<T>>,
     pub(crate) hinges: Hinges<T>,
-    pub(crate) links: Vec<LinkState<T>>,
-    /// First and second moments of composite bodies.
-    pub(crate) moments: Vec<(Vec3<T>, [T; 6])>,
+    /// Of bodies on which others than the next one hang.
+    pub(crate) motions: Vec<LinkMotion<T>>,
+    pub(crate) wrenches: Vec<LinkWrench<T>>,
+    /// Of bodies on which others than the next one hang.
+    pub(crate) moments: Vec<CompositeMoments<T>>,
     pub(crate) varied: Vec<VariedBody<T>>,
-    /// Square matrices over the joints of the tree, row-major.
-    pub(crate) matrices: [Vec<T>; 3],
+    /// Square matrix over the joints of the tree, row-major.
+    pub(crate) matrix: Vec<T>,
 }
 
 impl<T: Scalar> CoreScratch<T> {
@@ -56,10 +59,11 @@ impl<T: Scalar> CoreScratch<T> {
             composites: vec![Composite::ZERO; dof],
             articulated: vec![ArticulatedInertia::ZERO; dof],
             hinges: Hinges::new(dof),
-            links: vec![LinkState::REST; dof],
-            moments: vec![(Vec3::ZERO, [T::ZERO; 6]); dof],
+            motions: vec![LinkMotion::REST; dof],
+            wrenches: vec![LinkWrench::ZERO; dof],
+            moments: vec![CompositeMoments::ZERO; dof],
             varied: vec![VariedBody::REST; dof],
-            matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
+            matrix: vec![T::ZERO; dof * dof],
         }
     }
 

@@ -234,6 +234,7 @@ impl LogPass<'_> {
     /// Gives the motion to `take`, block by block and without its regressor, all of it or as many samples as are asked
     /// for: as it was kept, or read once and kept if it fits. Returns what the importer found; `None` for a motion that
     /// was made already.
+    pub(crate) fn each_block(
         &self,
         take: &mut dyn FnMut(&MotionBlock) -> Result<(), LogError>,
     ) -> Result<Option<ImportReport>, LogError> {
