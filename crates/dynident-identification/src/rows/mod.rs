@@ -16,6 +16,8 @@ mod pass;
 mod row_block;
 mod row_store;
 mod samples;
+#[cfg(test)]
+mod test_log;
 mod velocities;
 
 pub use builder::RowBuilder;

@@ -340,16 +340,16 @@ impl RowConsumer for Keeping<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_log::recording;
     use super::super::{KeptLog, LogPass, LogStatistics, ParallelFilterSettings, RawSamples};
     use super::*;
     use crate::progress::Silent;
-    use crate::recording::Recording;
     use dynident_dynamics::ParametricModel;
     use dynident_model::terms::{
         Coulomb, CoulombShape, DriveChoice, LoadFriction, MaxwellSlip, Stribeck, TorqueTerm, terms_per_joint,
     };
+    use dynident_recording::MotionSettings;
     use dynident_recording::derivative::DifferentiatorSettings;
-    use dynident_recording::{JointSamples, MotionSettings};
     use std::sync::OnceLock;
 
     /// All rows to the last bit; with samples in hand a pass makes every column itself.
@@ -377,23 +377,6 @@ mod tests {
         fn reads_samples(&self) -> bool {
             self.reads_samples
         }
-    }
-
-    /// Two holes and some torques that are none, at 500 Hz.
-    fn recording(joints: &[String]) -> Recording {
-        let rows = (0..20_000).filter(|row| !(7_000..7_300).contains(row) && !(15_000..15_500).contains(row));
-        let time_s: Vec<f64> = rows.map(|row| f64::from(row) / 500.0).collect();
-        let wave = |joint: usize, t: f64| (0.9 * t + joint as f64).sin() + 0.2 * (2.3 * t).cos();
-        let columns = |of: &dyn Fn(usize, f64) -> f64| {
-            (0..joints.len()).map(|joint| time_s.iter().map(|t| of(joint, *t)).collect()).collect::<Vec<Vec<f64>>>()
-        };
-        let q = columns(&wave);
-        let mut tau = columns(&|joint, t| 10.0 * wave(joint, t + 0.3));
-        for (joint, tau) in tau.iter_mut().enumerate() {
-            tau[2_000 + 37 * joint] = 1e4;
-        }
-        let samples = JointSamples::at_times(time_s.clone(), q, tau);
-        Recording::training("log", samples.into_log("log", joints).unwrap())
     }
 
     #[test]
