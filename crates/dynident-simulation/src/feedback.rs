@@ -49,10 +49,7 @@ impl<'a> Feedback<'a> {
             last_q: vec![0.0; joints],
             rate_hz,
             started: false,
-            perfect: settings.encoder_steps.is_none()
-                && (0..joints).all(|joint| settings.position_std.of(joint) == 0.0)
-                && settings.speed == VelocitySource::True
-                && slots == 1,
+            perfect: settings.see_the_truth(joints),
         }
     }
 

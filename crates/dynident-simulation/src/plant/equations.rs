@@ -55,6 +55,30 @@ pub(super) struct Equations {
     pub(super) unsettled: usize,
 }
 
+impl Clone for Equations {
+    /// The same robot with scratch of its own.
+    fn clone(&self) -> Self {
+        Self {
+            workspace: Workspace::with_level(&self.model, self.workspace.level()),
+            model: self.model.clone(),
+            drives: self.drives.clone(),
+            disturbances: self.disturbances.clone(),
+            locked: self.locked.clone(),
+            any_locked: self.any_locked,
+            matrix: self.matrix.clone(),
+            acceleration: self.acceleration.clone(),
+            load: self.load.clone(),
+            responses: self.responses.clone(),
+            compliance: self.compliance.clone(),
+            free: self.free.clone(),
+            solver: self.solver.clone(),
+            modes: self.modes.clone(),
+            chosen: Vec::with_capacity(self.drives.units.len()),
+            unsettled: self.unsettled,
+        }
+    }
+}
+
 impl Equations {
     pub(super) fn new(model: Model, drives: Drives) -> Self {
         let (n, units) = (model.dof(), drives.units.len());
