@@ -51,6 +51,7 @@ mod columns;
 mod composite;
 mod derivatives;
 mod energy;
+mod equation_of_motion;
 mod forward_dynamics;
 mod gravity;
 mod ground;

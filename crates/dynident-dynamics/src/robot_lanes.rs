@@ -1,9 +1,8 @@
 //! The equation of motion of several robots at once: one tree, and in every lane other bodies.
 
-use crate::hinge::{Hinge, Hinges, with_hinge};
-use crate::states::LinkState;
+use crate::equation_of_motion::{Bodies, EquationScratch, equation_of_motion};
 use dynident_lanes::Lane;
-use dynident_model::{JointStep, Mat3, Model, Vec3};
+use dynident_model::{JointStep, Model, Vec3};
 
 /// Robots of one tree side by side, each with its own inertial parameters and gravity, and scratch for their mass
 /// matrices and bias torques: what a simulation of many robots at once steps with. Lanes do not touch each other.
@@ -40,18 +39,16 @@ use dynident_model::{JointStep, Mat3, Model, Vec3};
 /// assert!(dispatch(Level::detect(), Difference) < 1e-12);
 /// ```
 #[derive(Debug)]
-pub struct RobotLanes<T> {
+pub struct RobotLanes<T: Lane> {
     /// The tree; inertial parameters are in `bodies`.
     steps: Vec<JointStep>,
     bodies: Vec<LaneBody<T>>,
     /// Minus gravity: the acceleration of the base as bodies feel it.
     base: Vec3<T>,
-    hinges: Hinges<T>,
-    links: Vec<LinkState<T>>,
-    moments: Vec<(Vec3<T>, [T; 6])>,
+    scratch: EquationScratch<T>,
+    /// Whether every entry of the matrix is written; else some are zero.
+    is_chain: bool,
     matrix: Vec<T>,
-    /// Whether every joint hangs on the one before: the matrix then has no entry that is always zero.
-    is_one_run: bool,
     bias: Vec<T>,
 }
 
@@ -62,6 +59,25 @@ struct LaneBody<T> {
     first: Vec3<T>,
     second: [T; 6],
     subtree_mass: T,
+}
+
+impl<T: Lane> Bodies<T> for &[LaneBody<T>] {
+    #[inline(always)]
+    fn mass(self, index: usize) -> T {
+        self[index].mass
+    }
+    #[inline(always)]
+    fn first(self, index: usize) -> Vec3<T> {
+        self[index].first
+    }
+    #[inline(always)]
+    fn second(self, index: usize) -> [T; 6] {
+        self[index].second
+    }
+    #[inline(always)]
+    fn subtree_mass(self, index: usize) -> T {
+        self[index].subtree_mass
+    }
 }
 
 impl<T: Lane> RobotLanes<T> {
@@ -77,14 +93,13 @@ impl<T: Lane> RobotLanes<T> {
             second: step.second.map(T::splat),
             subtree_mass: T::splat(step.subtree_mass),
         };
+        let scratch = EquationScratch::new(model);
         Some(Self {
+            is_chain: scratch.is_chain(),
             bodies: steps.iter().map(body).collect(),
             base: (-model.gravity()).splat(),
-            hinges: Hinges::new(joints),
-            links: vec![LinkState::REST; joints],
-            moments: vec![(Vec3::ZERO, [T::ZERO; 6]); joints],
+            scratch,
             matrix: vec![T::ZERO; joints * joints],
-            is_one_run: steps.iter().enumerate().all(|(index, step)| step.parent == index.checked_sub(1)),
             bias: vec![T::ZERO; joints],
             steps,
         })
@@ -121,84 +136,15 @@ impl<T: Lane> RobotLanes<T> {
     /// If a vector has not one entry per joint.
     #[inline(always)]
     pub fn matrix_and_bias(&mut self, q: &[T], dq: &[T]) -> (&mut [T], &mut [T]) {
-        self.hinges.place(&self.steps, q);
-        self.newton_euler(dq);
-        self.composite_bodies();
-        (&mut self.matrix, &mut self.bias)
-    }
-
-    /// Inverse dynamics without acceleration (Featherstone 2008, section 5.3) into `bias`.
-    #[inline(always)]
-    fn newton_euler(&mut self, dq: &[T]) {
-        let joints = self.steps.len();
-        let (steps, bodies, hinges) = (&self.steps[..joints], &self.bodies[..joints], self.hinges.placed(joints));
-        let (links, bias, dq) = (&mut self.links[..joints], &mut self.bias[..joints], &dq[..joints]);
-        let base = LinkState { acceleration: self.base, ..LinkState::REST };
-        for index in 0..joints {
-            let step = &steps[index];
-            let (inner, outer) = links.split_at_mut(index);
-            let parent = step.parent.map_or(&base, |parent| &inner[parent]);
-            let origin = parent.spin.mul_vec(hinges.translation(step, index)) + parent.acceleration;
-            let arriving = with_hinge!(hinges, *step, index, |hinge| {
-                [hinge.down(parent.omega), hinge.down(parent.alpha), hinge.down(origin)]
-            });
-            let link = &mut outer[0];
-            moved(step.turns, arriving, dq[index], link);
-            (link.force, link.moment) = wrench(step.turns, &bodies[index], link);
+        let Self { steps, bodies, base, scratch, matrix, bias, is_chain } = self;
+        equation_of_motion((steps, &**bodies, *base), scratch, (q, dq), bias);
+        if !*is_chain {
+            matrix.fill(T::ZERO);
         }
-        for index in (0..joints).rev() {
-            let step = &steps[index];
-            let (inner, outer) = links.split_at_mut(index);
-            let link = &outer[0];
-            bias[index] = if step.turns { link.moment[2] } else { link.force[2] };
-            if let Some(parent) = step.parent {
-                let parent = &mut inner[parent];
-                let (force, moment) =
-                    with_hinge!(hinges, *step, index, |hinge| (hinge.up(link.force), hinge.up(link.moment)));
-                parent.force += force;
-                parent.moment = hinges.translation(step, index).cross_add(force, parent.moment) + moment;
-            }
+        for entry in &scratch.columns.entries {
+            matrix[entry.lower] = T::load(&scratch.columns.rows[entry.work..]);
         }
-    }
-
-    /// Composite rigid bodies (Featherstone 2008, section 6.2) into the lower triangle of `matrix`.
-    #[inline(always)]
-    fn composite_bodies(&mut self) {
-        let joints = self.steps.len();
-        let (steps, bodies, hinges) = (&self.steps[..joints], &self.bodies[..joints], self.hinges.placed(joints));
-        let moments = &mut self.moments[..joints];
-        if !self.is_one_run {
-            self.matrix.fill(T::ZERO);
-        }
-        for index in (0..joints).rev() {
-            let (step, body) = (&steps[index], &bodies[index]);
-            let (inner, outer) = moments.split_at_mut(index);
-            if step.is_tip {
-                outer[0] = (body.first, body.second);
-            }
-            let (h, s) = &outer[0];
-            let row = &mut self.matrix[index * joints..][..=index];
-            let (mut f, mut n) = if step.turns {
-                (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], s[0] + s[3]]))
-            } else {
-                (Vec3([T::ZERO, T::ZERO, body.subtree_mass]), Vec3([h[1], -h[0], T::ZERO]))
-            };
-            let mut at = index;
-            loop {
-                row[at] = if steps[at].turns { n[2] } else { f[2] };
-                let Some(parent) = steps[at].parent else { break };
-                (f, n) = with_hinge!(hinges, steps[at], at, |hinge| (hinge.up(f), hinge.up(n)));
-                n = hinges.translation(&steps[at], at).cross_add(f, n);
-                at = parent;
-            }
-            let Some(parent) = step.parent else { continue };
-            let (h, s) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(*h), hinge.up_symmetric(s)));
-            let own = &bodies[parent];
-            // A body takes its own moments when the first of its children comes.
-            let mut sum = if step.is_last_child { (own.first, own.second) } else { inner[parent] };
-            add(&mut sum, h, &s, body.subtree_mass, hinges.translation(step, index));
-            inner[parent] = sum;
-        }
+        (matrix, bias)
     }
 }
 
@@ -222,72 +168,4 @@ fn same_steps(one: &[JointStep], other: &[JointStep]) -> bool {
     let shape =
         |step: &JointStep| JointStep { mass: 0.0, first: Vec3::ZERO, second: [0.0; 6], subtree_mass: 0.0, ..*step };
     one.iter().map(shape).eq(other.iter().map(shape))
-}
-
-/// One step outward without joint acceleration: see the inverse dynamics.
-#[inline(always)]
-fn moved<T: Lane>(turns: bool, arriving: [Vec3<T>; 3], dq: T, link: &mut LinkState<T>) {
-    let [mut omega, mut alpha, mut acceleration] = arriving;
-    let [wx, wy, _] = omega.0;
-    if turns {
-        alpha = Vec3([wy.mul_add(dq, alpha[0]), wx.neg_mul_add(dq, alpha[1]), alpha[2]]);
-        omega.0[2] += dq;
-    } else {
-        let twice = dq + dq;
-        let [x, y, z] = acceleration.0;
-        acceleration = Vec3([wy.mul_add(twice, x), wx.neg_mul_add(twice, y), z]);
-    }
-    let ([wx, wy, wz], [ax, ay, az]) = (omega.0, alpha.0);
-    let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
-    let spin = Mat3([
-        [-(yy + zz), wx.mul_add(wy, -az), wx.mul_add(wz, ay)],
-        [wx.mul_add(wy, az), -(xx + zz), wy.mul_add(wz, -ax)],
-        [wx.mul_add(wz, -ay), wy.mul_add(wz, ax), -(xx + yy)],
-    ]);
-    (link.omega, link.alpha, link.acceleration, link.spin) = (omega, alpha, acceleration, spin);
-}
-
-/// The wrench that a body needs by itself: see the inverse dynamics.
-#[inline(always)]
-fn wrench<T: Lane>(turns: bool, body: &LaneBody<T>, link: &LinkState<T>) -> (Vec3<T>, Vec3<T>) {
-    let g = &link.spin.0;
-    let [ax, ay, az] = link.acceleration.0;
-    let [hx, hy, hz] = body.first.0;
-    let [xx, xy, xz, yy, yz, zz] = body.second;
-    let mut f =
-        Vec3([g[0][1].mul_add(hy, g[0][0] * hx), g[1][1].mul_add(hy, g[1][0] * hx), g[2][1].mul_add(hy, g[2][0] * hx)]);
-    let mut n = Vec3([hy * az, -(hx * az), hx.mul_add(ay, -(hy * ax))]);
-    n.0[0] = g[1][1].neg_mul_add(yz, g[1][0].neg_mul_add(xz, n[0]));
-    n.0[0] = g[2][2].mul_add(yz, g[2][1].mul_add(yy, g[2][0].mul_add(xy, n[0])));
-    n.0[1] = g[2][2].neg_mul_add(xz, g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, n[1])));
-    n.0[1] = g[0][1].mul_add(yz, g[0][0].mul_add(xz, n[1]));
-    n.0[2] = g[1][2].mul_add(xz, g[1][1].mul_add(xy, g[1][0].mul_add(xx, n[2])));
-    n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, g[0][0].neg_mul_add(xy, n[2])));
-    if !turns {
-        let along = Vec3([g[0][2], g[1][2], g[2][2]]);
-        f = link.acceleration.scale_add(body.mass, along.scale_add(hz, f));
-        n.0[0] = g[1][2].neg_mul_add(zz, hz.neg_mul_add(ay, n[0]));
-        n.0[1] = g[0][2].mul_add(zz, hz.mul_add(ax, n[1]));
-    }
-    (f, n)
-}
-
-/// Adds moments `(m, h, Σ)` about the point `t` to moments `(h, Σ)` about the origin: see the mass matrix.
-#[inline(always)]
-fn add<T: Lane>(sum: &mut (Vec3<T>, [T; 6]), h: Vec3<T>, s: &[T; 6], mass: T, t: Vec3<T>) {
-    let (first, second) = sum;
-    *first += h;
-    *first += t.scale(mass);
-    let g = t.scale_add(T::splat(0.5) * mass, h);
-    macro_rules! entry {
-        ($k:literal, $a:literal, $b:literal) => {
-            second[$k] += t[$a].mul_add(g[$b], t[$b].mul_add(g[$a], s[$k]));
-        };
-    }
-    entry!(0, 0, 0);
-    entry!(1, 0, 1);
-    entry!(2, 0, 2);
-    entry!(3, 1, 1);
-    entry!(4, 1, 2);
-    entry!(5, 2, 2);
 }

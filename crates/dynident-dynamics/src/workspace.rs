@@ -2,6 +2,7 @@
 
 use crate::columns::ColumnScratch;
 use crate::composite::Composite;
+use crate::equation_of_motion::EquationScratch;
 use crate::hinge::Hinges;
 use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkState, VariedBody};
 use crate::tree_scratch::{TreeBatch, TreeScratch};
@@ -19,6 +20,8 @@ pub(crate) struct Scratch<T: Lane> {
     pub(crate) axes: AxisScratch<T>,
     /// Of the regressor's reverse sweep.
     pub(crate) adjoint: AdjointScratch<T>,
+    /// Of mass matrix and bias torque together.
+    pub(crate) equation: EquationScratch<T>,
 }
 
 /// The part of the scratch that every [`Scalar`], duals too, can use.
@@ -145,6 +148,7 @@ impl Kernel for MakeScratch<'_> {
             columns: ColumnScratch::new(self.0),
             axes: AxisScratch::new(self.0),
             adjoint: AdjointScratch::new(self.0),
+            equation: EquationScratch::new(self.0),
         }))
     }
 }

@@ -1,6 +1,6 @@
 //! A controller on a simulated robot along a reference.
 
-use crate::controllers::Controller;
+use crate::controllers::{Controller, Measured};
 use crate::error::{SimulationError, require_length};
 use crate::feedback::Feedback;
 use crate::motion_buffer::{Arrays, MotionBuffer, ReferenceBuffer, Row};
@@ -209,12 +209,14 @@ pub fn closed_loop(
     controller.reset();
     // Room for the whole run: the loop allocates nothing.
     let mut run = Run::begin(plant, reference, settings.accelerations);
-    run.measured_q = vec![0.0; joints * samples];
-    run.measured_dq = vec![0.0; joints * samples];
+    let sees_the_truth = settings.sensors.see_the_truth(joints);
+    if !sees_the_truth {
+        (run.measured_q, run.measured_dq) = (vec![0.0; joints * samples], vec![0.0; joints * samples]);
+    }
     let mut target = ReferenceBuffer::new(reference);
     let mut feedback = Feedback::new(&settings.sensors, plant, reference.rate_hz());
     let (mut tau, mut ddq) = (vec![0.0; joints], vec![0.0; joints]);
-    let mut tape = MotionBuffer::new(joints);
+    let mut tape = MotionBuffer::new(joints, !sees_the_truth);
     let mut kept = 0;
     for sample in 0..samples {
         // The state at this sample: still inside its limits?
@@ -226,8 +228,12 @@ pub fn closed_loop(
             break;
         }
         // Sensors, control law, drives that saturate.
-        feedback.read(plant.q(), plant.dq());
-        let measured = feedback.measured();
+        let measured = if sees_the_truth {
+            Measured { q: plant.q(), dq: plant.dq() }
+        } else {
+            feedback.read(plant.q(), plant.dq());
+            feedback.measured()
+        };
         controller.torque(time_s, target.target(), measured, &mut tau);
         if let Some(joint) = tau.iter().position(|tau| !tau.is_finite()) {
             run.status = RunStatus::Diverged { time_s, reason: Divergence::Torque { joint } };
@@ -243,7 +249,8 @@ pub fn closed_loop(
             run.rms_error[joint] += error * error;
         }
         // Record the sample, and move on to the next.
-        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured_q: measured.q, measured_dq: measured.dq };
+        let measured = (!sees_the_truth).then_some(measured);
+        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured };
         if tape.push(row) {
             tape.flush(arrays(&mut run), samples);
         }
@@ -265,6 +272,9 @@ pub fn closed_loop(
         }
     }
     tape.flush(arrays(&mut run), samples);
+    if sees_the_truth {
+        (run.measured_q, run.measured_dq) = (run.q.clone(), run.dq.clone());
+    }
     run.unsettled_steps = plant.unsettled_steps();
     run.end(kept);
     Ok(run)

@@ -71,7 +71,7 @@ struct Common {
     is_plain: bool,
 }
 
-struct Lanes<'a, T> {
+struct Lanes<'a, T: Lane> {
     common: Common,
     plant: PlantLanes<T>,
     slots: [Option<Slot<'a>>; MOST_LANES],

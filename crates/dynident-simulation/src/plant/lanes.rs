@@ -41,7 +41,7 @@ impl Plant {
 }
 
 /// Robots side by side, with their states.
-pub(crate) struct PlantLanes<T> {
+pub(crate) struct PlantLanes<T: Lane> {
     robots: RobotLanes<T>,
     constant: Vec<T>,
     inertia: Vec<(usize, usize, T)>,
