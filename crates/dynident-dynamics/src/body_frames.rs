@@ -111,7 +111,7 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
     for (composite, inertial) in scratch.composites.iter_mut().zip(model.inertials()) {
         *composite = Composite::of(inertial);
     }
-    let matrix = &mut scratch.matrices[0];
+    let matrix = &mut scratch.matrix;
     // Joints on different branches do not couple; every entry along a path is written below.
     matrix.fill(T::ZERO);
     for index in (0..dof).rev() {

@@ -20,7 +20,6 @@ pub(crate) struct ColumnScratch<T: Lane> {
     pub(crate) rows: Vec<f64>,
     /// Of all joints and those on the way to them: where the work stands in `rows`, and the two entries of the matrix.
     pub(crate) entries: Vec<Entry>,
-    is_one_run: bool,
 }
 
 /// One entry of the mass matrix and its mirror image.
@@ -77,12 +76,6 @@ impl<T: Lane> ColumnScratch<T> {
             moment: vec![Vec3::ZERO; bundles],
             rows: vec![0.0; joints * bundles * lanes],
             entries,
-            is_one_run: (1..joints).all(|joint| parents[joint] == Some(joint - 1)),
         }
-    }
-
-    /// True on a serial arm: every joint hangs on the one before.
-    pub(crate) fn is_one_run(&self) -> bool {
-        self.is_one_run
     }
 }

@@ -2,9 +2,10 @@
 
 use crate::ground::{MassMoments, MomentRates, Spatial};
 use crate::hinge::{Hinge, with_hinge};
+use crate::joint_matrices::{JointMatrices, MatrixRows};
 use crate::states::VariedBody;
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded, project_matrices};
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{Model, Transform, Vec3};
@@ -36,7 +37,7 @@ pub struct InverseDynamicsDerivatives<'w> {
 /// Allocation-free.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another size.
+/// If a vector's length is not the number of joints, or the workspace was made for another tree.
 #[doc(alias("jacobian", "rnea derivatives"))]
 pub fn inverse_dynamics_derivatives<'w>(
     model: &Model,
@@ -46,19 +47,24 @@ pub fn inverse_dynamics_derivatives<'w>(
     ddq: &[f64],
 ) -> InverseDynamicsDerivatives<'w> {
     workspace.check(model, &[q, dq, ddq]);
+    workspace.check_tree(model);
     let Workspace { level, scratch, matrices, tree, .. } = workspace;
     if let Some(coupling) = model.coupling() {
         tree.take_motion(coupling, q, dq, ddq);
-        let TreeScratch { q, dq, ddq, matrices: [by_position, by_velocity, by_acceleration], .. } = tree;
-        dispatch_single(*level, Single { model, scratch, q, dq, ddq, by_position, by_velocity, by_acceleration });
-        for (to, from) in matrices.iter_mut().zip(&tree.matrices) {
+        let TreeScratch { q, dq, ddq, matrices: tree_matrices, .. } = tree;
+        let motion = &JointMotion { samples: 1, q, dq, ddq };
+        let out = tree_matrices.each_mut().map(|out| MatrixRows { out, stride: 1 });
+        dispatch_single(*level, Fill { model, scratch, motion, out });
+        for (to, from) in matrices.iter_mut().zip(tree_matrices) {
             coupling.project_matrix(from, to);
         }
-        let [by_position, by_velocity, by_acceleration] = matrices;
-        return InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration };
+    } else {
+        let motion = &JointMotion { samples: 1, q, dq, ddq };
+        // Entries of joints on different branches are never written; they stay the zeros of the new workspace.
+        let out = matrices.each_mut().map(|out| MatrixRows { out, stride: 1 });
+        dispatch_single(*level, Fill { model, scratch, motion, out });
     }
     let [by_position, by_velocity, by_acceleration] = matrices;
-    dispatch_single(*level, Single { model, scratch, q, dq, ddq, by_position, by_velocity, by_acceleration });
     InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration }
 }
 
@@ -89,14 +95,44 @@ pub fn inverse_dynamics_derivatives_batch(
 ) {
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
     let DerivativeArrays { by_position, by_velocity, by_acceleration } = derivatives;
-    let mut out = [by_position, by_velocity, by_acceleration];
+    let out = [by_position, by_velocity, by_acceleration];
     for array in &out {
         let entries = model.dof() * model.dof() * motion.samples;
         assert_eq!(array.len(), entries, "a derivative has one entry for two joints and sample");
     }
+    let mut out = out.map(|out| MatrixRows { out, stride: motion.samples });
+    if model.coupling().is_none() {
+        for rows in &mut out {
+            rows.clear_across_branches(model);
+        }
+    }
+    fill(model, workspace, motion, out);
+}
+
+/// [`inverse_dynamics_derivatives`] of every sample of a motion, by position, velocity and acceleration in this order,
+/// into arrays that keep the zeros of a tree: as fast as may be.
+///
+/// Allocation-free once the arrays have grown to the number of samples, but for robots whose joints follow others.
+///
+/// # Panics
+/// If an array of the motion has not joints × samples numbers, or workspace or matrices were made for another tree.
+#[doc(alias("rnea derivatives"))]
+pub fn inverse_dynamics_derivative_matrices(
+    model: &Model,
+    workspace: &mut BatchWorkspace,
+    motion: &JointMotion<'_>,
+    out: &mut [JointMatrices; 3],
+) {
+    workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
+    let out = out.each_mut().map(|out| out.resize(model, motion.samples));
+    fill(model, workspace, motion, out);
+}
+
+/// Writes the entries of all pairs of joints that meet on a way to the base.
+fn fill(model: &Model, workspace: &mut BatchWorkspace, motion: &JointMotion<'_>, mut out: [MatrixRows<'_>; 3]) {
     let BatchWorkspace { level, scratch, tree, .. } = workspace;
     let Some(coupling) = model.coupling() else {
-        dispatch(*level, Batch { model, scratch, motion, out });
+        dispatch(*level, Fill { model, scratch, motion, out });
         return;
     };
     let TreeBatch { motion: tree_motion, matrices, .. } = tree;
@@ -104,21 +140,24 @@ pub fn inverse_dynamics_derivatives_batch(
     for matrix in matrices.iter_mut() {
         matrix.resize(coupling.joints() * motion.q.len(), 0.0);
     }
-    let tree_out = matrices.each_mut().map(Vec::as_mut_slice);
-    dispatch(*level, Batch { model, scratch, motion, out: tree_out });
+    let mut rows = matrices.each_mut().map(|out| MatrixRows { out, stride: motion.samples });
+    for rows in &mut rows {
+        rows.clear_across_branches(model);
+    }
+    dispatch(*level, Fill { model, scratch, motion, out: rows });
     for (to, from) in out.iter_mut().zip(matrices) {
         project_matrices(coupling, from, motion.samples, to);
     }
 }
 
-struct Batch<'a> {
+struct Fill<'a> {
     model: &'a Model,
     scratch: &'a mut AnyScratch,
     motion: &'a JointMotion<'a>,
-    out: [&'a mut [f64]; 3],
+    out: [MatrixRows<'a>; 3],
 }
 
-impl Kernel for Batch<'_> {
+impl Kernel for Fill<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
@@ -129,24 +168,11 @@ impl Kernel for Batch<'_> {
             take_lanes(&mut core.q, motion.q, samples, at);
             take_lanes(&mut core.dq, motion.dq, samples, at);
             take_lanes(&mut core.ddq, motion.ddq, samples, at);
-            newton_euler_derivatives(model, core);
-            for (out, matrix) in out.iter_mut().zip(&core.matrices) {
-                for (row, value) in out.chunks_exact_mut(samples).zip(matrix) {
-                    put_lanes(*value, row, at);
-                }
-            }
+            core.hinges.place(model.steps(), &core.q);
+            outward(model, core);
+            inward(model, core, &mut out, at);
         }
     }
-}
-
-one_sample_kernel!((q, dq, ddq), newton_euler_derivatives, by_position: matrices[0], by_velocity: matrices[1], by_acceleration: matrices[2]);
-
-/// From `q`, `dq`, `ddq` of the scratch to its three matrices.
-#[inline(always)]
-pub(crate) fn newton_euler_derivatives<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    scratch.hinges.place(model.steps(), &scratch.q);
-    outward(model, scratch);
-    inward(model, scratch);
 }
 
 /// Axes, their rates, and what every body alone contributes.
@@ -188,17 +214,11 @@ fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
 
 /// From the tips to the base: what hangs on a joint against all axes on the way to it.
 #[inline(always)]
-fn inward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+fn inward<T: Lane>(model: &Model, scratch: &mut CoreScratch<T>, out: &mut [MatrixRows<'_>; 3], sample: usize) {
     let steps = model.steps();
     let dof = steps.len();
-    let CoreScratch { varied, matrices: [by_position, by_velocity, by_acceleration], .. } = scratch;
-    let varied = &mut varied[..dof];
-    let [by_position, by_velocity, by_acceleration] =
-        [by_position, by_velocity, by_acceleration].map(|matrix| &mut matrix[..dof * dof]);
-    // Joints on different branches do not meet; every entry along a path is written below.
-    for matrix in [&mut *by_position, &mut *by_velocity, &mut *by_acceleration] {
-        matrix.fill(T::ZERO);
-    }
+    let varied = &mut scratch.varied[..dof];
+    let [by_position, by_velocity, by_acceleration] = out;
     for index in (0..dof).rev() {
         let (inner, outer) = varied.split_at_mut(index);
         let body = &outer[0];
@@ -210,20 +230,23 @@ fn inward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
         let row = rates.coriolis_transposed(axis);
         let twice_row = row + row;
 
-        by_position[index * dof + index] = axis.dot(&column_by_position);
-        by_velocity[index * dof + index] = axis.dot(&column_by_velocity);
-        by_acceleration[index * dof + index] = axis.dot(&column_by_acceleration);
+        let diagonal = index * dof + index;
+        by_position.put(diagonal, sample, axis.dot(&column_by_position));
+        by_velocity.put(diagonal, sample, axis.dot(&column_by_velocity));
+        by_acceleration.put(diagonal, sample, axis.dot(&column_by_acceleration));
         let mut link = steps[index].parent;
         while let Some(at) = link {
             let above = &inner[at];
             let (lower, upper) = (index * dof + at, at * dof + index);
-            by_position[upper] = above.axis.dot(&column_by_position);
-            by_velocity[upper] = above.axis.dot(&column_by_velocity);
+            by_position.put(upper, sample, above.axis.dot(&column_by_position));
+            by_velocity.put(upper, sample, above.axis.dot(&column_by_velocity));
             let inertia = above.axis.dot(&column_by_acceleration);
-            by_acceleration[upper] = inertia;
-            by_acceleration[lower] = inertia;
-            by_position[lower] = above.twice_rate.angular.dot(row) + above.second_rate.dot(&column_by_acceleration);
-            by_velocity[lower] = above.axis.angular.dot(twice_row) + above.twice_rate.dot(&column_by_acceleration);
+            by_acceleration.put(upper, sample, inertia);
+            by_acceleration.put(lower, sample, inertia);
+            let turned = above.twice_rate.angular.dot(row);
+            by_position.put(lower, sample, turned + above.second_rate.dot(&column_by_acceleration));
+            let turned = above.axis.angular.dot(twice_row);
+            by_velocity.put(lower, sample, turned + above.twice_rate.dot(&column_by_acceleration));
             link = steps[at].parent;
         }
         if let Some(parent) = steps[index].parent {

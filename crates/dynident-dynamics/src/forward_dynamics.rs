@@ -87,12 +87,13 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     let joints = steps.len();
     scratch.hinges.place(steps, &scratch.q);
     let hinges = scratch.hinges.placed(joints);
-    let (links, articulated) = (&mut scratch.links[..joints], &mut scratch.articulated[..joints]);
+    let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
+    let articulated = &mut scratch.articulated[..joints];
     let (tau, ddq) = (&scratch.tau[..joints], &mut scratch.ddq[..joints]);
     // With q̈ = 0 the outward recursion gives every body's velocity-dependent and gravity acceleration; the wrench that
     // goes with it is the bias. What is left is linear in the joint accelerations alone.
     ddq.fill(T::ZERO);
-    outward(model, hinges, links, &scratch.dq[..joints], ddq);
+    outward(model, hinges, motions, wrenches, &scratch.dq[..joints], ddq);
     for (own, step) in articulated.iter_mut().zip(steps) {
         let [xx, xy, xz, yy, yz, zz] = step.second;
         own.rotation = [yy + zz, -xy, -xz, xx + zz, -yz, xx + yy].map(T::splat);
@@ -102,7 +103,7 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     }
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let (inner, outer) = links.split_at_mut(index);
+        let (inner, outer) = wrenches.split_at_mut(index);
         let link = &outer[0];
         let (inner_inertias, outer_inertias) = articulated.split_at_mut(index);
         let own = &mut outer_inertias[0];
@@ -164,7 +165,7 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     for index in 0..joints {
         let step = &steps[index];
         let own = &articulated[index];
-        let (inner, outer) = links.split_at_mut(index);
+        let (inner, outer) = motions.split_at_mut(index);
         let link = &mut outer[0];
         let (mut alpha, mut acceleration, pull) = if let Some(parent) = step.parent {
             let parent = &inner[parent];

@@ -2,7 +2,7 @@
 //! rotations are none or a quarter turn about x, so that turning a vector takes four products in place of nine.
 
 use dynident_lanes::{Lane, Scalar};
-use dynident_model::{JointStep, Mat3, Vec3};
+use dynident_model::{JointStep, Mat3, Shift, Vec3};
 
 /// The rotation `parent_from_body` of one joint at its position.
 pub(crate) trait Hinge<T: Scalar>: Copy {
@@ -154,6 +154,24 @@ impl<T: Scalar> Hinges<T> {
         T::sin_cos_all(&self.position, &mut self.sine, &mut self.cosine);
     }
 
+    /// Places the joints that hang on others: what does not turn with the base needs no more.
+    #[inline(always)]
+    pub(crate) fn place_below_base(&mut self, steps: &[JointStep], q: &[T]) {
+        let joints = steps.len();
+        let (position, sine, cosine) =
+            (&mut self.position[..joints], &mut self.sine[..joints], &mut self.cosine[..joints]);
+        for (index, (step, q)) in steps.iter().zip(&q[..joints]).enumerate() {
+            if step.parent.is_none() {
+                continue;
+            }
+            if step.turns {
+                (sine[index], cosine[index]) = (*q + T::splat(step.offset)).sin_cos();
+            } else {
+                position[index] = *q;
+            }
+        }
+    }
+
     /// What was placed, with lengths that the compiler knows to be equal: loops over `joints` joints check no bounds.
     #[inline(always)]
     pub(crate) fn placed(&self, joints: usize) -> PlacedHinges<'_, T> {
@@ -187,6 +205,50 @@ impl<T: Scalar> PlacedHinges<'_, T> {
     pub(crate) fn translation(&self, step: &JointStep, index: usize) -> Vec3<T> {
         let translation = step.translation.splat();
         if step.turns { translation } else { step.slide.splat().scale_add(self.position[index], translation) }
+    }
+}
+
+/// `M t + addend` with the origin `t` of a body, of which `shift` says what is zero.
+#[inline(always)]
+pub(crate) fn times_shift<T: Scalar>(shift: Shift, t: Vec3<T>, m: &Mat3<T>, addend: Vec3<T>) -> Vec3<T> {
+    macro_rules! along {
+        ($k:literal) => {
+            Vec3([m.0[0][$k], m.0[1][$k], m.0[2][$k]]).scale_add(t[$k], addend)
+        };
+    }
+    match shift {
+        Shift::None => addend,
+        Shift::X => along!(0),
+        Shift::Y => along!(1),
+        Shift::Z => along!(2),
+        // The addend comes last: it is what takes longest to arrive.
+        Shift::Any => m.mul_vec(t) + addend,
+    }
+}
+
+/// `t × v + addend` with the origin `t` of a body, of which `shift` says what is zero.
+#[inline(always)]
+pub(crate) fn cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, addend: Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = addend.0;
+    match shift {
+        Shift::None => addend,
+        Shift::X => Vec3([x, t[0].neg_mul_add(v[2], y), t[0].mul_add(v[1], z)]),
+        Shift::Y => Vec3([t[1].mul_add(v[2], x), y, t[1].neg_mul_add(v[0], z)]),
+        Shift::Z => Vec3([t[2].neg_mul_add(v[1], x), t[2].mul_add(v[0], y), z]),
+        Shift::Any => t.cross_add(v, addend),
+    }
+}
+
+/// `v × t + addend` with the origin `t` of a body, of which `shift` says what is zero.
+#[inline(always)]
+pub(crate) fn minus_cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, addend: Vec3<T>) -> Vec3<T> {
+    let [x, y, z] = addend.0;
+    match shift {
+        Shift::None => addend,
+        Shift::X => Vec3([x, t[0].mul_add(v[2], y), t[0].neg_mul_add(v[1], z)]),
+        Shift::Y => Vec3([t[1].neg_mul_add(v[2], x), y, t[1].mul_add(v[0], z)]),
+        Shift::Z => Vec3([t[2].mul_add(v[1], x), t[2].neg_mul_add(v[0], y), z]),
+        Shift::Any => v.cross_add(t, addend),
     }
 }
 

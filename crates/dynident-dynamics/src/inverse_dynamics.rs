@@ -1,7 +1,8 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
-use crate::hinge::{Hinge, PlacedHinges, with_hinge};
-use crate::states::LinkState;
+use crate::bodies::Bodies;
+use crate::hinge::{Hinge, PlacedHinges, cross_shift, times_shift, with_hinge};
+use crate::states::{LinkMotion, LinkWrench};
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
@@ -118,23 +119,48 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
 /// The same with the hinges in place.
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let steps = model.steps();
+    let base = (-model.gravity()).splat();
+    newton_euler_of((model.steps(), model.steps(), base), scratch);
+}
+
+/// The same of a tree with bodies of its own, and the base's acceleration: minus gravity.
+#[inline(always)]
+pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
+    (steps, bodies, base): (&[JointStep], B, Vec3<T>),
+    scratch: &mut CoreScratch<T>,
+) {
     let joints = steps.len();
     let hinges = scratch.hinges.placed(joints);
-    let links = &mut scratch.links[..joints];
-    outward(model, hinges, links, &scratch.dq[..joints], &scratch.ddq[..joints]);
+    let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
+    outward_of((steps, bodies, base), hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
     let tau = &mut scratch.tau[..joints];
+    // What the body after this one asks of it, where it hangs on it: stays in registers.
+    let mut next = LinkWrench::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let (inner, outer) = links.split_at_mut(index);
-        let link = &outer[0];
-        tau[index] = if step.turns { link.moment[2] } else { link.force[2] };
-        if let Some(parent) = step.parent {
-            let parent = &mut inner[parent];
-            let (force, moment) =
-                with_hinge!(hinges, *step, index, |hinge| (hinge.up(link.force), hinge.up(link.moment)));
-            parent.force += force;
-            parent.moment = hinges.translation(step, index).cross_add(force, parent.moment) + moment;
+        let (inner, outer) = wrenches.split_at_mut(index);
+        let wrench = &outer[0];
+        let (force, moment) = (wrench.force + next.force, wrench.moment + next.moment);
+        tau[index] = if step.turns { moment[2] } else { force[2] };
+        next = LinkWrench::ZERO;
+        let Some(parent) = step.parent else { continue };
+        let (force, moment) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(force), hinge.up(moment)));
+        let translation = hinges.translation(step, index);
+        if step.hang.on_resting_axis {
+            let about = cross_shift(step.shift, translation, force, moment)[2];
+            if step.hang.follows {
+                next.moment.0[2] = about;
+            } else {
+                inner[parent].moment.0[2] += about;
+            }
+            continue;
+        }
+        let moment = cross_shift(step.shift, translation, force, moment);
+        if step.hang.follows {
+            next = LinkWrench { force, moment };
+        } else {
+            inner[parent].force += force;
+            inner[parent].moment += moment;
         }
     }
 }
@@ -144,34 +170,79 @@ pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreSc
 pub(crate) fn outward<T: Scalar>(
     model: &Model,
     hinges: PlacedHinges<'_, T>,
-    links: &mut [LinkState<T>],
+    motions: &mut [LinkMotion<T>],
+    wrenches: &mut [LinkWrench<T>],
     dq: &[T],
     ddq: &[T],
 ) {
-    let steps = model.steps();
-    let joints = links.len();
-    let (steps, dq, ddq) = (&steps[..joints], &dq[..joints], &ddq[..joints]);
-    let base = LinkState { acceleration: (-model.gravity()).splat(), ..LinkState::REST };
+    let base = (-model.gravity()).splat();
+    outward_of((model.steps(), model.steps(), base), hinges, motions, wrenches, dq, ddq);
+}
+
+/// The same of a tree with bodies of its own.
+#[inline(always)]
+fn outward_of<T: Scalar, B: Bodies<T>>(
+    (steps, bodies, base): (&[JointStep], B, Vec3<T>),
+    hinges: PlacedHinges<'_, T>,
+    motions: &mut [LinkMotion<T>],
+    wrenches: &mut [LinkWrench<T>],
+    dq: &[T],
+    ddq: &[T],
+) {
+    let joints = motions.len();
+    let (steps, wrenches, dq, ddq) = (&steps[..joints], &mut wrenches[..joints], &dq[..joints], &ddq[..joints]);
+    let base = LinkMotion { acceleration: base, ..LinkMotion::REST };
+    // Of the body before this one: along a chain it stays in registers.
+    let mut motion = base;
     for index in 0..joints {
         let step = &steps[index];
-        let (inner, outer) = links.split_at_mut(index);
-        let parent = step.parent.map_or(&base, |parent| &inner[parent]);
-        let translation = hinges.translation(step, index);
-        // The parent's acceleration comes last: it is what takes longest to arrive.
-        let origin = parent.spin.mul_vec(translation) + parent.acceleration;
-        let arriving = with_hinge!(hinges, *step, index, |hinge| {
-            [hinge.down(parent.omega), hinge.down(parent.alpha), hinge.down(origin)]
-        });
-        let link = &mut outer[0];
-        moved(step, arriving, dq[index], ddq[index], link);
-        (link.force, link.moment) = wrench(step, link);
+        match step.parent {
+            None if step.turns => {
+                let arriving = with_hinge!(hinges, *step, index, |hinge| hinge.down(base.acceleration));
+                (motion, wrenches[index]) = about_resting_axis(bodies, index, arriving, dq[index], ddq[index]);
+            }
+            parent => {
+                if !step.hang.follows {
+                    motion = parent.map_or(base, |parent| motions[parent]);
+                }
+                let translation = hinges.translation(step, index);
+                let origin = times_shift(step.shift, translation, &motion.spin, motion.acceleration);
+                let arriving = with_hinge!(hinges, *step, index, |hinge| {
+                    [hinge.down(motion.omega), hinge.down(motion.alpha), hinge.down(origin)]
+                });
+                motion = moved(step, arriving, dq[index], ddq[index]);
+                wrenches[index] = wrench(step.turns, bodies, index, &motion);
+            }
+        }
+        if step.branches {
+            motions[index] = motion;
+        }
     }
+}
+
+/// A body that turns about an axis at rest: motion from the acceleration against gravity in its frame, and the only part
+/// of its wrench that counts, the moment about the axis.
+#[inline(always)]
+fn about_resting_axis<T: Scalar>(
+    bodies: impl Bodies<T>,
+    index: usize,
+    acceleration: Vec3<T>,
+    dq: T,
+    ddq: T,
+) -> (LinkMotion<T>, LinkWrench<T>) {
+    let about = |rate: T| Vec3([T::ZERO, T::ZERO, rate]);
+    let inward = -(dq * dq);
+    let spin = Mat3([[inward, -ddq, T::ZERO], [ddq, inward, T::ZERO], [T::ZERO; 3]]);
+    let ([hx, hy, _], [xx, _, _, yy, ..]) = (bodies.first(index).0, bodies.second(index));
+    let moment = hx.mul_add(acceleration[1], hy.neg_mul_add(acceleration[0], (xx + yy) * ddq));
+    let motion = LinkMotion { omega: about(dq), alpha: about(ddq), acceleration, spin };
+    (motion, LinkWrench { force: Vec3::ZERO, moment: about(moment) })
 }
 
 /// One step outward, from angular velocity, angular acceleration and acceleration that arrive from the parent. A point
 /// `x` of a body has the acceleration `a + Γ x` with the spin `Γ = [α]× + [ω]× [ω]×`.
 #[inline(always)]
-fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T, link: &mut LinkState<T>) {
+fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> LinkMotion<T> {
     let [mut omega, mut alpha, mut acceleration] = arriving;
     let [wx, wy, _] = omega.0;
     if step.turns {
@@ -190,32 +261,31 @@ fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T, lin
         [wx.mul_add(wy, az), -(xx + zz), wy.mul_add(wz, -ax)],
         [wx.mul_add(wz, -ay), wy.mul_add(wz, ax), -(xx + yy)],
     ]);
-    (link.omega, link.alpha, link.acceleration, link.spin) = (omega, alpha, acceleration, spin);
+    LinkMotion { omega, alpha, acceleration, spin }
 }
 
 /// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x is `Γ_z Σ_y - Γ_y Σ_z` and so on
-/// with the rows of Γ and of the second moment Σ.
+/// with the rows of Γ and of the second moment Σ. Differences of Γ's diagonal are sums, which do not wait for products.
 #[inline(always)]
-fn wrench<T: Scalar>(step: &JointStep, link: &LinkState<T>) -> (Vec3<T>, Vec3<T>) {
-    let g = &link.spin.0;
-    let [ax, ay, az] = link.acceleration.0;
-    let [hx, hy, hz] = step.first.splat::<T>().0;
-    let [xx, xy, xz, yy, yz, zz] = step.second.map(T::splat);
+fn wrench<T: Scalar>(turns: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
+    let g = &motion.spin.0;
+    let [ax, ay, az] = motion.acceleration.0;
+    let [hx, hy, hz] = bodies.first(index).0;
+    let [xx, xy, xz, yy, yz, zz] = bodies.second(index);
+    let (x, y, z) = (g[2][2] - g[1][1], g[0][0] - g[2][2], g[1][1] - g[0][0]);
     // Turning bodies have neither mass nor first and second moment along the axis: see JointStep.
-    let force = |k: usize| g[k][1].mul_add(hy, g[k][0] * hx);
-    let mut f = Vec3([force(0), force(1), force(2)]);
+    let mut f =
+        Vec3([g[0][1].mul_add(hy, g[0][0] * hx), g[1][1].mul_add(hy, g[1][0] * hx), g[2][1].mul_add(hy, g[2][0] * hx)]);
     let mut n = Vec3([hy * az, -(hx * az), hx.mul_add(ay, -(hy * ax))]);
-    n.0[0] = g[1][1].neg_mul_add(yz, g[1][0].neg_mul_add(xz, n[0]));
-    n.0[0] = g[2][2].mul_add(yz, g[2][1].mul_add(yy, g[2][0].mul_add(xy, n[0])));
-    n.0[1] = g[2][2].neg_mul_add(xz, g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, n[1])));
-    n.0[1] = g[0][1].mul_add(yz, g[0][0].mul_add(xz, n[1]));
-    n.0[2] = g[1][2].mul_add(xz, g[1][1].mul_add(xy, g[1][0].mul_add(xx, n[2])));
-    n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, g[0][0].neg_mul_add(xy, n[2])));
-    if !step.turns {
+    n.0[0] = g[2][1].mul_add(yy, g[2][0].mul_add(xy, g[1][0].neg_mul_add(xz, x.mul_add(yz, n[0]))));
+    n.0[1] = g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, g[0][1].mul_add(yz, y.mul_add(xz, n[1]))));
+    n.0[2] = g[1][2].mul_add(xz, g[1][0].mul_add(xx, z.mul_add(xy, n[2])));
+    n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, n[2]));
+    if !turns {
         let along = Vec3([g[0][2], g[1][2], g[2][2]]);
-        f = link.acceleration.scale_add(T::splat(step.mass), along.scale_add(hz, f));
+        f = motion.acceleration.scale_add(bodies.mass(index), along.scale_add(hz, f));
         n.0[0] = g[1][2].neg_mul_add(zz, hz.neg_mul_add(ay, n[0]));
         n.0[1] = g[0][2].mul_add(zz, hz.mul_add(ax, n[1]));
     }
-    (f, n)
+    LinkWrench { force: f, moment: n }
 }

@@ -9,11 +9,11 @@
 //! | --- | --- | --- |
 //! | joint torques of a motion | [`inverse_dynamics()`]; of many samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
-//! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`]; of many samples: [`mass_matrix_batch`] | composite bodies (CRBA) |
+//! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`]; of many samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
 //! | the same of many robots of one tree | [`RobotLanes`], inside a kernel | the same, one robot in each lane |
 //! | torque of gravity, energies | [`gravity_torque`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
-//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; of many samples: [`inverse_dynamics_derivatives_batch`] | analytic, in one frame |
+//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; of many samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
 //! | where the bodies are | [`body_placements`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
 //! | regressor of chosen columns, many samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |
@@ -46,22 +46,25 @@
 #![forbid(unsafe_code)]
 
 mod base_parameters;
+mod bodies;
 mod body_frames;
 mod columns;
 mod composite;
+mod composite_moments;
 mod derivatives;
 mod energy;
-mod equation_of_motion;
 mod forward_dynamics;
 mod gravity;
 mod ground;
 mod hinge;
 mod independent_columns;
 mod inverse_dynamics;
+mod joint_matrices;
 mod kinematics;
 mod mass_matrix;
 mod motion_equation;
 mod over_scalar;
+mod own_turn;
 mod parametric_model;
 mod regressor;
 mod regressor_adjoint;
@@ -76,15 +79,17 @@ pub use base_parameters::{
     BaseParameterSettings, BaseParameters, Determination, NumericalRank, numerical_rank, numerical_rank_by_body,
 };
 pub use derivatives::{
-    DerivativeArrays, InverseDynamicsDerivatives, inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch,
+    DerivativeArrays, InverseDynamicsDerivatives, inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives,
+    inverse_dynamics_derivatives_batch,
 };
 pub use energy::{kinetic_energy, potential_energy};
 pub use forward_dynamics::forward_dynamics;
 pub use gravity::gravity_torque;
 pub use independent_columns::{IndependentColumns, independent_columns};
 pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
+pub use joint_matrices::JointMatrices;
 pub use kinematics::body_placements;
-pub use mass_matrix::{mass_matrix, mass_matrix_batch};
+pub use mass_matrix::{mass_matrices, mass_matrix, mass_matrix_batch};
 pub use motion_equation::mass_matrix_and_bias;
 pub use over_scalar::{inverse_dynamics_over, mass_matrix_over};
 pub use parametric_model::{ParametricModel, ParametricModelError};

@@ -1,9 +1,12 @@
 //! The joint-space mass matrix: the composite-rigid-body algorithm.
 
+use crate::bodies::Bodies;
 use crate::columns::ColumnScratch;
-use crate::hinge::{BundledHinges, Hinge, with_hinge};
+use crate::composite_moments::{CompositeMoments, gathered, handed_on};
+use crate::hinge::{BundledHinges, Hinge, cross_shift, with_hinge};
+use crate::joint_matrices::{JointMatrices, MatrixRows};
 use crate::tree_scratch::{TreeBatch, TreeScratch, project_matrices};
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Scratch, Workspace, put_lanes, take, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Scratch, Workspace, take, take_lanes};
 use dynident_lanes::{Kernel, Lane, dispatch, dispatch_single};
 use dynident_model::{JointStep, Model, Vec3};
 
@@ -42,6 +45,34 @@ pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64
     workspace.check(model, samples, &[q]);
     workspace.check_tree(model);
     assert_eq!(out.len(), model.dof() * model.dof() * samples, "one entry for two joints and sample");
+    let mut out = MatrixRows { out, stride: samples };
+    if model.coupling().is_none() {
+        out.clear_across_branches(model);
+    }
+    fill(model, workspace, q, samples, out);
+}
+
+/// [`mass_matrix`] of every sample, into an array that keeps the zeros of a tree: as fast as may be.
+///
+/// Allocation-free once `out` has grown to the number of samples, but for robots whose joints follow others.
+///
+/// # Panics
+/// If `q` has not joints × samples numbers, or workspace or matrices were made for another tree.
+#[doc(alias("crba"))]
+pub fn mass_matrices(
+    model: &Model,
+    workspace: &mut BatchWorkspace,
+    q: &[f64],
+    samples: usize,
+    out: &mut JointMatrices,
+) {
+    workspace.check(model, samples, &[q]);
+    workspace.check_tree(model);
+    fill(model, workspace, q, samples, out.resize(model, samples));
+}
+
+/// Writes the entries of all pairs of joints that couple.
+fn fill(model: &Model, workspace: &mut BatchWorkspace, q: &[f64], samples: usize, mut out: MatrixRows<'_>) {
     let BatchWorkspace { level, scratch, tree, .. } = workspace;
     if let Some(coupling) = model.coupling() {
         let TreeBatch { motion: [tree_q, ..], matrices: [tree_out, ..], .. } = tree;
@@ -49,8 +80,10 @@ pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64
         tree_q.resize(joints * samples, 0.0);
         coupling.positions(q, samples, tree_q);
         tree_out.resize(joints * joints * samples, 0.0);
-        dispatch(*level, Batch { model, scratch, samples, q: tree_q, out: tree_out });
-        project_matrices(coupling, tree_out, samples, out);
+        let mut rows = MatrixRows { out: tree_out, stride: samples };
+        rows.clear_across_branches(model);
+        dispatch(*level, Batch { model, scratch, samples, q: tree_q, out: rows });
+        project_matrices(coupling, tree_out, samples, &mut out);
     } else {
         dispatch(*level, Batch { model, scratch, samples, q, out });
     }
@@ -70,8 +103,7 @@ impl Kernel for Single<'_> {
         let Scratch { core, columns, .. } = self.scratch.of::<T>();
         take(&mut core.q, self.q);
         core.hinges.place(self.model.steps(), &core.q);
-        composite_rigid_bodies(self.model, core, columns);
-        put_matrix(columns, self.out);
+        matrix_of_sample(self.model, core, columns, self.out);
     }
 }
 
@@ -80,43 +112,36 @@ struct Batch<'a> {
     scratch: &'a mut AnyScratch,
     samples: usize,
     q: &'a [f64],
-    out: &'a mut [f64],
+    out: MatrixRows<'a>,
 }
 
 impl Kernel for Batch<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
-        let Self { model, scratch, samples, q, out } = self;
-        let Scratch { core, columns, .. } = scratch.of::<T>();
-        if !columns.is_one_run() {
-            out.fill(0.0);
-        }
+        let Self { model, scratch, samples, q, mut out } = self;
+        let Scratch { core, .. } = scratch.of::<T>();
         for at in (0..samples).step_by(T::LANES) {
             take_lanes(&mut core.q, q, samples, at);
-            core.hinges.place(model.steps(), &core.q);
-            composite_rigid_bodies(model, core, columns);
-            let is_whole = at + T::LANES <= samples;
-            for entry in &columns.entries {
-                let work = T::load(&columns.rows[entry.work..]);
-                if is_whole {
-                    work.store(&mut out[entry.upper * samples + at..]);
-                    work.store(&mut out[entry.lower * samples + at..]);
-                    continue;
-                }
-                put_lanes(work, &mut out[entry.upper * samples..(entry.upper + 1) * samples], at);
-                put_lanes(work, &mut out[entry.lower * samples..(entry.lower + 1) * samples], at);
-            }
+            core.hinges.place_below_base(model.steps(), &core.q);
+            composite_rigid_bodies(model.steps(), model.steps(), core, &mut out, at);
         }
     }
 }
 
-/// The matrix of one sample from what [`composite_rigid_bodies`] left.
+/// From placed hinges to the matrix of one sample. Entries of joints on different branches are never written.
 #[inline(always)]
-pub(crate) fn put_matrix<T: Lane>(columns: &ColumnScratch<T>, out: &mut [f64]) {
-    if !columns.is_one_run() {
-        out.fill(0.0);
+pub(crate) fn matrix_of_sample<T: Lane>(
+    model: &Model,
+    core: &mut CoreScratch<T>,
+    columns: &mut ColumnScratch<T>,
+    out: &mut [f64],
+) {
+    if T::PER_BUNDLE == 1 {
+        composite_rigid_bodies(model.steps(), model.steps(), core, &mut MatrixRows { out, stride: 1 }, 0);
+        return;
     }
+    composite_rigid_bodies_in_bundles(model, core, columns);
     for entry in &columns.entries {
         let work = columns.rows[entry.work];
         out[entry.upper] = work;
@@ -124,125 +149,111 @@ pub(crate) fn put_matrix<T: Lane>(columns: &ColumnScratch<T>, out: &mut [f64]) {
     }
 }
 
-/// From placed hinges to the rows of `columns`.
+/// From placed hinges to samples `at..` of `out`; lanes are samples.
 ///
 /// What hangs on a joint is one rigid body: first moment `h`, second moment Σ about the origin of the joint's frame.
 /// Along (about) z it needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`, the joint's column; carried inward, its part
-/// along (about) the axis of every joint on the way is an entry of the matrix. Columns of one sample travel together,
-/// several in a bundle.
+/// along (about) the axis of every joint on the way is an entry of the matrix. A column goes all the way to the base in
+/// registers, and so do moments along a chain.
 #[inline(always)]
-pub(crate) fn composite_rigid_bodies<T: Lane>(
+pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
+    steps: &[JointStep],
+    bodies: B,
+    core: &mut CoreScratch<T>,
+    out: &mut MatrixRows<'_>,
+    at: usize,
+) {
+    let joints = steps.len();
+    let (hinges, kept) = (core.hinges.placed(joints), &mut core.moments[..joints]);
+    let mut next = CompositeMoments::ZERO;
+    for index in (0..joints).rev() {
+        let step = &steps[index];
+        let moments = gathered(step, bodies, index, kept, &next);
+        let CompositeMoments { first: h, second: s } = &moments;
+        let diagonal = if step.turns { s[0] + s[3] } else { bodies.subtree_mass(index) };
+        out.put(index * joints + index, at, diagonal);
+        let (mut f, mut n) = if step.turns {
+            (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], diagonal]))
+        } else {
+            (Vec3([T::ZERO, T::ZERO, diagonal]), Vec3([h[1], -h[0], T::ZERO]))
+        };
+        let mut link = index;
+        while let Some(parent) = steps[link].parent {
+            let below = &steps[link];
+            let translation = hinges.translation(below, link);
+            let (force, moment) = with_hinge!(hinges, *below, link, |hinge| (hinge.up(f), hinge.up(n)));
+            let (upper, lower) = (parent * joints + index, index * joints + parent);
+            if below.hang.on_resting_axis {
+                let work = cross_shift(below.shift, translation, force, moment)[2];
+                out.put(upper, at, work);
+                out.put(lower, at, work);
+                break;
+            }
+            (f, n) = (force, cross_shift(below.shift, translation, force, moment));
+            let work = if steps[parent].turns { n[2] } else { f[2] };
+            out.put(upper, at, work);
+            out.put(lower, at, work);
+            link = parent;
+        }
+        if step.parent.is_some() {
+            handed_on(step, bodies, moments.up(step, bodies, hinges, index), kept, &mut next);
+        } else {
+            next = CompositeMoments::ZERO;
+        }
+    }
+}
+
+/// The same for one sample, to the rows of `columns`: columns travel together, several in a bundle.
+#[inline(always)]
+fn composite_rigid_bodies_in_bundles<T: Lane>(
     model: &Model,
     core: &mut CoreScratch<T>,
     columns: &mut ColumnScratch<T>,
 ) {
     let steps = model.steps();
     let joints = steps.len();
-    let (hinges, moments) = (core.hinges.placed(joints), &mut core.moments[..joints]);
+    let (hinges, kept) = (core.hinges.placed(joints), &mut core.moments[..joints]);
     let ColumnScratch { place, end, force, moment, rows, .. } = columns;
     let bundles = force.len();
     let (place, end, moment) = (&place[..joints], &end[..joints], &mut moment[..bundles]);
     let lanes = <T::Bundle as Lane>::LANES;
-    if T::PER_BUNDLE > 1 {
-        force.fill(Vec3::ZERO);
-        moment.fill(Vec3::ZERO);
-    }
+    force.fill(Vec3::ZERO);
+    moment.fill(Vec3::ZERO);
+    let mut next = CompositeMoments::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let (inner, outer) = moments.split_at_mut(index);
-        if step.is_tip {
-            outer[0] = own_moments(step);
-        }
-        let (h, s) = &outer[0];
+        let moments = gathered(step, steps, index, kept, &next);
+        let CompositeMoments { first: h, second: s } = &moments;
         let (own, lane) = place[index];
-        if T::PER_BUNDLE == 1 {
-            // Lanes are samples: a column goes all the way to the base in registers.
-            let (mut f, mut n) = if step.turns {
-                (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], s[0] + s[3]]))
-            } else {
-                (Vec3([T::ZERO, T::ZERO, T::splat(step.subtree_mass)]), Vec3([h[1], -h[0], T::ZERO]))
-            };
-            let mut at = index;
-            loop {
-                let work = if steps[at].turns { n[2] } else { f[2] };
-                work.store(&mut rows[(at * bundles + own) * lanes..]);
-                let Some(parent) = steps[at].parent else { break };
-                (f, n) = with_hinge!(hinges, steps[at], at, |hinge| (hinge.up(f), hinge.up(n)));
-                n = hinges.translation(&steps[at], at).cross_add(f, n);
-                at = parent;
-            }
+        let (f, n) = (&mut force[own].0, &mut moment[own].0);
+        if step.turns {
+            (-h[1]).add_at(&mut f[0], lane);
+            h[0].add_at(&mut f[1], lane);
+            (-s[2]).add_at(&mut n[0], lane);
+            (-s[4]).add_at(&mut n[1], lane);
+            (s[0] + s[3]).add_at(&mut n[2], lane);
         } else {
-            let (f, n) = (&mut force[own].0, &mut moment[own].0);
-            if step.turns {
-                (-h[1]).add_at(&mut f[0], lane);
-                h[0].add_at(&mut f[1], lane);
-                (-s[2]).add_at(&mut n[0], lane);
-                (-s[4]).add_at(&mut n[1], lane);
-                (s[0] + s[3]).add_at(&mut n[2], lane);
-            } else {
-                T::splat(step.subtree_mass).add_at(&mut f[2], lane);
-                h[1].add_at(&mut n[0], lane);
-                (-h[0]).add_at(&mut n[1], lane);
-            }
-            let (force, moment) = (&mut force[own..end[index]], &mut moment[own..end[index]]);
-            let row = rows[(index * bundles + own) * lanes..].chunks_exact_mut(lanes);
-            for (column, to) in (if step.turns { &*moment } else { &*force }).iter().zip(row) {
-                column[2].store(to);
-            }
-            if step.parent.is_some() {
-                let bundled = BundledHinges(hinges);
-                let translation = bundled.translation(step, index);
-                with_hinge!(bundled, *step, index, |hinge| {
-                    for (f, n) in force.iter_mut().zip(moment) {
-                        *f = hinge.up(*f);
-                        *n = translation.cross_add(*f, hinge.up(*n));
-                    }
-                });
-            }
+            T::splat(step.subtree_mass).add_at(&mut f[2], lane);
+            h[1].add_at(&mut n[0], lane);
+            (-h[0]).add_at(&mut n[1], lane);
         }
-        let Some(parent) = step.parent else { continue };
-        let (h, s) = with_hinge!(hinges, *step, index, |hinge| (hinge.up(*h), hinge.up_symmetric(s)));
-        let t = hinges.translation(step, index);
-        // A body takes its own moments when the first of its children comes.
-        if T::PER_BUNDLE == 1 {
-            // Stores of wide lanes are dear: one for each number.
-            let mut sum = if step.is_last_child { own_moments(&steps[parent]) } else { inner[parent] };
-            add(&mut sum, h, &s, step.subtree_mass, t);
-            inner[parent] = sum;
-        } else {
-            if step.is_last_child {
-                inner[parent] = own_moments(&steps[parent]);
-            }
-            add(&mut inner[parent], h, &s, step.subtree_mass, t);
+        let (force, moment) = (&mut force[own..end[index]], &mut moment[own..end[index]]);
+        let row = rows[(index * bundles + own) * lanes..].chunks_exact_mut(lanes);
+        for (column, to) in (if step.turns { &*moment } else { &*force }).iter().zip(row) {
+            column[2].store(to);
         }
+        if step.parent.is_none() {
+            next = CompositeMoments::ZERO;
+            continue;
+        }
+        let bundled = BundledHinges(hinges);
+        let translation = bundled.translation(step, index);
+        with_hinge!(bundled, *step, index, |hinge| {
+            for (f, n) in force.iter_mut().zip(moment) {
+                *f = hinge.up(*f);
+                *n = cross_shift(step.shift, translation, *f, hinge.up(*n));
+            }
+        });
+        handed_on(step, steps, moments.up(step, steps, hinges, index), kept, &mut next);
     }
-}
-
-#[inline(always)]
-fn own_moments<T: Lane>(step: &JointStep) -> (Vec3<T>, [T; 6]) {
-    (step.first.splat(), step.second.map(T::splat))
-}
-
-/// Adds moments `(m, h, Σ)` about the point `t` to moments `(h, Σ)` about the origin: `h + m t` and, with `g = h + m
-/// t/2`, `Σ + t gᵀ + g tᵀ`.
-#[inline(always)]
-fn add<T: Lane>(sum: &mut (Vec3<T>, [T; 6]), h: Vec3<T>, s: &[T; 6], mass: f64, t: Vec3<T>) {
-    let (first, second) = sum;
-    let mut g = h;
-    *first += h;
-    if mass != 0.0 {
-        *first += t.scale(T::splat(mass));
-        g = t.scale_add(T::splat(0.5 * mass), h);
-    }
-    macro_rules! entry {
-        ($k:literal, $a:literal, $b:literal) => {
-            second[$k] += t[$a].mul_add(g[$b], t[$b].mul_add(g[$a], s[$k]));
-        };
-    }
-    entry!(0, 0, 0);
-    entry!(1, 0, 1);
-    entry!(2, 0, 2);
-    entry!(3, 1, 1);
-    entry!(4, 1, 2);
-    entry!(5, 2, 2);
 }

@@ -1,16 +1,17 @@
 //! Both sides of the equation of motion at once, for simulation.
 
-use crate::equation_of_motion::equation_of_motion;
+use crate::inverse_dynamics::newton_euler_placed;
+use crate::mass_matrix::matrix_of_sample;
 use crate::tree_scratch::TreeScratch;
-use crate::workspace::{AnyScratch, CoreScratch, Scratch, Workspace, take};
+use crate::workspace::{AnyScratch, Scratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::Model;
 
 /// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias =
 /// τ`.
 ///
-/// What [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics()) without acceleration
-/// give, but for rounding, with the transforms of the joints made once. Allocation-free.
+/// The same numbers as [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics())
+/// without acceleration, with the transforms of the joints made once. Allocation-free.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another tree.
@@ -52,21 +53,15 @@ impl Kernel for Single<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
-        let Scratch { core, equation, .. } = self.scratch.of::<T>();
-        let CoreScratch { q, dq, tau, .. } = core;
-        take(q, self.q);
-        take(dq, self.dq);
-        let (steps, base) = (self.model.steps(), (-self.model.gravity()).splat());
-        equation_of_motion((steps, steps, base), equation, (q, dq), tau);
-        for (to, from) in self.bias.iter_mut().zip(tau) {
+        let Scratch { core, columns, .. } = self.scratch.of::<T>();
+        take(&mut core.q, self.q);
+        take(&mut core.dq, self.dq);
+        core.ddq.fill(T::ZERO);
+        core.hinges.place(self.model.steps(), &core.q);
+        newton_euler_placed(self.model, core);
+        for (to, from) in self.bias.iter_mut().zip(&core.tau) {
             *to = from.lane(0);
         }
-        if !equation.is_chain() {
-            self.matrix.fill(0.0);
-        }
-        for entry in &equation.columns.entries {
-            let work = equation.columns.rows[entry.work];
-            (self.matrix[entry.upper], self.matrix[entry.lower]) = (work, work);
-        }
+        matrix_of_sample(self.model, core, columns, self.matrix);
     }
 }

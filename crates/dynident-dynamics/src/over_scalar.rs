@@ -37,12 +37,11 @@ pub fn mass_matrix_over<T: Scalar>(model: &Model, q: &[T]) -> Vec<T> {
     let Some(coupling) = model.coupling() else {
         scratch.q.copy_from_slice(q);
         composite_rigid_bodies(model, &mut scratch);
-        let [matrix, ..] = scratch.matrices;
-        return matrix;
+        return scratch.matrix;
     };
     coupling.positions(q, 1, &mut scratch.q);
     composite_rigid_bodies(model, &mut scratch);
     let mut matrix = vec![T::ZERO; model.dof() * model.dof()];
-    coupling.project_symmetric(&scratch.matrices[0], &mut matrix);
+    coupling.project_symmetric(&scratch.matrix, &mut matrix);
     matrix
 }

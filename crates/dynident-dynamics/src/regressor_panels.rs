@@ -3,7 +3,7 @@
 //! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its
 //! own narrow panel: columns after one another, each with one value per sample. The whole regressor is never stored.
 
-use crate::regressor::{BlockSink, Work, regressor_blocks, torque_regressor};
+use crate::regressor::{BlockSink, Entries, regressor_blocks, torque_regressor};
 use crate::term_history::TermHistory;
 use crate::tree_scratch::{TreeBatch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, Workspace, parents, put_lanes, same_tree, take_lanes};
@@ -446,7 +446,7 @@ impl Kernel for Fill<'_> {
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, motion.dq, samples, at);
             take_lanes(&mut scratch.core.ddq, motion.ddq, samples, at);
-            let mut sink = IntoPanels { layout, panels, at };
+            let mut sink = IntoPanels { layout, panels, at, present: 0, places: &[] };
             regressor_blocks(model, &mut scratch.core, &mut scratch.axes, &mut sink);
         }
     }
@@ -456,39 +456,43 @@ struct IntoPanels<'a> {
     layout: &'a PanelLayout,
     panels: &'a mut Panels,
     at: usize,
+    /// Which parameters of the body have columns, and where these begin in the panels of the joints on the way to it.
+    present: u16,
+    places: &'a [usize],
 }
 
 impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
     #[inline(always)]
-    fn put<const TURNING: bool>(
-        &mut self,
-        body: usize,
-        path: &[u32],
-        bundle: usize,
-        work: &Work<'_, T::Bundle, TURNING>,
-    ) {
+    fn begin(&mut self, body: usize) {
+        self.present = self.layout.parameters[body];
+        self.places = &self.layout.places[self.layout.place_start[body]..];
+    }
+
+    #[inline(always)]
+    fn put(&mut self, _body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
         // Lanes are samples here, so a bundle is one joint.
         let samples = self.panels.samples;
-        let present = self.layout.parameters[body];
-        let start = self.layout.places[self.layout.place_start[body] + bundle] * samples;
-        let panel = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
-        let mut at = self.at;
-        let full = samples >= T::LANES;
-        // Written out, because a loop over the entries would first put all of them into memory.
+        let present = self.present;
+        let start = self.places[bundle] * samples + self.at;
+        let mut rest = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
+        // Written out, because a loop over the entries would first put all of them into memory. Behind the last column
+        // stands that of the torque.
         macro_rules! store {
             ($($parameter:literal)*) => {
-                $(if present & (1 << $parameter) != 0 {
-                    let value = work.of::<$parameter>();
-                    if full {
-                        value.store(&mut panel[at..at + T::LANES]);
-                    } else {
-                        put_lanes(value, &mut panel[at..at + samples], 0);
-                    }
-                    at += samples;
-                })*
+                if samples >= T::LANES {
+                    $(if present & (1 << $parameter) != 0 {
+                        work.of::<$parameter>().store(rest);
+                        rest = core::mem::take(&mut rest).get_mut(samples..).unwrap_or_default();
+                    })*
+                } else {
+                    $(if present & (1 << $parameter) != 0 {
+                        put_lanes(work.of::<$parameter>(), &mut rest[..samples], 0);
+                        rest = core::mem::take(&mut rest).get_mut(samples..).unwrap_or_default();
+                    })*
+                }
             };
         }
         store!(0 1 2 3 4 5 6 7 8 9);
-        debug_assert_eq!(at, self.at + present.count_ones() as usize * samples);
+        let _ = rest;
     }
 }

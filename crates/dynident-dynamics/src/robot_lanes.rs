@@ -1,7 +1,11 @@
 //! The equation of motion of several robots at once: one tree, and in every lane other bodies.
 
-use crate::equation_of_motion::{Bodies, EquationScratch, equation_of_motion};
-use dynident_lanes::Lane;
+use crate::bodies::Bodies;
+use crate::inverse_dynamics::newton_euler_of;
+use crate::joint_matrices::MatrixRows;
+use crate::mass_matrix::composite_rigid_bodies;
+use crate::workspace::CoreScratch;
+use dynident_lanes::{AlignedBuffer, Lane};
 use dynident_model::{JointStep, Model, Vec3};
 
 /// Robots of one tree side by side, each with its own inertial parameters and gravity, and scratch for their mass
@@ -45,11 +49,10 @@ pub struct RobotLanes<T: Lane> {
     bodies: Vec<LaneBody<T>>,
     /// Minus gravity: the acceleration of the base as bodies feel it.
     base: Vec3<T>,
-    scratch: EquationScratch<T>,
-    /// Whether every entry of the matrix is written; else some are zero.
-    is_chain: bool,
+    scratch: CoreScratch<T>,
+    /// Entry by entry, a place for each lane.
+    rows: AlignedBuffer,
     matrix: Vec<T>,
-    bias: Vec<T>,
 }
 
 /// The inertial numbers of a [`JointStep`], lane by lane.
@@ -78,6 +81,10 @@ impl<T: Lane> Bodies<T> for &[LaneBody<T>] {
     fn subtree_mass(self, index: usize) -> T {
         self[index].subtree_mass
     }
+    #[inline(always)]
+    fn is_massless(self, _: usize) -> bool {
+        false
+    }
 }
 
 impl<T: Lane> RobotLanes<T> {
@@ -93,14 +100,15 @@ impl<T: Lane> RobotLanes<T> {
             second: step.second.map(T::splat),
             subtree_mass: T::splat(step.subtree_mass),
         };
-        let scratch = EquationScratch::new(model);
+        let mut rows = AlignedBuffer::new();
+        rows.resize(joints * joints * T::LANES);
+        rows.as_mut_slice().fill(0.0);
         Some(Self {
-            is_chain: scratch.is_chain(),
             bodies: steps.iter().map(body).collect(),
             base: (-model.gravity()).splat(),
-            scratch,
+            scratch: CoreScratch::new(joints),
+            rows,
             matrix: vec![T::ZERO; joints * joints],
-            bias: vec![T::ZERO; joints],
             steps,
         })
     }
@@ -136,15 +144,21 @@ impl<T: Lane> RobotLanes<T> {
     /// If a vector has not one entry per joint.
     #[inline(always)]
     pub fn matrix_and_bias(&mut self, q: &[T], dq: &[T]) -> (&mut [T], &mut [T]) {
-        let Self { steps, bodies, base, scratch, matrix, bias, is_chain } = self;
-        equation_of_motion((steps, &**bodies, *base), scratch, (q, dq), bias);
-        if !*is_chain {
-            matrix.fill(T::ZERO);
+        let Self { steps, bodies, base, scratch, rows, matrix } = self;
+        let joints = steps.len();
+        scratch.q.copy_from_slice(q);
+        scratch.dq.copy_from_slice(dq);
+        scratch.hinges.place(steps, &scratch.q);
+        newton_euler_of((steps, &**bodies, *base), scratch);
+        // Joints on different branches do not couple: what stands there is zero from the beginning.
+        let out = &mut MatrixRows { out: rows.as_mut_slice(), stride: T::LANES };
+        composite_rigid_bodies(steps, &**bodies, scratch, out, 0);
+        for row in 0..joints {
+            for entry in row * joints..=row * joints + row {
+                matrix[entry] = T::load(&rows.as_slice()[entry * T::LANES..]);
+            }
         }
-        for entry in &scratch.columns.entries {
-            matrix[entry.lower] = T::load(&scratch.columns.rows[entry.work..]);
-        }
-        (matrix, bias)
+        (matrix, &mut scratch.tau)
     }
 }
 

@@ -33,30 +33,32 @@ impl<T: Scalar> BodyState<T> {
     };
 }
 
-/// A body in its inner frame ([`dynident_model::JointStep`]) while the inverse dynamics run.
+/// How a body moves, in its inner frame ([`dynident_model::JointStep`]).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LinkState<T> {
+pub(crate) struct LinkMotion<T> {
     pub(crate) omega: Vec3<T>,
     pub(crate) alpha: Vec3<T>,
     /// Of the frame's origin, minus gravity.
     pub(crate) acceleration: Vec3<T>,
     /// `[α]× + [ω]× [ω]×`.
     pub(crate) spin: Mat3<T>,
-    /// Force on the body (with everything that hangs on it).
+}
+
+impl<T: Scalar> LinkMotion<T> {
+    pub(crate) const REST: Self =
+        Self { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO, spin: Mat3::ZERO };
+}
+
+/// Wrench on a body (with everything that hangs on it), in its inner frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinkWrench<T> {
     pub(crate) force: Vec3<T>,
-    /// Moment about the frame's origin.
+    /// About the frame's origin.
     pub(crate) moment: Vec3<T>,
 }
 
-impl<T: Scalar> LinkState<T> {
-    pub(crate) const REST: Self = Self {
-        omega: Vec3::ZERO,
-        alpha: Vec3::ZERO,
-        acceleration: Vec3::ZERO,
-        spin: Mat3::ZERO,
-        force: Vec3::ZERO,
-        moment: Vec3::ZERO,
-    };
+impl<T: Scalar> LinkWrench<T> {
+    pub(crate) const ZERO: Self = Self { force: Vec3::ZERO, moment: Vec3::ZERO };
 }
 
 /// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ

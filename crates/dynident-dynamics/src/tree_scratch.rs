@@ -2,6 +2,7 @@
 //! from the degrees of freedom and results wait to go back, by `q_tree = G q + q_0` and `tau = Gᵀ tau_tree`
 //! ([`JointCoupling`]). Empty, and passed by, for all other robots.
 
+use crate::joint_matrices::MatrixRows;
 use dynident_lanes::AlignedBuffer;
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointCoupling, Model};
@@ -81,15 +82,16 @@ pub(crate) fn expanded<'r>(
 }
 
 /// `Gᵀ A G` of the matrices of `samples` samples, entry by entry as [`crate::mass_matrix_batch`] has them.
-pub(crate) fn project_matrices(coupling: &JointCoupling, tree: &[f64], samples: usize, out: &mut [f64]) {
+pub(crate) fn project_matrices(coupling: &JointCoupling, tree: &[f64], samples: usize, to: &mut MatrixRows<'_>) {
     let (joints, dof) = (coupling.joints(), coupling.dof());
+    let MatrixRows { out, stride } = to;
     out.fill(0.0);
     for row in 0..joints {
         for column in 0..joints {
             let from = &tree[(row * joints + column) * samples..][..samples];
             for &(a, share_a) in coupling.row(row) {
                 for &(b, share_b) in coupling.row(column) {
-                    let to = &mut out[(a * dof + b) * samples..][..samples];
+                    let to = &mut out[(a * dof + b) * *stride..][..samples];
                     for (to, from) in to.iter_mut().zip(from) {
                         *to += share_a * share_b * from;
                     }

@@ -2,9 +2,9 @@
 
 use crate::columns::ColumnScratch;
 use crate::composite::Composite;
-use crate::equation_of_motion::EquationScratch;
+use crate::composite_moments::CompositeMoments;
 use crate::hinge::Hinges;
-use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkState, VariedBody};
+use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkMotion, LinkWrench, VariedBody};
 use crate::tree_scratch::{TreeBatch, TreeScratch};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
@@ -20,8 +20,6 @@ pub(crate) struct Scratch<T: Lane> {
     pub(crate) axes: AxisScratch<T>,
     /// Of the regressor's reverse sweep.
     pub(crate) adjoint: AdjointScratch<T>,
-    /// Of mass matrix and bias torque together.
-    pub(crate) equation: EquationScratch<T>,
 }
 
 /// The part of the scratch that every [`Scalar`], duals too, can use.
@@ -37,12 +35,14 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) composites: Vec<Composite<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia<T>>,
     pub(crate) hinges: Hinges<T>,
-    pub(crate) links: Vec<LinkState<T>>,
-    /// First and second moments of composite bodies.
-    pub(crate) moments: Vec<(Vec3<T>, [T; 6])>,
+    /// Of bodies on which others than the next one hang.
+    pub(crate) motions: Vec<LinkMotion<T>>,
+    pub(crate) wrenches: Vec<LinkWrench<T>>,
+    /// Of bodies on which others than the next one hang.
+    pub(crate) moments: Vec<CompositeMoments<T>>,
     pub(crate) varied: Vec<VariedBody<T>>,
-    /// Square matrices over the joints of the tree, row-major.
-    pub(crate) matrices: [Vec<T>; 3],
+    /// Square matrix over the joints of the tree, row-major.
+    pub(crate) matrix: Vec<T>,
 }
 
 impl<T: Scalar> CoreScratch<T> {
@@ -59,10 +59,11 @@ impl<T: Scalar> CoreScratch<T> {
             composites: vec![Composite::ZERO; dof],
             articulated: vec![ArticulatedInertia::ZERO; dof],
             hinges: Hinges::new(dof),
-            links: vec![LinkState::REST; dof],
-            moments: vec![(Vec3::ZERO, [T::ZERO; 6]); dof],
+            motions: vec![LinkMotion::REST; dof],
+            wrenches: vec![LinkWrench::ZERO; dof],
+            moments: vec![CompositeMoments::ZERO; dof],
             varied: vec![VariedBody::REST; dof],
-            matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
+            matrix: vec![T::ZERO; dof * dof],
         }
     }
 
@@ -148,7 +149,6 @@ impl Kernel for MakeScratch<'_> {
             columns: ColumnScratch::new(self.0),
             axes: AxisScratch::new(self.0),
             adjoint: AdjointScratch::new(self.0),
-            equation: EquationScratch::new(self.0),
         }))
     }
 }

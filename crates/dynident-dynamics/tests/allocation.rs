@@ -3,10 +3,10 @@
 #![allow(unsafe_code, reason = "a global allocator cannot be written without")]
 
 use dynident_dynamics::{
-    BatchWorkspace, DerivativeArrays, PanelLayout, Panels, Workspace, all_columns, body_placements, forward_dynamics,
-    gravity_torque, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives,
-    inverse_dynamics_derivatives_batch, kinetic_energy, mass_matrix, mass_matrix_and_bias, mass_matrix_batch,
-    potential_energy, regressor_panels, torque_regressor,
+    BatchWorkspace, DerivativeArrays, JointMatrices, PanelLayout, Panels, Workspace, all_columns, body_placements,
+    forward_dynamics, gravity_torque, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivative_matrices,
+    inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch, kinetic_energy, mass_matrices, mass_matrix,
+    mass_matrix_and_bias, mass_matrix_batch, potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::random_tree;
@@ -127,6 +127,12 @@ fn batches_allocate_nothing() {
             inverse_dynamics_derivatives_batch(&model, &mut workspace, &motion, out);
         });
         assert_eq!(derivatives, 0, "derivatives, {}", level.name());
+        let mut kept = [(); 3].map(|()| JointMatrices::new(&model));
+        let inertias = requests_when_warm(|| mass_matrices(&model, &mut workspace, &q, samples, &mut kept[0]));
+        assert_eq!(inertias, 0, "kept mass matrices, {}", level.name());
+        let derivatives =
+            requests_when_warm(|| inverse_dynamics_derivative_matrices(&model, &mut workspace, &motion, &mut kept));
+        assert_eq!(derivatives, 0, "kept derivatives, {}", level.name());
         let whole = requests_when_warm(|| regressor_panels(&model, &mut workspace, &layout, &motion, &mut panels));
         assert_eq!(whole, 0, "panels, {}", level.name());
         // The last block of a log is shorter.

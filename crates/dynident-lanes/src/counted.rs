@@ -86,6 +86,13 @@ impl<const N: usize> Register for Counted<N> {
         count(|all| all.divisions += N as u64);
         Self(self.0.div(other.0))
     }
+    fn transposed(rows: [Self; 4]) -> [Self; 4] {
+        let [a, b, c, d] = Portable::transposed([rows[0].0, rows[1].0, rows[2].0, rows[3].0]);
+        [Self(a), Self(b), Self(c), Self(d)]
+    }
+    fn neg(self) -> Self {
+        Self(self.0.neg())
+    }
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         Self::fused(self.0.mul_add(factor.0, addend.0))
     }

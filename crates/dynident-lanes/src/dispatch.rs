@@ -123,7 +123,7 @@ pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
         Instructions::Avx2(proof) => enter_avx2::<K, Wide<Portable<1, true>, Avx2>>(proof, kernel),
         #[cfg(target_arch = "x86_64")]
         // Measured: inside one sample four lanes beat eight (half-empty registers, slower shuffles).
-        Instructions::Avx512(proof) => enter_avx2::<K, Wide<Portable<1, true>, Avx2>>(proof.avx2(), kernel),
+        Instructions::Avx512(proof) => enter_avx512::<K, Wide<Portable<1, true>, Avx2>>(proof, kernel),
         #[cfg(feature = "counted")]
         Instructions::Counted => kernel.run::<Wide<Counted<1>>>(),
     }

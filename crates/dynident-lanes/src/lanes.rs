@@ -79,6 +79,10 @@ pub trait Lane: Scalar {
         lanes[..Self::LANES].iter().sum()
     }
 
+    /// A square of four lanes by four values, transposed: lane `k` of value `i` goes to lane `i` of value `k`. Values of
+    /// more or fewer lanes are given back as they are.
+    fn transposed(values: [Self; 4]) -> [Self; 4];
+
     /// The lane type that holds several values of this one side by side: several joints of a single sample, or just one
     /// value where the lanes are samples already. What vectorises *inside* one sample is written over bundles.
     type Bundle: Lane;
@@ -145,7 +149,7 @@ impl<R: Register, B> Neg for Wide<R, B> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self::of(self.0.xor(R::splat(-0.0)))
+        Self::of(self.0.neg())
     }
 }
 impl<R: Register, B> AddAssign for Wide<R, B> {
@@ -279,6 +283,12 @@ impl<R: Register, B: Register> Lane for Wide<R, B> {
     #[inline(always)]
     fn decay(self) -> Self {
         Self::of(decay(self.0))
+    }
+
+    #[inline(always)]
+    fn transposed(values: [Self; 4]) -> [Self; 4] {
+        let [a, b, c, d] = R::transposed([values[0].0, values[1].0, values[2].0, values[3].0]);
+        [Self::of(a), Self::of(b), Self::of(c), Self::of(d)]
     }
 
     #[inline(always)]

@@ -71,6 +71,24 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
         self.zip(other, |a, b| a / b)
     }
     #[inline(always)]
+    fn transposed(mut rows: [Self; 4]) -> [Self; 4] {
+        if N == 4 {
+            for i in 0..4 {
+                for k in 0..i {
+                    (rows[i].0[k], rows[k].0[i]) = (rows[k].0[i], rows[i].0[k]);
+                }
+            }
+        }
+        rows
+    }
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for i in 0..N {
+            self.0[i] = -self.0[i];
+        }
+        self
+    }
+    #[inline(always)]
     fn mul_add(mut self, factor: Self, addend: Self) -> Self {
         for i in 0..N {
             self.0[i] =
@@ -128,5 +146,37 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
     #[inline(always)]
     fn all_at_most(self, bound: Self) -> bool {
         self.0.iter().zip(&bound.0).all(|(x, bound)| x <= bound)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::dispatch::{Level, dispatch_single};
+    use crate::kernel::Kernel;
+    use crate::lanes::Lane;
+
+    /// The square of the numbers 0 to 15 by rows, transposed in bundles of four.
+    struct Square;
+
+    impl Kernel for Square {
+        type Output = Vec<f64>;
+        #[inline(always)]
+        fn run<T: Lane>(self) -> Vec<f64> {
+            let numbers: Vec<f64> = (0..20).map(f64::from).collect();
+            let row = |k: usize| T::Bundle::load(&numbers[4 * k..]);
+            let mut out = vec![0.0; 16];
+            for (to, row) in out.chunks_exact_mut(4).zip(T::Bundle::transposed([row(0), row(1), row(2), row(3)])) {
+                row.store(to);
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn a_square_is_transposed_at_every_level() {
+        let expected: Vec<f64> = (0..16).map(|k| f64::from(k / 4 + 4 * (k % 4))).collect();
+        for level in Level::available() {
+            assert_eq!(dispatch_single(level, Square), expected, "{}", level.name());
+        }
     }
 }

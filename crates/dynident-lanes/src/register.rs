@@ -17,7 +17,11 @@ pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
+    /// Lane `k` of row `i` at lane `i` of row `k`, for registers of four lanes; others are given back as they are.
+    fn transposed(rows: [Self; 4]) -> [Self; 4];
     fn div(self, other: Self) -> Self;
+    /// The other sign. As the compiler knows it, which makes it part of the next sum or product where it can.
+    fn neg(self) -> Self;
     /// `self * factor + addend`, fused where the level has it.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
     /// `addend - self * factor`, fused where the level has it.

@@ -38,12 +38,6 @@ impl HasAvx512 {
             && std::is_x86_feature_detected!("avx512vl"))
         .then_some(Self(()))
     }
-
-    /// AVX-512 processors here have AVX2 as well.
-    #[allow(clippy::unused_self, reason = "taken as the proof")]
-    pub(crate) fn avx2(self) -> HasAvx2 {
-        HasAvx2(())
-    }
 }
 
 #[target_feature(enable = "avx2,fma")]
@@ -123,6 +117,21 @@ impl Register for Avx2 {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         Self(intrinsic!(_mm256_div_pd(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        let low = intrinsic!((_mm256_unpacklo_pd(a.0, b.0), _mm256_unpacklo_pd(c.0, d.0)));
+        let high = intrinsic!((_mm256_unpackhi_pd(a.0, b.0), _mm256_unpackhi_pd(c.0, d.0)));
+        [
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x20>(low.0, low.1))),
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x20>(high.0, high.1))),
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x31>(low.0, low.1))),
+            Self(intrinsic!(_mm256_permute2f128_pd::<0x31>(high.0, high.1))),
+        ]
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(intrinsic!(_mm256_sub_pd(_mm256_set1_pd(-0.0), self.0)))
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -217,6 +226,14 @@ impl Register for Avx512 {
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         Self(intrinsic!(_mm512_div_pd(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn transposed(rows: [Self; 4]) -> [Self; 4] {
+        rows
+    }
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(intrinsic!(_mm512_sub_pd(_mm512_set1_pd(-0.0), self.0)))
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {

@@ -1,6 +1,7 @@
 //! One joint: how a body may move against its parent.
 
 use crate::spatial::{Mat3, Transform, Vec3};
+use crate::structure::{EXACT, Shift};
 
 /// The kinds of joint with a degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,6 +129,20 @@ pub struct JointMap {
     pub translation: Vec3,
     /// Axis in the parent frame for a prismatic joint, zero for a revolute one.
     pub slide: Vec3,
+    /// Of a revolute joint about an axis of its frame that stands along an axis of the parent's: these axes, of the
+    /// parent and of the child (0, 1, 2 for x, y, z). The rotation then has five entries that are not zero. Right angles
+    /// count within 1e-15 rad, which is what rounding leaves of them: below the rounding of any result.
+    pub along: Option<(usize, usize)>,
+    /// Which entries of the origin are not zero.
+    pub shift: Shift,
+}
+
+/// The axes of parent and child which a joint about `axis` at `placement` leaves on one another.
+fn axes_along(placement: &Mat3, axis: Vec3) -> Option<(usize, usize)> {
+    let only = |v: Vec3| (0..3).find(|&k| (0..3).all(|i| i == k || v[i].abs() <= EXACT));
+    let child = only(axis)?;
+    let row = |k: usize| placement.0[k][child];
+    Some((only(Vec3([row(0), row(1), row(2)]))?, child))
 }
 
 impl Joint {
@@ -147,6 +162,8 @@ impl Joint {
                 sine: placement.mul_mat(&Mat3::skew(axis)),
                 translation,
                 slide: Vec3::ZERO,
+                along: axes_along(placement, axis),
+                shift: Shift::of(translation),
             }
         } else {
             JointMap {
@@ -158,6 +175,8 @@ impl Joint {
                 sine: Mat3::ZERO,
                 translation,
                 slide: placement.mul_vec(axis),
+                along: None,
+                shift: Shift::Any,
             }
         }
     }

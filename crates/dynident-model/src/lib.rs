@@ -68,6 +68,7 @@ pub mod sample;
 pub mod sdf;
 mod spatial;
 mod steps;
+mod structure;
 pub mod terms;
 mod tree;
 pub mod urdf;
@@ -88,7 +89,8 @@ pub use place::{Located, line_and_column};
 pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot, read_robot};
 pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, SdfWriteError, read_sdf, rewrite_sdf};
 pub use spatial::{Mat3, Transform, Vec3};
-pub use steps::{JointStep, StepRotation};
+pub use steps::{Hang, JointStep, StepRotation};
+pub use structure::Shift;
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{
     JointChange, LinkChange, StatedInertial, UnreadElement, UrdfError, UrdfFault, UrdfIrregularity, UrdfRobot,

@@ -15,6 +15,7 @@
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
 use crate::spatial::{Mat3, Vec3};
+use crate::structure::{EXACT, Shift};
 
 /// The constant part of the rotation from a body's inner frame to its parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +42,8 @@ pub struct JointStep {
     pub rotation: StepRotation,
     /// Origin in the parent's inner frame, m; of a sliding joint at `q = 0`.
     pub translation: Vec3,
+    /// Which entries of the origin are not zero.
+    pub shift: Shift,
     /// Axis of a sliding joint in the parent's inner frame; zero for one that turns.
     pub slide: Vec3,
     /// Mass, kg; zero for a turning body, whose mass has gone to its parent.
@@ -53,14 +56,23 @@ pub struct JointStep {
     pub subtree_mass: f64,
     /// True when nothing hangs on the body.
     pub is_tip: bool,
+    /// True when a body other than the next one hangs on this one, and its state is needed later.
+    pub branches: bool,
+    /// How it hangs on its parent.
+    pub hang: Hang,
+}
+
+/// How a body hangs on its parent; all false at the base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hang {
     /// True when no body with a higher index hangs on the same parent: from the tips to the base it is the first that
     /// gives its parent something.
     pub is_last_child: bool,
+    /// True when the parent is the body before this one: its state need not be looked up.
+    pub follows: bool,
+    /// True when the parent turns about an axis that rests in the base: only what acts about that axis counts there.
+    pub on_resting_axis: bool,
 }
-
-/// Axes are taken for parallel or at a right angle within this, rad: what rounding leaves of rotations by multiples of
-/// 90° that were written as roll, pitch and yaw. It moves no result by more than its own rounding.
-const EXACT: f64 = 1e-15;
 
 /// The steps of a tree, in its order.
 pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<JointStep> {
@@ -90,6 +102,7 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             (StepRotation::General(w.mul_mat(&about_z(turns[index]))), 0.0)
         };
         let slide = if joint.turns() { Vec3::ZERO } else { column(&w, 2) };
+        let translation = parent_frame.transpose_mul_vec(joint.placement.translation);
         let frame = &frames[index];
         let [mass, _, _, _, xx, xy, xz, yy, yz, zz] = inertials[index].0;
         let half = 0.5 * (xx + yy + zz);
@@ -100,14 +113,23 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
             turns: joint.turns(),
             offset,
             rotation,
-            translation: parent_frame.transpose_mul_vec(joint.placement.translation),
+            translation,
+            shift: if joint.turns() { Shift::of(translation) } else { Shift::Any },
             slide,
             mass,
             first: frame.transpose_mul_vec(inertials[index].first_moment()),
             second: [second[0][0], second[0][1], second[0][2], second[1][1], second[1][2], second[2][2]],
             subtree_mass: 0.0,
             is_tip: tree.iter().all(|other| other.parent != Some(index)),
-            is_last_child: tree[index + 1..].iter().all(|other| other.parent != joint.parent),
+            branches: tree.iter().skip(index + 2).any(|other| other.parent == Some(index)),
+            hang: joint.parent.map_or(
+                Hang { is_last_child: false, follows: false, on_resting_axis: false },
+                |parent| Hang {
+                    is_last_child: tree[index + 1..].iter().all(|other| other.parent != Some(parent)),
+                    follows: parent + 1 == index,
+                    on_resting_axis: tree[parent].parent.is_none() && tree[parent].turns(),
+                },
+            ),
         });
     }
     regroup(&mut steps);

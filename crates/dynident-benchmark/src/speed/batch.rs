@@ -3,8 +3,8 @@
 use super::clock::Report;
 use super::motion::{Motion, STATES};
 use dynident_dynamics::{
-    BatchWorkspace, DerivativeArrays, PanelLayout, Panels, all_columns, inverse_dynamics_batch,
-    inverse_dynamics_derivatives_batch, mass_matrix_batch, regressor_panels,
+    BatchWorkspace, JointMatrices, PanelLayout, Panels, all_columns, inverse_dynamics_batch,
+    inverse_dynamics_derivative_matrices, mass_matrices, regressor_panels,
 };
 use dynident_model::Model;
 use std::hint::black_box;
@@ -22,18 +22,16 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>, block: usize) {
             black_box(&tau);
         }
     });
-    let mut matrices = [(); 3].map(|()| vec![0.0; model.dof() * tau.len()]);
+    let mut matrices = [(); 3].map(|()| JointMatrices::new(model));
     report.time("crba_batch", samples, || {
         for motion in &blocks {
-            mass_matrix_batch(model, &mut workspace, &motion.q, block, &mut matrices[0]);
+            mass_matrices(model, &mut workspace, &motion.q, block, &mut matrices[0]);
             black_box(&matrices);
         }
     });
     report.time("rnea_derivatives_batch", samples, || {
         for motion in &blocks {
-            let [by_position, by_velocity, by_acceleration] = &mut matrices;
-            let out = DerivativeArrays { by_position, by_velocity, by_acceleration };
-            inverse_dynamics_derivatives_batch(model, &mut workspace, &motion.view(), out);
+            inverse_dynamics_derivative_matrices(model, &mut workspace, &motion.view(), &mut matrices);
             black_box(&matrices);
         }
     });

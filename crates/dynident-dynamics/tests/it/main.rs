@@ -9,4 +9,5 @@ mod golden_base_parameters;
 mod invariants;
 mod mjcf;
 mod pinocchio;
+mod right_angles;
 mod sdf;

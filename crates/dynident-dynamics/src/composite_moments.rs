@@ -1,0 +1,128 @@
+//! Moments of the mass of what hangs on a joint, from frame to frame: first moment `h`, second moment Σ about the origin
+//! of the joint's inner frame. Their mass is a constant of the robot.
+
+use crate::bodies::Bodies;
+use crate::hinge::{Hinge, PlacedHinges, with_hinge};
+use dynident_lanes::Scalar;
+use dynident_model::{JointStep, Shift, Vec3};
+
+/// First moment, and upper triangle by rows of the second moment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CompositeMoments<T> {
+    pub(crate) first: Vec3<T>,
+    pub(crate) second: [T; 6],
+}
+
+impl<T: Scalar> CompositeMoments<T> {
+    pub(crate) const ZERO: Self = Self { first: Vec3::ZERO, second: [T::ZERO; 6] };
+
+    /// Of one body.
+    #[inline(always)]
+    pub(crate) fn own(bodies: impl Bodies<T>, index: usize) -> Self {
+        Self { first: bodies.first(index), second: bodies.second(index) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.first += other.first;
+        for k in 0..6 {
+            self.second[k] += other.second[k];
+        }
+    }
+
+    /// In the frame of the parent. Where that turns about an axis at rest only `Σ_xx + Σ_yy` counts, and all of it stands
+    /// in `Σ_xx`.
+    #[inline(always)]
+    pub(crate) fn up(
+        &self,
+        step: &JointStep,
+        bodies: impl Bodies<T>,
+        hinges: PlacedHinges<'_, T>,
+        index: usize,
+    ) -> Self {
+        let (first, second) =
+            with_hinge!(hinges, *step, index, |hinge| (hinge.up(self.first), hinge.up_symmetric(&self.second)));
+        let moved = Self { first, second }.about_shifted(step, bodies, hinges.translation(step, index), index);
+        if step.hang.on_resting_axis {
+            let mut polar = Self::ZERO;
+            polar.second[0] = moved.second[0] + moved.second[3];
+            polar
+        } else {
+            moved
+        }
+    }
+
+    /// About a point from which the origin stands at `t`: `h + m t` and, with `g = h + m t/2`, `Σ + t gᵀ + g tᵀ`.
+    #[inline(always)]
+    fn about_shifted(self, step: &JointStep, bodies: impl Bodies<T>, t: Vec3<T>, index: usize) -> Self {
+        let Self { first, second: s } = self;
+        let (mut h, mut g) = (first, first);
+        if !bodies.is_massless(index) {
+            let mass = bodies.subtree_mass(index);
+            h = t.scale_add(mass, first);
+            g = t.scale_add(T::splat(0.5) * mass, first);
+        }
+        macro_rules! along {
+            ($k:literal: $xx:literal, $a:literal, $xa:literal, $b:literal, $xb:literal) => {{
+                let mut s = s;
+                s[$xx] = (t[$k] + t[$k]).mul_add(g[$k], s[$xx]);
+                s[$xa] = t[$k].mul_add(g[$a], s[$xa]);
+                s[$xb] = t[$k].mul_add(g[$b], s[$xb]);
+                s
+            }};
+        }
+        macro_rules! entry {
+            ($k:literal, $a:literal, $b:literal) => {
+                t[$a].mul_add(g[$b], t[$b].mul_add(g[$a], s[$k]))
+            };
+        }
+        let second = match step.shift {
+            Shift::None => s,
+            Shift::X => along!(0: 0, 1, 1, 2, 2),
+            Shift::Y => along!(1: 3, 0, 1, 2, 4),
+            Shift::Z => along!(2: 5, 0, 2, 1, 4),
+            Shift::Any => {
+                [entry!(0, 0, 0), entry!(1, 0, 1), entry!(2, 0, 2), entry!(3, 1, 1), entry!(4, 1, 2), entry!(5, 2, 2)]
+            }
+        };
+        Self { first: h, second }
+    }
+}
+
+/// From the tips to the base: the moments of joint `index` and all that hangs on it. `next` are those which the body
+/// after it gives, in registers; `kept` those of the others that hang on it, with its own.
+#[inline(always)]
+pub(crate) fn gathered<T: Scalar>(
+    step: &JointStep,
+    bodies: impl Bodies<T>,
+    index: usize,
+    kept: &[CompositeMoments<T>],
+    next: &CompositeMoments<T>,
+) -> CompositeMoments<T> {
+    let mut all = if step.branches { kept[index] } else { CompositeMoments::own(bodies, index) };
+    if !step.is_tip {
+        all.add(next);
+    }
+    all
+}
+
+/// Hands moments to the parent: in `next` to the body before, in memory to any other.
+#[inline(always)]
+pub(crate) fn handed_on<T: Scalar>(
+    step: &JointStep,
+    bodies: impl Bodies<T>,
+    moved: CompositeMoments<T>,
+    kept: &mut [CompositeMoments<T>],
+    next: &mut CompositeMoments<T>,
+) {
+    if step.hang.follows {
+        *next = moved;
+        return;
+    }
+    *next = CompositeMoments::ZERO;
+    let Some(parent) = step.parent else { return };
+    // A body takes its own moments when the first of its children comes.
+    let mut sum = if step.hang.is_last_child { CompositeMoments::own(bodies, parent) } else { kept[parent] };
+    sum.add(&moved);
+    kept[parent] = sum;
+}
