@@ -257,7 +257,7 @@ fn far_lanes<T: Lane>(q: &[T]) -> [bool; MOST_LANES] {
         let mut lanes = [0.0; MOST_LANES];
         q.store(&mut lanes);
         for (far, q) in far.iter_mut().zip(lanes) {
-            *far |= !(q.abs() <= FARTHEST);
+            *far |= q.is_nan() || q.abs() > FARTHEST;
         }
     }
     far
