@@ -1,4 +1,4 @@
-//! Closed loops side by side: sample by sample what [`closed_loop()`](crate::closed_loop()) does, one loop in each lane.
+//! Closed loops side by side: sample by sample what [`closed_loop()`](crate::closed_loop()) does, a loop in each lane.
 
 use super::tape::{BLOCK, LaneRows};
 use super::{Placed, is_plain};

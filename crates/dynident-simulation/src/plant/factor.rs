@@ -158,8 +158,8 @@ fn solve_of<const N: usize>(l: &[f64], b: &mut [f64]) {
     }
 }
 
-/// [`solve`] of several right-hand sides, one after the other in `b`, with the same numbers. Taken together they keep the
-/// processor busy, where each alone is a chain of steps that wait for each other.
+/// [`solve`] of several right-hand sides, one after the other in `b`, with the same numbers. Each alone is a chain of
+/// steps that wait for each other; together they keep the processor busy.
 #[inline]
 pub(super) fn solve_all(l: &[f64], n: usize, b: &mut [f64]) {
     match n {
