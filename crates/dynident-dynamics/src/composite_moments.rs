@@ -1,5 +1,5 @@
-//! Moments of the mass of what hangs on a joint, from frame to frame: first moment `h`, second moment Σ about the origin
-//! of the joint's inner frame. Their mass is a constant of the robot.
+//! Moments of the mass of what hangs on a joint, from frame to frame: first moment `h`, second moment Σ about the
+//! origin of the joint's inner frame. Their mass is a constant of the robot.
 
 use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, with_hinge};
@@ -30,8 +30,8 @@ impl<T: Scalar> CompositeMoments<T> {
         }
     }
 
-    /// In the frame of the parent. Where that turns about an axis at rest only `Σ_xx + Σ_yy` counts, and all of it stands
-    /// in `Σ_xx`.
+    /// In the frame of the parent. Where that turns about an axis at rest only `Σ_xx + Σ_yy` counts, and all of it
+    /// stands in `Σ_xx`.
     #[inline(always)]
     pub(crate) fn up(
         &self,

@@ -220,8 +220,8 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
     }
 }
 
-/// A body that turns about an axis at rest: motion from the acceleration against gravity in its frame, and the only part
-/// of its wrench that counts, the moment about the axis.
+/// A body that turns about an axis at rest: motion from the acceleration against gravity in its frame, and the only
+/// part of its wrench that counts, the moment about the axis.
 #[inline(always)]
 fn about_resting_axis<T: Scalar>(
     bodies: impl Bodies<T>,

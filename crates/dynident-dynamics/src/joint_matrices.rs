@@ -107,9 +107,14 @@ impl MatrixRows<'_> {
         }
     }
 
-    /// Writes the lanes that are samples `at..` of an entry.
+    /// Writes the lanes that are samples `at..` of an entry; a type of one lane has one sample.
     #[inline(always)]
     pub(crate) fn put<T: Lane>(&mut self, entry: usize, at: usize, value: T) {
+        if T::LANES == 1 {
+            // One sample: a plain matrix.
+            self.out[entry] = value.lane(0);
+            return;
+        }
         let start = entry * self.stride;
         if at + T::LANES <= self.stride {
             value.store(&mut self.out[start + at..]);

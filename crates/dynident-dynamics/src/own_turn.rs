@@ -1,6 +1,6 @@
-//! From frame to frame over one joint in the bodies' own frames: what [`crate::hinge`] is for inner frames. A joint about
-//! an axis of its frame that stands along an axis of the parent's turns two entries of a vector and passes the third on:
-//! five products in place of nine.
+//! From frame to frame over one joint in the bodies' own frames: what [`crate::hinge`] is for inner frames. A joint
+//! about an axis of its frame that stands along an axis of the parent's turns two entries of a vector and passes the
+//! third on: five products in place of nine.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{JointMap, Mat3, Vec3};

@@ -79,8 +79,8 @@ pub trait Lane: Scalar {
         lanes[..Self::LANES].iter().sum()
     }
 
-    /// A square of four lanes by four values, transposed: lane `k` of value `i` goes to lane `i` of value `k`. Values of
-    /// more or fewer lanes are given back as they are.
+    /// A square of four lanes by four values, transposed: lane `k` of value `i` goes to lane `i` of value `k`. Values
+    /// of more or fewer lanes are given back as they are.
     fn transposed(values: [Self; 4]) -> [Self; 4];
 
     /// The lane type that holds several values of this one side by side: several joints of a single sample, or just one

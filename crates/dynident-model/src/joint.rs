@@ -130,8 +130,8 @@ pub struct JointMap {
     /// Axis in the parent frame for a prismatic joint, zero for a revolute one.
     pub slide: Vec3,
     /// Of a revolute joint about an axis of its frame that stands along an axis of the parent's: these axes, of the
-    /// parent and of the child (0, 1, 2 for x, y, z). The rotation then has five entries that are not zero. Right angles
-    /// count within 1e-15 rad, which is what rounding leaves of them: below the rounding of any result.
+    /// parent and of the child (0, 1, 2 for x, y, z). The rotation then has five entries that are not zero. Right
+    /// angles count within 1e-15 rad, which is what rounding leaves of them: below the rounding of any result.
     pub along: Option<(usize, usize)>,
     /// Which entries of the origin are not zero.
     pub shift: Shift,
