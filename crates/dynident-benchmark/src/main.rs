@@ -64,6 +64,11 @@ fn counting() -> Option<Level> {
 
 fn main() -> ExitCode {
     let options = Options::parse();
+    // The clock is this thread's: so is all work.
+    if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global() {
+        eprintln!("{error}");
+        return ExitCode::FAILURE;
+    }
     let available = Level::available();
     let levels: Vec<Level> = if options.count {
         match counting() {

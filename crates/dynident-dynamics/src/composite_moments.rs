@@ -1,6 +1,7 @@
 //! Moments of the mass of what hangs on a joint, from frame to frame: first moment `h`, second moment Σ about the
 //! origin of the joint's inner frame. Their mass is a constant of the robot.
 
+use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, with_hinge};
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Shift, Vec3};
@@ -17,8 +18,8 @@ impl<T: Scalar> CompositeMoments<T> {
 
     /// Of one body.
     #[inline(always)]
-    pub(crate) fn own(step: &JointStep) -> Self {
-        Self { first: step.first.splat(), second: step.second.map(T::splat) }
+    pub(crate) fn own(bodies: impl Bodies<T>, index: usize) -> Self {
+        Self { first: bodies.first(index), second: bodies.second(index) }
     }
 
     #[inline(always)]
@@ -32,10 +33,16 @@ impl<T: Scalar> CompositeMoments<T> {
     /// In the frame of the parent. Where that turns about an axis at rest only `Σ_xx + Σ_yy` counts, and all of it
     /// stands in `Σ_xx`.
     #[inline(always)]
-    pub(crate) fn up(&self, step: &JointStep, hinges: PlacedHinges<'_, T>, index: usize) -> Self {
+    pub(crate) fn up(
+        &self,
+        step: &JointStep,
+        bodies: impl Bodies<T>,
+        hinges: PlacedHinges<'_, T>,
+        index: usize,
+    ) -> Self {
         let (first, second) =
             with_hinge!(hinges, *step, index, |hinge| (hinge.up(self.first), hinge.up_symmetric(&self.second)));
-        let moved = Self { first, second }.about_shifted(step, hinges.translation(step, index));
+        let moved = Self { first, second }.about_shifted(step, bodies, hinges.translation(step, index), index);
         if step.hang.on_resting_axis {
             let mut polar = Self::ZERO;
             polar.second[0] = moved.second[0] + moved.second[3];
@@ -47,13 +54,13 @@ impl<T: Scalar> CompositeMoments<T> {
 
     /// About a point from which the origin stands at `t`: `h + m t` and, with `g = h + m t/2`, `Σ + t gᵀ + g tᵀ`.
     #[inline(always)]
-    fn about_shifted(self, step: &JointStep, t: Vec3<T>) -> Self {
+    fn about_shifted(self, step: &JointStep, bodies: impl Bodies<T>, t: Vec3<T>, index: usize) -> Self {
         let Self { first, second: s } = self;
         let (mut h, mut g) = (first, first);
-        if step.subtree_mass != 0.0 {
-            let mass = step.subtree_mass;
-            h = t.scale_add(T::splat(mass), first);
-            g = t.scale_add(T::splat(0.5 * mass), first);
+        if !bodies.is_massless(index) {
+            let mass = bodies.subtree_mass(index);
+            h = t.scale_add(mass, first);
+            g = t.scale_add(T::splat(0.5) * mass, first);
         }
         macro_rules! along {
             ($k:literal: $xx:literal, $a:literal, $xa:literal, $b:literal, $xb:literal) => {{
@@ -87,10 +94,12 @@ impl<T: Scalar> CompositeMoments<T> {
 #[inline(always)]
 pub(crate) fn gathered<T: Scalar>(
     step: &JointStep,
-    kept: &CompositeMoments<T>,
+    bodies: impl Bodies<T>,
+    index: usize,
+    kept: &[CompositeMoments<T>],
     next: &CompositeMoments<T>,
 ) -> CompositeMoments<T> {
-    let mut all = if step.branches { *kept } else { CompositeMoments::own(step) };
+    let mut all = if step.branches { kept[index] } else { CompositeMoments::own(bodies, index) };
     if !step.is_tip {
         all.add(next);
     }
@@ -100,8 +109,8 @@ pub(crate) fn gathered<T: Scalar>(
 /// Hands moments to the parent: in `next` to the body before, in memory to any other.
 #[inline(always)]
 pub(crate) fn handed_on<T: Scalar>(
-    steps: &[JointStep],
     step: &JointStep,
+    bodies: impl Bodies<T>,
     moved: CompositeMoments<T>,
     kept: &mut [CompositeMoments<T>],
     next: &mut CompositeMoments<T>,
@@ -113,7 +122,7 @@ pub(crate) fn handed_on<T: Scalar>(
     *next = CompositeMoments::ZERO;
     let Some(parent) = step.parent else { return };
     // A body takes its own moments when the first of its children comes.
-    let mut sum = if step.hang.is_last_child { CompositeMoments::own(&steps[parent]) } else { kept[parent] };
+    let mut sum = if step.hang.is_last_child { CompositeMoments::own(bodies, parent) } else { kept[parent] };
     sum.add(&moved);
     kept[parent] = sum;
 }

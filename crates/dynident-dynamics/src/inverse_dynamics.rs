@@ -1,5 +1,6 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
+use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, cross_shift, times_shift, with_hinge};
 use crate::states::{LinkMotion, LinkWrench};
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded};
@@ -118,11 +119,20 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
 /// The same with the hinges in place.
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
-    let steps = model.steps();
+    let base = (-model.gravity()).splat();
+    newton_euler_of((model.steps(), model.steps(), base), scratch);
+}
+
+/// The same of a tree with bodies of its own, and the base's acceleration: minus gravity.
+#[inline(always)]
+pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
+    (steps, bodies, base): (&[JointStep], B, Vec3<T>),
+    scratch: &mut CoreScratch<T>,
+) {
     let joints = steps.len();
     let hinges = scratch.hinges.placed(joints);
     let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
-    outward(model, hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
+    outward_of((steps, bodies, base), hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
     let tau = &mut scratch.tau[..joints];
     // What the body after this one asks of it, where it hangs on it: stays in registers.
     let mut next = LinkWrench::ZERO;
@@ -165,10 +175,23 @@ pub(crate) fn outward<T: Scalar>(
     dq: &[T],
     ddq: &[T],
 ) {
-    let steps = model.steps();
+    let base = (-model.gravity()).splat();
+    outward_of((model.steps(), model.steps(), base), hinges, motions, wrenches, dq, ddq);
+}
+
+/// The same of a tree with bodies of its own.
+#[inline(always)]
+fn outward_of<T: Scalar, B: Bodies<T>>(
+    (steps, bodies, base): (&[JointStep], B, Vec3<T>),
+    hinges: PlacedHinges<'_, T>,
+    motions: &mut [LinkMotion<T>],
+    wrenches: &mut [LinkWrench<T>],
+    dq: &[T],
+    ddq: &[T],
+) {
     let joints = motions.len();
     let (steps, wrenches, dq, ddq) = (&steps[..joints], &mut wrenches[..joints], &dq[..joints], &ddq[..joints]);
-    let base = LinkMotion { acceleration: (-model.gravity()).splat(), ..LinkMotion::REST };
+    let base = LinkMotion { acceleration: base, ..LinkMotion::REST };
     // Of the body before this one: along a chain it stays in registers.
     let mut motion = base;
     for index in 0..joints {
@@ -176,7 +199,7 @@ pub(crate) fn outward<T: Scalar>(
         match step.parent {
             None if step.turns => {
                 let arriving = with_hinge!(hinges, *step, index, |hinge| hinge.down(base.acceleration));
-                (motion, wrenches[index]) = about_resting_axis(step, arriving, dq[index], ddq[index]);
+                (motion, wrenches[index]) = about_resting_axis(bodies, index, arriving, dq[index], ddq[index]);
             }
             parent => {
                 if !step.hang.follows {
@@ -188,7 +211,7 @@ pub(crate) fn outward<T: Scalar>(
                     [hinge.down(motion.omega), hinge.down(motion.alpha), hinge.down(origin)]
                 });
                 motion = moved(step, arriving, dq[index], ddq[index]);
-                wrenches[index] = wrench(step, &motion);
+                wrenches[index] = wrench(step.turns, bodies, index, &motion);
             }
         }
         if step.branches {
@@ -201,7 +224,8 @@ pub(crate) fn outward<T: Scalar>(
 /// part of its wrench that counts, the moment about the axis.
 #[inline(always)]
 fn about_resting_axis<T: Scalar>(
-    step: &JointStep,
+    bodies: impl Bodies<T>,
+    index: usize,
     acceleration: Vec3<T>,
     dq: T,
     ddq: T,
@@ -209,9 +233,8 @@ fn about_resting_axis<T: Scalar>(
     let about = |rate: T| Vec3([T::ZERO, T::ZERO, rate]);
     let inward = -(dq * dq);
     let spin = Mat3([[inward, -ddq, T::ZERO], [ddq, inward, T::ZERO], [T::ZERO; 3]]);
-    let [hx, hy, _] = step.first.splat::<T>().0;
-    let moment =
-        hx.mul_add(acceleration[1], hy.neg_mul_add(acceleration[0], T::splat(step.second[0] + step.second[3]) * ddq));
+    let ([hx, hy, _], [xx, _, _, yy, ..]) = (bodies.first(index).0, bodies.second(index));
+    let moment = hx.mul_add(acceleration[1], hy.neg_mul_add(acceleration[0], (xx + yy) * ddq));
     let motion = LinkMotion { omega: about(dq), alpha: about(ddq), acceleration, spin };
     (motion, LinkWrench { force: Vec3::ZERO, moment: about(moment) })
 }
@@ -244,11 +267,11 @@ fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> 
 /// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x is `Γ_z Σ_y - Γ_y Σ_z` and so on
 /// with the rows of Γ and of the second moment Σ. Differences of Γ's diagonal are sums, which do not wait for products.
 #[inline(always)]
-fn wrench<T: Scalar>(step: &JointStep, motion: &LinkMotion<T>) -> LinkWrench<T> {
+fn wrench<T: Scalar>(turns: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
     let g = &motion.spin.0;
     let [ax, ay, az] = motion.acceleration.0;
-    let [hx, hy, hz] = step.first.splat::<T>().0;
-    let [xx, xy, xz, yy, yz, zz] = step.second.map(T::splat);
+    let [hx, hy, hz] = bodies.first(index).0;
+    let [xx, xy, xz, yy, yz, zz] = bodies.second(index);
     let (x, y, z) = (g[2][2] - g[1][1], g[0][0] - g[2][2], g[1][1] - g[0][0]);
     // Turning bodies have neither mass nor first and second moment along the axis: see JointStep.
     let mut f =
@@ -258,9 +281,9 @@ fn wrench<T: Scalar>(step: &JointStep, motion: &LinkMotion<T>) -> LinkWrench<T> 
     n.0[1] = g[2][1].neg_mul_add(xy, g[2][0].neg_mul_add(xx, g[0][1].mul_add(yz, y.mul_add(xz, n[1]))));
     n.0[2] = g[1][2].mul_add(xz, g[1][0].mul_add(xx, z.mul_add(xy, n[2])));
     n.0[2] = g[0][2].neg_mul_add(yz, g[0][1].neg_mul_add(yy, n[2]));
-    if !step.turns {
+    if !turns {
         let along = Vec3([g[0][2], g[1][2], g[2][2]]);
-        f = motion.acceleration.scale_add(T::splat(step.mass), along.scale_add(hz, f));
+        f = motion.acceleration.scale_add(bodies.mass(index), along.scale_add(hz, f));
         n.0[0] = g[1][2].neg_mul_add(zz, hz.neg_mul_add(ay, n[0]));
         n.0[1] = g[0][2].mul_add(zz, hz.mul_add(ax, n[1]));
     }

@@ -10,6 +10,7 @@
 //! | joint torques of a motion | [`inverse_dynamics()`]; of many samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
 //! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`]; of many samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
+//! | the same of many robots of one tree | [`RobotLanes`], inside a kernel | the same, one robot in each lane |
 //! | torque of gravity, energies | [`gravity_torque`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; of many samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
@@ -45,6 +46,7 @@
 #![forbid(unsafe_code)]
 
 mod base_parameters;
+mod bodies;
 mod body_frames;
 mod columns;
 mod composite;
@@ -67,6 +69,7 @@ mod parametric_model;
 mod regressor;
 mod regressor_adjoint;
 mod regressor_panels;
+mod robot_lanes;
 mod states;
 mod term_history;
 mod tree_scratch;
@@ -96,6 +99,7 @@ pub use regressor_panels::{
     Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following, regressor_panels_of_sample,
     term_panels_following,
 };
+pub use robot_lanes::{RobotLanes, share_tree};
 pub use term_history::TermHistory;
 pub use workspace::{BatchWorkspace, Workspace};
 

@@ -1,5 +1,6 @@
 //! The joint-space mass matrix: the composite-rigid-body algorithm.
 
+use crate::bodies::Bodies;
 use crate::columns::ColumnScratch;
 use crate::composite_moments::{CompositeMoments, gathered, handed_on};
 use crate::hinge::{BundledHinges, Hinge, cross_shift, with_hinge};
@@ -7,7 +8,7 @@ use crate::joint_matrices::{JointMatrices, MatrixRows};
 use crate::tree_scratch::{TreeBatch, TreeScratch, project_matrices};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Scratch, Workspace, take, take_lanes};
 use dynident_lanes::{Kernel, Lane, dispatch, dispatch_single};
-use dynident_model::{Model, Vec3};
+use dynident_model::{JointStep, Model, Vec3};
 
 /// The mass matrix `M(q)`, row-major, symmetric, dof × dof: `∂τ/∂q̈` of the inverse dynamics.
 ///
@@ -123,7 +124,7 @@ impl Kernel for Batch<'_> {
         for at in (0..samples).step_by(T::LANES) {
             take_lanes(&mut core.q, q, samples, at);
             core.hinges.place_below_base(model.steps(), &core.q);
-            composite_rigid_bodies(model, core, &mut out, at);
+            composite_rigid_bodies(model.steps(), model.steps(), core, &mut out, at);
         }
     }
 }
@@ -137,7 +138,7 @@ pub(crate) fn matrix_of_sample<T: Lane>(
     out: &mut [f64],
 ) {
     if T::PER_BUNDLE == 1 {
-        composite_rigid_bodies(model, core, &mut MatrixRows { out, stride: 1 }, 0);
+        composite_rigid_bodies(model.steps(), model.steps(), core, &mut MatrixRows { out, stride: 1 }, 0);
         return;
     }
     composite_rigid_bodies_in_bundles(model, core, columns);
@@ -155,16 +156,21 @@ pub(crate) fn matrix_of_sample<T: Lane>(
 /// along (about) the axis of every joint on the way is an entry of the matrix. A column goes all the way to the base in
 /// registers, and so do moments along a chain.
 #[inline(always)]
-fn composite_rigid_bodies<T: Lane>(model: &Model, core: &mut CoreScratch<T>, out: &mut MatrixRows<'_>, at: usize) {
-    let steps = model.steps();
+pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
+    steps: &[JointStep],
+    bodies: B,
+    core: &mut CoreScratch<T>,
+    out: &mut MatrixRows<'_>,
+    at: usize,
+) {
     let joints = steps.len();
     let (hinges, kept) = (core.hinges.placed(joints), &mut core.moments[..joints]);
     let mut next = CompositeMoments::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let moments = gathered(step, &kept[index], &next);
+        let moments = gathered(step, bodies, index, kept, &next);
         let CompositeMoments { first: h, second: s } = &moments;
-        let diagonal = if step.turns { s[0] + s[3] } else { T::splat(step.subtree_mass) };
+        let diagonal = if step.turns { s[0] + s[3] } else { bodies.subtree_mass(index) };
         out.put(index * joints + index, at, diagonal);
         let (mut f, mut n) = if step.turns {
             (Vec3([-h[1], h[0], T::ZERO]), Vec3([-s[2], -s[4], diagonal]))
@@ -190,7 +196,7 @@ fn composite_rigid_bodies<T: Lane>(model: &Model, core: &mut CoreScratch<T>, out
             link = parent;
         }
         if step.parent.is_some() {
-            handed_on(steps, step, moments.up(step, hinges, index), kept, &mut next);
+            handed_on(step, bodies, moments.up(step, bodies, hinges, index), kept, &mut next);
         } else {
             next = CompositeMoments::ZERO;
         }
@@ -216,7 +222,7 @@ fn composite_rigid_bodies_in_bundles<T: Lane>(
     let mut next = CompositeMoments::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
-        let moments = gathered(step, &kept[index], &next);
+        let moments = gathered(step, steps, index, kept, &next);
         let CompositeMoments { first: h, second: s } = &moments;
         let (own, lane) = place[index];
         let (f, n) = (&mut force[own].0, &mut moment[own].0);
@@ -248,6 +254,6 @@ fn composite_rigid_bodies_in_bundles<T: Lane>(
                 *n = cross_shift(step.shift, translation, *f, hinge.up(*n));
             }
         });
-        handed_on(steps, step, moments.up(step, hinges, index), kept, &mut next);
+        handed_on(step, steps, moments.up(step, steps, hinges, index), kept, &mut next);
     }
 }

@@ -100,7 +100,7 @@ pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: 
 }
 
 /// A scratch whose lane type was chosen at run time.
-pub(crate) struct AnyScratch(Box<dyn Any + Send>);
+pub(crate) struct AnyScratch(Box<dyn Any + Send + Sync>);
 
 impl AnyScratch {
     /// The scratch of lane type `T`, which must be the type it was made for.

@@ -117,11 +117,17 @@ impl<const N: usize> Register for Counted<N> {
     fn min(self, other: Self) -> Self {
         Self(self.0.min(other.0))
     }
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
     fn lowest_bit_mask(self) -> Self {
         Self(self.0.lowest_bit_mask())
     }
     fn all_within(self, bound: f64) -> bool {
         self.0.all_within(bound)
+    }
+    fn all_at_most(self, bound: Self) -> bool {
+        self.0.all_at_most(bound.0)
     }
 }
 

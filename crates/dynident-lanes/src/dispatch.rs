@@ -148,6 +148,35 @@ mod tests {
         }
     }
 
+    struct Comparisons;
+    impl Kernel for Comparisons {
+        type Output = ();
+        #[inline(always)]
+        fn run<T: Lane>(self) {
+            let values = [-3.0, 2.0, -0.0, f64::INFINITY, 1.0, -1.0, 0.5, 4.0];
+            let (x, last) = (T::load(&values), T::LANES - 1);
+            for (index, value) in values[..T::LANES].iter().enumerate() {
+                assert_eq!(x.abs().lane(index), value.abs());
+                assert_eq!(x.max(T::ONE).lane(index), value.max(1.0));
+                assert_eq!(x.min(T::ONE).lane(index), value.min(1.0));
+            }
+            assert!(x.all_at_most(x) && x.all_at_most(T::splat(f64::INFINITY)));
+            let none = x.with_lane(last, f64::NAN);
+            assert!(!none.all_at_most(T::splat(f64::INFINITY)) && !T::splat(-9.0).all_at_most(none));
+            assert!(!x.with_lane(last, 3.0).all_at_most(x.with_lane(last, 2.9)));
+            assert_eq!(none.max(T::ONE).lane(last), 1.0);
+            assert_eq!(none.min(T::ONE).lane(last), 1.0);
+        }
+    }
+
+    #[test]
+    fn lanes_are_compared_one_by_one() {
+        for level in Level::available() {
+            dispatch(level, Comparisons);
+            dispatch_single(level, Comparisons);
+        }
+    }
+
     #[test]
     fn every_level_computes_the_same() {
         let values: Vec<f64> = (0..64).map(f64::from).collect();

@@ -36,8 +36,34 @@ pub trait Lane: Scalar {
         lanes[index]
     }
 
+    /// The same with `value` in lane `index`.
+    ///
+    /// # Panics
+    /// If `index` is not below [`LANES`](Lane::LANES).
+    #[must_use]
+    #[inline(always)]
+    fn with_lane(self, index: usize, value: f64) -> Self {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        assert!(index < Self::LANES);
+        lanes[index] = value;
+        Self::load(&lanes)
+    }
+
     /// Every lane divided by a number.
     fn divided_by(self, divisor: f64) -> Self;
+
+    /// Magnitude of every lane.
+    fn abs(self) -> Self;
+
+    /// The lesser of the two, lane by lane; that of `other` where one of them is not a number.
+    fn min(self, other: Self) -> Self;
+
+    /// The greater of the two, lane by lane; that of `other` where one of them is not a number.
+    fn max(self, other: Self) -> Self;
+
+    /// True when every lane is at most that of `bound`; false when one of them is not a number.
+    fn all_at_most(self, bound: Self) -> bool;
 
     /// Hyperbolic tangent of every lane, within 4 units of the last place.
     fn tanh(self) -> Self;
@@ -227,6 +253,26 @@ impl<R: Register, B: Register> Lane for Wide<R, B> {
     #[inline(always)]
     fn divided_by(self, divisor: f64) -> Self {
         Self::of(self.0.div(R::splat(divisor)))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self::of(self.0.and(R::splat(f64::from_bits(!(1 << 63)))))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self::of(self.0.min(other.0))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::of(self.0.max(other.0))
+    }
+
+    #[inline(always)]
+    fn all_at_most(self, bound: Self) -> bool {
+        self.0.all_at_most(bound.0)
     }
 
     #[inline(always)]

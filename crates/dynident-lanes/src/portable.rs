@@ -132,12 +132,20 @@ impl<const N: usize, const FUSED: bool> Register for Portable<N, FUSED> {
         Self(core::array::from_fn(|k| if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] }))
     }
     #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
     fn lowest_bit_mask(self) -> Self {
         self.map_bits(|bits| 0_u64.wrapping_sub(bits & 1))
     }
     #[inline(always)]
     fn all_within(self, bound: f64) -> bool {
         self.0.iter().all(|x| x.abs() <= bound)
+    }
+    #[inline(always)]
+    fn all_at_most(self, bound: Self) -> bool {
+        self.0.iter().zip(&bound.0).all(|(x, bound)| x <= bound)
     }
 }
 

@@ -37,8 +37,12 @@ pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     fn bits_shifted_by_52(self) -> Self;
     /// The lesser of the two; `other` where one of them is not a number.
     fn min(self, other: Self) -> Self;
+    /// The greater of the two; `other` where one of them is not a number.
+    fn max(self, other: Self) -> Self;
     /// All ones where the lowest bit is set, else all zeros.
     fn lowest_bit_mask(self) -> Self;
     /// True when every |lane| is at most `bound` (false when one is not a number).
     fn all_within(self, bound: f64) -> bool;
+    /// True when every lane is at most that of `bound` (false when one of the two is not a number).
+    fn all_at_most(self, bound: Self) -> bool;
 }

@@ -168,6 +168,10 @@ impl Register for Avx2 {
         Self(intrinsic!(_mm256_min_pd(self.0, other.0)))
     }
     #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(intrinsic!(_mm256_max_pd(self.0, other.0)))
+    }
+    #[inline(always)]
     fn lowest_bit_mask(self) -> Self {
         let bit = intrinsic!(_mm256_and_si256(_mm256_castpd_si256(self.0), _mm256_set1_epi64x(1)));
         Self(intrinsic!(_mm256_castsi256_pd(_mm256_sub_epi64(_mm256_setzero_si256(), bit))))
@@ -177,6 +181,10 @@ impl Register for Avx2 {
         let magnitude = intrinsic!(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0));
         let within = intrinsic!(_mm256_cmp_pd::<_CMP_LE_OQ>(magnitude, _mm256_set1_pd(bound)));
         intrinsic!(_mm256_movemask_pd(within)) == 0b1111
+    }
+    #[inline(always)]
+    fn all_at_most(self, bound: Self) -> bool {
+        intrinsic!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, bound.0))) == 0b1111
     }
 }
 
@@ -262,6 +270,10 @@ impl Register for Avx512 {
         Self(intrinsic!(_mm512_min_pd(self.0, other.0)))
     }
     #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(intrinsic!(_mm512_max_pd(self.0, other.0)))
+    }
+    #[inline(always)]
     fn lowest_bit_mask(self) -> Self {
         let bit = intrinsic!(_mm512_and_si512(_mm512_castpd_si512(self.0), _mm512_set1_epi64(1)));
         Self(intrinsic!(_mm512_castsi512_pd(_mm512_sub_epi64(_mm512_setzero_si512(), bit))))
@@ -270,5 +282,9 @@ impl Register for Avx512 {
     fn all_within(self, bound: f64) -> bool {
         let magnitude = intrinsic!(_mm512_abs_pd(self.0));
         intrinsic!(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(magnitude, _mm512_set1_pd(bound))) == 0xff
+    }
+    #[inline(always)]
+    fn all_at_most(self, bound: Self) -> bool {
+        intrinsic!(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, bound.0)) == 0xff
     }
 }

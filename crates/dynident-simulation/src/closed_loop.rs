@@ -1,6 +1,6 @@
 //! A controller on a simulated robot along a reference.
 
-use crate::controllers::Controller;
+use crate::controllers::{Controller, Measured};
 use crate::error::{SimulationError, require_length};
 use crate::feedback::Feedback;
 use crate::motion_buffer::{Arrays, MotionBuffer, ReferenceBuffer, Row};
@@ -129,19 +129,58 @@ impl LoopSettings {
     }
 }
 
-struct Limits {
-    torque: Vec<f64>,
-    lower: Vec<f64>,
-    upper: Vec<f64>,
-    speed: Vec<f64>,
-    error: Vec<f64>,
+/// Limits of every joint, infinite where there are none.
+#[derive(Clone, Debug)]
+pub(crate) struct Limits {
+    pub(crate) torque: Vec<f64>,
+    pub(crate) lower: Vec<f64>,
+    pub(crate) upper: Vec<f64>,
+    pub(crate) speed: Vec<f64>,
+    pub(crate) error: Vec<f64>,
     /// Velocities that no such robot has.
-    beyond: Vec<f64>,
+    pub(crate) beyond: Vec<f64>,
+}
+
+/// What is settled before the first sample.
+#[derive(Clone, Debug)]
+pub(crate) struct Beginning {
+    pub(crate) limits: Limits,
+    pub(crate) q: Vec<f64>,
+    pub(crate) dq: Vec<f64>,
+}
+
+impl Beginning {
+    /// Checks a loop's parts.
+    pub(crate) fn of(
+        plant: &Plant,
+        controller: &dyn Controller,
+        reference: &Reference,
+        settings: &LoopSettings,
+    ) -> Result<Self, SimulationError> {
+        let joints = plant.dof();
+        settings.validate(joints)?;
+        let own = plant.model().own_scale();
+        let beyond = plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), BEYOND)).collect();
+        let limits = Limits { beyond, ..settings.limits.values(joints)? };
+        require_length("joints of the reference", joints, reference.joints())?;
+        require_length("joints of the controller", joints, controller.joints())?;
+        let motion = reference.motion();
+        let first = |values: &[f64]| (0..joints).map(|joint| values[joint * motion.samples]).collect::<Vec<f64>>();
+        let (q, dq) = match &settings.start {
+            Start::Reference => (first(&motion.q), first(&motion.dq)),
+            Start::AtRest => (first(&motion.q), vec![0.0; joints]),
+            Start::At { q, dq } => {
+                plant.check_state(q, dq)?;
+                (q.clone(), dq.clone())
+            }
+        };
+        Ok(Self { limits, q, dq })
+    }
 }
 
 /// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques,
 /// which are cut to their limits and hold until the next sample. The controller is reset first. Steps allocate nothing
-/// (but those of the adaptive integrator).
+/// (but those of the adaptive integrator). Many loops at once: [`closed_loops`](crate::closed_loops).
 ///
 /// ```
 /// use dynident_simulation::{ControllerSettings, LoopSettings, Plant, Reference, closed_loop};
@@ -164,61 +203,37 @@ pub fn closed_loop(
     reference: &Reference,
     settings: &LoopSettings,
 ) -> Result<Run, SimulationError> {
-    let joints = plant.dof();
-    settings.validate(joints)?;
-    let own = plant.model().own_scale();
-    let beyond = plant.model().joints().iter().map(|joint| own.velocity(joint.turns(), BEYOND)).collect();
-    let limits = Limits { beyond, ..settings.limits.values(joints)? };
-    require_length("joints of the reference", joints, reference.joints())?;
-    require_length("joints of the controller", joints, controller.joints())?;
-    let samples = reference.samples();
-    // Robot, target and controller at the start.
-    let mut target = ReferenceBuffer::new(reference);
-    target.go_to(0);
-    match &settings.start {
-        Start::Reference => plant.set_state(0.0, target.target().q, target.target().dq),
-        Start::AtRest => plant.set_state(0.0, target.target().q, &vec![0.0; joints]),
-        Start::At { q, dq } => {
-            plant.check_state(q, dq)?;
-            plant.set_state(0.0, q, dq);
-        }
-    }
+    let Beginning { limits, q, dq } = Beginning::of(plant, controller, reference, settings)?;
+    let (joints, samples) = (plant.dof(), reference.samples());
+    plant.set_state(0.0, &q, &dq);
     controller.reset();
     // Room for the whole run: the loop allocates nothing.
-    let zeros = || vec![0.0; joints * samples];
-    let mut run = Run {
-        joints: plant.model().joints().iter().map(|joint| joint.name.clone()).collect(),
-        rate_hz: reference.rate_hz(),
-        samples,
-        status: RunStatus::Done,
-        reference: reference.shared(),
-        q: zeros(),
-        dq: zeros(),
-        ddq: if settings.accelerations { zeros() } else { Vec::new() },
-        tau: zeros(),
-        measured_q: zeros(),
-        measured_dq: zeros(),
-        max_error: vec![0.0; joints],
-        rms_error: vec![0.0; joints],
-        saturated: vec![0; joints],
-        unsettled_steps: 0,
-    };
+    let mut run = Run::begin(plant, reference, settings.accelerations);
+    let sees_the_truth = settings.sensors.see_the_truth(joints);
+    if !sees_the_truth {
+        (run.measured_q, run.measured_dq) = (vec![0.0; joints * samples], vec![0.0; joints * samples]);
+    }
+    let mut target = ReferenceBuffer::new(reference);
     let mut feedback = Feedback::new(&settings.sensors, plant, reference.rate_hz());
     let (mut tau, mut ddq) = (vec![0.0; joints], vec![0.0; joints]);
-    let mut tape = MotionBuffer::new(joints);
+    let mut tape = MotionBuffer::new(joints, !sees_the_truth);
     let mut kept = 0;
     for sample in 0..samples {
         // The state at this sample: still inside its limits?
         let time_s = run.time_s(sample);
         plant.set_time_s(time_s);
         target.go_to(sample);
-        if let Some(status) = verdict(plant, &limits, target.target().q, time_s, &run.joints) {
+        if let Some(status) = verdict(plant.q(), plant.dq(), &limits, target.target().q, time_s, &run.joints) {
             run.status = status;
             break;
         }
         // Sensors, control law, drives that saturate.
-        feedback.read(plant.q(), plant.dq());
-        let measured = feedback.measured();
+        let measured = if sees_the_truth {
+            Measured { q: plant.q(), dq: plant.dq() }
+        } else {
+            feedback.read(plant.q(), plant.dq());
+            feedback.measured()
+        };
         controller.torque(time_s, target.target(), measured, &mut tau);
         if let Some(joint) = tau.iter().position(|tau| !tau.is_finite()) {
             run.status = RunStatus::Diverged { time_s, reason: Divergence::Torque { joint } };
@@ -234,7 +249,8 @@ pub fn closed_loop(
             run.rms_error[joint] += error * error;
         }
         // Record the sample, and move on to the next.
-        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured_q: measured.q, measured_dq: measured.dq };
+        let measured = (!sees_the_truth).then_some(measured);
+        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured };
         if tape.push(row) {
             tape.flush(arrays(&mut run), samples);
         }
@@ -256,11 +272,11 @@ pub fn closed_loop(
         }
     }
     tape.flush(arrays(&mut run), samples);
-    for error in &mut run.rms_error {
-        *error = (*error / kept.max(1) as f64).sqrt();
+    if sees_the_truth {
+        (run.measured_q, run.measured_dq) = (run.q.clone(), run.dq.clone());
     }
     run.unsettled_steps = plant.unsettled_steps();
-    run.cut(kept);
+    run.end(kept);
     Ok(run)
 }
 
@@ -270,9 +286,16 @@ fn arrays(run: &mut Run) -> Arrays<'_> {
 
 /// Why the run must stop here, if it must.
 #[inline]
-fn verdict(plant: &Plant, limits: &Limits, target: &[f64], time_s: f64, names: &[String]) -> Option<RunStatus> {
+pub(crate) fn verdict(
+    q: &[f64],
+    dq: &[f64],
+    limits: &Limits,
+    target: &[f64],
+    time_s: f64,
+    names: &[String],
+) -> Option<RunStatus> {
     for joint in 0..target.len() {
-        let (q, dq) = (plant.q()[joint], plant.dq()[joint]);
+        let (q, dq) = (q[joint], dq[joint]);
         if dq.abs() > limits.beyond[joint] {
             return Some(RunStatus::Diverged { time_s, reason: Divergence::Speed { joint, value: dq } });
         }

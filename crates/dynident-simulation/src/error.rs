@@ -54,6 +54,14 @@ pub enum SimulationError {
         /// Its parameter.
         value: f64,
     },
+    /// One of many loops that could not be set up.
+    #[error("loop {index}: {source}")]
+    Loop {
+        /// Its place, from zero.
+        index: usize,
+        /// What is wrong with it.
+        source: Box<SimulationError>,
+    },
     /// The mass matrix has no inverse: some joint moves nothing.
     #[error(
         "the simulated robot's mass matrix is not positive definite at the start: give every body at the tip a mass and an inertia, or its drive an inertia"

@@ -24,8 +24,6 @@ pub(crate) struct Feedback<'a> {
     last_q: Vec<f64>,
     rate_hz: f64,
     started: bool,
-    /// Nothing between the robot and the controller.
-    perfect: bool,
 }
 
 impl<'a> Feedback<'a> {
@@ -49,10 +47,6 @@ impl<'a> Feedback<'a> {
             last_q: vec![0.0; joints],
             rate_hz,
             started: false,
-            perfect: settings.encoder_steps.is_none()
-                && (0..joints).all(|joint| settings.position_std.of(joint) == 0.0)
-                && settings.speed == VelocitySource::True
-                && slots == 1,
         }
     }
 
@@ -62,11 +56,6 @@ impl<'a> Feedback<'a> {
         let joints = q.len();
         self.place = self.after(self.place);
         let own = self.place * joints;
-        if self.perfect {
-            self.q.copy_from_slice(q);
-            self.dq.copy_from_slice(dq);
-            return;
-        }
         for joint in 0..joints {
             let reading = self.settings.position(joint, q[joint], self.turns[joint], &mut self.random);
             self.q[own + joint] = reading;

@@ -2,7 +2,7 @@
 //! straight, every sample would touch a page for each joint of each array, more than a processor keeps addresses of; in
 //! blocks it is one page in 32 samples.
 
-use crate::controllers::Target;
+use crate::controllers::{Measured, Target};
 use crate::reference::Reference;
 
 /// Samples in a block: with 35 numbers each, nine kilobytes.
@@ -14,16 +14,18 @@ pub(crate) struct Row<'a> {
     pub(crate) q: &'a [f64],
     pub(crate) dq: &'a [f64],
     pub(crate) tau: &'a [f64],
-    pub(crate) measured_q: &'a [f64],
-    pub(crate) measured_dq: &'a [f64],
+    /// Where it is not the true motion.
+    pub(crate) measured: Option<Measured<'a>>,
 }
 
-/// The arrays in the order of [`Row`].
+/// The arrays in the order of [`Row`]; the last two are filled where something is measured.
 pub(crate) type Arrays<'a> = [&'a mut Vec<f64>; 5];
 
 #[derive(Debug)]
 pub(crate) struct MotionBuffer {
     joints: usize,
+    /// Numbers of each joint in a row.
+    kinds: usize,
     rows: Vec<f64>,
     filled: usize,
     /// The sample of the first row.
@@ -31,33 +33,36 @@ pub(crate) struct MotionBuffer {
 }
 
 impl MotionBuffer {
-    pub(crate) fn new(joints: usize) -> Self {
-        Self { joints, rows: vec![0.0; 5 * joints * BLOCK], filled: 0, first: 0 }
+    pub(crate) fn new(joints: usize, with_measured: bool) -> Self {
+        let kinds = if with_measured { 5 } else { 3 };
+        Self { joints, kinds, rows: vec![0.0; kinds * joints * BLOCK], filled: 0, first: 0 }
     }
 
     /// True once the block must be given to [`flush`](Self::flush).
     #[inline]
     pub(crate) fn push(&mut self, row: Row<'_>) -> bool {
         let n = self.joints;
-        let to = &mut self.rows[self.filled * 5 * n..][..5 * n];
+        let to = &mut self.rows[self.filled * self.kinds * n..][..self.kinds * n];
         to[..n].copy_from_slice(row.q);
         to[n..2 * n].copy_from_slice(row.dq);
         to[2 * n..3 * n].copy_from_slice(row.tau);
-        to[3 * n..4 * n].copy_from_slice(row.measured_q);
-        to[4 * n..].copy_from_slice(row.measured_dq);
+        if let Some(measured) = row.measured {
+            to[3 * n..4 * n].copy_from_slice(measured.q);
+            to[4 * n..].copy_from_slice(measured.dq);
+        }
         self.filled += 1;
         self.filled == BLOCK
     }
 
     /// Writes the rows into arrays of `samples` samples a joint.
     pub(crate) fn flush(&mut self, arrays: Arrays<'_>, samples: usize) {
-        let width = 5 * self.joints;
-        for (place, array) in arrays.into_iter().enumerate() {
+        let width = self.kinds * self.joints;
+        for (place, array) in arrays.into_iter().take(self.kinds).enumerate() {
             for joint in 0..self.joints {
                 let column = place * self.joints + joint;
                 let to = &mut array[joint * samples + self.first..][..self.filled];
-                for (row, to) in to.iter_mut().enumerate() {
-                    *to = self.rows[row * width + column];
+                for (to, value) in to.iter_mut().zip(self.rows[column..].iter().step_by(width)) {
+                    *to = *value;
                 }
             }
         }
@@ -94,8 +99,9 @@ impl<'a> ReferenceBuffer<'a> {
         let count = BLOCK.min(samples - first);
         for (place, array) in [&motion.q, &motion.dq, &motion.ddq].into_iter().enumerate() {
             for joint in 0..joints {
-                for (row, value) in array[joint * samples + first..][..count].iter().enumerate() {
-                    self.rows[(row * 3 + place) * joints + joint] = *value;
+                let to = self.rows[place * joints + joint..].iter_mut().step_by(3 * joints);
+                for (to, value) in to.zip(&array[joint * samples + first..][..count]) {
+                    *to = *value;
                 }
             }
         }

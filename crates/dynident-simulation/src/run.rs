@@ -1,6 +1,7 @@
 //! What came of a run.
 
-use crate::plant::PlantFault;
+use crate::plant::{Plant, PlantFault};
+use crate::reference::Reference;
 use dynident_excitation::Motion;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -153,6 +154,37 @@ pub struct Run {
 }
 
 impl Run {
+    /// A run that has not begun: zeros, room for what is true at every sample, none yet for what is measured.
+    pub(crate) fn begin(plant: &Plant, reference: &Reference, accelerations: bool) -> Self {
+        let (joints, samples) = (plant.dof(), reference.samples());
+        let zeros = || vec![0.0; joints * samples];
+        Self {
+            joints: plant.model().joints().iter().map(|joint| joint.name.clone()).collect(),
+            rate_hz: reference.rate_hz(),
+            samples,
+            status: RunStatus::Done,
+            reference: reference.shared(),
+            q: zeros(),
+            dq: zeros(),
+            ddq: if accelerations { zeros() } else { Vec::new() },
+            tau: zeros(),
+            measured_q: Vec::new(),
+            measured_dq: Vec::new(),
+            max_error: vec![0.0; joints],
+            rms_error: vec![0.0; joints],
+            saturated: vec![0; joints],
+            unsettled_steps: 0,
+        }
+    }
+
+    /// The end of a run of which `kept` samples were run, with sums of squares in place of root mean squares.
+    pub(crate) fn end(&mut self, kept: usize) {
+        for error in &mut self.rms_error {
+            *error = (*error / kept.max(1) as f64).sqrt();
+        }
+        self.cut(kept);
+    }
+
     /// The range of one joint in any of the arrays.
     pub fn of(&self, joint: usize) -> core::ops::Range<usize> {
         joint * self.samples..(joint + 1) * self.samples

@@ -132,6 +132,14 @@ impl SensorSettings {
         require(drift.abs() <= 1e5, "clock_drift_ppm", drift, "give -100000 to 100000")
     }
 
+    /// Whether the controller sees the true state.
+    pub(crate) fn see_the_truth(&self, joints: usize) -> bool {
+        self.encoder_steps.is_none()
+            && (0..joints).all(|joint| self.position_std.of(joint) == 0.0)
+            && self.speed == VelocitySource::True
+            && self.feedback_delay_samples == 0
+    }
+
     /// What the encoder of a joint says of a position.
     #[inline]
     pub(crate) fn position(&self, joint: usize, q: f64, turns: bool, random: &mut Random) -> f64 {

@@ -18,5 +18,6 @@ chapters! {
     dynamics: "dynamics.md",
     base_parameters: "base-parameters.md",
     estimation: "estimation.md",
+    simulation: "simulation.md",
     validation: "validation.md",
 }

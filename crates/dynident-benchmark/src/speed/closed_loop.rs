@@ -6,10 +6,10 @@ use dynident_excitation::Motion;
 use dynident_model::Model;
 use dynident_model::sample::Random;
 use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
-use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
+use dynident_simulation::controllers::{FiniteTimeSettings, JointPd, JointPdSettings};
 use dynident_simulation::{
-    ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SimulationError, Start,
-    closed_loop,
+    ClosedLoop, ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SimulationError,
+    Start, closed_loop, closed_loops,
 };
 use std::hint::black_box;
 
@@ -31,7 +31,7 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
     let matrix = mass_matrix(model, &mut workspace, &zeros);
     let scaled = |factor: f64| (0..dof).map(|joint| factor * matrix[joint * dof + joint]).collect::<Vec<f64>>();
     let gains = JointPdSettings { kp: scaled(100.0).into(), kd: scaled(20.0).into() };
-    let mut controller = ControllerSettings::JointPd(gains).build(dof, None)?;
+    let mut controller = ControllerSettings::JointPd(gains.clone()).build(dof, None)?;
     let mut plant = Plant::new(model, &[], &[])?;
     let reference = Reference::standing(&zeros, 1000.0, (SAMPLES - 1) as f64 / 1000.0)?;
     let mut random = Random::new(1);
@@ -44,20 +44,7 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
-    // Many loops from different postures: there is no batch of them, they run one after the other.
-    let short = Reference::standing(&zeros, 1000.0, (LOOP_SAMPLES - 1) as f64 / 1000.0)?;
-    let many: Vec<LoopSettings> = (0..LOOPS)
-        .map(|_| {
-            let start = Start::At { q: (0..dof).map(|_| random.uniform(-0.3, 0.3)).collect(), dq: zeros.clone() };
-            LoopSettings { integrator: EULER, start, ..LoopSettings::default() }
-        })
-        .collect();
-    closed_loop(&mut plant, controller.as_mut(), &short, &many[0])?;
-    report.time("pd_step_euler_64_loops", LOOPS * LOOP_SAMPLES, || {
-        for settings in &many {
-            let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &short, settings));
-        }
-    });
+    time_many(model, &gains, &mut random, report)?;
     // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some
     // slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
@@ -86,5 +73,40 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
     report.time("finite_time_10s", 1, || {
         let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
     });
+    Ok(())
+}
+
+/// Times a step of one of many loops from different postures, side by side.
+fn time_many(
+    model: &Model,
+    gains: &JointPdSettings,
+    random: &mut Random,
+    report: &Report<'_>,
+) -> Result<(), SimulationError> {
+    let zeros = vec![0.0; model.dof()];
+    let reference = Reference::standing(&zeros, 1000.0, (LOOP_SAMPLES - 1) as f64 / 1000.0)?;
+    let plant = Plant::new(model, &[], &[])?;
+    let starts: Vec<Start> = (0..LOOPS)
+        .map(|_| zeros.iter().map(|_| random.uniform(-0.3, 0.3)).collect())
+        .map(|q| Start::At { q, dq: zeros.clone() })
+        .collect();
+    let controllers = (0..LOOPS).map(|_| JointPd::new(model.dof(), gains)).collect::<Result<Vec<_>, _>>()?;
+    for (quantity, integrator) in [("pd_step_euler_64_loops", EULER), ("pd_step_rk4_64_loops", RK4)] {
+        let mut controllers = controllers.clone();
+        let settings: Vec<LoopSettings> = (starts.iter().cloned())
+            .map(|start| LoopSettings { integrator, start, ..LoopSettings::default() })
+            .collect();
+        let mut loops: Vec<ClosedLoop<'_>> = (controllers.iter_mut().zip(&settings))
+            .map(|(controller, settings)| ClosedLoop { plant: &plant, controller, reference: &reference, settings })
+            .collect();
+        // Every run is looked at and dropped, as the single ones are.
+        let one_by_one = |_, run| {
+            black_box(run);
+        };
+        closed_loops(&mut loops, one_by_one)?;
+        report.time(quantity, LOOPS * LOOP_SAMPLES, || {
+            let _ = closed_loops(&mut loops, one_by_one);
+        });
+    }
     Ok(())
 }

@@ -4,7 +4,7 @@
 use super::PlantFault;
 use super::disturbance::JointDisturbance;
 use super::drives::Drives;
-use super::factor::{eliminate, factor, solve};
+use super::factor::{eliminate, factor_and_solve, solve_all};
 use super::friction_solver::FrictionSolver;
 use super::friction_unit::FrictionUnit;
 use dynident_dynamics::{Workspace, mass_matrix_and_bias};
@@ -53,6 +53,30 @@ pub(super) struct Equations {
     chosen: Vec<usize>,
     /// How often friction torques had not settled.
     pub(super) unsettled: usize,
+}
+
+impl Clone for Equations {
+    /// The same robot with scratch of its own.
+    fn clone(&self) -> Self {
+        Self {
+            workspace: Workspace::with_level(&self.model, self.workspace.level()),
+            model: self.model.clone(),
+            drives: self.drives.clone(),
+            disturbances: self.disturbances.clone(),
+            locked: self.locked.clone(),
+            any_locked: self.any_locked,
+            matrix: self.matrix.clone(),
+            acceleration: self.acceleration.clone(),
+            load: self.load.clone(),
+            responses: self.responses.clone(),
+            compliance: self.compliance.clone(),
+            free: self.free.clone(),
+            solver: self.solver.clone(),
+            modes: self.modes.clone(),
+            chosen: Vec::with_capacity(self.drives.units.len()),
+            unsettled: self.unsettled,
+        }
+    }
 }
 
 impl Equations {
@@ -149,11 +173,7 @@ impl Equations {
     #[inline]
     pub(super) fn factor_and_solve(&mut self) -> Result<(), PlantFault> {
         let n = self.acceleration.len();
-        if !factor(&mut self.matrix, n) {
-            return Err(PlantFault::MassMatrix);
-        }
-        solve(&self.matrix, n, &mut self.acceleration);
-        Ok(())
+        if factor_and_solve(&mut self.matrix, n, &mut self.acceleration) { Ok(()) } else { Err(PlantFault::MassMatrix) }
     }
 
     /// Chooses the units for the next calls.
@@ -178,8 +198,8 @@ impl Equations {
                     response[joint] = ratio;
                 }
             }
-            solve(&self.matrix, n, response);
         }
+        solve_all(&self.matrix, n, &mut self.responses[..count * n]);
         for (row, &index) in self.chosen.iter().enumerate() {
             for column in 0..count {
                 let response = &self.responses[column * n..(column + 1) * n];

@@ -65,6 +65,56 @@ fn factor_of<const N: usize>(a: &mut [f64]) -> bool {
     true
 }
 
+/// [`factor`] and [`solve`] at once, with the same numbers: while one column is divided, the right-hand side moves on.
+#[inline]
+pub(super) fn factor_and_solve(a: &mut [f64], n: usize, b: &mut [f64]) -> bool {
+    match n {
+        2 => factor_and_solve_of::<2>(a, b),
+        6 => factor_and_solve_of::<6>(a, b),
+        7 => factor_and_solve_of::<7>(a, b),
+        _ => {
+            let fine = factor(a, n);
+            if fine {
+                solve(a, n, b);
+            }
+            fine
+        }
+    }
+}
+
+#[inline(always)]
+fn factor_and_solve_of<const N: usize>(a: &mut [f64], b: &mut [f64]) -> bool {
+    let (rows, _) = a.as_chunks_mut::<N>();
+    let (Ok(m), Ok(b)) = (<&mut [[f64; N]; N]>::try_from(rows), <&mut [f64; N]>::try_from(b)) else { return false };
+    for j in 0..N {
+        let pivot = m[j][j];
+        if !is_pivot(pivot) {
+            return false;
+        }
+        let inverse = pivot.recip();
+        let x = b[j];
+        for i in j + 1..N {
+            let ratio = m[i][j] * inverse;
+            for k in j + 1..=i {
+                m[i][k] -= ratio * m[k][j];
+            }
+            b[i] -= ratio * x;
+        }
+        for row in m.iter_mut().skip(j + 1) {
+            row[j] *= inverse;
+        }
+        m[j][j] = inverse;
+        b[j] = x * inverse;
+    }
+    for i in (0..N).rev() {
+        let x = b[i];
+        for k in 0..i {
+            b[k] -= m[i][k] * x;
+        }
+    }
+    true
+}
+
 /// Solves `L D Lᵀ x = b` in place, with the result of [`factor`].
 #[inline]
 pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
@@ -104,6 +154,60 @@ fn solve_of<const N: usize>(l: &[f64], b: &mut [f64]) {
         let x = b[i];
         for k in 0..i {
             b[k] -= l[i][k] * x;
+        }
+    }
+}
+
+/// [`solve`] of several right-hand sides, one after the other in `b`, with the same numbers. Each alone is a chain of
+/// steps that wait for each other; together they keep the processor busy.
+#[inline]
+pub(super) fn solve_all(l: &[f64], n: usize, b: &mut [f64]) {
+    match n {
+        2 => solve_all_of::<2>(l, b),
+        6 => solve_all_of::<6>(l, b),
+        7 => solve_all_of::<7>(l, b),
+        _ => b.chunks_exact_mut(n).for_each(|b| solve(l, n, b)),
+    }
+}
+
+#[inline(always)]
+fn solve_all_of<const N: usize>(l: &[f64], b: &mut [f64]) {
+    let (rows, _) = l.as_chunks::<N>();
+    let Ok(l) = <&[[f64; N]; N]>::try_from(rows) else { return };
+    let (sides, _) = b.as_chunks_mut::<N>();
+    for sides in sides.chunks_mut(N) {
+        // Entry by entry, each of all sides.
+        let mut x = [[0.0; N]; N];
+        for (at, side) in sides.iter().enumerate() {
+            for i in 0..N {
+                x[i][at] = side[i];
+            }
+        }
+        for i in 0..N {
+            let known = x[i];
+            for k in i + 1..N {
+                for at in 0..N {
+                    x[k][at] -= l[k][i] * known[at];
+                }
+            }
+        }
+        for i in 0..N {
+            for at in 0..N {
+                x[i][at] *= l[i][i];
+            }
+        }
+        for i in (0..N).rev() {
+            let known = x[i];
+            for k in 0..i {
+                for at in 0..N {
+                    x[k][at] -= l[i][k] * known[at];
+                }
+            }
+        }
+        for (at, side) in sides.iter_mut().enumerate() {
+            for i in 0..N {
+                side[i] = x[i][at];
+            }
         }
     }
 }
@@ -162,6 +266,16 @@ mod tests {
             let (mut lower, mut x) = (a.clone(), b.clone());
             assert!(factor(&mut lower, n));
             solve(&lower, n, &mut x);
+            let (mut lower_too, mut same) = (a.clone(), b.clone());
+            assert!(factor_and_solve(&mut lower_too, n, &mut same));
+            assert!(x == same && lower == lower_too);
+            for sides in [1, n, n + 1] {
+                let mut together: Vec<f64> = (0..sides * n).map(|_| random.normal()).collect();
+                let mut alone = together.clone();
+                solve_all(&lower, n, &mut together);
+                alone.chunks_exact_mut(n).for_each(|side| solve(&lower, n, side));
+                assert_eq!(together, alone);
+            }
             let (mut used, mut y) = (a.clone(), b.clone());
             assert!(eliminate(&mut used, n, &mut y));
             for solution in [x, y] {

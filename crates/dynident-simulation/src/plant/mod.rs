@@ -6,14 +6,17 @@ mod drives;
 mod equations;
 mod euler;
 mod factor;
+mod factor_lanes;
 mod friction_solver;
 mod friction_unit;
 mod integrator;
+mod lanes;
 mod lengths;
 mod runge_kutta;
 
 pub use disturbance::{Disturbance, TimeCourse};
 pub use integrator::Integrator;
+pub(crate) use lanes::{FARTHEST, MOST_LANES, PlantLanes};
 pub use lengths::{with_length_errors, with_placements};
 
 use crate::error::{SimulationError, require, require_length};
@@ -80,6 +83,7 @@ impl State {
 /// assert!((plant.energy_j() - before).abs() < 1e-8);
 /// # Ok::<(), dynident_simulation::SimulationError>(())
 /// ```
+#[derive(Clone)]
 pub struct Plant {
     equations: Equations,
     stages: Stages,

@@ -1,0 +1,42 @@
+//! Where algorithms take the inertial numbers of bodies from: one model's, or in every lane another robot's.
+
+use dynident_lanes::Scalar;
+use dynident_model::{JointStep, Vec3};
+
+/// The inertial numbers of a tree's steps.
+pub(crate) trait Bodies<T: Scalar>: Copy {
+    /// See [`JointStep::mass`].
+    fn mass(self, index: usize) -> T;
+    /// See [`JointStep::first`].
+    fn first(self, index: usize) -> Vec3<T>;
+    /// See [`JointStep::second`].
+    fn second(self, index: usize) -> [T; 6];
+    /// See [`JointStep::subtree_mass`].
+    fn subtree_mass(self, index: usize) -> T;
+    /// Whether [`subtree_mass`](Self::subtree_mass) is zero for certain: its products are left out then.
+    fn is_massless(self, index: usize) -> bool;
+}
+
+/// All lanes hold the bodies of one model.
+impl<T: Scalar> Bodies<T> for &[JointStep] {
+    #[inline(always)]
+    fn mass(self, index: usize) -> T {
+        T::splat(self[index].mass)
+    }
+    #[inline(always)]
+    fn first(self, index: usize) -> Vec3<T> {
+        self[index].first.splat()
+    }
+    #[inline(always)]
+    fn second(self, index: usize) -> [T; 6] {
+        self[index].second.map(T::splat)
+    }
+    #[inline(always)]
+    fn subtree_mass(self, index: usize) -> T {
+        T::splat(self[index].subtree_mass)
+    }
+    #[inline(always)]
+    fn is_massless(self, index: usize) -> bool {
+        self[index].subtree_mass == 0.0
+    }
+}
