@@ -3,9 +3,10 @@
 use crate::ground::{MassMoments, MomentRates, Spatial};
 use crate::hinge::{Hinge, with_hinge};
 use crate::joint_matrices::{JointMatrices, MatrixRows};
+use crate::sample_lanes::take_lanes;
 use crate::states::VariedBody;
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded, project_matrices};
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{Model, Transform, Vec3};

@@ -2,9 +2,10 @@
 
 use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, cross_shift, times_shift, with_hinge};
+use crate::sample_lanes::{put_lanes, take_lanes};
 use crate::states::{LinkMotion, LinkWrench};
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded};
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointStep, Mat3, Model, Vec3};

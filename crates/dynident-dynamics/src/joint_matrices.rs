@@ -1,6 +1,7 @@
 //! Square matrices over the joints, of many samples: where their entries go.
 
-use crate::workspace::{parents, put_lanes, same_tree};
+use crate::same_tree::{parents, same_tree};
+use crate::sample_lanes::put_lanes;
 use dynident_lanes::{AlignedBuffer, Lane};
 use dynident_model::Model;
 

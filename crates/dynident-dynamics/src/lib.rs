@@ -70,6 +70,8 @@ mod regressor;
 mod regressor_adjoint;
 mod regressor_panels;
 mod robot_lanes;
+mod same_tree;
+mod sample_lanes;
 mod states;
 mod term_history;
 mod tree_scratch;

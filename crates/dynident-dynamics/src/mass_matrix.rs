@@ -5,8 +5,9 @@ use crate::columns::ColumnScratch;
 use crate::composite_moments::{CompositeMoments, gathered, handed_on};
 use crate::hinge::{BundledHinges, Hinge, cross_shift, with_hinge};
 use crate::joint_matrices::{JointMatrices, MatrixRows};
+use crate::sample_lanes::{take, take_lanes};
 use crate::tree_scratch::{TreeBatch, TreeScratch, project_matrices};
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Scratch, Workspace, take, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Scratch, Workspace};
 use dynident_lanes::{Kernel, Lane, dispatch, dispatch_single};
 use dynident_model::{JointStep, Model, Vec3};
 

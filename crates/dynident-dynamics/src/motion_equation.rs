@@ -2,8 +2,9 @@
 
 use crate::inverse_dynamics::newton_euler_placed;
 use crate::mass_matrix::matrix_of_sample;
+use crate::sample_lanes::take;
 use crate::tree_scratch::TreeScratch;
-use crate::workspace::{AnyScratch, Scratch, Workspace, take};
+use crate::workspace::{AnyScratch, Scratch, Workspace};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::Model;
 

@@ -8,9 +8,10 @@
 
 use crate::hinge::{minus_cross_shift, times_shift};
 use crate::own_turn::{OwnTurn, bundles, with_own_turn};
+use crate::sample_lanes::take;
 use crate::states::{AxisScratch, LinkMotion};
 use crate::tree_scratch::TreeScratch;
-use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
+use crate::workspace::{AnyScratch, CoreScratch, Workspace};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
 use dynident_model::{Mat3, Model, Vec3};
 

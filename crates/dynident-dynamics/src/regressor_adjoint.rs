@@ -9,9 +9,10 @@
 
 use crate::body_frames::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
+use crate::sample_lanes::{put_lanes, take_lanes};
 use crate::states::{AdjointScratch, BodyAdjoint};
 use crate::tree_scratch::{TreeBatch, expanded};
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, put_lanes, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
 use dynident_model::terms::JointMotion;
 use dynident_model::{Mat3, Model, Transform, Vec3};

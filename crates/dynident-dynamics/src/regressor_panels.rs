@@ -4,9 +4,11 @@
 //! own narrow panel: columns after one another, each with one value per sample. The whole regressor is never stored.
 
 use crate::regressor::{BlockSink, Entries, regressor_blocks, torque_regressor};
+use crate::same_tree::{parents, same_tree};
+use crate::sample_lanes::{put_lanes, take_lanes};
 use crate::term_history::TermHistory;
 use crate::tree_scratch::{TreeBatch, expanded};
-use crate::workspace::{AnyScratch, BatchWorkspace, Workspace, parents, put_lanes, same_tree, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, Workspace};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
 use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, JointCoupling, Model};

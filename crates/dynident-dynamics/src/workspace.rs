@@ -4,6 +4,7 @@ use crate::columns::ColumnScratch;
 use crate::composite::Composite;
 use crate::composite_moments::CompositeMoments;
 use crate::hinge::Hinges;
+use crate::same_tree::{parents, same_tree};
 use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyState, LinkMotion, LinkWrench, VariedBody};
 use crate::tree_scratch::{TreeBatch, TreeScratch};
 use core::any::Any;
@@ -127,7 +128,7 @@ macro_rules! one_sample_kernel {
             #[inline(always)]
             fn run<T: dynident_lanes::Lane>(self) {
                 let scratch = &mut self.scratch.of::<T>().core;
-                $($crate::workspace::take(&mut scratch.$input, self.$input);)*
+                $($crate::sample_lanes::take(&mut scratch.$input, self.$input);)*
                 $algorithm(self.model, scratch);
                 $(for (to, from) in self.$output.iter_mut().zip(&scratch.$field $([$index])?) {
                     *to = from.lane(0);
@@ -258,54 +259,5 @@ impl BatchWorkspace {
 impl core::fmt::Debug for BatchWorkspace {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("BatchWorkspace").field("dof", &self.dof).field("level", &self.level).finish_non_exhaustive()
-    }
-}
-
-/// Which body hangs on which.
-pub(crate) fn parents(model: &Model) -> Vec<Option<usize>> {
-    model.maps().iter().map(|map| map.parent).collect()
-}
-
-/// Whether a model's bodies hang on each other as `parents` says.
-pub(crate) fn same_tree(parents: &[Option<usize>], model: &Model) -> bool {
-    model.maps().iter().map(|map| map.parent).eq(parents.iter().copied())
-}
-
-/// Takes one joint vector into scratch scalars.
-#[inline(always)]
-pub(crate) fn take<T: Lane>(to: &mut [T], from: &[f64]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = T::splat(*from);
-    }
-}
-
-/// Takes samples `at..at + LANES` of a joint-major array into scratch lanes; past the end the last sample repeats.
-#[inline(always)]
-pub(crate) fn take_lanes<T: Lane>(to: &mut [T], from: &[f64], samples: usize, at: usize) {
-    if at + T::LANES <= samples {
-        for (joint, to) in to.iter_mut().enumerate() {
-            *to = T::load(&from[joint * samples + at..]);
-        }
-    } else {
-        for (joint, to) in to.iter_mut().enumerate() {
-            let row = &from[joint * samples..(joint + 1) * samples];
-            let mut padded = [0.0; 8];
-            for (k, value) in padded.iter_mut().enumerate() {
-                *value = row[(at + k).min(samples - 1)];
-            }
-            *to = T::load(&padded);
-        }
-    }
-}
-
-/// Writes the lanes that are samples `at..` of a row, and drops those past its end.
-#[inline(always)]
-pub(crate) fn put_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
-    if at + T::LANES <= row.len() {
-        value.store(&mut row[at..]);
-    } else {
-        for (k, to) in row[at..].iter_mut().enumerate() {
-            *to = value.lane(k);
-        }
     }
 }
