@@ -20,6 +20,9 @@ const MOST_NUMBERS: usize = 1 << 23;
 /// A column of one joint as it left the filter.
 type Filtered = Arc<Vec<f64>>;
 
+/// Sends all columns of a model, or some of its terms, through a filter to a consumer.
+pub(super) type FilterPass<'p> = dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<Passed, LogError> + 'p;
+
 /// The filtered rows of one log, by filter.
 #[derive(Debug, Default)]
 pub(super) struct RowStore(Mutex<Vec<Arc<FilteredRows>>>);
@@ -58,7 +61,7 @@ impl RowStore {
         &self,
         model: &RegressorModel,
         filter: &DecimationSettings,
-        pass: &mut dyn FnMut(Option<&[Column]>, &mut dyn RowConsumer) -> Result<Passed, LogError>,
+        pass: &mut FilterPass<'_>,
     ) -> Result<Arc<FilteredRows>, LogError> {
         let kept = self.lock().iter().find(|kept| kept.is_of(model.model(), filter)).cloned();
         let missing = kept.as_ref().and_then(|kept| kept.missing_terms(model));
