@@ -14,6 +14,7 @@
 //! | torque of gravity, energies | [`gravity_torque`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; of many samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
+//! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, by `M = LᵀL` along the tree |
 //! | where the bodies are | [`body_placements`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
 //! | regressor of chosen columns, many samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |
@@ -54,6 +55,7 @@ mod composite_moments;
 mod derivatives;
 mod energy;
 mod forward_dynamics;
+mod forward_dynamics_derivatives;
 mod gravity;
 mod ground;
 mod hinge;
@@ -86,6 +88,7 @@ pub use derivatives::{
 };
 pub use energy::{kinetic_energy, potential_energy};
 pub use forward_dynamics::forward_dynamics;
+pub use forward_dynamics_derivatives::{ForwardDynamicsDerivatives, forward_dynamics_derivatives};
 pub use gravity::gravity_torque;
 pub use independent_columns::{IndependentColumns, independent_columns};
 pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};

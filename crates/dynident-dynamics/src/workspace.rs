@@ -161,10 +161,13 @@ pub struct Workspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
     /// Parents of the bodies it was made for: the regressor's scratch follows the tree.
-    parents: Vec<Option<usize>>,
+    pub(crate) parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
     pub(crate) vector: Vec<f64>,
     pub(crate) matrices: [Vec<f64>; 3],
+    /// For derivatives of the forward dynamics, which need the other matrices on their way.
+    pub(crate) inverse: Vec<f64>,
+    pub(crate) acceleration: Vec<f64>,
     pub(crate) regressor: Vec<f64>,
     pub(crate) placements: Vec<Transform>,
     /// Where joints follow others.
@@ -188,6 +191,8 @@ impl Workspace {
             scratch: dispatch_single(level, MakeScratch(model)),
             vector: vec![0.0; dof],
             matrices: core::array::from_fn(|_| vec![0.0; dof * dof]),
+            inverse: vec![0.0; dof * dof],
+            acceleration: vec![0.0; dof],
             regressor: vec![0.0; dof * bodies * 10],
             placements: vec![Transform::IDENTITY; bodies],
             tree: TreeScratch::new(model),

@@ -3,7 +3,8 @@
 use super::clock::Report;
 use super::motion::{Motion, STATES};
 use dynident_dynamics::{
-    Workspace, forward_dynamics, inverse_dynamics, inverse_dynamics_derivatives, mass_matrix, torque_regressor,
+    Workspace, forward_dynamics, forward_dynamics_derivatives, inverse_dynamics, inverse_dynamics_derivatives,
+    mass_matrix, torque_regressor,
 };
 use dynident_model::Model;
 use std::hint::black_box;
@@ -27,5 +28,6 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     // Accelerations of one stand in for torques, as in the rival's program: the path through the algorithm is the same.
     time("aba", &mut |w, q, dq, tau| forward_dynamics(model, w, q, dq, tau)[0]);
     time("joint_torque_regressor", &mut |w, q, dq, ddq| torque_regressor(model, w, q, dq, ddq)[0]);
+    time("aba_derivatives", &mut |w, q, dq, tau| forward_dynamics_derivatives(model, w, q, dq, tau).by_position[0]);
     time("rnea_derivatives", &mut |w, q, dq, ddq| inverse_dynamics_derivatives(model, w, q, dq, ddq).by_position[0]);
 }

@@ -3,9 +3,9 @@
 
 use dynident_dynamics::{
     BatchWorkspace, PanelLayout, Panels, TermHistory, Workspace, all_columns, body_placements, forward_dynamics,
-    gravity_torque, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, kinetic_energy,
-    mass_matrix, mass_matrix_and_bias, potential_energy, regressor_panels, regressor_panels_of_sample,
-    torque_regressor,
+    forward_dynamics_derivatives, gravity_torque, inverse_dynamics, inverse_dynamics_batch,
+    inverse_dynamics_derivatives, kinetic_energy, mass_matrix, mass_matrix_and_bias, potential_energy,
+    regressor_panels, regressor_panels_of_sample, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::{Random, random_tree};
@@ -112,6 +112,44 @@ fn derivative_by_acceleration_is_the_mass_matrix_and_inverse_dynamics_is_affine_
         }
         let derivatives = inverse_dynamics_derivatives(&model, &mut ws, &q, &dq, &ddq);
         assert_close(derivatives.by_acceleration, &m, ROUNDING, "derivative by acceleration");
+    }
+}
+
+#[test]
+fn derivatives_of_the_acceleration_are_those_of_differences() {
+    for Case { model, q, dq, ddq } in cases() {
+        let dof = model.dof();
+        for level in Level::available() {
+            let mut ws = Workspace::with_level(&model, level);
+            let tau = inverse_dynamics(&model, &mut ws, &q, &dq, &ddq).to_vec();
+            let mass = nalgebra::DMatrix::from_row_slice(dof, dof, mass_matrix(&model, &mut ws, &q));
+            let acceleration = forward_dynamics(&model, &mut ws, &q, &dq, &tau).to_vec();
+            let found = forward_dynamics_derivatives(&model, &mut ws, &q, &dq, &tau);
+            assert_eq!(found.acceleration, acceleration, "what the articulated bodies say");
+            // The mass matrix's condition number (up to some thousand here) multiplies the rounding.
+            let identity = nalgebra::DMatrix::from_row_slice(dof, dof, found.by_torque) * &mass;
+            assert_close(identity.as_slice(), nalgebra::DMatrix::identity(dof, dof).as_slice(), 1e-9, "inverse");
+            let found = [found.by_position, found.by_velocity, found.by_torque].map(<[f64]>::to_vec);
+
+            let state = [q.clone(), dq.clone(), tau];
+            let mut change = |which: usize, joint: usize, step: f64| -> Vec<f64> {
+                let [mut up, mut down] = [state.clone(), state.clone()];
+                (up[which][joint], down[which][joint]) = (state[which][joint] + step, state[which][joint] - step);
+                let up = forward_dynamics(&model, &mut ws, &up[0], &up[1], &up[2]).to_vec();
+                let down = forward_dynamics(&model, &mut ws, &down[0], &down[1], &down[2]);
+                up.iter().zip(down).map(|(up, down)| (up - down) / (2.0 * step)).collect()
+            };
+            for (which, matrix) in found.iter().enumerate() {
+                // Fourth-order differences with a step of 1e-3: error about h^4 times fifth derivatives, which are large
+                // where light bodies hang on heavy ones.
+                for joint in 0..dof {
+                    let (coarse, fine) = (change(which, joint, 2e-3), change(which, joint, 1e-3));
+                    let slope: Vec<f64> = fine.iter().zip(&coarse).map(|(f, c)| (4.0 * f - c) / 3.0).collect();
+                    let column: Vec<f64> = (0..dof).map(|row| matrix[row * dof + joint]).collect();
+                    assert_close(&column, &slope, 1e-6, level.name());
+                }
+            }
+        }
     }
 }
 
