@@ -74,8 +74,8 @@ pub fn forward_dynamics_derivatives<'w>(
     inverse.fill(0.0);
     inverse.iter_mut().step_by(*dof + 1).for_each(|diagonal| *diagonal = 1.0);
     dispatch_single(*level, Solve { dof: *dof, before, mass, right: [by_position, by_velocity, inverse] });
-    for matrix in [&mut *by_position, &mut *by_velocity] {
-        matrix.iter_mut().for_each(|value| *value = -*value);
+    for value in by_position.iter_mut().chain(by_velocity.iter_mut()) {
+        *value = -*value;
     }
     ForwardDynamicsDerivatives { acceleration, by_position, by_velocity, by_torque: inverse }
 }
@@ -122,7 +122,9 @@ impl<F: Fn(usize) -> Option<usize>> Kernel for Solve<'_, F> {
                 let (above, own) = matrix.split_at_mut(joint * dof);
                 let own = &mut own[..dof];
                 let scale = 1.0 / mass[joint * dof + joint];
-                own.iter_mut().for_each(|value| *value *= scale);
+                for value in own.iter_mut() {
+                    *value *= scale;
+                }
                 let mut at = before(joint);
                 while let Some(i) = at {
                     let factor = mass[joint * dof + i];
@@ -146,7 +148,9 @@ impl<F: Fn(usize) -> Option<usize>> Kernel for Solve<'_, F> {
                     at = before(i);
                 }
                 let scale = 1.0 / mass[joint * dof + joint];
-                own.iter_mut().for_each(|value| *value *= scale);
+                for value in own.iter_mut() {
+                    *value *= scale;
+                }
             }
         }
     }

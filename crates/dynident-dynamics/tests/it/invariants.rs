@@ -140,8 +140,8 @@ fn derivatives_of_the_acceleration_are_those_of_differences() {
                 up.iter().zip(down).map(|(up, down)| (up - down) / (2.0 * step)).collect()
             };
             for (which, matrix) in found.iter().enumerate() {
-                // Fourth-order differences with a step of 1e-3: error about h^4 times fifth derivatives, which are large
-                // where light bodies hang on heavy ones.
+                // Fourth-order differences with a step of 1e-3: error about h^4 times fifth derivatives, which are
+                // large where light bodies hang on heavy ones.
                 for joint in 0..dof {
                     let (coarse, fine) = (change(which, joint, 2e-3), change(which, joint, 1e-3));
                     let slope: Vec<f64> = fine.iter().zip(&coarse).map(|(f, c)| (4.0 * f - c) / 3.0).collect();
