@@ -1,31 +1,23 @@
 //! Factors of small symmetric positive definite matrices, row-major, without allocation.
 
+use dynident_lanes::Scalar;
+
 /// `A = L D Lᵀ` in the lower triangle of `a` (n × n); the diagonal holds 1/D_ii, the upper triangle is not used. False
 /// if `A` is not positive definite (or not a number).
 #[inline]
 pub(super) fn factor(a: &mut [f64], n: usize) -> bool {
+    factor_over(a, n, is_pivot)
+}
+
+/// [`factor`] over other scalars: false where a pivot is not what `is_pivot` wants, which is asked of every one.
+#[inline(always)]
+pub(super) fn factor_over<T: Scalar>(a: &mut [T], n: usize, is_pivot: impl FnMut(T) -> bool) -> bool {
     // Sizes known to the compiler: arms have six or seven joints, and loops that end there are unrolled.
     match n {
-        2 => factor_of::<2>(a),
-        6 => factor_of::<6>(a),
-        7 => factor_of::<7>(a),
-        _ => {
-            for j in 0..n {
-                let pivot = a[j * n + j];
-                if !is_pivot(pivot) {
-                    return false;
-                }
-                let inverse = pivot.recip();
-                for i in j + 1..n {
-                    let ratio = a[i * n + j] * inverse;
-                    for k in j + 1..=i {
-                        a[i * n + k] -= ratio * a[k * n + j];
-                    }
-                }
-                scale_column(a, n, j, inverse);
-            }
-            true
-        }
+        2 => factor_of::<T, 2>(a, is_pivot),
+        6 => factor_of::<T, 6>(a, is_pivot),
+        7 => factor_of::<T, 7>(a, is_pivot),
+        _ => factor_of_any_size(a, n, is_pivot),
     }
 }
 
@@ -34,22 +26,14 @@ fn is_pivot(pivot: f64) -> bool {
     pivot > 0.0 && pivot < f64::INFINITY
 }
 
-fn scale_column(a: &mut [f64], n: usize, j: usize, inverse: f64) {
-    for i in j + 1..n {
-        a[i * n + j] *= inverse;
-    }
-    a[j * n + j] = inverse;
-}
-
 #[inline(always)]
-fn factor_of<const N: usize>(a: &mut [f64]) -> bool {
+fn factor_of<T: Scalar, const N: usize>(a: &mut [T], mut is_pivot: impl FnMut(T) -> bool) -> bool {
     let (rows, _) = a.as_chunks_mut::<N>();
-    let Ok(m) = <&mut [[f64; N]; N]>::try_from(rows) else { return false };
+    let Ok(m) = <&mut [[T; N]; N]>::try_from(rows) else { return false };
+    let mut fine = true;
     for j in 0..N {
         let pivot = m[j][j];
-        if !is_pivot(pivot) {
-            return false;
-        }
+        fine &= is_pivot(pivot);
         let inverse = pivot.recip();
         for i in j + 1..N {
             let ratio = m[i][j] * inverse;
@@ -58,11 +42,32 @@ fn factor_of<const N: usize>(a: &mut [f64]) -> bool {
             }
         }
         for row in m.iter_mut().skip(j + 1) {
-            row[j] *= inverse;
+            row[j] = row[j] * inverse;
         }
         m[j][j] = inverse;
     }
-    true
+    fine
+}
+
+#[inline(always)]
+fn factor_of_any_size<T: Scalar>(a: &mut [T], n: usize, mut is_pivot: impl FnMut(T) -> bool) -> bool {
+    let mut fine = true;
+    for j in 0..n {
+        let pivot = a[j * n + j];
+        fine &= is_pivot(pivot);
+        let inverse = pivot.recip();
+        for i in j + 1..n {
+            let ratio = a[i * n + j] * inverse;
+            for k in j + 1..=i {
+                a[i * n + k] -= ratio * a[k * n + j];
+            }
+        }
+        for i in j + 1..n {
+            a[i * n + j] = a[i * n + j] * inverse;
+        }
+        a[j * n + j] = inverse;
+    }
+    fine
 }
 
 /// [`factor`] and [`solve`] at once, with the same numbers: while one column is divided, the right-hand side moves on.
@@ -116,12 +121,12 @@ fn factor_and_solve_of<const N: usize>(a: &mut [f64], b: &mut [f64]) -> bool {
 }
 
 /// Solves `L D Lᵀ x = b` in place, with the result of [`factor`].
-#[inline]
-pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
+#[inline(always)]
+pub(super) fn solve<T: Scalar>(l: &[T], n: usize, b: &mut [T]) {
     match n {
-        2 => solve_of::<2>(l, b),
-        6 => solve_of::<6>(l, b),
-        7 => solve_of::<7>(l, b),
+        2 => solve_of::<T, 2>(l, b),
+        6 => solve_of::<T, 6>(l, b),
+        7 => solve_of::<T, 7>(l, b),
         _ => {
             for i in 0..n {
                 let x = b[i];
@@ -130,17 +135,21 @@ pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
                 }
             }
             for i in (0..n).rev() {
-                let x = b[i];
-                b[i] = l[i * n + i] * x - (i + 1..n).map(|k| l[k * n + i] * b[k]).sum::<f64>();
+                // As the standard library's sums begin.
+                let mut sum = T::splat(-0.0);
+                for k in i + 1..n {
+                    sum += l[k * n + i] * b[k];
+                }
+                b[i] = l[i * n + i] * b[i] - sum;
             }
         }
     }
 }
 
 #[inline(always)]
-fn solve_of<const N: usize>(l: &[f64], b: &mut [f64]) {
+fn solve_of<T: Scalar, const N: usize>(l: &[T], b: &mut [T]) {
     let (rows, _) = l.as_chunks::<N>();
-    let (Ok(l), Ok(b)) = (<&[[f64; N]; N]>::try_from(rows), <&mut [f64; N]>::try_from(b)) else { return };
+    let (Ok(l), Ok(b)) = (<&[[T; N]; N]>::try_from(rows), <&mut [T; N]>::try_from(b)) else { return };
     for i in 0..N {
         let x = b[i];
         for k in i + 1..N {
@@ -148,7 +157,7 @@ fn solve_of<const N: usize>(l: &[f64], b: &mut [f64]) {
         }
     }
     for i in 0..N {
-        b[i] *= l[i][i];
+        b[i] = b[i] * l[i][i];
     }
     for i in (0..N).rev() {
         let x = b[i];

@@ -22,8 +22,8 @@ struct Parts {
     settings: LoopSettings,
 }
 
-fn many(parts: &mut [Parts]) -> Vec<Run> {
-    let mut loops: Vec<ClosedLoop<'_>> = parts
+fn loops_of(parts: &mut [Parts]) -> Vec<ClosedLoop<'_>> {
+    parts
         .iter_mut()
         .map(|Parts { plant, controller, reference, settings }| ClosedLoop {
             plant,
@@ -31,8 +31,11 @@ fn many(parts: &mut [Parts]) -> Vec<Run> {
             reference,
             settings,
         })
-        .collect();
-    closed_loops(&mut loops, |_, run| run).unwrap()
+        .collect()
+}
+
+fn many(parts: &mut [Parts]) -> Vec<Run> {
+    closed_loops(&mut loops_of(parts), |_, run| run).unwrap()
 }
 
 fn alone(parts: &mut Parts) -> Run {
@@ -299,16 +302,8 @@ fn loops_that_cannot_be_set_up_are_named_and_none_is_run() {
     let mut random = Random::new(3);
     let mut parts: Vec<Parts> = (0..3).map(|_| any_loop(&model, &mut random)).collect();
     parts[1].settings.start = Start::At { q: vec![0.0; 3], dq: vec![0.0; 4] };
-    let mut loops: Vec<ClosedLoop<'_>> = parts
-        .iter_mut()
-        .map(|Parts { plant, controller, reference, settings }| ClosedLoop {
-            plant,
-            controller: controller.as_mut(),
-            reference,
-            settings,
-        })
-        .collect();
-    let refused = closed_loops(&mut loops, |_, _| panic!("nothing may run")).map(|_: Vec<()>| ()).unwrap_err();
+    let refused =
+        closed_loops(&mut loops_of(&mut parts), |_, _| panic!("nothing may run")).map(|_: Vec<()>| ()).unwrap_err();
     assert!(matches!(refused, SimulationError::Loop { index: 1, .. }) && refused.to_string().contains("loop 1"));
     assert!(closed_loops(&mut [], |_, run| run).unwrap().is_empty());
 }
