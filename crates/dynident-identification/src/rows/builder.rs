@@ -139,11 +139,11 @@ impl PanelFilter<'_> {
             self.filters.restart();
         }
         consumer.raw(&raw)?;
-        let mut rows = samples.samples;
+        let (samples, mut rows) = (raw.panels.samples(), 0);
         for (joint, unfiltered) in self.unfiltered.iter().enumerate() {
             let left_out = raw.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
-            let panel = &samples.panels.joint(joint)[unfiltered * samples.samples..];
-            let all = self.filters.push(joint, panel, samples.samples, left_out);
+            let panel = &raw.panels.joint(joint)[unfiltered * samples..];
+            let all = self.filters.push(joint, panel, samples, left_out);
             rows = all.rows;
             let counted = match &mut self.mask {
                 Some(mask) if rows > 0 => mask.apply(&all),
@@ -153,7 +153,7 @@ impl PanelFilter<'_> {
                 consumer.filtered(&counted)?;
             }
         }
-        self.filters.advance(samples.samples);
+        self.filters.advance(samples);
         self.filtered_rows += rows as u64;
         Ok(())
     }

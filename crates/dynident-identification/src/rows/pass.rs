@@ -6,7 +6,7 @@ use super::builder::RowBuilder;
 use super::declared::require_declared;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
 use super::mask::RowMask;
-use super::row_store::{Collector, Keeping, Passed, RowStore};
+use super::row_store::{Keeping, Passed, RowStore};
 use super::samples::SamplePanels;
 use super::velocities::VelocityHistogram;
 use crate::progress::Progress;
@@ -150,9 +150,9 @@ impl LogPass<'_> {
             Motion::Stream(stream) => {
                 let keeps = self.kept.is_some() && filter.as_ref().is_some_and(|one| self.may_keep_rows(one, consumer));
                 let blocks = if keeps {
-                    let mut keeping = Keeping { consumer, rows: Collector::new(self.model.dof()) };
+                    let mut keeping = Keeping::new(consumer, self.model.dof());
                     let blocks = self.stream(stream, &mut builder, &mut keeping)?;
-                    made = Some(keeping.rows);
+                    made = keeping.rows;
                     blocks
                 } else {
                     self.stream(stream, &mut builder, consumer)?
@@ -435,5 +435,38 @@ impl BlockCache {
             }
             None => Some(block),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_log::TestLog;
+    use super::*;
+    use dynident_dynamics::ParametricModel;
+
+    #[test]
+    fn a_pass_over_blocks_ends_where_enough_has_passed() {
+        let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+        let model = dynident_model::load_robot(robot).unwrap().model;
+        let model = RegressorModel::from(ParametricModel::new(model, Vec::new()).unwrap());
+        let log = TestLog::new(&model.joint_names());
+        let blocks_of = |most_samples: Option<u64>| {
+            let mut blocks = Vec::new();
+            let pass = LogPass { most_samples, ..log.pass(&model) };
+            pass.each_block(&mut |block| {
+                blocks.push(block.rows);
+                Ok(())
+            })
+            .unwrap();
+            blocks
+        };
+        let some = blocks_of(Some(5_000));
+        assert!(log.kept.get().is_none(), "a part of a log is not kept for the whole");
+        let all = blocks_of(None);
+        assert!(log.kept.get().is_some() && all.iter().sum::<usize>() > 18_000 && some.len() < all.len());
+        assert_eq!(some, all[..some.len()]);
+        let passed: usize = some.iter().sum();
+        assert!(passed >= 5_000 && passed - some[some.len() - 1] < 5_000, "{some:?}");
+        assert_eq!(blocks_of(Some(5_000)), some, "of what is kept the same part");
     }
 }

@@ -70,7 +70,7 @@ impl RowStore {
             (Some(kept), Some(missing)) => {
                 let mut made = Collector::new(model.dof());
                 pass(Some(&missing), &mut made)?;
-                kept.with_terms(model, &missing, made)
+                kept.with_terms(&missing, made)
             }
             _ => {
                 let mut made = Collector::new(model.dof());
@@ -84,9 +84,7 @@ impl RowStore {
 
     /// Keeps all rows of a pass over samples that were read for it.
     pub(super) fn keep(&self, model: &RegressorModel, filter: &DecimationSettings, made: Collector, passed: Passed) {
-        if let Some(made) = made.all() {
-            self.put(FilteredRows::new(model, filter, made, passed).fewer(model));
-        }
+        self.put(FilteredRows::new(model, filter, made, passed).fewer(model));
     }
 
     /// Keeps rows in place of those of the same filter; of other filters the oldest go first.
@@ -147,7 +145,7 @@ impl FilteredRows {
         let mut missing = vec![false; layout.columns().len()];
         for (joint, kept) in self.joints.iter().enumerate() {
             for &column in layout.joint_columns(joint) {
-                missing[column] |= kept.column(model, &layout.columns()[column]).is_none();
+                missing[column] |= kept.values(&layout.columns()[column]).is_none();
             }
         }
         let missing = layout.columns().iter().zip(missing).filter(|(_, missing)| *missing);
@@ -155,50 +153,29 @@ impl FilteredRows {
         missing.iter().all(|column| matches!(column, Column::Term(_))).then_some(missing)
     }
 
-    /// The same with further terms, or other columns of the same terms, which the collector has in their order.
-    fn with_terms(&self, model: &RegressorModel, terms: &[Column], made: Collector) -> Self {
+    /// The same with further terms, which the collector has in their order.
+    fn with_terms(&self, terms: &[Column], made: Collector) -> Self {
         let mut all = self.clone();
         for (joint, (kept, made)) in all.joints.iter_mut().zip(made.joints).enumerate() {
             let feels = |column: &&Column| matches!(column, Column::Term(term) if term.joints().contains(&joint));
             let own = terms.iter().filter(feels).cloned();
-            kept.columns.retain(|(column, _)| !terms.contains(column));
             kept.columns.extend(own.zip(made.columns.into_iter().map(Arc::new)));
         }
-        debug_assert!(all.missing_of_any(model).is_none());
         all
     }
 
-    /// A column of the model that is not here although it was to be made.
-    fn missing_of_any(&self, model: &RegressorModel) -> Option<Column> {
-        let layout = model.layout();
-        (0..self.joints.len()).find_map(|joint| {
-            let mut columns = layout.joint_columns(joint).iter().map(|&column| &layout.columns()[column]);
-            columns.find(|column| self.joints[joint].values(column).is_none()).cloned()
-        })
-    }
-
-    /// What is worth being kept for other models: no columns that know a load, which changes with every fit, and of
-    /// those that this model does not have as many as there is room for.
+    /// What is worth being kept for other models: no columns that know a load, which changes with every fit; and of
+    /// those that this model does not have none where all are too many.
     fn fewer(&self, model: &RegressorModel) -> Self {
         let layout = model.layout();
         let mut fewer = self.clone();
-        for (joint, kept) in fewer.joints.iter_mut().enumerate() {
-            kept.columns.retain(|(column, _)| !matches!(column, Column::Term(term) if term.needs_load()));
-            let is_own =
-                |column: &Column| layout.joint_columns(joint).iter().any(|&own| layout.columns()[own] == *column);
-            // The model's own first; of equals the order stays.
-            kept.columns.sort_by_key(|(column, _)| !is_own(column));
-        }
-        let rows: usize = fewer.pieces.iter().sum();
-        let most = (MOST_NUMBERS / (rows.max(1) * fewer.joints.len().max(1))).saturating_sub(2);
-        let bodies = |kept: &FilteredJoint| {
-            kept.columns.iter().filter(|(column, _)| matches!(column, Column::Body { .. })).count()
-        };
-        let spare: usize = fewer.joints.iter().map(|kept| most.saturating_sub(bodies(kept))).sum();
-        let each = spare / fewer.joints.len().max(1);
         for kept in &mut fewer.joints {
-            let room = bodies(kept) + each;
-            kept.columns.truncate(room.max(bodies(kept)));
+            kept.columns.retain(|(column, _)| !matches!(column, Column::Term(term) if term.needs_load()));
+        }
+        if fewer.numbers() > MOST_NUMBERS {
+            for kept in &mut fewer.joints {
+                kept.columns.retain(|(column, _)| layout.columns().contains(column));
+            }
         }
         fewer
     }
@@ -233,7 +210,7 @@ impl FilteredRows {
         };
         let columns: Vec<Vec<Filtered>> = self.joints.iter().enumerate().map(of_joint).collect();
         let (mut from, mut panel) = (0, Vec::new());
-        for &rows in self.pieces.iter().filter(|rows| **rows > 0) {
+        for &rows in &self.pieces {
             for (joint, (columns, kept)) in columns.iter().zip(&self.joints).enumerate() {
                 panel.clear();
                 for column in columns {
@@ -250,25 +227,15 @@ impl FilteredRows {
 }
 
 impl FilteredJoint {
-    /// The values of a column that do not depend on more than the motion.
-    fn column(&self, model: &RegressorModel, wanted: &Column) -> Option<&Filtered> {
-        let is_loaded = |term: &dynident_model::terms::TorqueTerm| term.needs_load() && model.load_parameters.is_some();
-        if matches!(wanted, Column::Term(term) if is_loaded(term)) {
-            return None;
-        }
-        self.values(wanted)
-    }
-
     fn values(&self, wanted: &Column) -> Option<&Filtered> {
         self.columns.iter().find(|(column, _)| column == wanted).map(|(_, values)| values)
     }
 }
 
-/// Takes all rows of a pass together, until they are too many.
+/// Takes all rows of a pass together.
 pub(super) struct Collector {
     pieces: Vec<usize>,
     joints: Vec<CollectedJoint>,
-    numbers: usize,
 }
 
 #[derive(Clone, Default)]
@@ -278,25 +245,13 @@ struct CollectedJoint {
 }
 
 impl Collector {
-    pub(super) fn new(dof: usize) -> Self {
-        Self { pieces: Vec::new(), joints: vec![CollectedJoint::default(); dof], numbers: 0 }
+    fn new(dof: usize) -> Self {
+        Self { pieces: Vec::new(), joints: vec![CollectedJoint::default(); dof] }
     }
+}
 
-    fn has_room(&self) -> bool {
-        self.numbers <= MOST_NUMBERS
-    }
-
-    /// All rows; none where they were too many.
-    fn all(self) -> Option<Self> {
-        self.has_room().then_some(self)
-    }
-
-    fn take(&mut self, rows: &JointRows<'_>) {
-        self.numbers += rows.panel.len() + rows.rows;
-        if !self.has_room() {
-            self.joints.iter_mut().for_each(|joint| *joint = CollectedJoint::default());
-            return;
-        }
+impl RowConsumer for Collector {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if rows.joint == 0 {
             self.pieces.push(rows.rows);
         }
@@ -310,12 +265,6 @@ impl Collector {
         } else {
             joint.coverage.extend_from_slice(rows.coverage);
         }
-    }
-}
-
-impl RowConsumer for Collector {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.take(rows);
         Ok(())
     }
 
@@ -324,15 +273,27 @@ impl RowConsumer for Collector {
     }
 }
 
-/// Sends rows on to a consumer and keeps them.
+/// Sends rows on to a consumer and takes them together, until they are too many.
 pub(super) struct Keeping<'c> {
-    pub(super) consumer: &'c mut dyn RowConsumer,
-    pub(super) rows: Collector,
+    consumer: &'c mut dyn RowConsumer,
+    /// None once they are too many.
+    pub(super) rows: Option<Collector>,
+    numbers: usize,
+}
+
+impl<'c> Keeping<'c> {
+    pub(super) fn new(consumer: &'c mut dyn RowConsumer, dof: usize) -> Self {
+        Self { consumer, rows: Some(Collector::new(dof)), numbers: 0 }
+    }
 }
 
 impl RowConsumer for Keeping<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.rows.take(rows);
+        self.numbers += rows.panel.len() + rows.rows;
+        self.rows = self.rows.take().filter(|_| self.numbers <= MOST_NUMBERS);
+        if let Some(kept) = &mut self.rows {
+            kept.filtered(rows)?;
+        }
         self.consumer.filtered(rows)
     }
 
@@ -343,17 +304,13 @@ impl RowConsumer for Keeping<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_log::recording;
-    use super::super::{KeptLog, LogPass, LogStatistics, ParallelFilterSettings, RawSamples};
+    use super::super::test_log::TestLog;
+    use super::super::{LogPass, LogStatistics, RawSamples};
     use super::*;
-    use crate::progress::Silent;
     use dynident_dynamics::ParametricModel;
     use dynident_model::terms::{
         Coulomb, CoulombShape, DriveChoice, LoadFriction, MaxwellSlip, Stribeck, TorqueTerm, terms_per_joint,
     };
-    use dynident_recording::MotionSettings;
-    use dynident_recording::derivative::DifferentiatorSettings;
-    use std::sync::OnceLock;
 
     /// All rows to the last bit; with samples in hand a pass makes every column itself.
     #[derive(Default)]
@@ -412,27 +369,9 @@ mod tests {
             plain.clone(),
         ];
 
-        let names = plain.joint_names();
-        let recording = recording(&names);
-        let motion = MotionSettings {
-            differentiator: DifferentiatorSettings::default().with_cutoff(4.0),
-            ..MotionSettings::default()
-        };
-        let kept: OnceLock<KeptLog> = OnceLock::new();
-        let filter = ParallelFilterSettings::default();
-        let pass = |model: &RegressorModel, threads: bool, consumer: &mut Bits| -> LogStatistics {
-            let pass = LogPass {
-                recording: &recording,
-                model,
-                motion: &motion,
-                filter: &filter,
-                torque_hz: Some(12.0),
-                reader_thread: threads,
-                most_samples: None,
-                progress: &Silent,
-                kept: Some(&kept),
-            };
-            pass.run(consumer).unwrap()
+        let log = TestLog::new(&plain.joint_names());
+        let pass = |model: &RegressorModel, reader_thread: bool, consumer: &mut Bits| -> LogStatistics {
+            LogPass { reader_thread, ..log.pass(model) }.run(consumer).unwrap()
         };
         for (number, model) in models.iter().enumerate() {
             for threads in [false, true] {
@@ -447,6 +386,6 @@ mod tests {
                 assert_eq!(of_kept.velocities, of_samples.velocities);
             }
         }
-        assert!(kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MOST_NUMBERS);
+        assert!(log.kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MOST_NUMBERS);
     }
 }

@@ -48,8 +48,7 @@ pub(super) struct PanelMaker<'a> {
 /// Some samples of all joints, with the torque as logged.
 #[derive(Debug, Default)]
 pub(super) struct SamplePanels {
-    pub(super) panels: Panels,
-    pub(super) samples: usize,
+    panels: Panels,
     segment: usize,
     rate_hz: f64,
     set_aside: Vec<Vec<bool>>,
@@ -174,7 +173,7 @@ impl<'a> PanelMaker<'a> {
             let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
             out.set_aside.extend(of_joints);
         }
-        (out.samples, out.segment, out.rate_hz, out.settled) = (samples, block.segment, block.rate_hz, settled);
+        (out.segment, out.rate_hz, out.settled) = (block.segment, block.rate_hz, settled);
         self.samples += samples as u64;
         from + samples
     }

@@ -1,5 +1,5 @@
-//! Factors of small symmetric positive definite matrices, one in each lane: by the steps of [`super::factor`], so that a
-//! lane has the bits of a robot by itself.
+//! Factors of small symmetric positive definite matrices, one in each lane: by the steps of [`super::factor`], so that
+//! a lane has the bits of a robot by itself.
 
 use super::factor::{factor_over, solve};
 use dynident_lanes::Lane;
