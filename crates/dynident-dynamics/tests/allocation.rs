@@ -4,9 +4,10 @@
 
 use dynident_dynamics::{
     BatchWorkspace, DerivativeArrays, JointMatrices, PanelLayout, Panels, Workspace, all_columns, body_placements,
-    forward_dynamics, gravity_torque, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivative_matrices,
-    inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch, kinetic_energy, mass_matrices, mass_matrix,
-    mass_matrix_and_bias, mass_matrix_batch, potential_energy, regressor_panels, torque_regressor,
+    forward_dynamics, forward_dynamics_derivatives, gravity_torque, inverse_dynamics, inverse_dynamics_batch,
+    inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch,
+    kinetic_energy, mass_matrices, mass_matrix, mass_matrix_and_bias, mass_matrix_batch, potential_energy,
+    regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::random_tree;
@@ -86,6 +87,9 @@ fn one_sample_at_a_time_allocates_nothing() {
             check("regressor", &mut |w| use_up(torque_regressor(&model, w, &q, &dq, &ddq)[0]));
             check("derivatives", &mut |w| {
                 use_up(inverse_dynamics_derivatives(&model, w, &q, &dq, &ddq).by_position[0]);
+            });
+            check("derivatives of the acceleration", &mut |w| {
+                use_up(forward_dynamics_derivatives(&model, w, &q, &dq, &ddq).by_position[0]);
             });
             check("placements", &mut |w| use_up(body_placements(&model, w, &q)[0]));
             check("kinetic energy", &mut |w| use_up(kinetic_energy(&model, w, &q, &dq)));
