@@ -393,6 +393,13 @@ pub(crate) fn plain_estimate(
 }
 
 impl LogFactors {
+    /// The same rows, each joint's as one segment: all that values and bars by white noise need.
+    pub(crate) fn as_one_segment(&self) -> Self {
+        let factors = self.factors.iter().map(SegmentedFactor::as_one_segment).collect();
+        let (statistics, nominal_agreement) = (self.statistics.clone(), self.nominal_agreement.clone());
+        Self { index: self.index, factors, statistics, noise: self.noise.clone(), nominal_agreement }
+    }
+
     /// The same rows as another model sees them, whose columns are among those of `wide`.
     pub(crate) fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
         for (joint, factor) in self.factors.iter_mut().enumerate() {

@@ -27,6 +27,7 @@ pub use rank::{FixedColumn, RankReport, RankSettings};
 pub(crate) use rank::{Solution, Split, report, solve, solved_values, split};
 pub use recursive::RecursiveFactor;
 pub(crate) use reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
+pub(crate) use segmented::ReducedRows;
 pub use segmented::{SegmentSettings, SegmentedFactor};
 pub use stored::{FactorShape, SegmentShape};
 pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};

@@ -217,6 +217,13 @@ impl SegmentedFactor {
         self.segments.iter().map(|segment| segment.factor(self.columns, &mut workspace)).collect()
     }
 
+    /// Of every segment, in order of time, rows that say of the parameters what its own say: these while they are no
+    /// more than there are columns, else those of its factor that are not zero.
+    pub(crate) fn reduced_segments(&self) -> Vec<ReducedRows> {
+        let mut workspace = FactorWorkspace::default();
+        self.segments.iter().map(|segment| segment.reduced(self.columns, &mut workspace)).collect()
+    }
+
     /// The factor of all rows; made once and kept, and of a [selection](Self::selected) or a [map](Self::mapped) made
     /// of this one.
     pub fn total(&self) -> &TriangularFactor {
@@ -338,6 +345,14 @@ impl SegmentedFactor {
     }
 }
 
+/// Few rows `[W | τ]` that stand for those of a segment.
+pub(crate) struct ReducedRows {
+    /// W, shape (rows, columns).
+    pub(crate) regressor: DMatrix<f64>,
+    /// τ, one for each row.
+    pub(crate) torque: DVector<f64>,
+}
+
 impl Segment {
     pub(super) fn rows(&self, columns: usize) -> usize {
         match self {
@@ -401,9 +416,28 @@ impl Segment {
             Self::Factor(factor) => Self::Factor(factor.mapped(workspace, map)),
             Self::Rows(values) => {
                 let rows: Vec<f64> = values.chunks_exact(map.size()).flat_map(|row| map.of_row(row)).collect();
-                let mut factor = TriangularFactor::new(map.columns());
-                factor.absorb_row_by_row(workspace, &rows);
-                Self::Factor(factor)
+                let mut mapped = Self::Rows(rows);
+                if mapped.rows(map.columns()) > most_rows(map.columns()) {
+                    mapped.condense(map.columns(), workspace);
+                }
+                mapped
+            }
+        }
+    }
+
+    fn reduced(&self, columns: usize, workspace: &mut FactorWorkspace) -> ReducedRows {
+        match self {
+            Self::Rows(values) if self.rows(columns) <= columns => {
+                let (rows, size) = (self.rows(columns), columns + 1);
+                let regressor = DMatrix::from_fn(rows, columns, |row, column| values[row * size + column]);
+                ReducedRows { regressor, torque: DVector::from_fn(rows, |row, _| values[row * size + columns]) }
+            }
+            Self::Rows(_) => Self::Factor(self.factor(columns, workspace)).reduced(columns, workspace),
+            Self::Factor(factor) => {
+                // The last row holds what no parameter explains.
+                let rows = factor.filled_rows().min(columns);
+                let regressor = DMatrix::from_fn(rows, columns, |row, column| factor.entry(row, column));
+                ReducedRows { regressor, torque: DVector::from_fn(rows, |row, _| factor.entry(row, columns)) }
             }
         }
     }

@@ -398,7 +398,7 @@ impl TriangularFactor {
     }
 
     /// Rows of the triangle that can hold something: later ones are still zero when few rows were absorbed.
-    fn filled_rows(&self) -> usize {
+    pub(super) fn filled_rows(&self) -> usize {
         let size = self.columns + 1;
         (0..size)
             .rev()

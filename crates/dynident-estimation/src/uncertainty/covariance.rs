@@ -123,10 +123,7 @@ pub(crate) fn covariances(
 
 /// Each segment by the change that leaving it out makes: `(G − 1)/G Σ_g Δ_g Δ_gᵀ`.
 fn jackknife(scores: &Scores<'_>) -> Result<Moment, EstimationError> {
-    let of_joint = |joint: &JointScores<'_>| -> Vec<DVector<f64>> {
-        joint.segments().iter().map(|segment| joint.change_without(segment)).collect()
-    };
-    let changes = scores.joints.par_iter().map(of_joint).collect::<Vec<_>>().concat();
+    let changes = scores.joints.par_iter().map(JointScores::changes_without).collect::<Vec<_>>().concat();
     let g = at_least_two(changes.len())? as f64;
     Ok(second_moment(&changes, scores.free, (g - 1.0) / g))
 }
@@ -188,17 +185,8 @@ fn newey_west(scores: &Scores<'_>, rows: usize) -> Result<Moment, EstimationErro
 /// Segments of a joint in a log drawn with replacement.
 fn bootstrap(scores: &Scores<'_>, prior: &DMatrix<f64>) -> Result<Moment, EstimationError> {
     let clusters = at_least_two(scores.clusters())?;
-    let blocks: Vec<Blocks> = scores
-        .joints
-        .iter()
-        .map(|joint| {
-            let informations = joint.segments().iter().map(|segment| {
-                let whitened = joint.whitened(segment);
-                whitened.tr_mul(&whitened)
-            });
-            informations.zip(joint.scores.iter().cloned()).collect()
-        })
-        .collect();
+    let blocks: Vec<Blocks> =
+        scores.joints.iter().map(|joint| joint.informations().zip(joint.scores.iter().cloned()).collect()).collect();
     Ok(Moment { matrix: replicated(&blocks, prior)?, clusters, independent: 1.0 })
 }
 

@@ -4,7 +4,7 @@
 //! s_g` of each time segment g of each joint in each log, and its result `M` spreads to the columns as `R⁻¹ M R⁻ᵀ`.
 
 use crate::error::EstimationError;
-use crate::factor::{JointRows, Solution, Split, StackedProblem, TriangularFactor};
+use crate::factor::{JointRows, ReducedRows, Solution, Split, StackedProblem};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -45,8 +45,8 @@ pub(super) struct JointScores<'a> {
     pub(super) scores: Vec<DVector<f64>>,
     /// `‖w W R⁻¹‖²`: what the squared scores sum up to under unit white noise.
     information: f64,
-    /// The factor of every segment, once a method asks for it.
-    segments: OnceLock<Vec<TriangularFactor>>,
+    /// What every segment holds, once a method asks for it.
+    segments: OnceLock<Vec<ReducedRows>>,
 }
 
 impl<'a> Scores<'a> {
@@ -122,36 +122,46 @@ impl<'a> Scores<'a> {
 }
 
 impl JointScores<'_> {
-    /// The factor of every segment, in order of time.
-    pub(super) fn segments(&self) -> &[TriangularFactor] {
-        self.segments.get_or_init(|| self.rows.factor.segment_factors())
+    /// What every segment holds, in order of time.
+    fn segments(&self) -> &[ReducedRows] {
+        self.segments.get_or_init(|| self.rows.factor.reduced_segments())
     }
 
-    /// `w R_g R⁻¹`: the rows of a segment in whitened coordinates.
-    pub(super) fn whitened(&self, segment: &TriangularFactor) -> DMatrix<f64> {
-        segment.regressor_triangle() * &self.local_inverse * self.weight
+    /// The information of every segment in whitened coordinates, `w² R⁻ᵀ W_gᵀ W_g R⁻¹`.
+    pub(super) fn informations(&self) -> impl Iterator<Item = DMatrix<f64>> {
+        self.segments().iter().map(|segment| {
+            let whitened = &segment.regressor * &self.local_inverse * self.weight;
+            whitened.tr_mul(&whitened)
+        })
     }
 
-    /// By how much leaving out one segment changes the estimate.
-    pub(super) fn change_without(&self, segment: &TriangularFactor) -> DVector<f64> {
+    /// By how much leaving out one segment changes the estimate, for every segment: `R⁻ᵀ w W_gᵀ (I − H_g)⁻¹ w (τ_g − W_g
+    /// θ)`, with the segment's part of the hat matrix `H_g = w² W_g A⁻¹ W_gᵀ`.
+    pub(super) fn changes_without(&self) -> Vec<DVector<f64>> {
         // Where a segment alone fixes a direction its own residual there is zero, and so is the quotient; this keeps it
         // from being 0/0.
         const ALONE: f64 = 1.0e-6;
-        let triangle = segment.regressor_triangle();
-        let rest = (segment.rotated_torque() - &triangle * DVector::from_column_slice(&self.theta)) * self.weight;
-        let whitened = self.whitened(segment);
-        let left = DMatrix::identity(rest.len(), rest.len()) * (1.0 + ALONE) - &whitened * whitened.transpose();
-        // Positive definite but for rounding: the segment is a part of the total, which is one here.
-        let without = left.cholesky().map_or_else(|| rest.clone(), |factor| factor.solve(&rest));
-        whitened.tr_mul(&without)
+        let theta = DVector::from_column_slice(&self.theta);
+        // A root of w² A⁻¹ over the columns that these rows see, as wide as it is high: the triangle L of R⁻¹ = L Q.
+        let root = self.local_inverse.transpose().qr().unpack_r().transpose() * self.weight;
+        let change = |segment: &ReducedRows| {
+            let ReducedRows { regressor, torque } = segment;
+            let rest = (torque - regressor * &theta) * self.weight;
+            let half = regressor * &root;
+            let left = DMatrix::identity(rest.len(), rest.len()) * (1.0 + ALONE) - &half * half.transpose();
+            // Positive definite but for rounding: the segment is a part of the total, which is one here.
+            let without = left.cholesky().map_or_else(|| rest.clone(), |factor| factor.solve(&rest));
+            self.local_inverse.tr_mul(&regressor.tr_mul(&without)) * self.weight
+        };
+        self.segments().iter().map(change).collect()
     }
 
-    /// For every segment its share in the variance of every free column under white noise, `‖w R_g R⁻¹ R⁻ᵀ‖²` column
-    /// by column.
+    /// For every segment its share in the variance of every free column under white noise, `‖w W_g A⁻¹‖²` column by
+    /// column.
     fn shares(&self, inverse: &DMatrix<f64>) -> Vec<Vec<f64>> {
         let local_covariance = &self.local_inverse * inverse.transpose() * self.weight;
-        let share = |segment: &TriangularFactor| {
-            let part = segment.regressor_triangle() * &local_covariance;
+        let share = |segment: &ReducedRows| {
+            let part = &segment.regressor * &local_covariance;
             part.column_iter().map(|column| column.norm_squared()).collect()
         };
         self.segments().iter().map(share).collect()

@@ -3,7 +3,7 @@
 
 use super::passes::{with_friction_of, with_terms, without_bars};
 use crate::error::IdentificationError;
-use crate::estimators::Estimator;
+use crate::estimators::{EstimationSettings, Estimator};
 use crate::friction::{
     ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, Weak, is_one_friction, second_start,
 };
@@ -35,6 +35,7 @@ struct LastPass {
 struct ConstantsPass {
     wide: RegressorModel,
     factors: Vec<LogFactors>,
+    /// The rows without the columns beside them, each log's as one segment.
     problem: LinearProblem,
     fit: Estimate,
 }
@@ -44,11 +45,32 @@ impl ConstantsPass {
     fn step(
         &self,
         passes: &TrainingPasses<'_>,
-        (constants, model): (&FrictionConstants, &RegressorModel),
+        centre: (&FrictionConstants, &RegressorModel),
         gains: &[usize],
     ) -> Result<ConstantsStep, IdentificationError> {
-        let wide_problem = passes.free_problem(&self.wide, &self.factors, (model, &self.fit, gains))?;
-        let solve = |problem: &LinearProblem| plain_estimate(&passes.settings.estimation, problem);
+        self.step_by(passes, centre, gains, (&self.factors, &passes.settings.estimation))
+    }
+
+    /// The same step with bars that count every row for independent: no time segments are looked at.
+    fn step_without_bars(
+        &self,
+        passes: &TrainingPasses<'_>,
+        centre: (&FrictionConstants, &RegressorModel),
+        gains: &[usize],
+    ) -> Result<ConstantsStep, IdentificationError> {
+        let factors: Vec<LogFactors> = self.factors.iter().map(LogFactors::as_one_segment).collect();
+        self.step_by(passes, centre, gains, (&factors, &without_bars(passes.settings)))
+    }
+
+    fn step_by(
+        &self,
+        passes: &TrainingPasses<'_>,
+        (constants, model): (&FrictionConstants, &RegressorModel),
+        gains: &[usize],
+        (factors, estimation): (&[LogFactors], &EstimationSettings),
+    ) -> Result<ConstantsStep, IdentificationError> {
+        let wide_problem = passes.free_problem(&self.wide, factors, (model, &self.fit, gains))?;
+        let solve = |problem: &LinearProblem| plain_estimate(estimation, problem);
         Ok(constants.step((model, &self.fit), (&self.wide, &wide_problem), solve)?)
     }
 }
@@ -261,6 +283,17 @@ pub(crate) fn with_constants(
             continue;
         }
 
+        // On the way bars are for nobody.
+        if pass < DROP_PASSES && !are_found {
+            let step = measured.step_without_bars(passes, (&constants, &model), gains)?;
+            if !step.may_have_settled() {
+                let terms = constants.moved(&step.steps);
+                model = with_chosen(robot, joints, &terms, (&model, fit))?;
+                last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
+                continue;
+            }
+        }
+
         let step = measured.step(passes, (&constants, &model), gains)?;
         take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
@@ -333,7 +366,7 @@ impl TrainingPasses<'_> {
     ) -> Result<ConstantsPass, IdentificationError> {
         let wide = with_terms(model, constants.neighbours().into_iter());
         let factors = self.read(&wide)?;
-        let own = factors.iter().map(|log| log.clone().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
+        let own = factors.iter().map(|log| log.as_one_segment().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
         let problem = self.stated_problem(model, &self.columns(model)?, &own)?;
         let fit = plain_estimate(&without_bars(self.settings), &problem)?;
         Ok(ConstantsPass { wide, factors, problem, fit })

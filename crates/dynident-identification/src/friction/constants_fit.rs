@@ -28,6 +28,10 @@ const FURTHEST: f64 = 0.7;
 const KNOWN_BEFOREHAND: f64 = 1.2;
 /// Steps have ended once every one is below this share of its standard deviation, or of the constant.
 const SETTLED: (f64, f64) = (0.1, 2.0e-3);
+/// Times what white noise makes of a standard deviation that the one of bars may be: a step that is long beside so much
+/// has not ended, whatever the bars.
+const MOST_INFLATION: f64 = 10.0;
+
 /// Chosen friction and those of its constants that can be moved.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionConstants {
@@ -89,7 +93,17 @@ impl ConstantsStep {
 
     /// Whether another pass would not change what is known.
     pub(crate) fn has_settled(&self) -> bool {
-        let small = |(step, std): (&f64, &f64)| step.abs() <= (SETTLED.0 * std).max(SETTLED.1);
+        self.is_below(1.0)
+    }
+
+    /// Whether a step with bars by white noise may have settled by those that are reported.
+    pub(crate) fn may_have_settled(&self) -> bool {
+        self.is_below(MOST_INFLATION)
+    }
+
+    /// Whether all steps are small beside bars that are so many times as wide.
+    fn is_below(&self, inflation: f64) -> bool {
+        let small = |(step, std): (&f64, &f64)| step.abs() <= (SETTLED.0 * inflation * std).max(SETTLED.1);
         self.steps.iter().zip(&self.std).all(small)
     }
 }

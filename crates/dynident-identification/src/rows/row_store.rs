@@ -52,7 +52,7 @@ impl RowStore {
     /// Whether the rows that this filter makes of `samples` samples are few enough to be kept.
     pub(super) fn has_room(model: &RegressorModel, filter: &DecimationSettings, samples: usize) -> bool {
         let columns: usize = (0..model.dof()).map(|joint| model.layout().joint_columns(joint).len() + 2).sum();
-        filter.factor > 1 && samples / filter.factor * columns <= MOST_NUMBERS
+        samples / filter.factor * columns <= MOST_NUMBERS
     }
 
     /// The rows of `model` behind `filter`: what is kept of them, and the rest of what `pass` sends to its consumer
