@@ -20,6 +20,8 @@ const MOST_PASSES: usize = 8;
 const DROP_PASSES: usize = 3;
 /// Times that a step which makes the fit worse is halved: the constants are as good as they get.
 const MOST_HALVINGS: usize = 3;
+/// Deviance that a step may cost without being too long: far less than chance makes of it.
+const NO_WORSE: f64 = 0.1;
 /// Passes at least where friction depends on the load, which is the fit's before.
 const LOAD_PASSES: usize = 3;
 
@@ -273,7 +275,7 @@ pub(crate) fn with_constants(
         // A step that made the fit worse was too long; where no length makes it better the constants are found, and one
         // more pass there says which terms no row shows.
         let misfit = misfit(&measured.problem, fit, equal_weights);
-        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit) {
+        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + NO_WORSE) {
             before.halvings += 1;
             are_found = before.halvings > MOST_HALVINGS || pass >= MOST_PASSES;
             before.steps.iter_mut().for_each(|step| *step *= if are_found { 0.0 } else { 0.5 });
@@ -373,11 +375,13 @@ impl TrainingPasses<'_> {
     }
 }
 
-/// What a fit leaves: its deviance; where joints count alike the sum of squares.
+/// What a fit leaves: its deviance; where joints count alike that of all rows together, `N ln(Σ N_j σ_j²)`.
 fn misfit(problem: &LinearProblem, fit: &Estimate, equal_weights: bool) -> f64 {
     if !equal_weights {
         return deviance(problem, fit);
     }
-    let of_joint = |(rows, sigma): (usize, &f64)| rows as f64 * sigma * sigma;
-    problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
+    let rows = problem.joint_rows();
+    let of_joint = |(rows, sigma): (&usize, &f64)| *rows as f64 * sigma * sigma;
+    let squares: f64 = rows.iter().zip(&fit.joint_sigma).map(of_joint).sum();
+    rows.iter().sum::<usize>() as f64 * squares.max(f64::MIN_POSITIVE).ln()
 }
