@@ -416,12 +416,15 @@ impl LogFactors {
     }
 }
 
-struct FactorConsumer<'a> {
+/// Makes a factor for each joint.
+struct FactorConsumer<'a>(Vec<JointFactor<'a>>);
+
+/// The factor of one joint in the making.
+struct JointFactor<'a> {
     log: String,
-    factors: Vec<SegmentedFactor>,
-    blocks: Vec<RowBlock>,
+    factor: SegmentedFactor,
+    block: RowBlock,
     evidence: Option<Evidence<'a>>,
-    buffer: Vec<f64>,
     counted: Vec<f64>,
 }
 
@@ -431,13 +434,26 @@ impl RowConsumer for FactorConsumer<'_> {
     }
 
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+        self.0[rows.joint].filtered(rows)
+    }
+
+    fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
+        Some(self.0.iter_mut().map(|joint| joint as &mut (dyn RowConsumer + Send)).collect())
+    }
+}
+
+impl RowConsumer for JointFactor<'_> {
+    fn reads_samples(&self) -> bool {
+        false
+    }
+
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if let Some(evidence) = &mut self.evidence {
-            evidence.filtered(rows, &mut self.buffer);
+            evidence.filtered(rows);
         }
         let rows = rows.counted(&mut self.counted);
-        let factor = &mut self.factors[rows.joint];
-        self.blocks[rows.joint]
-            .push(rows.panel, rows.rows, |panel, rows| factor.absorb(panel, rows))
+        self.block
+            .push(rows.panel, rows.rows, |panel, rows| self.factor.absorb(panel, rows))
             .map_err(|source| LogError::Rows { log: self.log.clone(), source })
     }
 }
@@ -452,24 +468,27 @@ pub fn log_factors(
     index: usize,
     alone: bool,
 ) -> Result<LogFactors, LogError> {
-    let columns: Vec<&[usize]> = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
     let log = logs.recordings[index].label();
-    let factors = columns
-        .iter()
-        .map(|columns| SegmentedFactor::new(columns.len(), settings.estimation.segments))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(|source| LogError::Rows { log: log.clone(), source })?;
+    let in_rows = |source| LogError::Rows { log: log.clone(), source };
     // Torque in a unit that nobody knows says nothing about the description.
     let nominal = model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated);
-    let evidence = nominal.map(|nominal| Evidence::new(columns, nominal));
-    let blocks = (0..model.dof()).map(|joint| RowBlock::new(model.layout().joint_columns(joint).len() + 1)).collect();
-    let mut consumer = FactorConsumer { log, factors, blocks, evidence, buffer: Vec::new(), counted: Vec::new() };
+    let joint = |joint: usize| {
+        let columns = model.layout().joint_columns(joint);
+        let factor = SegmentedFactor::new(columns.len(), settings.estimation.segments).map_err(in_rows)?;
+        let evidence = nominal.map(|nominal| Evidence::new((model, joint), nominal));
+        let block = RowBlock::new(columns.len() + 1);
+        Ok(JointFactor { log: log.clone(), factor, block, evidence, counted: Vec::new() })
+    };
+    let mut consumer = FactorConsumer((0..model.dof()).map(joint).collect::<Result<_, LogError>>()?);
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
     let statistics = pass.run(&mut consumer)?;
-    let in_rows = |source| LogError::Rows { log: consumer.log.clone(), source };
-    for (factor, block) in consumer.factors.iter_mut().zip(consumer.blocks) {
+    let mut factors = Vec::with_capacity(model.dof());
+    let mut evidence = Vec::new();
+    for JointFactor { mut factor, block, evidence: own, .. } in consumer.0 {
         block.finish(|panel, rows| factor.absorb(panel, rows)).map_err(in_rows)?;
+        factors.push(factor);
+        evidence.extend(own);
     }
-    let nominal_agreement = consumer.evidence.as_ref().map(|evidence| evidence.agreement(&model.joint_names()));
-    Ok(LogFactors { index, factors: consumer.factors, statistics, noise: None, nominal_agreement })
+    let nominal_agreement = nominal.map(|_| PriorAgreement::of(model.joint_names().iter().zip(&evidence)));
+    Ok(LogFactors { index, factors, statistics, noise: None, nominal_agreement })
 }

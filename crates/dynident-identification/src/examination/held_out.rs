@@ -63,7 +63,8 @@ struct Test<'a> {
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     motion_band: Option<MotionBand<'a>>,
-    evidence: Option<Evidence<'a>>,
+    /// Joint by joint; none without nominal values.
+    evidence: Option<Vec<Evidence<'a>>>,
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
@@ -84,7 +85,7 @@ impl Test<'_> {
             added.map_err(|source| LogError::Rows { log: self.log.clone(), source })?;
         }
         if let Some(evidence) = &mut self.evidence {
-            evidence.filtered(rows, &mut self.buffer);
+            evidence[rows.joint].filtered(rows);
         }
         Ok(())
     }
@@ -172,7 +173,6 @@ pub(crate) fn tested_on(
 ) -> Result<HeldOutExamination, LogError> {
     let ModelUnderTest { theta, physical, uncertainty, traced } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
-    let columns = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
     let nominal = model.parametric.nominal_base();
     // Where samples or times are left out the rows of the fit alone know it.
     let is_whole = matches!(recording.samples, Samples::Log(_));
@@ -187,7 +187,7 @@ pub(crate) fn tested_on(
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
-        evidence: nominal.map(|nominal| Evidence::new(columns, nominal)),
+        evidence: nominal.map(|nominal| (0..model.dof()).map(|joint| Evidence::new((model, joint), nominal)).collect()),
         delay: DelayCheck::new(model, theta),
         trace: traced.then(|| TraceConsumer::new(model, physical.unwrap_or(theta))),
         buffer: Vec::new(),
@@ -221,7 +221,7 @@ pub(crate) fn tested_on(
             prior: tested_prior,
             residuals,
         },
-        nominal_agreement: test.evidence.as_ref().map(|evidence| evidence.agreement(&joints)),
+        nominal_agreement: test.evidence.map(|evidence| PriorAgreement::of(joints.iter().zip(&evidence))),
         delays: lags_after_pass(test.delay, (logs, settings), index)?,
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,

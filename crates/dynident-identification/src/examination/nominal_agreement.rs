@@ -2,6 +2,7 @@
 //!
 //! Least squares fits either sign equally well (all parameters change sign), so only a nominal model can decide.
 
+use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, predicted_torque};
 use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
@@ -44,55 +45,59 @@ struct Products {
     mixed: f64,
 }
 
-/// Gathers the evidence while rows pass.
+impl Products {
+    /// `100 ‖τ − sign · τ_prior‖ / ‖τ‖`; none without torque.
+    fn residual_percent(&self, sign: f64) -> Option<f64> {
+        let share = (self.measured - 2.0 * sign * self.mixed + self.predicted) / self.measured;
+        (self.measured > 0.0).then(|| 100.0 * share.max(0.0).sqrt())
+    }
+
+    fn is_reversed(&self) -> bool {
+        let both = self.residual_percent(1.0).zip(self.residual_percent(-1.0));
+        both.is_some_and(|(given, other)| other < CLEARLY_BETTER * given)
+    }
+}
+
+/// Gathers the evidence of one joint while its rows pass.
 pub(crate) struct Evidence<'a> {
-    columns: Vec<&'a [usize]>,
+    columns: &'a [usize],
     prior: &'a [f64],
-    products: Vec<Products>,
+    products: Products,
+    predicted: Vec<f64>,
 }
 
 impl<'a> Evidence<'a> {
-    pub(crate) fn new(columns: Vec<&'a [usize]>, prior: &'a [f64]) -> Self {
-        let joints = columns.len();
-        Self { columns, prior, products: vec![Products::default(); joints] }
+    /// For rows of a joint of the model, with the nominal values of all its columns.
+    pub(crate) fn new((model, joint): (&'a RegressorModel, usize), prior: &'a [f64]) -> Self {
+        let columns = model.layout().joint_columns(joint);
+        Self { columns, prior, products: Products::default(), predicted: Vec::new() }
     }
 
-    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>, buffer: &mut Vec<f64>) {
-        let columns = self.columns[rows.joint];
-        predicted_torque(rows.panel, rows.rows, columns, self.prior, buffer);
-        let measured = &rows.panel[columns.len() * rows.rows..];
-        let sums = &mut self.products[rows.joint];
-        for (p, m) in buffer.iter().zip(measured) {
-            sums.measured += m * m;
-            sums.predicted += p * p;
-            sums.mixed += m * p;
+    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
+        predicted_torque(rows.panel, rows.rows, self.columns, self.prior, &mut self.predicted);
+        let measured = &rows.panel[self.columns.len() * rows.rows..];
+        for (p, m) in self.predicted.iter().zip(measured) {
+            self.products.measured += m * m;
+            self.products.predicted += p * p;
+            self.products.mixed += m * p;
         }
     }
+}
 
-    pub(crate) fn agreement(&self, joints: &[String]) -> PriorAgreement {
-        let residual = |p: &Products, sign: f64| {
-            let share = (p.measured - 2.0 * sign * p.mixed + p.predicted) / p.measured;
-            (p.measured > 0.0).then(|| 100.0 * share.max(0.0).sqrt())
-        };
-        let total = self.products.iter().fold(Products::default(), |a, b| Products {
-            measured: a.measured + b.measured,
-            predicted: a.predicted + b.predicted,
-            mixed: a.mixed + b.mixed,
-        });
-        let reversed = |p: &Products| match (residual(p, 1.0), residual(p, -1.0)) {
-            (Some(given), Some(other)) => other < CLEARLY_BETTER * given,
-            _ => false,
-        };
-        PriorAgreement {
-            residual_percent: residual(&total, 1.0),
-            residual_percent_if_reversed: residual(&total, -1.0),
-            reversed_joints: joints
-                .iter()
-                .zip(&self.products)
-                .filter(|(_, products)| reversed(products))
-                .map(|(name, _)| name.clone())
-                .collect(),
+impl PriorAgreement {
+    /// What all joints' evidence says, joint by joint with its name.
+    pub(crate) fn of<'e>(joints: impl IntoIterator<Item = (&'e String, &'e Evidence<'e>)>) -> Self {
+        let (mut total, mut reversed_joints) = (Products::default(), Vec::new());
+        for (name, Evidence { products, .. }) in joints {
+            total.measured += products.measured;
+            total.predicted += products.predicted;
+            total.mixed += products.mixed;
+            if products.is_reversed() {
+                reversed_joints.push(name.clone());
+            }
         }
+        let [residual_percent, residual_percent_if_reversed] = [1.0, -1.0].map(|sign| total.residual_percent(sign));
+        Self { residual_percent, residual_percent_if_reversed, reversed_joints }
     }
 }
 

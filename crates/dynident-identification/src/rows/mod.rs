@@ -90,6 +90,12 @@ pub trait RowConsumer {
     fn reads_samples(&self) -> bool {
         true
     }
+
+    /// A consumer for each joint that takes its rows alone, where joints do not matter to each other: they may be
+    /// served side by side. None by default.
+    fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
+        None
+    }
 }
 
 /// `panel · θ` of one joint: the torque that base parameters `theta` predict for its rows; `columns` are the joint's

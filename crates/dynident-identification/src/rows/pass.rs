@@ -70,7 +70,7 @@ pub struct LogPass<'a> {
     pub filter: &'a ParallelFilterSettings,
     /// The cut-off that the parallel filter follows, where it is not the motion's.
     pub torque_hz: Option<f64>,
-    /// Whether a second thread reads.
+    /// Whether a second thread reads, and joints whose rows are kept are served side by side.
     pub reader_thread: bool,
     /// Stop after about so many samples.
     pub most_samples: Option<u64>,
@@ -226,7 +226,7 @@ impl LogPass<'_> {
         };
         let rows = kept.rows.rows(self.model, filter, &mut pass)?;
         self.progress.advance(rows.samples() - made);
-        rows.give(self.model, consumer)?;
+        rows.give(self.model, consumer, self.reader_thread)?;
         let passed = Passed { samples: rows.samples(), velocities: rows.velocities().to_vec() };
         self.statistics(Some(kept.report.clone()), (kept.rate_hz, Some(filter)), (rows.count(), needed), passed)
     }

@@ -12,6 +12,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_model::Model;
 use dynident_recording::DecimationSettings;
+use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Numbers that are kept of one log, at most: 64 MiB.
@@ -200,29 +201,61 @@ impl FilteredRows {
         &self.velocities
     }
 
-    /// Sends the rows of the model to a consumer, in the pieces in which a pass over samples would.
-    pub(super) fn give(&self, model: &RegressorModel, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
-        let layout = model.layout();
-        let of_joint = |(joint, kept): (usize, &FilteredJoint)| -> Vec<Filtered> {
-            let columns = layout.joint_columns(joint).iter();
-            let found = columns.filter_map(|&column| kept.values(&layout.columns()[column]));
-            found.chain([&kept.torque]).map(Arc::clone).collect()
-        };
-        let columns: Vec<Vec<Filtered>> = self.joints.iter().enumerate().map(of_joint).collect();
+    /// Sends the rows of the model to a consumer, in the pieces in which a pass over samples would; `beside` each other
+    /// for all joints where the consumer lets it.
+    pub(super) fn give(
+        &self,
+        model: &RegressorModel,
+        consumer: &mut dyn RowConsumer,
+        beside: bool,
+    ) -> Result<(), LogError> {
+        let joints: Vec<JointPieces<'_>> =
+            self.joints.iter().enumerate().map(|(joint, kept)| JointPieces::new(model, joint, kept)).collect();
+        if let Some(consumers) = consumer.joints().filter(|_| beside) {
+            return joints.par_iter().zip(consumers).try_for_each(|(joint, consumer)| {
+                let (mut from, mut panel) = (0, Vec::new());
+                for &rows in &self.pieces {
+                    consumer.filtered(&joint.piece(from, rows, &mut panel))?;
+                    from += rows;
+                }
+                Ok(())
+            });
+        }
         let (mut from, mut panel) = (0, Vec::new());
         for &rows in &self.pieces {
-            for (joint, (columns, kept)) in columns.iter().zip(&self.joints).enumerate() {
-                panel.clear();
-                for column in columns {
-                    panel.extend_from_slice(&column[from..from + rows]);
-                }
-                let coverage = &kept.coverage[from..from + rows];
-                let coverage = if coverage.iter().all(|share| *share == 1.0) { &[] } else { coverage };
-                consumer.filtered(&JointRows { joint, rows, panel: &panel, coverage })?;
+            for joint in &joints {
+                consumer.filtered(&joint.piece(from, rows, &mut panel))?;
             }
             from += rows;
         }
         Ok(())
+    }
+}
+
+/// The columns of a joint in a model's order, its torque last.
+struct JointPieces<'k> {
+    joint: usize,
+    columns: Vec<&'k [f64]>,
+    coverage: &'k [f64],
+}
+
+impl<'k> JointPieces<'k> {
+    fn new(model: &RegressorModel, joint: usize, kept: &'k FilteredJoint) -> Self {
+        let layout = model.layout();
+        let found = layout.joint_columns(joint).iter().filter_map(|&column| kept.values(&layout.columns()[column]));
+        let columns = found.chain([&kept.torque]).map(|values| values.as_slice()).collect();
+        Self { joint, columns, coverage: &kept.coverage }
+    }
+
+    /// Some of its rows, gathered in `panel`.
+    fn piece<'p>(&'p self, from: usize, rows: usize, panel: &'p mut Vec<f64>) -> JointRows<'p> {
+        panel.clear();
+        for column in &self.columns {
+            panel.extend_from_slice(&column[from..from + rows]);
+        }
+        let coverage = &self.coverage[from..from + rows];
+        let coverage = if coverage.iter().all(|share| *share == 1.0) { &[] } else { coverage };
+        JointRows { joint: self.joint, rows, panel, coverage }
     }
 }
 
@@ -339,6 +372,23 @@ mod tests {
         }
     }
 
+    /// A consumer for each joint.
+    struct ByJoint(Vec<Bits>);
+
+    impl RowConsumer for ByJoint {
+        fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+            self.0[rows.joint].filtered(rows)
+        }
+
+        fn reads_samples(&self) -> bool {
+            false
+        }
+
+        fn joints(&mut self) -> Option<Vec<&mut (dyn RowConsumer + Send)>> {
+            Some(self.0.iter_mut().map(|joint| joint as &mut (dyn RowConsumer + Send)).collect())
+        }
+    }
+
     #[test]
     fn a_pass_over_rows_that_are_kept_sees_what_a_pass_over_samples_sees() {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
@@ -370,7 +420,7 @@ mod tests {
         ];
 
         let log = TestLog::new(&plain.joint_names());
-        let pass = |model: &RegressorModel, reader_thread: bool, consumer: &mut Bits| -> LogStatistics {
+        let pass = |model: &RegressorModel, reader_thread: bool, consumer: &mut dyn RowConsumer| -> LogStatistics {
             LogPass { reader_thread, ..log.pass(model) }.run(consumer).unwrap()
         };
         for (number, model) in models.iter().enumerate() {
@@ -384,6 +434,12 @@ mod tests {
                 assert!(found.rows == plain.rows, "model {number}, threads {threads}");
                 assert_eq!(of_kept.filtered_rows, of_samples.filtered_rows);
                 assert_eq!(of_kept.velocities, of_samples.velocities);
+
+                let mut side_by_side = ByJoint((0..6).map(|_| Bits::default()).collect());
+                pass(model, threads, &mut side_by_side);
+                for (joint, own) in side_by_side.0.iter().enumerate() {
+                    assert!(own.rows.iter().eq(plain.rows.iter().filter(|rows| rows.0 == joint)), "joint {joint}");
+                }
             }
         }
         assert!(log.kept.get().unwrap().rows.lock().iter().map(|rows| rows.numbers()).sum::<usize>() <= MOST_NUMBERS);
