@@ -1,15 +1,14 @@
 //! Analytic derivatives of the inverse dynamics.
 
-use crate::ground::{MassMoments, MomentRates, Spatial};
-use crate::hinge::{Hinge, with_hinge};
+use crate::ground::Spatial;
 use crate::joint_matrices::{JointMatrices, MatrixRows};
 use crate::sample_lanes::take_lanes;
-use crate::states::VariedBody;
 use crate::tree_scratch::{TreeBatch, TreeScratch, expanded, project_matrices};
+use crate::varied_body::VariedBody;
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
-use dynident_model::{Model, Transform, Vec3};
+use dynident_model::{Model, Vec3};
 
 /// Derivatives of the joint torques, row-major, dof × dof: row = torque, column = what it is derived by.
 #[derive(Clone, Copy, Debug)]
@@ -191,23 +190,10 @@ fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
         let (inner, outer) = varied.split_at_mut(index);
         let parent = step.parent.map_or(&base, |parent| &inner[parent]);
         let body = &mut outer[0];
-        let (above, dq, ddq) = (&parent.placement, dq[index], ddq[index]);
-        body.placement.translation = above.point(hinges.translation(step, index));
-        body.placement.rotation = with_hinge!(hinges, *step, index, |hinge| hinge.after(&above.rotation));
-        let Transform { rotation, translation } = &body.placement;
-
-        let direction = Vec3([rotation.0[0][2], rotation.0[1][2], rotation.0[2][2]]);
-        let axis = Spatial::axis(step.turns, direction, *translation);
-        // The parent's velocity and the body's own move the axis alike: S × S = 0.
-        let rate = parent.velocity.cross(&axis);
-        body.velocity = axis.scale_add(dq, &parent.velocity);
-        body.acceleration = axis.scale_add(ddq, &rate.scale_add(dq, &parent.acceleration));
-        body.second_rate = parent.acceleration.cross_add(&axis, &parent.velocity.cross(&rate));
-        body.axis = axis;
-        body.twice_rate = Spatial { angular: rate.angular + rate.angular, linear: rate.linear + rate.linear };
-
-        body.moments = MassMoments::of(step, &body.placement);
-        body.rates = MomentRates::of(&body.moments, &body.velocity);
+        body.follow(parent, (step, index), &hinges);
+        let rate = body.move_along(parent, dq[index]);
+        body.acceleration = body.axis.scale_add(ddq[index], &rate.scale_add(dq[index], &parent.acceleration));
+        body.second_rate = parent.acceleration.cross_add(&body.axis, &parent.velocity.cross(&rate));
         let inertial = body.moments.times(&body.acceleration);
         body.wrench = body.velocity.cross_dual_add(&body.rates.spatial_momentum(), &inertial);
     }

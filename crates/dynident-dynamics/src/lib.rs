@@ -11,7 +11,8 @@
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
 //! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`]; of many samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
 //! | the same of many robots of one tree | [`RobotLanes`], inside a kernel | the same, one robot in each lane |
-//! | torque of gravity, energies | [`gravity_torque`], [`kinetic_energy`], [`potential_energy`] | |
+//! | Coriolis matrix, `Ṁ = C + Cᵀ` | [`coriolis_matrix`]; of many samples: [`coriolis_matrices`] | analytic, in one frame |
+//! | torque of gravity, its derivative, energies | [`gravity_torque`], [`gravity_torque_derivative`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; of many samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
 //! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, by `M = LᵀL` along the tree |
@@ -52,6 +53,7 @@ mod body_frames;
 mod columns;
 mod composite;
 mod composite_moments;
+mod coriolis;
 mod derivatives;
 mod energy;
 mod forward_dynamics;
@@ -77,11 +79,13 @@ mod sample_lanes;
 mod states;
 mod term_history;
 mod tree_scratch;
+mod varied_body;
 mod workspace;
 
 pub use base_parameters::{
     BaseParameterSettings, BaseParameters, Determination, NumericalRank, numerical_rank, numerical_rank_by_body,
 };
+pub use coriolis::{coriolis_matrices, coriolis_matrix};
 pub use derivatives::{
     DerivativeArrays, InverseDynamicsDerivatives, inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives,
     inverse_dynamics_derivatives_batch,
@@ -89,7 +93,7 @@ pub use derivatives::{
 pub use energy::{kinetic_energy, potential_energy};
 pub use forward_dynamics::forward_dynamics;
 pub use forward_dynamics_derivatives::{ForwardDynamicsDerivatives, forward_dynamics_derivatives};
-pub use gravity::gravity_torque;
+pub use gravity::{gravity_torque, gravity_torque_derivative};
 pub use independent_columns::{IndependentColumns, independent_columns};
 pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
 pub use joint_matrices::JointMatrices;

@@ -1,7 +1,6 @@
 //! What each algorithm keeps for each body while it runs: plain numbers, no rules. The rules are in the algorithms' own
 //! files.
 
-use crate::ground::{MassMoments, MomentRates, Spatial};
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
@@ -84,40 +83,6 @@ impl<T: Scalar> ArticulatedInertia<T> {
         column: (Vec3::ZERO, Vec3::ZERO),
         inverse_inertia: T::ZERO,
         rest_torque: T::ZERO,
-    };
-}
-
-/// What the derivatives of the inverse dynamics need of a body, all in the base's frame. Inertia and wrench are the
-/// body's own at first, then those of everything that moves with it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct VariedBody<T> {
-    /// `base_from_body`.
-    pub(crate) placement: Transform<T>,
-    pub(crate) velocity: Spatial<T>,
-    /// Minus gravity.
-    pub(crate) acceleration: Spatial<T>,
-    /// The joint's axis `S` as a twist.
-    pub(crate) axis: Spatial<T>,
-    /// `2 Ψ̇ = 2 v × S`: how the axis moves.
-    pub(crate) twice_rate: Spatial<T>,
-    /// `Ψ̈ = a × S + v × Ψ̇`, with velocity and acceleration of the parent.
-    pub(crate) second_rate: Spatial<T>,
-    pub(crate) moments: MassMoments<T>,
-    pub(crate) rates: MomentRates<T>,
-    pub(crate) wrench: Spatial<T>,
-}
-
-impl<T: Scalar> VariedBody<T> {
-    pub(crate) const REST: Self = Self {
-        placement: Transform::IDENTITY,
-        velocity: Spatial::ZERO,
-        acceleration: Spatial::ZERO,
-        axis: Spatial::ZERO,
-        twice_rate: Spatial::ZERO,
-        second_rate: Spatial::ZERO,
-        moments: MassMoments::ZERO,
-        rates: MomentRates::ZERO,
-        wrench: Spatial::ZERO,
     };
 }
 

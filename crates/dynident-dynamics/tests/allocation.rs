@@ -4,10 +4,10 @@
 
 use dynident_dynamics::{
     BatchWorkspace, DerivativeArrays, JointMatrices, PanelLayout, Panels, Workspace, all_columns, body_placements,
-    forward_dynamics, forward_dynamics_derivatives, gravity_torque, inverse_dynamics, inverse_dynamics_batch,
-    inverse_dynamics_derivative_matrices, inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch,
-    kinetic_energy, mass_matrices, mass_matrix, mass_matrix_and_bias, mass_matrix_batch, potential_energy,
-    regressor_panels, torque_regressor,
+    coriolis_matrices, coriolis_matrix, forward_dynamics, forward_dynamics_derivatives, gravity_torque,
+    gravity_torque_derivative, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivative_matrices,
+    inverse_dynamics_derivatives, inverse_dynamics_derivatives_batch, kinetic_energy, mass_matrices, mass_matrix,
+    mass_matrix_and_bias, mass_matrix_batch, potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::random_tree;
@@ -91,6 +91,8 @@ fn one_sample_at_a_time_allocates_nothing() {
             check("derivatives of the acceleration", &mut |w| {
                 use_up(forward_dynamics_derivatives(&model, w, &q, &dq, &ddq).by_position[0]);
             });
+            check("Coriolis matrix", &mut |w| use_up(coriolis_matrix(&model, w, &q, &dq)[0]));
+            check("derivative of gravity", &mut |w| use_up(gravity_torque_derivative(&model, w, &q)[0]));
             check("placements", &mut |w| use_up(body_placements(&model, w, &q)[0]));
             check("kinetic energy", &mut |w| use_up(kinetic_energy(&model, w, &q, &dq)));
             check("potential energy", &mut |w| use_up(potential_energy(&model, w, &q)));
@@ -132,6 +134,8 @@ fn batches_allocate_nothing() {
         });
         assert_eq!(derivatives, 0, "derivatives, {}", level.name());
         let mut kept = [(); 3].map(|()| JointMatrices::new(&model));
+        let coriolis = requests_when_warm(|| coriolis_matrices(&model, &mut workspace, &motion, &mut kept[1]));
+        assert_eq!(coriolis, 0, "Coriolis matrices, {}", level.name());
         let inertias = requests_when_warm(|| mass_matrices(&model, &mut workspace, &q, samples, &mut kept[0]));
         assert_eq!(inertias, 0, "kept mass matrices, {}", level.name());
         let derivatives =

@@ -29,7 +29,9 @@ enum Chosen {
     InverseDynamics,
     ForwardDynamics,
     MassMatrix,
+    CoriolisMatrix,
     Gravity,
+    GravityDerivative,
     Regressor,
 }
 
@@ -38,7 +40,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         Chosen::InverseDynamics => Quantity::InverseDynamics,
         Chosen::ForwardDynamics => Quantity::ForwardDynamics,
         Chosen::MassMatrix => Quantity::MassMatrix,
+        Chosen::CoriolisMatrix => Quantity::CoriolisMatrix,
         Chosen::Gravity => Quantity::Gravity,
+        Chosen::GravityDerivative => Quantity::GravityDerivative,
         Chosen::Regressor => Quantity::Regressor,
     };
     if let Some(out) = &options.out {

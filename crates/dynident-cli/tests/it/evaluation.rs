@@ -1,7 +1,8 @@
 //! `evaluate` against the library to the last digit, and against Pinocchio.
 use crate::common::{repository, run_in};
 use dynident::dynamics::{
-    Workspace, forward_dynamics, gravity_torque, inverse_dynamics, mass_matrix, torque_regressor,
+    Workspace, coriolis_matrix, forward_dynamics, gravity_torque, gravity_torque_derivative, inverse_dynamics,
+    mass_matrix, torque_regressor,
 };
 use dynident::model::load_robot;
 use serde_json::Value;
@@ -72,7 +73,9 @@ fn every_quantity_is_the_librarys_to_the_last_digit() {
     let golden = golden("ur10");
     let model = load_robot(&golden.robot).unwrap().model;
     let mut w = Workspace::new(&model);
-    for quantity in ["inverse-dynamics", "forward-dynamics", "mass-matrix", "gravity", "regressor"] {
+    let matrices = ["mass-matrix", "coriolis-matrix", "gravity-derivative"];
+    let all = ["inverse-dynamics", "forward-dynamics", "gravity", "regressor"].into_iter().chain(matrices);
+    for quantity in all {
         let third = if quantity == "forward-dynamics" { ("tau", "tau") } else { ("ddq", "ddq") };
         let rows = evaluate(folder.path(), &golden, [("q", "q"), ("dq", "dq"), third], quantity);
         assert_eq!(rows.len(), golden.states.len());
@@ -82,7 +85,9 @@ fn every_quantity_is_the_librarys_to_the_last_digit() {
                 "inverse-dynamics" => inverse_dynamics(&model, &mut w, &q, &dq, &third).to_vec(),
                 "forward-dynamics" => forward_dynamics(&model, &mut w, &q, &dq, &third).to_vec(),
                 "mass-matrix" => mass_matrix(&model, &mut w, &q).to_vec(),
+                "coriolis-matrix" => coriolis_matrix(&model, &mut w, &q, &dq).to_vec(),
                 "gravity" => gravity_torque(&model, &mut w, &q).to_vec(),
+                "gravity-derivative" => gravity_torque_derivative(&model, &mut w, &q).to_vec(),
                 _ => torque_regressor(&model, &mut w, &q, &dq, &third).to_vec(),
             };
             assert_eq!(*row, expected, "{quantity}");

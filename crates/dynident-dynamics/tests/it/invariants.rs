@@ -2,10 +2,11 @@
 //! physics.
 
 use dynident_dynamics::{
-    BatchWorkspace, PanelLayout, Panels, TermHistory, Workspace, all_columns, body_placements, forward_dynamics,
-    forward_dynamics_derivatives, gravity_torque, inverse_dynamics, inverse_dynamics_batch,
-    inverse_dynamics_derivatives, kinetic_energy, mass_matrix, mass_matrix_and_bias, potential_energy,
-    regressor_panels, regressor_panels_of_sample, torque_regressor,
+    BatchWorkspace, JointMatrices, PanelLayout, Panels, TermHistory, Workspace, all_columns, body_placements,
+    coriolis_matrices, coriolis_matrix, forward_dynamics, forward_dynamics_derivatives, gravity_torque,
+    gravity_torque_derivative, inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, kinetic_energy,
+    mass_matrix, mass_matrix_and_bias, potential_energy, regressor_panels, regressor_panels_of_sample,
+    torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::sample::{Random, random_tree};
@@ -210,6 +211,9 @@ fn coriolis_matrix_of_christoffel_symbols_makes_the_difference_skew() {
         let c = nalgebra::DMatrix::from_fn(dof, dof, |i, j| {
             (0..dof).map(|k| 0.5 * (slope[k][(i, j)] + slope[j][(i, k)] - slope[i][(j, k)]) * dq[k]).sum::<f64>()
         });
+        // Fourth-order differences of masses of some tens: as above.
+        let found = coriolis_matrix(&model, &mut Workspace::new(&model), &q, &dq).to_vec();
+        assert_close(&found, &c.transpose().iter().copied().collect::<Vec<f64>>(), 1e-7, "Coriolis matrix");
         let velocity_torque: Vec<f64> = (&c * nalgebra::DVector::from_column_slice(&dq)).iter().copied().collect();
         let total = inverse_dynamics(&model, &mut ws, &q, &dq, &vec![0.0; dof]).to_vec();
         let gravity = gravity_torque(&model, &mut ws, &q).to_vec();
@@ -240,6 +244,57 @@ fn gravity_torque_is_the_slope_of_potential_energy() {
             .collect();
         // Rounding of energies (some hundred joules) over the step: 1e-16 · 1e2 / 1e-3 = 1e-11, and h^4 of harmonics.
         assert_close(&slope, &gravity, 1e-8, "gravity");
+        let stiffness = gravity_torque_derivative(&model, &mut ws, &q).to_vec();
+        let slopes: Vec<Vec<f64>> = (0..model.dof())
+            .map(|k| {
+                let mut at = |step: f64| {
+                    let mut q = q.clone();
+                    q[k] += step;
+                    gravity_torque(&model, &mut ws, &q).to_vec()
+                };
+                let (near, far) = ([at(h), at(-h)], [at(2.0 * h), at(-2.0 * h)]);
+                let slope = |i: usize| (8.0 * (near[0][i] - near[1][i]) - (far[0][i] - far[1][i])) / (12.0 * h);
+                (0..model.dof()).map(slope).collect()
+            })
+            .collect();
+        // The second derivative of an energy: symmetric.
+        assert_close(&slopes.concat(), &stiffness, 1e-8, "derivative of gravity");
+    }
+}
+
+#[test]
+fn coriolis_matrix_and_gravity_derivative_are_parts_of_the_derivatives_of_the_torque() {
+    for Case { model, q, dq, ddq } in cases() {
+        let dof = model.dof();
+        let zeros = vec![0.0; dof];
+        for level in Level::available() {
+            let mut ws = Workspace::with_level(&model, level);
+            let found = inverse_dynamics_derivatives(&model, &mut ws, &q, &dq, &ddq);
+            let half: Vec<f64> = found.by_velocity.iter().map(|entry| 0.5 * entry).collect();
+            let at_rest = inverse_dynamics_derivatives(&model, &mut ws, &q, &zeros, &zeros).by_position.to_vec();
+            // The same products in the same order.
+            assert_close(coriolis_matrix(&model, &mut ws, &q, &dq), &half, 1e-14, "Coriolis matrix");
+            // Terms that cancel: masses at some metres from the base's origin.
+            assert_close(gravity_torque_derivative(&model, &mut ws, &q), &at_rest, 1e-12, "derivative of gravity");
+
+            let torque = inverse_dynamics(&model, &mut ws, &q, &dq, &zeros).to_vec();
+            let gravity = gravity_torque(&model, &mut ws, &q).to_vec();
+            let c = nalgebra::DMatrix::from_row_slice(dof, dof, &half);
+            let of_velocity = c * nalgebra::DVector::from_column_slice(&dq);
+            let wanted: Vec<f64> = torque.iter().zip(&gravity).map(|(torque, gravity)| torque - gravity).collect();
+            assert_close(of_velocity.as_slice(), &wanted, 1e-11, "C dq");
+
+            let samples = 11;
+            let repeated = |v: &[f64]| v.iter().flat_map(|&x| core::iter::repeat_n(x, samples)).collect::<Vec<f64>>();
+            let (q, dq) = (repeated(&q), repeated(&dq));
+            let mut matrices = JointMatrices::new(&model);
+            let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &[] };
+            coriolis_matrices(&model, &mut BatchWorkspace::with_level(&model, level), &motion, &mut matrices);
+            for sample in 0..samples {
+                let all = (0..dof * dof).map(|entry| matrices.entry(entry / dof, entry % dof)[sample]);
+                assert_close(&all.collect::<Vec<f64>>(), &half, 1e-12, "Coriolis matrices");
+            }
+        }
     }
 }
 

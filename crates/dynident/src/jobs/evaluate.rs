@@ -1,7 +1,10 @@
 //! Dynamics for a table of states.
 
 use crate::error::Error;
-use dynident_dynamics::{Workspace, forward_dynamics, gravity_torque, inverse_dynamics, mass_matrix, torque_regressor};
+use dynident_dynamics::{
+    Workspace, coriolis_matrix, forward_dynamics, gravity_torque, gravity_torque_derivative, inverse_dynamics,
+    mass_matrix, torque_regressor,
+};
 use dynident_model::{INERTIAL_NAMES, Model};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,8 +18,12 @@ pub enum Quantity {
     ForwardDynamics,
     /// Mass matrix from `q`, row by row.
     MassMatrix,
+    /// Coriolis matrix from `q`, `dq`, row by row.
+    CoriolisMatrix,
     /// Gravity torque from `q`.
     Gravity,
+    /// Its derivative by position from `q`, row by row.
+    GravityDerivative,
     /// Torque regressor from `q`, `dq`, `ddq`, row by row.
     Regressor,
 }
@@ -27,17 +34,21 @@ impl Quantity {
         match self {
             Self::InverseDynamics | Self::Regressor => &["q", "dq", "ddq"],
             Self::ForwardDynamics => &["q", "dq", "tau"],
-            Self::MassMatrix | Self::Gravity => &["q"],
+            Self::CoriolisMatrix => &["q", "dq"],
+            Self::MassMatrix | Self::Gravity | Self::GravityDerivative => &["q"],
         }
     }
 
     fn header(self, dof: usize, bodies: usize) -> Vec<String> {
         let numbered = |name: &str| (1..=dof).map(|j| format!("{name}{j}")).collect();
+        let matrix = |name: &str| (1..=dof).flat_map(|i| (1..=dof).map(move |j| format!("{name}{i}_{j}"))).collect();
         match self {
             Self::InverseDynamics => numbered("tau"),
             Self::ForwardDynamics => numbered("ddq"),
             Self::Gravity => numbered("g"),
-            Self::MassMatrix => (1..=dof).flat_map(|i| (1..=dof).map(move |j| format!("M{i}_{j}"))).collect(),
+            Self::MassMatrix => matrix("M"),
+            Self::CoriolisMatrix => matrix("C"),
+            Self::GravityDerivative => matrix("g"),
             Self::Regressor => (1..=dof)
                 .flat_map(|row| {
                     (1..=bodies).flat_map(move |body| INERTIAL_NAMES.map(|name| format!("tau{row}_{name}{body}")))
@@ -107,7 +118,9 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
         let (q, rest) = state.split_at(dof);
         let result = match quantity {
             Quantity::MassMatrix => mass_matrix(model, &mut workspace, q),
+            Quantity::CoriolisMatrix => coriolis_matrix(model, &mut workspace, q, rest),
             Quantity::Gravity => gravity_torque(model, &mut workspace, q),
+            Quantity::GravityDerivative => gravity_torque_derivative(model, &mut workspace, q),
             Quantity::InverseDynamics => inverse_dynamics(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
             Quantity::ForwardDynamics => forward_dynamics(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
             Quantity::Regressor => torque_regressor(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
