@@ -3,8 +3,8 @@
 use super::clock::Report;
 use super::motion::{Motion, STATES};
 use dynident_dynamics::{
-    Workspace, forward_dynamics, forward_dynamics_derivatives, inverse_dynamics, inverse_dynamics_derivatives,
-    mass_matrix, torque_regressor,
+    Workspace, coriolis_matrix, forward_dynamics, forward_dynamics_derivatives, gravity_torque_derivative,
+    inverse_dynamics, inverse_dynamics_derivatives, mass_matrix, torque_regressor,
 };
 use dynident_model::Model;
 use std::hint::black_box;
@@ -30,4 +30,6 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     time("joint_torque_regressor", &mut |w, q, dq, ddq| torque_regressor(model, w, q, dq, ddq)[0]);
     time("aba_derivatives", &mut |w, q, dq, tau| forward_dynamics_derivatives(model, w, q, dq, tau).by_position[0]);
     time("rnea_derivatives", &mut |w, q, dq, ddq| inverse_dynamics_derivatives(model, w, q, dq, ddq).by_position[0]);
+    time("coriolis", &mut |w, q, dq, _| coriolis_matrix(model, w, q, dq)[0]);
+    time("gravity_derivatives", &mut |w, q, _, _| gravity_torque_derivative(model, w, q)[0]);
 }
