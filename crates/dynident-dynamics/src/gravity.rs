@@ -23,8 +23,8 @@ pub fn gravity_torque<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]
 /// The second derivative of the potential energy, so symmetric: the stiffness that gravity adds to a joint's spring, or
 /// takes from it.
 ///
-/// With axes `S` in the base's frame, the inertia `I` of what hangs on a joint, and `a` against gravity, for a joint `i`
-/// on the way to `j`
+/// With axes `S` in the base's frame, the inertia `I` of what hangs on a joint, and `a` against gravity, for a joint
+/// `i` on the way to `j`
 ///
 /// ```text
 /// ∂g_i/∂q_j = S_i · (S_j ×* I_j a + I_j (a × S_j))

@@ -135,8 +135,8 @@ impl JointScores<'_> {
         })
     }
 
-    /// By how much leaving out one segment changes the estimate, for every segment: `R⁻ᵀ w W_gᵀ (I − H_g)⁻¹ w (τ_g − W_g
-    /// θ)`, with the segment's part of the hat matrix `H_g = w² W_g A⁻¹ W_gᵀ`.
+    /// By how much leaving out one segment changes the estimate, for every segment: `R⁻ᵀ w W_gᵀ (I − H_g)⁻¹ w (τ_g −
+    /// W_g θ)`, with the segment's part of the hat matrix `H_g = w² W_g A⁻¹ W_gᵀ`.
     pub(super) fn changes_without(&self) -> Vec<DVector<f64>> {
         // Where a segment alone fixes a direction its own residual there is zero, and so is the quotient; this keeps it
         // from being 0/0.
