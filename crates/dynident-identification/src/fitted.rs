@@ -131,9 +131,10 @@ impl<'a> LagStart<'a> {
     }
 
     /// The start after looks for a common lag beside friction without memory, until there is none that moves
-    /// parameters: lags of single joints are told only beside friction that is chosen whole.
+    /// parameters: lags of single joints are told only beside friction that is chosen whole. `without_lag` is a fit to
+    /// the same recordings.
     fn looked(
-        task: &'a IdentificationTask,
+        (task, without_lag): (&'a IdentificationTask, &Fitted<'a>),
         chosen: &[usize],
         execution: Execution<'a>,
         job: &mut Job<'_, '_>,
@@ -141,8 +142,9 @@ impl<'a> LagStart<'a> {
         let mut settings = task.settings.clone();
         let mut rounds = LagRounds::of(LagCandidates::Common);
         let mut times = StageTimes::default();
-        let known = Known::Look(GridTerms::WithoutMemory);
+        let mut alike = Some(without_lag);
         loop {
+            let known = Known::Look(GridTerms::WithoutMemory, alike.take());
             let mut found = fitted_once((task, &settings), (chosen, known), execution, job)?;
             times = times.and(&found.times);
             if !rounds.again(free_lag(&found, chosen)?.as_ref(), &mut found.estimation.estimate) {
@@ -161,7 +163,7 @@ impl<'a> LagStart<'a> {
         execution: Execution<'a>,
         job: &mut Job<'_, '_>,
     ) -> Result<Self, IdentificationError> {
-        let known = Known::Look(GridTerms::All);
+        let known = Known::Look(GridTerms::All, self.first_look.as_ref());
         let found = fitted_once((task, &self.settings), (chosen, known), execution, job)?;
         let times = self.times.and(&found.times);
         Ok(Self { first_look: Some(found), times, ..self })
@@ -204,7 +206,7 @@ fn best_start<'a>(
             return Ok(LagStart { times, ..none });
         }
     }
-    let mut late = LagStart::looked(task, chosen, execution, job)?;
+    let mut late = LagStart::looked((task, found), chosen, execution, job)?;
     if !is_seen {
         late = late.with_memory(task, chosen, execution, job)?;
     }

@@ -117,8 +117,9 @@ pub(crate) struct Choices {
 #[derive(Clone, Copy)]
 pub(crate) enum Known<'k, 'a> {
     Nothing,
-    /// Nothing, and a lag is still to be found: friction of a grid tells it, of these terms.
-    Look(GridTerms),
+    /// A lag is still to be found: friction of a grid tells it, of these terms. Drives and the cut-off before friction
+    /// are those of a fit to the same recordings with the same lag taken off, where there was one.
+    Look(GridTerms, Option<&'k Fitted<'a>>),
     /// Choices that were made by an excerpt, or with friction of another cut-off.
     Choices(&'k Choices),
     /// A fit to the same recordings with the same lag taken off, which differs only in how its friction was chosen.
@@ -163,7 +164,7 @@ pub(crate) fn fitted_once<'a>(
         },
     };
     let mut found = Estimated { logs, training, estimation, settings: settings.clone() };
-    if matches!(known, Known::Look(_)) {
+    if matches!(known, Known::Look(..)) {
         // What the noise of the positions biases tells no lag, and a later fit is made for it.
         take_estimator(&mut found);
     } else {
@@ -214,7 +215,11 @@ fn chosen_here<'a>(
     (chosen, payloads): (&[usize], &[Payload]),
     (job, known): (&Job<'_, '_>, Known<'_, 'a>),
 ) -> Result<Chosen<'a>, IdentificationError> {
-    let alike = if let Known::Alike(found) = known { Some(found) } else { None };
+    let alike = match known {
+        Known::Alike(found) => Some(found),
+        Known::Look(_, found) => found,
+        Known::Nothing | Known::Choices(_) => None,
+    };
     let (robot, drive_inertia) = match (job.arm(), alike) {
         (Some(_), _) => (robot.clone(), None),
         (None, Some(alike)) => (alike.robot.clone(), alike.drive_inertia.clone()),
@@ -234,7 +239,7 @@ fn chosen_here<'a>(
     } else {
         let places = (chosen, payloads);
         friction_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
-        let (of_friction, friction) = if let Known::Look(terms) = known {
+        let (of_friction, friction) = if let Known::Look(terms, _) = known {
             let logs = logs.clone().with_chosen_cutoff(&settings.motion, friction_hz);
             let found = friction_by_grid((&logs, settings), &robot, places, terms)?;
             let friction = found.as_ref().map_or_else(|| ChosenFriction::as_stated(first), GridFriction::as_chosen);
