@@ -107,4 +107,5 @@ run 0 env DYNIDENT_BENCHMARK='target/debug/dynident-benchmark --only rnea' bench
 run 0 "$venv/bin/python" benchmarks/bench_commands.py "$dynident" "$out/panda_arm7.csv" "$out"
 run 0 "$venv/bin/python" benchmarks/bench_rollout.py robots/ur10.urdf
 run 0 "$venv/bin/python" benchmarks/growth.py "$dynident" target/debug/dynident-benchmark "$out/growth" --logs 1 --joints 2 --only logs identify --out "$out/growth.csv"
+run 0 "$venv/bin/python" benchmarks/generated.py target/debug/dynident-benchmark "$examples/description" "$out/generated" robots/ur10.urdf --rounds 1
 run 0 python3 docs/summaries.py --check
