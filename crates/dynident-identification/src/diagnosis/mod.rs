@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | `motion_rows` | a recording as a few hundred instants |
 //! | `mistake`, `candidates`, `units` | mistakes of studies, and which to try |
-//! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
+//! | `joint_fits`, `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `step_width` | the step of dry friction that the rows have |
 //! | `beside_friction`, `usual_errors` | torque beside friction, drive inertia and offsets; descriptions as they err |
 //! | `reading`, `search` | their sum, and the reading with the best |
@@ -32,6 +32,7 @@ mod explanation;
 mod further_friction;
 mod held_out_logs;
 mod held_out_reading;
+mod joint_fits;
 mod mistake;
 mod motion_rows;
 mod noise_torque;

@@ -155,8 +155,7 @@ fn one_round(
     let all: Vec<Mistake> = candidates(&at.robot, &at.rows, breadth).into_iter().filter(is_new).collect();
     let bounded = |mistake: &Mistake| {
         let corrected = at.without(mistake);
-        let bound = corrected.reading(None).ok()?.lower_bound();
-        (bound <= best.score() - CLEARLY_BETTER).then_some((bound, corrected))
+        corrected.lower_bound_within(best.score() - CLEARLY_BETTER).map(|bound| (bound, corrected))
     };
     let mut left: Vec<(f64, Corrected)> = all.par_iter().filter_map(bounded).collect();
     let gains = gains_of_torques(at, &left);
@@ -235,8 +234,7 @@ fn twin_of_best(
 /// For each joint whose torque some other gain explains better, the gain that does best: a joint whose torque spoils
 /// the others' is not mended by one that is only nearer.
 fn gains_of_torques(at: &Corrected, tried: &[(f64, Corrected)]) -> Vec<Mistake> {
-    let free =
-        |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| reading.free_score);
+    let free = |mistake: &Mistake| at.without(mistake).free_score().unwrap_or(f64::INFINITY);
     let mut nearest: Vec<Option<(f64, Mistake)>> = vec![None; at.robot.dof()];
     for (_, corrected) in tried {
         let Some(mistake @ Mistake::TorqueUnit { joint, .. }) = corrected.mistakes.last() else { continue };

@@ -1,7 +1,7 @@
 //! Is the torque of another moment than the motion? Two recorders that were started by hand, a buffer, a network:
 //! shifts of tenths of seconds, which the lag that a fit takes off by itself does not reach.
 
-use super::explanation::Explanation;
+use super::explanation::{Explanation, free_score};
 use super::mistake::{Channels, Mistake};
 use super::motion_rows::{MotionRows, MotionSamples};
 use super::numbers::least_by_thirds;
@@ -127,8 +127,7 @@ impl<'a> TorqueClock<'a> {
         }
         // By the fit without physical limits, which is cheap.
         let score = |(joints, channels): &(Vec<usize>, Channels), lag_s: f64| {
-            let explained = Explanation::new(robot, &self.rows((joints, *channels), lag_s, INSTANTS), None);
-            explained.map_or(f64::INFINITY, |explained| explained.free_score())
+            free_score(robot, &self.rows((joints, *channels), lag_s, INSTANTS)).unwrap_or(f64::INFINITY)
         };
         let best_of = |group: &(Vec<usize>, Channels)| -> Option<(f64, f64)> {
             let tried: Vec<f64> =
