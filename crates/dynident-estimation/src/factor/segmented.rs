@@ -111,23 +111,12 @@ impl SegmentedFactor {
         })
     }
 
-    /// All rows of a short log as one segment, column by column as in [`TriangularFactor::absorb`]: what values need,
-    /// and little work for those who make many.
-    ///
-    /// # Errors
-    /// As [`TriangularFactor::absorb`].
-    pub fn of_rows(
-        workspace: &mut FactorWorkspace,
-        columns: usize,
-        panel: &[f64],
-        rows: usize,
-    ) -> Result<Self, EstimationError> {
-        let mut factor = TriangularFactor::new(columns);
-        factor.absorb_with(workspace, panel, rows)?;
-        let total = OnceLock::from(factor.clone());
-        let workspace = FactorWorkspace::default();
+    /// The rows of a factor as one segment: all that values need, and little work for those who make many.
+    pub fn of_factor(factor: TriangularFactor) -> Self {
+        let (columns, rows) = (factor.columns(), factor.rows());
+        let (total, workspace) = (OnceLock::from(factor.clone()), FactorWorkspace::default());
         let segments = vec![Segment::Factor(factor)];
-        Ok(Self { columns, max_segments: 2, length_rows: rows.max(1), rows, segments, total, workspace })
+        Self { columns, max_segments: 2, length_rows: rows.max(1), rows, segments, total, workspace }
     }
 
     /// The factor of these segments.

@@ -1,7 +1,7 @@
 //! How well robots explain the torque of some instants: each joint by itself, one robot for all joints, one that is
 //! physically consistent.
 
-use super::joint_fits::{JointFits, panels};
+use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
 use crate::consistent::{ConsistencySettings, consistent_parameters};
 use crate::rows::predicted_torque;
@@ -110,21 +110,6 @@ impl Explanation {
     pub(super) fn alone_score(&self) -> f64 {
         score(&self.alone, &self.torque)
     }
-}
-
-/// [`Explanation::free_score`] alone.
-///
-/// # Errors
-/// Too few rows.
-pub(super) fn free_score(robot: &ParametricModel, rows: &MotionRows) -> Result<f64, EstimationError> {
-    let fits = JointFits::new(robot, rows)?;
-    let (_, free) = fits.one_set()?;
-    Ok(score(&free, &fits.torque))
-}
-
-/// `Σ_j ln(left of joint j / torque of joint j)`, joints without torque aside.
-pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
-    left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
 }
 
 /// The torque that base parameters `theta` predict, one vector for each joint.

@@ -4,9 +4,12 @@
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, torque_of_bodies};
 use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
-use dynident_estimation::{EstimationError, FactorWorkspace, JointRows, LinearProblem, SegmentedFactor};
+use dynident_estimation::{
+    EstimationError, FactorWorkspace, JointRows, LinearProblem, SegmentedFactor, TriangularFactor,
+};
 use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Rounds of weighting; the third changes scores by less than a hundredth.
 const ROUNDS: usize = 3;
@@ -17,12 +20,47 @@ const RIDGE: f64 = 1.0e-10;
 /// be judged by their rounding.
 const FLOOR: f64 = 1.0e-2;
 
+/// A motion with several torques of each joint, for readings that differ in nothing else: one pass over the rows serves
+/// all of them.
+pub(super) struct SharedMotion {
+    panels: Arc<Panels>,
+    /// For each joint its columns, then its torques.
+    factors: Vec<TriangularFactor>,
+}
+
+impl SharedMotion {
+    /// The motion of `rows` with the `torques` that each joint may have, at least one; those of `rows` aside.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(super) fn new<'t>(
+        robot: &ParametricModel,
+        rows: &MotionRows,
+        torques: impl Fn(usize) -> Vec<&'t [f64]>,
+    ) -> Result<Self, EstimationError> {
+        let panels = panels(robot, rows);
+        let mut workspace = FactorWorkspace::default();
+        let mut with_torques = Vec::new();
+        let mut of_joint = |joint: usize| {
+            let (columns, torques) = (robot.layout().joint_columns(joint).len(), torques(joint));
+            with_torques.clear();
+            with_torques.extend_from_slice(&panels.joint(joint)[..columns * rows.len()]);
+            torques.iter().for_each(|torque| with_torques.extend_from_slice(torque));
+            let mut factor = TriangularFactor::new(columns + torques.len() - 1);
+            factor.absorb_with(&mut workspace, &with_torques, rows.len())?;
+            Ok(factor)
+        };
+        let factors = (0..robot.dof()).map(&mut of_joint).collect::<Result<_, EstimationError>>()?;
+        Ok(Self { panels: Arc::new(panels), factors })
+    }
+}
+
 /// The rows of a reading joint by joint. What is left of a torque is a root mean square, Nm (N), with the floor of a
 /// hundredth of the torque.
 pub(super) struct JointFits<'a> {
     robot: &'a ParametricModel,
     rows: &'a MotionRows,
-    panels: Panels,
+    panels: Arc<Panels>,
     /// The rows over the base parameters.
     pub(super) problem: LinearProblem,
     /// Of the torque itself.
@@ -37,19 +75,50 @@ impl<'a> JointFits<'a> {
     /// # Errors
     /// Too few rows.
     pub(super) fn new(robot: &'a ParametricModel, rows: &'a MotionRows) -> Result<Self, EstimationError> {
-        let layout = robot.layout();
-        let samples = rows.len();
         let mut panels = panels(robot, rows);
-        let mut problem = LinearProblem::new(robot.base().expressions(), robot.joint_names());
         let mut workspace = FactorWorkspace::default();
-        let mut alone = Vec::with_capacity(robot.dof());
-        for joint in 0..robot.dof() {
+        let mut of_joint = |joint: usize| {
             panels.torque_mut(joint).copy_from_slice(&rows.tau[joint]);
-            let columns = layout.joint_columns(joint).to_vec();
-            let factor = SegmentedFactor::of_rows(&mut workspace, columns.len(), panels.joint(joint), samples)?;
-            let last = factor.total().entry(columns.len(), columns.len());
-            alone.push(last.abs() / (samples.max(1) as f64).sqrt());
-            problem.add("rows", joint, columns, factor)?;
+            let mut factor = TriangularFactor::new(robot.layout().joint_columns(joint).len());
+            factor.absorb_with(&mut workspace, panels.joint(joint), rows.len())?;
+            Ok(factor)
+        };
+        let factors = (0..robot.dof()).map(&mut of_joint).collect::<Result<_, EstimationError>>()?;
+        Self::of_factors((robot, rows), Arc::new(panels), factors)
+    }
+
+    /// The same for `rows` with the shared motion, where joint `j` has the torque number `chosen[j].0` of those that it
+    /// may have, times `chosen[j].1`.
+    ///
+    /// # Errors
+    /// Torques that are not there.
+    pub(super) fn of_shared(
+        (robot, rows): (&'a ParametricModel, &'a MotionRows),
+        motion: &SharedMotion,
+        chosen: &[(usize, f64)],
+    ) -> Result<Self, EstimationError> {
+        let of_joint = |(factor, (joint, &(torque, times))): (&TriangularFactor, (usize, &(usize, f64)))| {
+            let columns = robot.layout().joint_columns(joint).len();
+            let mut weights = vec![0.0; factor.columns() + 1 - columns];
+            weights[torque] = times;
+            factor.with_torque(columns, &weights)
+        };
+        let factors = motion.factors.iter().zip(chosen.iter().enumerate()).map(of_joint).collect::<Result<_, _>>()?;
+        Self::of_factors((robot, rows), Arc::clone(&motion.panels), factors)
+    }
+
+    fn of_factors(
+        (robot, rows): (&'a ParametricModel, &'a MotionRows),
+        panels: Arc<Panels>,
+        factors: Vec<TriangularFactor>,
+    ) -> Result<Self, EstimationError> {
+        let mut problem = LinearProblem::new(robot.base().expressions(), robot.joint_names());
+        let mut alone = Vec::with_capacity(robot.dof());
+        for (joint, factor) in factors.into_iter().enumerate() {
+            let columns = robot.layout().joint_columns(joint).to_vec();
+            let last = factor.entry(columns.len(), columns.len());
+            alone.push(last.abs() / (rows.len().max(1) as f64).sqrt());
+            problem.add("rows", joint, columns, SegmentedFactor::of_factor(factor))?;
         }
         let torque = residuals(&problem, &vec![0.0; problem.columns().len()], &[])?;
         let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
@@ -108,6 +177,15 @@ impl<'a> JointFits<'a> {
         Ok((theta.as_slice().to_vec(), sigma))
     }
 
+    /// Sum over all joints of the logarithm of what that set leaves beside the torque.
+    ///
+    /// # Errors
+    /// Rows of another robot.
+    pub(super) fn free_score(&self) -> Result<f64, EstimationError> {
+        let (_, free) = self.one_set()?;
+        Ok(score(&free, &self.torque))
+    }
+
     /// What base parameters `theta` leave of each joint's torque.
     ///
     /// # Errors
@@ -132,6 +210,11 @@ pub(super) fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
     let motion = JointMotion { samples: rows.len(), q: &q, dq: &dq, ddq: &ddq };
     regressor_panels(model, &mut BatchWorkspace::new(model), layout, &motion, &mut panels);
     panels
+}
+
+/// `Σ_j ln(left of joint j / torque of joint j)`, joints without torque aside.
+pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
+    left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
 }
 
 /// Root mean square of `τ - W θ` joint by joint, at least the floor beside `torque` where that is given.

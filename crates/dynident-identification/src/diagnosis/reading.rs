@@ -1,8 +1,8 @@
 //! One reading of the samples and what speaks for and against it.
 
 use super::candidates::FAR;
-use super::explanation::{Explanation, free_score, score};
-use super::joint_fits::JointFits;
+use super::explanation::Explanation;
+use super::joint_fits::{JointFits, SharedMotion, score};
 use super::mistake::Mistake;
 use super::motion_rows::MotionRows;
 use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
@@ -148,9 +148,10 @@ impl Corrected {
     }
 
     /// The [least that the score could be](Reading::lower_bound), where that is at most `limit`. Most readings that
-    /// cannot win are told by parameters of each joint's own, before any are found for all joints together.
-    pub(super) fn lower_bound_within(&self, limit: f64) -> Option<f64> {
-        let fits = JointFits::new(&self.robot, &self.rows).ok()?;
+    /// cannot win are told by parameters of each joint's own, before any are found for all joints together. `motion` is that of the
+    /// reading before the last mistake with the torques of all joints for each.
+    pub(super) fn lower_bound_within(&self, limit: f64, motion: &SharedMotion) -> Option<f64> {
+        let fits = self.joint_fits(motion).ok()?;
         let broken = broken(&self.beyond(), self.plausible_rate());
         let nominal_score = score(&fits.left_by_nominal(), &fits.torque);
         let beside_fit = beside_fit(&self.mistakes, nominal_score, self.torque_growth, broken);
@@ -162,9 +163,23 @@ impl Corrected {
         (bound <= limit).then_some(bound)
     }
 
-    /// What one set of base parameters leaves, [as a score](Reading::free_score), without all else.
-    pub(super) fn free_score(&self) -> Result<f64, EstimationError> {
-        free_score(&self.robot, &self.rows)
+    /// What one set of base parameters leaves, [as a score](Reading::free_score), without all else; `motion` as
+    /// [there](Self::lower_bound_within).
+    pub(super) fn free_score(&self, motion: &SharedMotion) -> Result<f64, EstimationError> {
+        self.joint_fits(motion)?.free_score()
+    }
+
+    /// The motion with the torques of all joints for each.
+    pub(super) fn motion(&self) -> Result<SharedMotion, EstimationError> {
+        let torques = |_| self.rows.tau.iter().map(Vec::as_slice).collect();
+        SharedMotion::new(&self.robot, &self.rows, torques)
+    }
+
+    fn joint_fits(&self, motion: &SharedMotion) -> Result<JointFits<'_>, EstimationError> {
+        match self.mistakes.last().and_then(|last| last.torques(self.robot.dof())) {
+            Some(torques) => JointFits::of_shared((&self.robot, &self.rows), motion, &torques),
+            None => JointFits::new(&self.robot, &self.rows),
+        }
     }
 
     fn beyond(&self) -> Vec<BeyondLimit> {

@@ -5,6 +5,7 @@
 //! best are named beside it.
 
 use super::candidates::{Breadth, FAR, candidates};
+use super::joint_fits::SharedMotion;
 use super::mistake::{Channels, Mistake, without_mistakes};
 use super::motion_rows::MotionRows;
 use super::numbers::between_those_tried;
@@ -186,13 +187,14 @@ impl Round {
         let is_new = |mistake: &Mistake| !at.mistakes.contains(mistake);
         // The usual ones stand first.
         let all: Vec<Mistake> = candidates(&at.robot, &at.rows, breadth).into_iter().filter(is_new).collect();
+        let Ok(motion) = at.motion() else { return Self::default() };
         let bounded = |mistake: &Mistake| {
             let corrected = at.without(mistake);
-            corrected.lower_bound_within(best.score() - CLEARLY_BETTER).map(|bound| (bound, corrected))
+            corrected.lower_bound_within(best.score() - CLEARLY_BETTER, &motion).map(|bound| (bound, corrected))
         };
         let mut left = known.left.clone();
         left.extend(all[known.tried..].par_iter().filter_map(bounded).collect::<Vec<_>>());
-        let of_gains: Vec<_> = gains_of_torques(at, &left).par_iter().filter_map(bounded).collect();
+        let of_gains: Vec<_> = gains_of_torques((at, &motion), &left).par_iter().filter_map(bounded).collect();
         let mut can_win: Vec<&(f64, Corrected)> = left.iter().chain(&of_gains).collect();
         can_win.sort_by(|a, b| a.0.total_cmp(&b.0));
         // In batches of fixed size, so that the answer is the same for any number of threads.
@@ -279,8 +281,8 @@ fn twin_of_best(
 
 /// For each joint whose torque some other gain explains better, the gain that does best: a joint whose torque spoils
 /// the others' is not mended by one that is only nearer.
-fn gains_of_torques(at: &Corrected, tried: &[(f64, Corrected)]) -> Vec<Mistake> {
-    let free = |mistake: &Mistake| at.without(mistake).free_score().unwrap_or(f64::INFINITY);
+fn gains_of_torques((at, motion): (&Corrected, &SharedMotion), tried: &[(f64, Corrected)]) -> Vec<Mistake> {
+    let free = |mistake: &Mistake| at.without(mistake).free_score(motion).unwrap_or(f64::INFINITY);
     let mut nearest: Vec<Option<(f64, Mistake)>> = vec![None; at.robot.dof()];
     for (_, corrected) in tried {
         let Some(mistake @ Mistake::TorqueUnit { joint, .. }) = corrected.mistakes.last() else { continue };
