@@ -45,7 +45,9 @@ impl SharedMotion {
             let (columns, torques) = (robot.layout().joint_columns(joint).len(), torques(joint));
             with_torques.clear();
             with_torques.extend_from_slice(&panels.joint(joint)[..columns * rows.len()]);
-            torques.iter().for_each(|torque| with_torques.extend_from_slice(torque));
+            for torque in &torques {
+                with_torques.extend_from_slice(torque);
+            }
             let mut factor = TriangularFactor::new(columns + torques.len() - 1);
             factor.absorb_with(&mut workspace, &with_torques, rows.len())?;
             Ok(factor)
@@ -138,30 +140,26 @@ impl<'a> JointFits<'a> {
         let mut theta = DVector::zeros(count);
         // What stands in the normal equations of each joint: weighted anew in every round, where triangles would have
         // to be merged anew. The ridge is far above their rounding.
-        let squares = |equation: &JointRows| {
-            let total = equation.factor.total();
-            let triangle = total.regressor_triangle();
-            (triangle.tr_mul(&triangle), triangle.tr_mul(&total.rotated_torque()))
-        };
         let squares: Vec<_> = problem.equations().iter().map(squares).collect();
         for _ in 0..ROUNDS {
+            // On and below the diagonal, which is all that is read of it.
             let (mut gram, mut right) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
             for (equation, (own_gram, own_right)) in problem.equations().iter().zip(&squares) {
                 let sigma = sigma[equation.joint];
                 let weight = if sigma > 0.0 { sigma.recip().powi(2) } else { 0.0 };
                 for (k, &column) in equation.columns.iter().enumerate() {
                     right[column] += weight * own_right[k];
-                    for (l, &row) in equation.columns.iter().enumerate() {
-                        gram[(row, column)] += weight * own_gram[(l, k)];
+                    for (&row, own) in equation.columns[k..].iter().zip(&own_gram[k]) {
+                        gram[(row.max(column), row.min(column))] += weight * own;
                     }
                 }
             }
             let norms: Vec<f64> = (0..count).map(|k| gram[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
             for k in 0..count {
                 right[k] /= norms[k];
-                for l in 0..count {
+                for (entry, norm) in gram.as_mut_slice()[k * count..][k..count].iter_mut().zip(&norms[k..]) {
                     // One by one: the product of two that are not excited would be zero.
-                    gram[(l, k)] = gram[(l, k)] / norms[l] / norms[k];
+                    *entry = *entry / norm / norms[k];
                 }
             }
             for k in 0..gram.nrows() {
@@ -215,6 +213,23 @@ pub(super) fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
 /// `Σ_j ln(left of joint j / torque of joint j)`, joints without torque aside.
 pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
     left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
+}
+
+/// Of one joint's rows the columns of `WᵀW` from the diagonal on, and `Wᵀτ`.
+fn squares(equation: &JointRows) -> (Vec<Vec<f64>>, DVector<f64>) {
+    let total = equation.factor.total();
+    let triangle = total.regressor_triangle();
+    let count = triangle.ncols();
+    let mut gram: Vec<Vec<f64>> = (0..count).map(|column| vec![0.0; count - column]).collect();
+    let mut row = vec![0.0; count];
+    for r in 0..count {
+        row[r..].iter_mut().enumerate().for_each(|(k, entry)| *entry = triangle[(r, r + k)]);
+        for column in r..count {
+            let sums = gram[column].iter_mut().zip(&row[column..]);
+            sums.for_each(|(sum, entry)| *sum += row[column] * entry);
+        }
+    }
+    (gram, triangle.tr_mul(&total.rotated_torque()))
 }
 
 /// Root mean square of `τ - W θ` joint by joint, at least the floor beside `torque` where that is given.

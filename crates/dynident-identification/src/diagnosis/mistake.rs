@@ -183,7 +183,9 @@ impl Mistake {
         let mut torques: Vec<(usize, f64)> = (0..joints).map(|joint| (joint, 1.0)).collect();
         match self {
             Self::Sign { joints, channels: Channels::Torque } => {
-                joints.iter().for_each(|&joint| torques[joint].1 = -1.0);
+                for &joint in joints {
+                    torques[joint].1 = -1.0;
+                }
             }
             Self::Order { order, channels: Channels::Torque } => {
                 torques.iter_mut().zip(order).for_each(|(torque, &from)| torque.0 = from);

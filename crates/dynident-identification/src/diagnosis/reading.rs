@@ -148,8 +148,8 @@ impl Corrected {
     }
 
     /// The [least that the score could be](Reading::lower_bound), where that is at most `limit`. Most readings that
-    /// cannot win are told by parameters of each joint's own, before any are found for all joints together. `motion` is that of the
-    /// reading before the last mistake with the torques of all joints for each.
+    /// cannot win are told by parameters of each joint's own, before any are found for all joints together. `motion` is
+    /// that of the reading before the last mistake with the torques of all joints for each.
     pub(super) fn lower_bound_within(&self, limit: f64, motion: &SharedMotion) -> Option<f64> {
         let fits = self.joint_fits(motion).ok()?;
         let broken = broken(&self.beyond(), self.plausible_rate());
