@@ -111,6 +111,14 @@ impl SegmentedFactor {
         })
     }
 
+    /// The rows of a factor as one segment: all that values need, and little work for those who make many.
+    pub fn of_factor(factor: TriangularFactor) -> Self {
+        let (columns, rows) = (factor.columns(), factor.rows());
+        let (total, workspace) = (OnceLock::from(factor.clone()), FactorWorkspace::default());
+        let segments = vec![Segment::Factor(factor)];
+        Self { columns, max_segments: 2, length_rows: rows.max(1), rows, segments, total, workspace }
+    }
+
     /// The factor of these segments.
     pub(super) fn of_segments(
         (columns, rows): (usize, usize),

@@ -310,6 +310,37 @@ impl TriangularFactor {
         Ok(scaled)
     }
 
+    /// The factor of the same rows with the first `columns` columns and, as torque, the sum of those behind them, each
+    /// times its weight: many torques of one motion from one pass over its rows.
+    ///
+    /// ```
+    /// use dynident_estimation::TriangularFactor;
+    /// // One column w = 1, 2, 2 and two torques, of which the second is taken twice.
+    /// let both = TriangularFactor::from_rows(2, &[1.0, 2.0, 2.0, 0.0, 3.0, 1.0, 2.0, 4.0, 7.0], 3)?;
+    /// let second = both.with_torque(1, &[0.0, 2.0])?;
+    /// assert!((second.residual_sum_of_squares(&[4.0])? - 36.0).abs() < 1e-12);
+    /// # Ok::<(), dynident_estimation::EstimationError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] unless there is one weight for each column behind the first ones.
+    pub fn with_torque(&self, columns: usize, weights: &[f64]) -> Result<Self, EstimationError> {
+        expect("weights of the columns of a torque", (self.columns + 1).saturating_sub(columns), weights.len())?;
+        let torque = |row: usize| {
+            let behind = self.row(row).iter().rev().zip(weights.iter().rev());
+            behind.map(|(entry, weight)| entry * weight).sum::<f64>()
+        };
+        // Below the columns that are kept the torque is all there is.
+        let below = (columns..=self.columns).map(|row| torque(row).powi(2)).sum::<f64>().sqrt();
+        let mut triangle = Vec::with_capacity(row_start(columns + 1, columns + 1));
+        for row in 0..columns {
+            triangle.extend_from_slice(&self.row(row)[..columns - row]);
+            triangle.push(torque(row));
+        }
+        triangle.push(below);
+        Ok(Self { columns, rows: self.rows, triangle })
+    }
+
     /// `‖τ − Wθ‖²` over all rows absorbed.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 //! friction, a description with usual errors, and bodies of placeholders, which another rate makes up for.
 
 use super::error::DiagnosisError;
-use super::explanation::score;
+use super::joint_fits::score;
 use super::mistake::{Mistake, without_mistakes};
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, nominal_torque};

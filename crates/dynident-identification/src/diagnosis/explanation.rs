@@ -1,22 +1,13 @@
 //! How well robots explain the torque of some instants: each joint by itself, one robot for all joints, one that is
 //! physically consistent.
 
+use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
-use super::nominal::{left_by_nominal, nominal_torque};
 use crate::consistent::{ConsistencySettings, consistent_parameters};
 use crate::rows::predicted_torque;
-use dynident_dynamics::{BatchWorkspace, Column, Panels, ParametricModel, regressor_panels};
-use dynident_estimation::{EstimationError, LinearProblem, SegmentSettings, SegmentedFactor};
-use dynident_model::terms::JointMotion;
-use nalgebra::{DMatrix, DVector};
+use dynident_dynamics::{Column, ParametricModel};
+use dynident_estimation::EstimationError;
 
-/// Rounds of weighting; the third changes scores by less than a hundredth.
-const ROUNDS: usize = 3;
-/// Added to columns of unit length: what is not excited stays at zero.
-const RIDGE: f64 = 1.0e-10;
-/// What is left of a joint's torque counts as nothing below this share of it: noise-free simulations would otherwise
-/// be judged by their rounding.
-const FLOOR: f64 = 1.0e-2;
 /// Independent instants to one of a joint's own parameters below which these follow the noise, and whatever friction
 /// and elasticity the model has no term for.
 const TELLING: f64 = 2.0;
@@ -55,28 +46,22 @@ impl Explanation {
         rows: &MotionRows,
         consistency: Option<&ConsistencySettings>,
     ) -> Result<Self, EstimationError> {
-        let (problem, alone) = problem(robot, rows)?;
-        let theta = solved(&problem)?;
-        let torque = residuals(&problem, &vec![0.0; theta.len()], &[])?;
-        let free = residuals(&problem, &theta, &torque)?;
-        let fit = consistency.and_then(|settings| consistent_parameters(robot, &problem, &free, settings).ok());
+        let fits = JointFits::new(robot, rows)?;
+        let (free_parameters, free) = fits.one_set()?;
+        let fit = consistency.and_then(|settings| consistent_parameters(robot, &fits.problem, &free, settings).ok());
         let consistent_parameters = fit.map(|fit| fit.base_values).unwrap_or_default();
-        let consistent = if consistent_parameters.is_empty() {
-            Vec::new()
-        } else {
-            residuals(&problem, &consistent_parameters, &torque)?
-        };
-        let alone = alone.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
+        let consistent =
+            if consistent_parameters.is_empty() { Vec::new() } else { fits.left_by(&consistent_parameters)? };
+        let nominal = fits.left_by_nominal();
         let of_own = |joint: usize| rows.independent / robot.layout().joint_columns(joint).len().max(1) as f64;
         let independent_of_own = (0..robot.dof()).map(of_own).collect();
-        let nominal = nominal_torque(robot, rows).map_or_else(Vec::new, |torque| left_by_nominal(robot, rows, &torque));
-        let nominal = nominal.iter().zip(&torque).map(|(left, torque)| left.max(FLOOR * torque)).collect();
+        let JointFits { torque, alone, .. } = fits;
         Ok(Self {
             torque,
             alone,
             independent_of_own,
             free,
-            free_parameters: theta,
+            free_parameters,
             consistent,
             consistent_parameters,
             nominal,
@@ -127,60 +112,6 @@ impl Explanation {
     }
 }
 
-/// `Σ_j ln(left of joint j / torque of joint j)`, joints without torque aside.
-pub(super) fn score(left: &[f64], torque: &[f64]) -> f64 {
-    left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
-}
-
-/// Base parameters by weighted least squares, joints weighted by what is left of their torque: what
-/// [`weighted_least_squares`](dynident_estimation::weighted_least_squares) finds, without its covariance and its
-/// account of what is excited, which a comparison of readings does not need.
-fn solved(problem: &LinearProblem) -> Result<Vec<f64>, EstimationError> {
-    let torque = residuals(problem, &vec![0.0; problem.columns().len()], &[])?;
-    let mut sigma = torque.clone();
-    let count = problem.columns().len();
-    let mut theta = DVector::zeros(count);
-    // What stands in the normal equations of each joint: weighted anew in every round, where triangles would have to be
-    // merged anew. The ridge is far above their rounding.
-    let squares = |equation: &dynident_estimation::JointRows| {
-        let total = equation.factor.total();
-        let triangle = total.regressor_triangle();
-        (triangle.tr_mul(&triangle), triangle.tr_mul(&total.rotated_torque()))
-    };
-    let squares: Vec<_> = problem.equations().iter().map(squares).collect();
-    for _ in 0..ROUNDS {
-        let (mut gram, mut right) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
-        for (equation, (own_gram, own_right)) in problem.equations().iter().zip(&squares) {
-            let sigma = sigma[equation.joint];
-            let weight = if sigma > 0.0 { sigma.recip().powi(2) } else { 0.0 };
-            for (k, &column) in equation.columns.iter().enumerate() {
-                right[column] += weight * own_right[k];
-                for (l, &row) in equation.columns.iter().enumerate() {
-                    gram[(row, column)] += weight * own_gram[(l, k)];
-                }
-            }
-        }
-        let norms: Vec<f64> = (0..count).map(|k| gram[(k, k)].sqrt().max(f64::MIN_POSITIVE)).collect();
-        for k in 0..count {
-            right[k] /= norms[k];
-            for l in 0..count {
-                // One by one: the product of two that are not excited would be zero.
-                gram[(l, k)] = gram[(l, k)] / norms[l] / norms[k];
-            }
-        }
-        for k in 0..gram.nrows() {
-            gram[(k, k)] += RIDGE;
-        }
-        let Some(cholesky) = gram.cholesky() else { break };
-        theta = cholesky.solve(&right);
-        for (value, norm) in theta.iter_mut().zip(&norms) {
-            *value /= norm;
-        }
-        sigma = residuals(problem, theta.as_slice(), &torque)?;
-    }
-    Ok(theta.as_slice().to_vec())
-}
-
 /// The torque that base parameters `theta` predict, one vector for each joint.
 pub(super) fn predicted(robot: &ParametricModel, rows: &MotionRows, theta: &[f64]) -> Vec<Vec<f64>> {
     let panels = panels(robot, rows);
@@ -203,48 +134,4 @@ pub(super) fn without_terms(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> 
         .zip(theta)
         .map(|(column, value)| if of_body(column) { *value } else { 0.0 })
         .collect()
-}
-
-fn panels(robot: &ParametricModel, rows: &MotionRows) -> Panels {
-    let (model, layout) = (robot.model(), robot.layout());
-    let (q, dq, ddq) = (rows.q.concat(), rows.dq.concat(), rows.ddq.concat());
-    let mut panels = Panels::default();
-    let motion = JointMotion { samples: rows.len(), q: &q, dq: &dq, ddq: &ddq };
-    regressor_panels(model, &mut BatchWorkspace::new(model), layout, &motion, &mut panels);
-    panels
-}
-
-/// The rows as a problem over the base parameters, and what parameters of each joint's own leave of its torque.
-fn problem(robot: &ParametricModel, rows: &MotionRows) -> Result<(LinearProblem, Vec<f64>), EstimationError> {
-    let (model, layout) = (robot.model(), robot.layout());
-    let samples = rows.len();
-    let mut panels = panels(robot, rows);
-    let mut problem = LinearProblem::new(robot.base().expressions(), robot.joint_names());
-    let mut alone = Vec::with_capacity(model.dof());
-    for joint in 0..model.dof() {
-        panels.torque_mut(joint).copy_from_slice(&rows.tau[joint]);
-        let columns = layout.joint_columns(joint).to_vec();
-        let mut factor = SegmentedFactor::new(
-            columns.len(),
-            SegmentSettings { max_segments: 2, first_length_rows: samples.max(1) },
-        )?;
-        factor.absorb(panels.joint(joint), samples)?;
-        // What follows asks for its triangle again and again.
-        let factor = factor.as_one_segment();
-        let total = factor.total();
-        alone.push(total.entry(columns.len(), columns.len()).abs() / (samples.max(1) as f64).sqrt());
-        problem.add("rows", joint, columns, factor)?;
-    }
-    Ok((problem, alone))
-}
-
-/// Root mean square of `τ - W θ` joint by joint, at least the floor beside `torque` where that is given.
-fn residuals(problem: &LinearProblem, theta: &[f64], torque: &[f64]) -> Result<Vec<f64>, EstimationError> {
-    let one = |equation: &dynident_estimation::JointRows| {
-        let own: Vec<f64> = equation.columns.iter().map(|&column| theta[column]).collect();
-        let factor = equation.factor.total();
-        let left = (factor.residual_sum_of_squares(&own)? / factor.rows().max(1) as f64).sqrt();
-        Ok(left.max(torque.get(equation.joint).map_or(0.0, |torque| FLOOR * torque)))
-    };
-    problem.equations().iter().map(one).collect()
 }

@@ -177,6 +177,35 @@ impl Mistake {
         }
     }
 
+    /// Where a mistake is of nothing but single torques of `joints` joints: for each joint the one whose torque it gets
+    /// if the mistake is corrected, and times what.
+    pub(super) fn torques(&self, joints: usize) -> Option<Vec<(usize, f64)>> {
+        let mut torques: Vec<(usize, f64)> = (0..joints).map(|joint| (joint, 1.0)).collect();
+        match self {
+            Self::Sign { joints, channels: Channels::Torque } => {
+                for &joint in joints {
+                    torques[joint].1 = -1.0;
+                }
+            }
+            Self::Order { order, channels: Channels::Torque } => {
+                torques.iter_mut().zip(order).for_each(|(torque, &from)| torque.0 = from);
+            }
+            Self::TorqueUnit { joint, factor } => torques[*joint].1 = *factor,
+            Self::Sign { .. }
+            | Self::Order { .. }
+            | Self::Offset { .. }
+            | Self::PositionUnit { .. }
+            | Self::Coupled { .. }
+            | Self::TimeUnit { .. }
+            | Self::Lag { .. }
+            | Self::Convention { .. }
+            | Self::Length { .. }
+            | Self::Compensated
+            | Self::Gravity { .. } => return None,
+        }
+        Some(torques)
+    }
+
     /// The motion of a robot as it was if this mistake was made. What the torque was at another moment is not among the
     /// instants: of a lag they are chosen anew.
     pub fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> MotionRows {

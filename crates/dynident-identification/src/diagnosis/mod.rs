@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | `motion_rows` | a recording as a few hundred instants |
 //! | `mistake`, `candidates`, `units` | mistakes of studies, and which to try |
-//! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
+//! | `joint_fits`, `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `step_width` | the step of dry friction that the rows have |
 //! | `beside_friction`, `usual_errors` | torque beside friction, drive inertia and offsets; descriptions as they err |
 //! | `reading`, `search` | their sum, and the reading with the best |
@@ -32,6 +32,7 @@ mod explanation;
 mod further_friction;
 mod held_out_logs;
 mod held_out_reading;
+mod joint_fits;
 mod mistake;
 mod motion_rows;
 mod noise_torque;
@@ -68,7 +69,6 @@ use crate::left_to_the_logs::with_drives_left_to_the_logs;
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
-use candidates::Breadth;
 use dynident_dynamics::ParametricModel;
 use dynident_model::Model;
 use dynident_recording::ImportReport;
@@ -181,14 +181,12 @@ fn diagnosed(
     let as_read = as_written.reading(Some(&consistency))?;
     let taken_off_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
     let taken_off_s: Vec<f64> = (0..robot.dof()).map(taken_off_s).collect();
-    let searches = |as_written: &Reading, start: (Corrected, Reading)| {
-        let usual = search::search(as_written.clone(), start.clone(), &consistency, Breadth::Usual);
-        (usual, search::search(as_written.clone(), start, &consistency, Breadth::All))
-    };
+    let searches =
+        |as_written: &Reading, start: (Corrected, Reading)| search::searches(as_written, &start, &consistency);
     // A torque of another moment hides every other mistake, and another mistake may look like one.
     let clock = TorqueClock::new(&robot, &samples, taken_off_s.clone());
     let shifted = clock.and_then(|clock| clock.reading(&robot, &as_read, &consistency, INSTANTS));
-    let (mut search, further) = match shifted {
+    let [mut search, further] = match shifted {
         // A fit takes it off by itself.
         Some(late) if late.corrected.mistakes.is_empty() => {
             rows.clone_from(&late.corrected.rows);
@@ -198,7 +196,7 @@ fn diagnosed(
         Some(late) => {
             let in_time = searches(&as_read, (as_written, as_read.clone()));
             // Half a turn of a motion that repeats looks like another sign: the lag has to explain clearly more.
-            let believed = in_time.1.believed();
+            let believed = in_time[1].believed();
             let gain = as_read.score() - believed.score();
             let leaves_less = late.reading.left_of_all < LEAVES_LESS * believed.left_of_all;
             if leaves_less && late.gain > gain + CLEARLY_BETTER {

@@ -2,14 +2,32 @@
 
 use super::beside_friction::step_of;
 use super::motion_rows::MotionRows;
-use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
+use crate::rows::predicted_torque;
+use dynident_dynamics::{Panels, ParametricModel, Workspace, inverse_dynamics};
 use dynident_model::terms::CoulombShape;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// The torque of the nominal bodies, one vector for each joint, Nm (N); `None` while a body's inertials are unknown.
 pub(super) fn nominal_torque(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<Vec<f64>>> {
     robot.nominal_base()?;
     Some(torque_of(robot, rows, |[q, dq, ddq]| [q, dq, ddq]))
+}
+
+/// The same from the regressor's columns of the rows, where these are known.
+pub(super) fn torque_of_bodies(robot: &ParametricModel, panels: &Panels) -> Option<Vec<Vec<f64>>> {
+    robot.nominal_base()?;
+    let mut parameters = robot.model().parameter_vector();
+    parameters.resize(robot.nominal().len(), 0.0);
+    let mut theta = robot.base().values(&parameters);
+    // Further columns are of terms.
+    theta.resize(robot.layout().columns().len(), 0.0);
+    let of_joint = |joint: usize| {
+        let mut torque = Vec::new();
+        let columns = robot.layout().joint_columns(joint);
+        predicted_torque(panels.joint(joint), panels.samples(), columns, &theta, &mut torque);
+        torque
+    };
+    Some((0..robot.dof()).map(of_joint).collect())
 }
 
 /// The torque that holds the nominal bodies against gravity, one vector for each joint, Nm (N); zeros while a body's
@@ -50,30 +68,35 @@ pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nomina
 /// Root mean square of `tau` beside an offset and friction of at least zero.
 fn left_by_friction((dq, step): (&[f64], CoulombShape), tau: &[f64]) -> f64 {
     let count = tau.len();
-    let column = |which: usize, row: usize| match which {
-        0 => 1.0,
-        1 => dq[row],
-        _ => step.step(dq[row]),
-    };
-    let tau = DVector::from_column_slice(tau);
+    let columns = [vec![1.0; count], dq.to_vec(), dq.iter().map(|&dq| step.step(dq)).collect()];
+    let gram = Matrix3::from_fn(|k, l| dot(&columns[k], &columns[l]));
+    let right = Vector3::from_fn(|k, _| dot(&columns[k], tau));
     let mut kept = vec![0, 1, 2];
     loop {
-        let matrix = DMatrix::from_fn(count, kept.len(), |row, k| column(kept[k], row));
-        let gram = matrix.transpose() * &matrix;
-        let solution = gram.cholesky().map(|factor| factor.solve(&(matrix.transpose() * &tau)));
-        let Some(solution) = solution else {
+        let own_gram = DMatrix::from_fn(kept.len(), kept.len(), |k, l| gram[(kept[k], kept[l])]);
+        let own_right = DVector::from_fn(kept.len(), |k, _| right[kept[k]]);
+        let Some(solution) = own_gram.cholesky().map(|factor| factor.solve(&own_right)) else {
             if kept.len() > 1 {
                 kept.pop();
                 continue;
             }
-            return tau.norm() / (count.max(1) as f64).sqrt();
+            return (dot(tau, tau) / count.max(1) as f64).sqrt();
         };
         // Friction that would drive the joint is none.
         let negative =
             (1..kept.len()).filter(|&k| solution[k] < 0.0).min_by(|&a, &b| solution[a].total_cmp(&solution[b]));
-        match negative {
-            Some(k) => drop(kept.remove(k)),
-            None => return (&tau - &matrix * solution).norm() / (count.max(1) as f64).sqrt(),
+        if let Some(k) = negative {
+            kept.remove(k);
+            continue;
         }
+        let mut left = tau.to_vec();
+        for (value, &column) in solution.iter().zip(&kept) {
+            left.iter_mut().zip(&columns[column]).for_each(|(left, x)| *left -= value * x);
+        }
+        return (dot(&left, &left) / count.max(1) as f64).sqrt();
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -2,6 +2,7 @@
 
 use super::candidates::FAR;
 use super::explanation::Explanation;
+use super::joint_fits::{JointFits, SharedMotion, score};
 use super::mistake::Mistake;
 use super::motion_rows::MotionRows;
 use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
@@ -95,14 +96,23 @@ impl Reading {
     }
 
     fn beside_fit(&self) -> f64 {
-        let rarity: f64 = self.mistakes.iter().map(Mistake::rarity).sum();
-        NOMINAL_WEIGHT * self.nominal_score + (1.0 + NOMINAL_WEIGHT) * self.torque_growth + self.broken() + rarity
+        beside_fit(&self.mistakes, self.nominal_score, self.torque_growth, self.broken())
     }
 
     /// What its broken limits cost.
     fn broken(&self) -> f64 {
-        LIMIT_COST * (self.beyond.len() + usize::from(!self.plausible_rate)) as f64
+        broken(&self.beyond, self.plausible_rate)
     }
+}
+
+/// What speaks for a reading and against it beside the fit of a robot.
+fn beside_fit(mistakes: &[Mistake], nominal_score: f64, torque_growth: f64, broken: f64) -> f64 {
+    let rarity: f64 = mistakes.iter().map(Mistake::rarity).sum();
+    NOMINAL_WEIGHT * nominal_score + (1.0 + NOMINAL_WEIGHT) * torque_growth + broken + rarity
+}
+
+fn broken(beyond: &[BeyondLimit], plausible_rate: bool) -> f64 {
+    LIMIT_COST * (beyond.len() + usize::from(!plausible_rate)) as f64
 }
 
 /// The robot and the rows of a reading, for going on from it.
@@ -137,6 +147,49 @@ impl Corrected {
         Self { robot, rows, mistakes, torque_growth: self.torque_growth + growth }
     }
 
+    /// The [least that the score could be](Reading::lower_bound), where that is at most `limit`. Most readings that
+    /// cannot win are told by parameters of each joint's own, before any are found for all joints together. `motion` is
+    /// that of the reading before the last mistake with the torques of all joints for each.
+    pub(super) fn lower_bound_within(&self, limit: f64, motion: &SharedMotion) -> Option<f64> {
+        let fits = self.joint_fits(motion).ok()?;
+        let broken = broken(&self.beyond(), self.plausible_rate());
+        let nominal_score = score(&fits.left_by_nominal(), &fits.torque);
+        let beside_fit = beside_fit(&self.mistakes, nominal_score, self.torque_growth, broken);
+        if score(&fits.alone, &fits.torque) + beside_fit > limit {
+            return None;
+        }
+        let (_, free) = fits.one_set().ok()?;
+        let bound = score(&free, &fits.torque) + beside_fit;
+        (bound <= limit).then_some(bound)
+    }
+
+    /// What one set of base parameters leaves, [as a score](Reading::free_score), without all else; `motion` as
+    /// [there](Self::lower_bound_within).
+    pub(super) fn free_score(&self, motion: &SharedMotion) -> Result<f64, EstimationError> {
+        self.joint_fits(motion)?.free_score()
+    }
+
+    /// The motion with the torques of all joints for each.
+    pub(super) fn motion(&self) -> Result<SharedMotion, EstimationError> {
+        let torques = |_| self.rows.tau.iter().map(Vec::as_slice).collect();
+        SharedMotion::new(&self.robot, &self.rows, torques)
+    }
+
+    fn joint_fits(&self, motion: &SharedMotion) -> Result<JointFits<'_>, EstimationError> {
+        match self.mistakes.last().and_then(|last| last.torques(self.robot.dof())) {
+            Some(torques) => JointFits::of_shared((&self.robot, &self.rows), motion, &torques),
+            None => JointFits::new(&self.robot, &self.rows),
+        }
+    }
+
+    fn beyond(&self) -> Vec<BeyondLimit> {
+        beyond_limits(self.robot.model(), &self.rows)
+    }
+
+    fn plausible_rate(&self) -> bool {
+        is_rate_of_a_recorder(self.robot.model(), self.rows.rate_hz)
+    }
+
     /// What speaks for it and against it; without a consistent robot where `consistency` is not given.
     pub(super) fn reading(&self, consistency: Option<&ConsistencySettings>) -> Result<Reading, EstimationError> {
         let explained = Explanation::new(&self.robot, &self.rows, consistency)?;
@@ -155,8 +208,8 @@ impl Corrected {
             own_parameters_tell: explained.own_parameters_tell(),
             margin: explained.margin(),
             left_of_all: if all > 0.0 { left_of_all / all } else { 0.0 },
-            beyond: beyond_limits(self.robot.model(), &self.rows),
-            plausible_rate: is_rate_of_a_recorder(self.robot.model(), self.rows.rate_hz),
+            beyond: self.beyond(),
+            plausible_rate: self.plausible_rate(),
             consistent_score: explained.consistent_score(),
             free_score: explained.free_score(),
             alone_score: explained.alone_score(),

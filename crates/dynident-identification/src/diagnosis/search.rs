@@ -5,6 +5,7 @@
 //! best are named beside it.
 
 use super::candidates::{Breadth, FAR, candidates};
+use super::joint_fits::SharedMotion;
 use super::mistake::{Channels, Mistake, without_mistakes};
 use super::motion_rows::MotionRows;
 use super::numbers::between_those_tried;
@@ -68,10 +69,24 @@ pub(super) fn rough_consistency(settings: Option<&ConsistencySettings>) -> Consi
     ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known }
 }
 
-/// Looks for mistakes behind the reading `start` of a study that reads `as_written`, as rare ones as `breadth` says.
-pub(super) fn search(
+/// Looks for mistakes behind the reading `start` of a study that reads `as_written`: for those that people often make,
+/// and for rarer ones beside them.
+pub(super) fn searches(
+    as_written: &Reading,
+    start: &(Corrected, Reading),
+    consistency: &ConsistencySettings,
+) -> [Search; 2] {
+    let usual = Round::new((&start.0, &start.1), consistency, Breadth::Usual, &Round::default());
+    let all = Round::new((&start.0, &start.1), consistency, Breadth::All, &usual);
+    [(usual, Breadth::Usual), (all, Breadth::All)]
+        .map(|(first, breadth)| search(as_written.clone(), start.clone(), first, consistency, breadth))
+}
+
+/// Goes on from the round `first` of one more mistake behind `start`, as far as `breadth` says.
+fn search(
     as_written: Reading,
     start: (Corrected, Reading),
+    first: Round,
     consistency: &ConsistencySettings,
     breadth: Breadth,
 ) -> Search {
@@ -79,9 +94,12 @@ pub(super) fn search(
     let (mut at, mut best) = start;
     let (mut alike, mut tried): (Vec<Reading>, usize) = (Vec::new(), 0);
     let mut runners_up: Vec<(Corrected, Reading)> = Vec::new();
+    let mut first = Some(first);
     for round in 0..MOST_MISTAKES {
-        let (fitted, count) = one_round((&at, &best), consistency, breadth);
-        tried += count;
+        let next = || Round::new((&at, &best), consistency, breadth, &Round::default());
+        let of_round = first.take().unwrap_or_else(next);
+        tried += of_round.tried;
+        let fitted = of_round.winners((&at, &best), consistency);
         let Some((first, rest)) = fitted.split_first() else { break };
         // A second mistake is rarer than the first.
         if first.1.score() > best.score() - CLEARLY_BETTER * (made + round + 1) as f64 {
@@ -92,9 +110,10 @@ pub(super) fn search(
         let mut first = first.clone();
         if round == 1 {
             for (start, reading) in &runners_up {
-                let (further, count) = one_round((start, reading), consistency, breadth);
-                tried += count;
-                if let Some(pair) = further.into_iter().next().filter(|pair| pair.1.score() < first.1.score()) {
+                let further = Round::new((start, reading), consistency, breadth, &Round::default());
+                tried += further.tried;
+                let winners = further.winners((start, reading), consistency);
+                if let Some(pair) = winners.into_iter().next().filter(|pair| pair.1.score() < first.1.score()) {
                     first = pair;
                 }
             }
@@ -145,46 +164,74 @@ fn before_last(reached: &(Corrected, Reading), at: &Corrected, others: &[(Correc
     other.map_or_else(|| at.clone(), |(other, _)| other.clone())
 }
 
-/// The readings with one more mistake corrected that can win, best first, and how many were tried.
-fn one_round(
-    (at, best): (&Corrected, &Reading),
-    consistency: &ConsistencySettings,
-    breadth: Breadth,
-) -> (Vec<(Corrected, Reading)>, usize) {
-    let is_new = |mistake: &Mistake| !at.mistakes.contains(mistake);
-    let all: Vec<Mistake> = candidates(&at.robot, &at.rows, breadth).into_iter().filter(is_new).collect();
-    let bounded = |mistake: &Mistake| {
-        let corrected = at.without(mistake);
-        let bound = corrected.reading(None).ok()?.lower_bound();
-        (bound <= best.score() - CLEARLY_BETTER).then_some((bound, corrected))
-    };
-    let mut left: Vec<(f64, Corrected)> = all.par_iter().filter_map(bounded).collect();
-    let gains = gains_of_torques(at, &left);
-    left.extend(gains.par_iter().filter_map(bounded).collect::<Vec<_>>());
-    left.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // In batches of fixed size, so that the answer is the same for any number of threads.
-    let mut fitted: Vec<(Corrected, Reading)> = Vec::new();
-    let mut least = f64::INFINITY;
-    for batch in left.chunks(4) {
-        if batch[0].0 > least + ALIKE {
-            break;
-        }
-        let fit = |(_, corrected): &(f64, Corrected)| {
-            corrected.reading(Some(consistency)).ok().map(|reading| (corrected.clone(), reading))
+/// Readings with one more mistake corrected.
+#[derive(Default)]
+struct Round {
+    /// How many were tried.
+    tried: usize,
+    /// Those that can win by what is known of them without a consistent robot, each with the least that its score can
+    /// be.
+    left: Vec<(f64, Corrected)>,
+    /// Of these, and of gains between those tried, the ones that a consistent robot was found for.
+    fitted: Vec<(Corrected, Reading)>,
+}
+
+impl Round {
+    /// The readings behind the reading `best` of `at`, from what is `known` of the usual ones among them.
+    fn new(
+        (at, best): (&Corrected, &Reading),
+        consistency: &ConsistencySettings,
+        breadth: Breadth,
+        known: &Self,
+    ) -> Self {
+        let is_new = |mistake: &Mistake| !at.mistakes.contains(mistake);
+        // The usual ones stand first.
+        let all: Vec<Mistake> = candidates(&at.robot, &at.rows, breadth).into_iter().filter(is_new).collect();
+        let Ok(motion) = at.motion() else { return Self::default() };
+        let bounded = |mistake: &Mistake| {
+            let corrected = at.without(mistake);
+            corrected.lower_bound_within(best.score() - CLEARLY_BETTER, &motion).map(|bound| (bound, corrected))
         };
-        fitted.extend(batch.par_iter().filter_map(fit).collect::<Vec<_>>());
-        least = fitted.iter().map(|(_, reading)| reading.score()).fold(least, f64::min);
+        let mut left = known.left.clone();
+        left.extend(all[known.tried..].par_iter().filter_map(bounded).collect::<Vec<_>>());
+        let of_gains: Vec<_> = gains_of_torques((at, &motion), &left).par_iter().filter_map(bounded).collect();
+        let mut can_win: Vec<&(f64, Corrected)> = left.iter().chain(&of_gains).collect();
+        can_win.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // In batches of fixed size, so that the answer is the same for any number of threads.
+        let mut fitted: Vec<(Corrected, Reading)> = Vec::new();
+        let mut least = f64::INFINITY;
+        for batch in can_win.chunks(4) {
+            if batch[0].0 > least + ALIKE {
+                break;
+            }
+            let fit = |(_, corrected): &&(f64, Corrected)| {
+                let as_known = known.fitted.iter().find(|(fitted, _)| fitted.mistakes == corrected.mistakes);
+                let reading = || Some((corrected.clone(), corrected.reading(Some(consistency)).ok()?));
+                as_known.cloned().or_else(reading)
+            };
+            fitted.extend(batch.par_iter().filter_map(fit).collect::<Vec<_>>());
+            least = fitted.iter().map(|(_, reading)| reading.score()).fold(least, f64::min);
+        }
+        Self { tried: all.len(), left, fitted }
     }
-    fitted.extend(twin_of_best(&fitted, at, consistency));
-    // What explains a weak joint at the cost of the strong ones explains the wrong thing.
-    fitted.retain(|(_, reading)| {
-        reading.left_of_all <= NO_WORSE * best.left_of_all
-            && !sacrifices(reading, best)
-            && explains_its_joint(reading, best)
-    });
-    fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
-    likelier_sign_first(&mut fitted);
-    (fitted, all.len())
+
+    /// Those that explain the samples without harm to any joint, best first.
+    fn winners(
+        mut self,
+        (at, best): (&Corrected, &Reading),
+        consistency: &ConsistencySettings,
+    ) -> Vec<(Corrected, Reading)> {
+        self.fitted.extend(twin_of_best(&self.fitted, at, consistency));
+        // What explains a weak joint at the cost of the strong ones explains the wrong thing.
+        self.fitted.retain(|(_, reading)| {
+            reading.left_of_all <= NO_WORSE * best.left_of_all
+                && !sacrifices(reading, best)
+                && explains_its_joint(reading, best)
+        });
+        self.fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
+        likelier_sign_first(&mut self.fitted);
+        self.fitted
+    }
 }
 
 /// Whether two readings are of the same joints, one of positions and the other of torques: what tells them apart is as
@@ -234,9 +281,8 @@ fn twin_of_best(
 
 /// For each joint whose torque some other gain explains better, the gain that does best: a joint whose torque spoils
 /// the others' is not mended by one that is only nearer.
-fn gains_of_torques(at: &Corrected, tried: &[(f64, Corrected)]) -> Vec<Mistake> {
-    let free =
-        |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| reading.free_score);
+fn gains_of_torques((at, motion): (&Corrected, &SharedMotion), tried: &[(f64, Corrected)]) -> Vec<Mistake> {
+    let free = |mistake: &Mistake| at.without(mistake).free_score(motion).unwrap_or(f64::INFINITY);
     let mut nearest: Vec<Option<(f64, Mistake)>> = vec![None; at.robot.dof()];
     for (_, corrected) in tried {
         let Some(mistake @ Mistake::TorqueUnit { joint, .. }) = corrected.mistakes.last() else { continue };

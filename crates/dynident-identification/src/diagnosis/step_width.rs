@@ -3,7 +3,7 @@
 //! A motion that is read slower than it was has its steps nearer to zero velocity, so another rate would get the credit
 //! for a step that is only wider than the study's. The width is no mistake of a study: identification chooses it.
 
-use super::explanation::Explanation;
+use super::joint_fits::JointFits;
 use super::motion_rows::MotionRows;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
@@ -16,15 +16,14 @@ const NEAR: [[f64; 2]; 2] = [[0.77, 1.3], [0.88, 1.14]];
 /// Share of what is left of a joint's torque that another width leaves at most: less is its noise.
 const CLEARLY_LESS: f64 = 0.9;
 
-/// The robot with the widths of smooth steps at which one set of parameters ([`Explanation::free`]) leaves least of
+/// The robot with the widths of smooth steps at which one set of parameters ([`JointFits::one_set`]) leaves least of
 /// each joint's torque; those in force where no other leaves clearly less. Parameters of each joint's own would follow
 /// a wrong step.
 ///
 /// # Errors
 /// Too few rows.
 pub(super) fn with_steps_of(robot: &ParametricModel, rows: &MotionRows) -> Result<ParametricModel, EstimationError> {
-    let mut least: Vec<f64> =
-        Explanation::new(robot, rows, None)?.free.iter().map(|left| CLEARLY_LESS * left).collect();
+    let mut least: Vec<f64> = left_by_one_set(robot, rows)?.iter().map(|left| CLEARLY_LESS * left).collect();
     let mut times = vec![1.0; robot.dof()];
     let first: Vec<Vec<f64>> = TIMES.iter().map(|factor| vec![*factor; robot.dof()]).collect();
     narrow_down(robot, rows, &first, (&mut least, &mut times))?;
@@ -39,6 +38,11 @@ pub(super) fn with_steps_of(robot: &ParametricModel, rows: &MotionRows) -> Resul
     Ok(with_widths(robot, &times).unwrap_or_else(|| robot.clone()))
 }
 
+fn left_by_one_set(robot: &ParametricModel, rows: &MotionRows) -> Result<Vec<f64>, EstimationError> {
+    let (_, left) = JointFits::new(robot, rows)?.one_set()?;
+    Ok(left)
+}
+
 /// Takes for each joint whose torque some of these widths leave less of than any before its own.
 fn narrow_down(
     robot: &ParametricModel,
@@ -46,9 +50,7 @@ fn narrow_down(
     tried: &[Vec<f64>],
     (least, times): (&mut [f64], &mut [f64]),
 ) -> Result<(), EstimationError> {
-    let left = |times: &Vec<f64>| {
-        with_widths(robot, times).map(|other| Ok(Explanation::new(&other, rows, None)?.free)).transpose()
-    };
+    let left = |times: &Vec<f64>| with_widths(robot, times).map(|other| left_by_one_set(&other, rows)).transpose();
     let all: Vec<Option<Vec<f64>>> = tried.par_iter().map(left).collect::<Result<_, EstimationError>>()?;
     for (tried, left) in tried.iter().zip(all).filter_map(|(tried, left)| Some((tried, left?))) {
         for joint in 0..left.len() {

@@ -2,6 +2,7 @@
 //! shifts of tenths of seconds, which the lag that a fit takes off by itself does not reach.
 
 use super::explanation::Explanation;
+use super::joint_fits::{JointFits, SharedMotion};
 use super::mistake::{Channels, Mistake};
 use super::motion_rows::{MotionRows, MotionSamples};
 use super::numbers::least_by_thirds;
@@ -127,15 +128,30 @@ impl<'a> TorqueClock<'a> {
         }
         // By the fit without physical limits, which is cheap.
         let score = |(joints, channels): &(Vec<usize>, Channels), lag_s: f64| {
-            let explained = Explanation::new(robot, &self.rows((joints, *channels), lag_s, INSTANTS), None);
-            explained.map_or(f64::INFINITY, |explained| explained.free_score())
+            let rows = self.rows((joints, *channels), lag_s, INSTANTS);
+            JointFits::new(robot, &rows).and_then(|fits| fits.free_score()).unwrap_or(f64::INFINITY)
+        };
+        let lags_s: Vec<f64> = self.lags_s().collect();
+        let late: Vec<MotionRows> =
+            lags_s.iter().map(|&lag_s| self.rows((&all, Channels::Torque), lag_s, INSTANTS)).collect();
+        // Other moments of the torque are torques of one motion.
+        let torques = |joint: usize| [&rows].into_iter().chain(&late).map(|rows| &rows.tau[joint][..]).collect();
+        let motion = SharedMotion::new(robot, &rows, torques).ok()?;
+        let score_of_tried = |group: &(Vec<usize>, Channels), lag: usize| {
+            if group.1 != Channels::Torque {
+                return score(group, lags_s[lag]);
+            }
+            let chosen: Vec<(usize, f64)> =
+                all.iter().map(|joint| (if group.0.contains(joint) { 1 + lag } else { 0 }, 1.0)).collect();
+            let fits = JointFits::of_shared((robot, &rows), &motion, &chosen);
+            fits.and_then(|fits| fits.free_score()).unwrap_or(f64::INFINITY)
         };
         let best_of = |group: &(Vec<usize>, Channels)| -> Option<(f64, f64)> {
-            let tried: Vec<f64> =
-                self.lags_s().filter(|lag_s| group.0.len() > 1 || lag_s.abs() <= self.alone_s).collect();
-            let scores: Vec<f64> = tried.par_iter().map(|&lag_s| score(group, lag_s)).collect();
+            let is_near = |lag: &usize| group.0.len() > 1 || lags_s[*lag].abs() <= self.alone_s;
+            let tried: Vec<usize> = (0..lags_s.len()).filter(is_near).collect();
+            let scores: Vec<f64> = tried.par_iter().map(|&lag| score_of_tried(group, lag)).collect();
             let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
-            Some((tried[best], scores[best]))
+            Some((lags_s[tried[best]], scores[best]))
         };
         let found = groups.iter().filter_map(|group| best_of(group).map(|(lag_s, score)| (group, lag_s, score)));
         let (group, lag_s, least) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
