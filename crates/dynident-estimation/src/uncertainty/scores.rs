@@ -68,8 +68,7 @@ impl<'a> Scores<'a> {
             }
             let information = (total.regressor_triangle() * &local_inverse * weight).norm_squared();
             let theta = rows.local(&fit.solution.values);
-            let whitened = |score: &DVector<f64>| local_inverse.tr_mul(score) * (weight * weight);
-            let scores = rows.factor.scores(&theta)?.iter().map(whitened).collect();
+            let scores = whitened(&local_inverse, &rows.factor.scores(&theta)?, weight * weight);
             Ok(JointScores { rows, weight, theta, local_inverse, scores, information, segments: OnceLock::new() })
         });
         Ok(Self { joints: joints.collect::<Result<_, EstimationError>>()?, free, inverse, place })
@@ -151,9 +150,10 @@ impl JointScores<'_> {
             let left = DMatrix::identity(rest.len(), rest.len()) * (1.0 + ALONE) - &half * half.transpose();
             // Positive definite but for rounding: the segment is a part of the total, which is one here.
             let without = left.cholesky().map_or_else(|| rest.clone(), |factor| factor.solve(&rest));
-            self.local_inverse.tr_mul(&regressor.tr_mul(&without)) * self.weight
+            regressor.tr_mul(&without)
         };
-        self.segments().iter().map(change).collect()
+        let changes: Vec<DVector<f64>> = self.segments().iter().map(change).collect();
+        whitened(&self.local_inverse, &changes, self.weight)
     }
 
     /// For every segment its share in the variance of every free column under white noise, `‖w W_g A⁻¹‖²` column by
@@ -166,6 +166,13 @@ impl JointScores<'_> {
         };
         self.segments().iter().map(share).collect()
     }
+}
+
+/// `R⁻ᵀ` times vectors over the columns of one joint's rows, times a number: all at once.
+fn whitened(local_inverse: &DMatrix<f64>, vectors: &[DVector<f64>], times: f64) -> Vec<DVector<f64>> {
+    let stacked = DMatrix::from_fn(local_inverse.nrows(), vectors.len(), |row, g| vectors[g][row]);
+    let product = local_inverse.transpose() * stacked * times;
+    product.column_iter().map(nalgebra::Matrix::into_owned).collect()
 }
 
 /// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
