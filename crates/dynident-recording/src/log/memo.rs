@@ -21,8 +21,9 @@ struct About {
 }
 
 impl Log {
-    /// What `find` finds of this log, read with or without its outliers; not asked again while neither the description
-    /// nor the file changes. Of clones that are described alike it is found once for all.
+    /// What `find` finds of this log's times, positions and torques, read with or without outliers; not asked again
+    /// while neither the file nor their description changes. Of clones that are described alike it is found once for
+    /// all.
     ///
     /// # Errors
     /// Those of `find`, which is asked again then.
@@ -33,7 +34,7 @@ impl Log {
     ) -> Result<Arc<T>, E> {
         let file = self.source.path().and_then(|path| path.metadata().ok());
         let about = About {
-            format: self.format.clone(),
+            format: LogFormat { velocity: None, acceleration: None, ..self.format.clone() },
             joints: self.joints.clone(),
             keep_outliers,
             file: file.map(|data| (data.len(), data.modified().ok())),
@@ -64,7 +65,10 @@ mod tests {
             [of(&log, true, 1), of(&log.clone(), true, 2), of(&log, false, 3), of(&log, false, 4)],
             [1, 1, 3, 3]
         );
+        // Read beside positions and torques, or not.
+        log.format.velocity = Some(log.format.position.clone());
+        assert_eq!(of(&log, false, 5), 3);
         log.format.bridge_gaps = !log.format.bridge_gaps;
-        assert_eq!([of(&log, false, 5), of(&log, false, 6)], [5, 5]);
+        assert_eq!([of(&log, false, 6), of(&log, false, 7)], [6, 6]);
     }
 }
