@@ -68,16 +68,20 @@ pub fn forward_dynamics_derivatives<'w>(
     inverse_dynamics_derivatives(model, workspace, q, dq, &acceleration);
     workspace.acceleration = acceleration;
     let is_coupled = model.coupling().is_some();
-    let Workspace { level, dof, parents, matrices, inverse, acceleration, .. } = workspace;
-    let [by_position, by_velocity, mass] = matrices;
+    let Workspace { level, dof, parents, matrices, acceleration_derivatives, acceleration, .. } = workspace;
+    // Solutions couple joints of different branches, where the matrices keep zeros.
+    let [torque_by_position, torque_by_velocity, mass] = matrices;
+    let [by_position, by_velocity, by_torque] = acceleration_derivatives;
+    by_position.copy_from_slice(torque_by_position);
+    by_velocity.copy_from_slice(torque_by_velocity);
+    by_torque.fill(0.0);
+    by_torque.iter_mut().step_by(*dof + 1).for_each(|diagonal| *diagonal = 1.0);
     let before = |joint: usize| if is_coupled { joint.checked_sub(1) } else { parents[joint] };
-    inverse.fill(0.0);
-    inverse.iter_mut().step_by(*dof + 1).for_each(|diagonal| *diagonal = 1.0);
-    dispatch_single(*level, Solve { dof: *dof, before, mass, right: [by_position, by_velocity, inverse] });
+    dispatch_single(*level, Solve { dof: *dof, before, mass, right: [by_position, by_velocity, by_torque] });
     for value in by_position.iter_mut().chain(by_velocity.iter_mut()) {
         *value = -*value;
     }
-    ForwardDynamicsDerivatives { acceleration, by_position, by_velocity, by_torque: inverse }
+    ForwardDynamicsDerivatives { acceleration, by_position, by_velocity, by_torque }
 }
 
 /// Takes a mass matrix apart, and solves for three matrices at once.

@@ -165,9 +165,10 @@ pub struct Workspace {
     pub(crate) parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
     pub(crate) vector: Vec<f64>,
+    /// Entries of joints on different branches are zero, and no algorithm writes them.
     pub(crate) matrices: [Vec<f64>; 3],
-    /// For derivatives of the forward dynamics, which need the other matrices on their way.
-    pub(crate) inverse: Vec<f64>,
+    /// Derivatives of the forward dynamics, which have all entries.
+    pub(crate) acceleration_derivatives: [Vec<f64>; 3],
     pub(crate) acceleration: Vec<f64>,
     pub(crate) regressor: Vec<f64>,
     pub(crate) placements: Vec<Transform>,
@@ -192,7 +193,7 @@ impl Workspace {
             scratch: dispatch_single(level, MakeScratch(model)),
             vector: vec![0.0; dof],
             matrices: core::array::from_fn(|_| vec![0.0; dof * dof]),
-            inverse: vec![0.0; dof * dof],
+            acceleration_derivatives: core::array::from_fn(|_| vec![0.0; dof * dof]),
             acceleration: vec![0.0; dof],
             regressor: vec![0.0; dof * bodies * 10],
             placements: vec![Transform::IDENTITY; bodies],

@@ -262,6 +262,38 @@ fn gravity_torque_is_the_slope_of_potential_energy() {
     }
 }
 
+/// Joints on different branches of a tree have entries that no algorithm writes: what another one left there would
+/// stay.
+#[test]
+fn a_workspace_keeps_nothing_of_one_algorithm_for_another() {
+    type Quantity = fn(&Model, &mut Workspace, &[f64], &[f64], &[f64]) -> Vec<f64>;
+    let quantities: [Quantity; 7] = [
+        |model, ws, q, dq, ddq| {
+            let found = forward_dynamics_derivatives(model, ws, q, dq, ddq);
+            [found.by_position, found.by_velocity, found.by_torque].concat()
+        },
+        |model, ws, q, dq, ddq| {
+            let found = inverse_dynamics_derivatives(model, ws, q, dq, ddq);
+            [found.by_position, found.by_velocity, found.by_acceleration].concat()
+        },
+        |model, ws, q, _, _| mass_matrix(model, ws, q).to_vec(),
+        |model, ws, q, dq, _| mass_matrix_and_bias(model, ws, q, dq).0.to_vec(),
+        |model, ws, q, dq, _| coriolis_matrix(model, ws, q, dq).to_vec(),
+        |model, ws, q, _, _| gravity_torque_derivative(model, ws, q).to_vec(),
+        |model, ws, q, dq, ddq| forward_dynamics(model, ws, q, dq, ddq).to_vec(),
+    ];
+    for Case { model, q, dq, ddq } in cases() {
+        let mut used = Workspace::new(&model);
+        for before in quantities {
+            for quantity in quantities {
+                before(&model, &mut used, &dq, &q, &ddq);
+                let fresh = quantity(&model, &mut Workspace::new(&model), &q, &dq, &ddq);
+                assert_eq!(quantity(&model, &mut used, &q, &dq, &ddq), fresh);
+            }
+        }
+    }
+}
+
 #[test]
 fn coriolis_matrix_and_gravity_derivative_are_parts_of_the_derivatives_of_the_torque() {
     for Case { model, q, dq, ddq } in cases() {
