@@ -285,9 +285,7 @@ impl SegmentedFactor {
     /// The same rows as one segment: all that values need, and little work for those who solve again and again.
     #[must_use]
     pub fn as_one_segment(&self) -> Self {
-        let segments = vec![Segment::Factor(self.total().clone())];
-        let (total, workspace) = (self.total.clone(), FactorWorkspace::default());
-        Self { segments, length_rows: self.rows.max(1), total, workspace, ..*self }
+        Self { max_segments: self.max_segments, ..Self::of_factor(self.total().clone()) }
     }
 
     /// The same columns and segments without their rows, for another pass over the same log.

@@ -37,7 +37,9 @@ struct LastPass {
 struct ConstantsPass {
     wide: RegressorModel,
     factors: Vec<LogFactors>,
-    /// The rows without the columns beside them, each log's as one segment.
+    /// The same rows, each log's as one segment.
+    merged: Vec<LogFactors>,
+    /// Those without the columns beside them.
     problem: LinearProblem,
     fit: Estimate,
 }
@@ -60,8 +62,7 @@ impl ConstantsPass {
         centre: (&FrictionConstants, &RegressorModel),
         gains: &[usize],
     ) -> Result<ConstantsStep, IdentificationError> {
-        let factors: Vec<LogFactors> = self.factors.iter().map(LogFactors::as_one_segment).collect();
-        self.step_by(passes, centre, gains, (&factors, &without_bars(passes.settings)))
+        self.step_by(passes, centre, gains, (&self.merged, &without_bars(passes.settings)))
     }
 
     fn step_by(
@@ -368,10 +369,11 @@ impl TrainingPasses<'_> {
     ) -> Result<ConstantsPass, IdentificationError> {
         let wide = with_terms(model, constants.neighbours().into_iter());
         let factors = self.read(&wide)?;
-        let own = factors.iter().map(|log| log.as_one_segment().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
+        let merged: Vec<LogFactors> = factors.iter().map(LogFactors::as_one_segment).collect();
+        let own = merged.iter().map(|log| log.clone().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
         let problem = self.stated_problem(model, &self.columns(model)?, &own)?;
         let fit = plain_estimate(&without_bars(self.settings), &problem)?;
-        Ok(ConstantsPass { wide, factors, problem, fit })
+        Ok(ConstantsPass { wide, factors, merged, problem, fit })
     }
 }
 
