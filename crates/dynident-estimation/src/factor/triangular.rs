@@ -323,9 +323,15 @@ impl TriangularFactor {
     /// ```
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless there is one weight for each column behind the first ones.
+    /// [`EstimationError::Mismatch`] unless there is one weight for each column behind the first ones, and at least
+    /// one; [`EstimationError::Setting`] for one that is not finite.
     pub fn with_torque(&self, columns: usize, weights: &[f64]) -> Result<Self, EstimationError> {
-        expect("weights of the columns of a torque", (self.columns + 1).saturating_sub(columns), weights.len())?;
+        let given = columns.saturating_add(weights.len());
+        expect("columns and weights of those behind them", self.columns + 1, given)?;
+        expect("columns before the torques, at most", self.columns.min(columns), columns)?;
+        for &weight in weights {
+            require(weight.is_finite(), "weight of a torque", weight, "give a finite number")?;
+        }
         let torque = |row: usize| {
             let behind = self.row(row).iter().rev().zip(weights.iter().rev());
             behind.map(|(entry, weight)| entry * weight).sum::<f64>()

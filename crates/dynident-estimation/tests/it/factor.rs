@@ -337,3 +337,30 @@ fn a_sample_with_a_number_that_is_none_is_refused_whole() {
     assert!(RecursiveFactor::new(3, &[0]).start_from(&before).is_err());
     assert!(!RecursiveFactor::new(3, &[0]).solve(&mut [0.0; 3]));
 }
+
+#[test]
+fn torques_of_one_motion_come_from_one_factor() {
+    let mut random = Random::new(31);
+    let (columns, torques, count) = (4, 3, 60);
+    let all = rows(&mut random, count, columns + torques - 1);
+    let of = |matrix: &DMatrix<f64>| {
+        TriangularFactor::from_rows(matrix.ncols() - 1, matrix.as_slice(), matrix.nrows()).unwrap()
+    };
+    let both = of(&all);
+    for weights in [[0.0, 1.0, 0.0], [2.0, -0.5, 3.0], [0.0; 3]] {
+        let mut wanted = all.columns(0, columns + 1).into_owned();
+        wanted.set_column(columns, &(all.columns(columns, torques) * nalgebra::Vector3::from(weights)));
+        let found = both.with_torque(columns, &weights).unwrap();
+        assert_eq!((found.rows(), found.columns()), (count, columns));
+        assert!(gram_difference(&triangle(&found), &wanted) < TOLERANCE, "{weights:?}");
+    }
+    for (columns, weights) in
+        [(4, &[1.0; 2][..]), (5, &[1.0; 3]), (6, &[1.0]), (7, &[]), (9, &[]), (usize::MAX, &[1.0])]
+    {
+        let is_possible = columns == 6;
+        let found = both.with_torque(columns, weights);
+        assert_eq!(found.is_ok(), is_possible, "{columns} {weights:?}");
+    }
+    let found = both.with_torque(columns, &[1.0, f64::NAN, 0.0]);
+    assert!(matches!(found, Err(EstimationError::Setting { .. })));
+}
