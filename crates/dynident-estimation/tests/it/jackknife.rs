@@ -78,3 +78,22 @@ fn intervals_hold_where_segments_are_few() {
     assert!(share(inside) >= 0.92 && share(inside) <= 0.99, "jackknife {}", share(inside));
     assert!(share(inside_own) < share(inside), "own residuals {}", share(inside_own));
 }
+
+/// Rows that say nothing, in some segments and in all.
+#[test]
+fn segments_and_columns_without_motion_are_no_trouble() {
+    let mut random = Random::new(5);
+    let moving = rows(&mut random, 120, 0.5);
+    let still = |row: &Vec<f64>| [vec![0.0; COLUMNS], vec![0.1 * row[COLUMNS]]].concat();
+    for length in [4, 30] {
+        // The second half stands still.
+        let half: Vec<Vec<f64>> =
+            moving.iter().enumerate().map(|(t, row)| if t < 60 { row.clone() } else { still(row) }).collect();
+        let found = fit(&half, length, CovarianceMethod::Jackknife);
+        assert!(found.std.iter().all(|std| std.is_finite() && *std > 0.0), "{:?}", found.std);
+        let none: Vec<Vec<f64>> = moving.iter().map(still).collect();
+        let found = fit(&none, length, CovarianceMethod::Jackknife);
+        assert_eq!(found.std, [0.0; COLUMNS], "nothing is estimated");
+        assert_eq!(found.rank.fixed.len(), COLUMNS);
+    }
+}
