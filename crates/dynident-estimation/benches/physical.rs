@@ -2,8 +2,7 @@
 //! problems. Prints one line per case.
 //! `cargo bench -p dynident-estimation --bench physical`
 //!
-//! With `-- --intervals` it prints the time of a fit in the intervals of 7 bodies, of which each begins near the one
-//! before.
+//! With `-- --intervals` it prints the time of one interval of 7 bodies, of which each end is a program of its own.
 //!
 //! With `-- --problems FIRST LAST [--both-routes]` it prints the random problems of the tests as JSON lines instead,
 //! each with the answers found here, for `benchmarks/bench_lmi.py`.

@@ -10,6 +10,7 @@ use super::{PhysicalError, PhysicalSettings};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// A program with what its variables and constraints stand for.
+#[derive(Clone, Debug)]
 pub(super) struct AssembledProgram {
     pub(super) program: Program,
     /// Names of the constraints by label.
@@ -88,6 +89,15 @@ impl AssembledProgram {
 
     /// A constraint on standard parameters as one on variables, of unit length.
     fn row(&self, problem: &PhysicalProblem, entries: &[(usize, f64)], offset: f64, label: usize) -> Row {
+        let found = self.functional(problem, entries);
+        let length = found.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
+        let scale = if length > 0.0 { 1.0 / length } else { 1.0 };
+        let entries = found.into_iter().map(|(column, value)| (column, value * scale)).collect();
+        Row { entries, offset: offset * scale, label }
+    }
+
+    /// Coefficients of standard parameters as those of variables; known bodies have none.
+    pub(super) fn functional(&self, problem: &PhysicalProblem, entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
         let bodies = problem.bodies.len();
         let mut by_body: Vec<(usize, [f64; 10])> = Vec::new();
         let mut found = Vec::new();
@@ -110,10 +120,7 @@ impl AssembledProgram {
             }
         }
         found.retain(|&(_, value)| value != 0.0);
-        let length = found.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
-        let scale = if length > 0.0 { 1.0 / length } else { 1.0 };
-        let entries = found.into_iter().map(|(column, value)| (column, value * scale)).collect();
-        Row { entries, offset: offset * scale, label }
+        found
     }
 
     /// Standard parameters of a point.

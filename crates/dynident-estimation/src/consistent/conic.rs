@@ -58,6 +58,9 @@ pub(super) struct Program {
     pub(super) variables: usize,
     pub(super) data: DMatrix<f64>,
     pub(super) target: DVector<f64>,
+    /// What the data's half squares may be: they are a constraint then, and no part of f. Its pair of slack and
+    /// multiplier stands behind those of the rows.
+    pub(super) data_limit: Option<f64>,
     pub(super) local: Vec<LocalSquares>,
     pub(super) linear: DVector<f64>,
     pub(super) blocks: Vec<Block>,
@@ -76,6 +79,8 @@ pub(super) struct Multipliers {
 pub(super) struct Certificate {
     /// `‖∇f − Σ Mᵀ Z − Σ a z‖_∞` over one plus the largest of its terms.
     pub(super) stationarity: f64,
+    /// The same imbalance itself.
+    pub(super) imbalance: f64,
     /// The duality gap over `1 + |f|`: what the objective can still fall at most, when `stationarity` is zero.
     pub(super) gap: f64,
     /// f(x).
@@ -86,6 +91,11 @@ impl Certificate {
     /// The larger of both.
     pub(super) fn residual(&self) -> f64 {
         self.stationarity.max(self.gap)
+    }
+
+    /// The duality gap itself.
+    pub(super) fn absolute_gap(&self) -> f64 {
+        self.gap * (1.0 + self.objective.abs())
     }
 }
 
@@ -134,6 +144,7 @@ impl Program {
             variables,
             data: DMatrix::zeros(0, variables),
             target: DVector::zeros(0),
+            data_limit: None,
             local: Vec::new(),
             linear: DVector::zeros(variables),
             blocks: Vec::new(),
@@ -143,10 +154,7 @@ impl Program {
 
     /// Gradient of the smooth part (without `−ln det`), and the largest magnitude of the terms that it is a sum of.
     pub(super) fn gradient(&self, x: &Precise) -> (DVector<f64>, f64) {
-        let mut data = DVector::zeros(self.variables);
-        if self.data.nrows() > 0 {
-            data.gemv_tr(-1.0, &self.data, x.data_rest(&self.data, &self.target), 0.0);
-        }
+        let data = if self.data_limit.is_some() { DVector::zeros(self.variables) } else { -self.data_slope(x) };
         let x = &x.high;
         let mut largest = data.amax().max(self.linear.amax());
         let mut gradient = data + &self.linear;
@@ -160,9 +168,23 @@ impl Program {
         (gradient, largest)
     }
 
+    /// `Aᵀ (b − A x)`: how fast the data's half squares fall.
+    pub(super) fn data_slope(&self, x: &Precise) -> DVector<f64> {
+        let mut slope = DVector::zeros(self.variables);
+        if self.data.nrows() > 0 {
+            slope.gemv_tr(1.0, &self.data, x.data_rest(&self.data, &self.target), 0.0);
+        }
+        slope
+    }
+
+    /// `½‖A x − b‖²`.
+    pub(super) fn data_squares(&self, x: &Precise) -> f64 {
+        0.5 * x.data_rest(&self.data, &self.target).norm_squared()
+    }
+
     /// The squares and linear terms of f.
     pub(super) fn smooth_objective(&self, x: &Precise) -> f64 {
-        let data = 0.5 * x.data_rest(&self.data, &self.target).norm_squared();
+        let data = if self.data_limit.is_some() { 0.0 } else { self.data_squares(x) };
         let x = &x.high;
         let local = |term: &LocalSquares| {
             0.5 * (&term.matrix * x.rows(term.first, term.matrix.ncols()) - &term.target).norm_squared()
@@ -206,10 +228,16 @@ impl Program {
             row.add_to(z, &mut forces);
             gap += s * z;
         }
+        if self.data_limit.is_some() {
+            let (s, z) = (slacks.rows.last()?, multipliers.rows.last()?);
+            forces.axpy(*z, &self.data_slope(x), 1.0);
+            gap += s * z;
+        }
         largest = largest.max(forces.amax());
         residual -= forces;
         let certificate = Certificate {
             stationarity: residual.amax() / (1.0 + largest),
+            imbalance: residual.amax(),
             gap: gap / (1.0 + objective.abs()),
             objective,
         };

@@ -138,30 +138,23 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
     Ok(finished(problem, settings, &assembled, &solved))
 }
 
-/// As [`physical_fit`], from where the fit of a problem with the same bodies, scalars and limits was on its way
-/// (`before`), and what is on the way of this one. The optimum is the same, by the same certificate; where the fit does
-/// not end there from `before`, it begins as any other.
-pub(super) fn physical_fit_near(
+/// As [`physical_fit`], with what is on the way of the interior point, whatever the route.
+pub(super) fn physical_fit_on_the_way(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
-    before: Option<&OnTheWay>,
 ) -> Result<(PhysicalFit, Option<OnTheWay>), PhysicalError> {
-    if settings.route != PhysicalRoute::InteriorPoint {
-        return Ok((physical_fit(problem, settings)?, None));
-    }
+    settings.validate()?;
     let assembled = AssembledProgram::new(problem, settings);
+    let start = assembled.interior_start(problem)?;
     let limits = (settings.tolerance, settings.max_iterations);
-    let from = |start| interior_point_on_the_way(&assembled.program, start, limits);
-    let is_solved = |found: &(InteriorPointResult, _)| found.0.ending == Ending::Solved;
-    let mut found = before.and_then(|before| from(Err(before))).filter(is_solved);
-    if found.is_none() {
-        settings.validate()?;
-        found = from(Ok(assembled.interior_start(problem)?)).filter(is_solved);
-    }
-    match found {
-        Some((solved, kept)) => Ok((finished(problem, settings, &assembled, &solved), kept)),
-        None => Ok((physical_fit(problem, settings)?, None)),
-    }
+    let found = interior_point_on_the_way(&assembled.program, start, limits);
+    let fit = match &found {
+        Some((solved, _)) if settings.route == PhysicalRoute::InteriorPoint && solved.ending == Ending::Solved => {
+            finished(problem, settings, &assembled, solved)
+        }
+        _ => physical_fit(problem, settings)?,
+    };
+    Ok((fit, found.map(|(_, on_the_way)| on_the_way)))
 }
 
 /// The interior point, and where it stalls short of the tolerance (2 of 1,000 problems with a prior against data of a

@@ -13,6 +13,10 @@
 //! masses of 1e6 references keep their digits, which neither S nor Z could hold. An entropic prior is a pair that stays
 //! at its own weight γ from the beginning; it keeps no other barrier's place.
 
+mod data_limit;
+
+pub(super) use data_limit::{Look, OnTheWay, Seen, interior_point_on_the_way, interior_point_within_limit};
+
 use super::cone::Scaling;
 use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
 use super::coordinates::{Vector10, matrix_of, vector_of};
@@ -55,15 +59,11 @@ const CENTRE_BELOW: f64 = 0.1;
 /// is left of the start's imbalance holds them back like a weight on their trace.
 const HOLD_BELOW: f64 = 0.3;
 
+/// How far the imbalance alone may drive a point then, beside the room that the barrier leaves.
+const LARGEST_DRIVE: f64 = 0.3;
+
 /// μ stops where the gap is this share of the tolerance.
 const LEAST_GAP: f64 = 0.7;
-
-/// The certificate at which a solution on its way is kept for programs like this one: of 0.01 to 1 the one with which
-/// the fits of intervals took the least time (36 iterations from their own start, 13 from there), and ended there
-/// nearly always.
-const KEPT_BELOW: f64 = 0.2;
-/// Most iterations from there: an optimum that is farther away is found sooner from a start of its own.
-const MOST_ON_THE_WAY: usize = 60;
 
 /// Solves the program from a point strictly inside; none when `start` is not.
 pub(super) fn interior_point(
@@ -86,38 +86,6 @@ pub(super) fn interior_point_until(
     from_state(program, State::new(program, start)?, limits, &mut |state, now| enough(&state.x.high, now))
 }
 
-/// A point and multipliers well inside the cones, on the way to the optimum of a program: where another begins that has
-/// the same variables, blocks and rows and other squares. It need not come from far outside then, and its own optimum
-/// is not so near that it would be stuck at this one's boundary (Gondzio, Math. Programming 83 (1998) 125).
-#[derive(Clone, Debug)]
-pub(super) struct OnTheWay(State);
-
-/// As [`interior_point`], from where another program's solution was on its way, if there is such a one; with what is on
-/// the way of this one.
-pub(super) fn interior_point_on_the_way(
-    program: &Program,
-    start: Result<DVector<f64>, &OnTheWay>,
-    limits: (f64, usize),
-) -> Option<(InteriorPointResult, Option<OnTheWay>)> {
-    let (state, limits) = match start {
-        Ok(start) => (State::new(program, start)?, limits),
-        Err(OnTheWay(state)) => {
-            let (cones, rows) = (state.cones.clone(), state.rows.clone());
-            let state = State { x: state.x.of_another(), cones, rows, balanced: false };
-            (state, (limits.0, limits.1.min(MOST_ON_THE_WAY)))
-        }
-    };
-    let mut kept: Option<State> = None;
-    let mut keep = |state: &State, now: &Certificate| {
-        if kept.is_none() && now.residual() < KEPT_BELOW {
-            kept = Some(state.clone());
-        }
-        false
-    };
-    let solved = from_state(program, state, limits, &mut keep)?;
-    Some((solved, kept.map(OnTheWay)))
-}
-
 /// From a state to the optimum, or to where `seen` says that it is enough.
 fn from_state(
     program: &Program,
@@ -128,7 +96,9 @@ fn from_state(
     let mut best = state.solved(program, 0, Ending::Limit)?;
     let mut poor = 0;
     for iteration in 1..=max_iterations {
-        if state.step(program, tolerance).is_none() {
+        // Lower than the gap that is asked, slacks would only lose digits.
+        let least_gap = LEAST_GAP * tolerance * (1.0 + program.smooth_objective(&state.x).abs());
+        if state.step(program, least_gap).is_none() {
             best.ending = Ending::Stalled;
             break;
         }
@@ -212,7 +182,7 @@ struct Newton<'a> {
     /// For every row of the program, its coefficients in the frame (not scaled).
     framed_rows: Vec<DVector<f64>>,
     singles: Singles,
-    /// `b − A x` and the same of the local squares.
+    /// `b − A x`, none of it where the data are limited, and the same of the local squares.
     data_rest: DVector<f64>,
     local_rest: Vec<DVector<f64>>,
     linear: DVector<f64>,
@@ -247,6 +217,11 @@ impl State {
     }
 
     fn solved(&self, program: &Program, iterations: usize, ending: Ending) -> Option<InteriorPointResult> {
+        let (certificate, multipliers) = self.certificate(program)?;
+        Some(InteriorPointResult { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
+    }
+
+    fn certificate(&self, program: &Program) -> Option<(Certificate, Multipliers)> {
         let multipliers = Multipliers {
             blocks: self.cones.iter().map(|cone| cone.scaling.dual()).collect(),
             rows: self.rows.iter().map(|pair| pair.force).collect(),
@@ -256,13 +231,13 @@ impl State {
             rows: self.rows.iter().map(|pair| pair.slack).collect(),
         };
         let certificate = program.certificate_of(&self.x, &slacks, &multipliers)?;
-        Some(InteriorPointResult { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
+        Some((certificate, multipliers))
     }
 
     /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first;
     /// then the multipliers are brought into balance with the gradient while μ is still large; then predictor and
-    /// corrector lower μ.
-    fn step(&mut self, program: &Program, tolerance: f64) -> Option<()> {
+    /// corrector lower μ, but not below where the products' sum is `least_gap`.
+    fn step(&mut self, program: &Program, least_gap: f64) -> Option<()> {
         let newton = Newton::new(program, self)?;
         let (mu, balance) = (newton.excess(None), self.balance(program));
         if balance < CENTRE_BELOW {
@@ -273,7 +248,11 @@ impl State {
             }
         }
         let scale = 1.0 + program.smooth_objective(&self.x).abs();
-        if !self.balanced && mu * newton.degree() < HOLD_BELOW * scale && newton.residual() > 0.3 * mu.sqrt() {
+        let (is_near, drive) = match program.data_limit {
+            Some(_) => (true, data_limit::LARGEST_DRIVE),
+            None => (mu * newton.degree() < HOLD_BELOW * scale, LARGEST_DRIVE),
+        };
+        if !self.balanced && is_near && newton.residual() > drive * mu.sqrt() {
             let direction = newton.direction(&newton.targets(mu), 1.0)?;
             if let Some((alpha, next)) = self.followed(program, &newton, &direction, WORST_BALANCE) {
                 *self = next;
@@ -285,8 +264,7 @@ impl State {
         let alpha = newton.longest(&affine).min(1.0);
         let after = newton.excess(Some((&affine, alpha)));
         let sigma = if mu > 0.0 { (after / mu).powi(3).clamp(0.0, 1.0) } else { 0.0 };
-        // Lower than the gap that is asked, slacks would only lose digits.
-        let least = LEAST_GAP * tolerance * scale / newton.degree();
+        let least = least_gap / newton.degree();
         let mut targets = newton.targets((sigma * mu).max(least));
         // The corrector's second-order term holds for full steps; scaled down it does no harm after short ones.
         let share = alpha * alpha;
@@ -296,6 +274,9 @@ impl State {
         }
         for (l, target) in targets.rows.iter_mut().enumerate() {
             *target -= share * affine.row_primal[l] * affine.row_dual[l];
+        }
+        if program.data_limit.is_some() {
+            newton.bend(&mut targets, &affine, share);
         }
         let worst = balance.min(WORST_BALANCE);
         let mut best = self.followed(program, &newton, &newton.direction(&targets, 1.0)?, worst);
@@ -374,12 +355,15 @@ impl State {
         let rows = self
             .rows
             .iter()
-            .zip(&program.rows)
             .enumerate()
-            .map(|(l, (pair, row))| {
+            .map(|(l, pair)| {
                 let (ds, dz) = (alpha * direction.row_primal[l], alpha * direction.row_dual[l]);
-                // A small slack is known better by its changes than as a difference of large numbers.
-                let slack = if ds.abs() < 0.999 * pair.slack { pair.slack + ds } else { row.value(&x.high) };
+                let slack = match (program.rows.get(l), program.data_limit) {
+                    // A small slack is known better by its changes than as a difference of large numbers.
+                    (Some(_), _) if ds.abs() < 0.999 * pair.slack => pair.slack + ds,
+                    (Some(row), _) => row.value(&x.high),
+                    (None, limit) => limit? - program.data_squares(&x),
+                };
                 let force = pair.force + dz;
                 (slack > 0.0 && force > 0.0 && slack.is_finite() && force.is_finite()).then_some(Pair { slack, force })
             })
@@ -397,7 +381,9 @@ impl<'a> Newton<'a> {
             }
         }
         let frame_at = |first: usize| state.cones.iter().find(|cone| cone.owner == Some(first));
-        rows.wide.push(rows.framed(&program.data));
+        // Squares that are limited count by their multiplier.
+        let limiting = program.data_limit.and_then(|_| state.rows.last()).map(|pair| pair.force);
+        rows.wide.push(rows.framed(&program.data) * limiting.map_or(1.0, f64::sqrt));
         for term in &program.local {
             let framed = rows.framed_part(term.first, &term.matrix);
             rows.local.push(LocalRows { first: term.first, matrix: framed });
@@ -424,14 +410,17 @@ impl<'a> Newton<'a> {
                 }
             }
         }
+        let of_limit = limiting.map(|_| program.data_slope(&state.x));
         let framed_rows: Vec<DVector<f64>> = program
             .rows
             .iter()
             .map(|row| {
                 let mut dense = DVector::zeros(program.variables);
                 row.add_to(1.0, &mut dense);
-                rows.framed_gradient(&dense)
+                dense
             })
+            .chain(of_limit)
+            .map(|dense| rows.framed_gradient(&dense))
             .collect();
         let scaled = |(row, pair): (&DVector<f64>, &Pair)| row * (pair.force / pair.slack).sqrt();
         let scaled: Vec<DVector<f64>> = framed_rows.iter().zip(&state.rows).map(scaled).collect();
@@ -442,12 +431,13 @@ impl<'a> Newton<'a> {
             .local
             .iter()
             .map(|term| &term.target - &term.matrix * state.x.high.rows(term.first, term.matrix.ncols()));
+        let data_rest = state.x.data_rest(&program.data, &program.target);
         Some(Self {
             program,
             state,
             framed_rows,
             singles,
-            data_rest: state.x.data_rest(&program.data, &program.target).clone(),
+            data_rest: if limiting.is_some() { data_rest * 0.0 } else { data_rest.clone() },
             local_rest: local_rest.collect(),
             linear,
             system,
@@ -562,6 +552,9 @@ impl<'a> Newton<'a> {
         let mut alpha = f64::INFINITY;
         for (k, cone) in self.state.cones.iter().enumerate() {
             alpha = alpha.min(cone.scaling.largest_step(&d.primal[k])).min(cone.scaling.largest_step(&d.dual[k]));
+        }
+        if self.program.data_limit.is_some() {
+            alpha = alpha.min(self.longest_within_limit(d));
         }
         for (l, pair) in self.state.rows.iter().enumerate() {
             for (value, change) in [(pair.slack, d.row_primal[l]), (pair.force, d.row_dual[l])] {

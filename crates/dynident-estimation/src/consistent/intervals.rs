@@ -1,9 +1,11 @@
 //! Intervals of standard parameters that respect what is physically consistent: how far can a mass, a moment of
 //! inertia, a friction go before the data object, every body and term staying physically consistent?
 
-use super::description::{BaseMap, PhysicalProblem, expect, finite};
-use super::fit::{PhysicalFit, physical_fit_near};
-use super::interior_point::OnTheWay;
+use super::assembly::AssembledProgram;
+use super::conic::Row;
+use super::description::{PhysicalProblem, expect, finite};
+use super::fit::{PhysicalFit, physical_fit_on_the_way};
+use super::interior_point::{Look, OnTheWay, Seen, interior_point_within_limit};
 use super::{PhysicalError, PhysicalSettings};
 use crate::uncertainty::student_half_width;
 use nalgebra::{DMatrix, DVector};
@@ -21,14 +23,14 @@ pub struct IntervalSettings {
     /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's
     /// `scale`). Default 100.
     pub open_beyond: f64,
-    /// Most physical fits for one end. Default 20; three or four are usual.
-    pub max_fits: usize,
+    /// Most thresholds for one end, each from how the data gave way at the one before. Default 5; one or two are usual.
+    pub max_limits: usize,
 }
 
 impl Default for IntervalSettings {
     fn default() -> Self {
         let physical = PhysicalSettings { prior_weight: 1.0e-5, ..PhysicalSettings::default() };
-        Self { level: 0.95, physical, open_beyond: 100.0, max_fits: 20 }
+        Self { level: 0.95, physical, open_beyond: 100.0, max_limits: 5 }
     }
 }
 
@@ -36,7 +38,7 @@ impl IntervalSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`PhysicalError::Setting`] for a level outside 0.5 to 0.9999, a size below 10, fewer than three fits, or as
+    /// [`PhysicalError::Setting`] for a level outside 0.5 to 0.9999, a size below 10, no threshold at all, or as
     /// [`PhysicalSettings::validate`].
     pub fn validate(&self) -> Result<(), PhysicalError> {
         self.physical.validate()?;
@@ -47,8 +49,8 @@ impl IntervalSettings {
         if !(10.0..=1.0e9).contains(&self.open_beyond) {
             return error("open_beyond", self.open_beyond, "give 10 to 1e9 times the reference's size");
         }
-        if self.max_fits < 3 {
-            return error("max_fits", self.max_fits as f64, "give at least 3");
+        if self.max_limits == 0 {
+            return error("max_limits", 0.0, "give at least 1");
         }
         Ok(())
     }
@@ -66,7 +68,7 @@ pub enum IntervalEnd {
     Constraint,
     /// Neither holds it: the value can be as large as one likes.
     Open,
-    /// The fits were used up: the value may go farther than is said.
+    /// The solver came to no end: the value may go farther than is said.
     Unsettled,
 }
 
@@ -93,19 +95,23 @@ pub struct ConsistentInterval {
 /// residuals the variance of what the data say in the direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the
 /// covariance Σ of the base parameters that is thought honest. Without active constraints this is the usual interval
 /// `π̂_i ± t σ_i`; an end that only physics holds is said to be so, and one that nothing holds is open. Profile
-/// likelihood: Venzon and Moolgavkar, Applied Statistics 37 (1988) 87; here every profile is a convex problem, solved
-/// by pulling the parameter with a spring and moving the spring's other end.
+/// likelihood: Venzon and Moolgavkar, Applied Statistics 37 (1988) 87; here every end is a convex problem, the farthest
+/// that the parameter goes below the threshold, and exact to a hundredth of the half width.
 #[derive(Clone, Debug)]
 pub struct ConsistentIntervals {
     problem: PhysicalProblem,
     settings: IntervalSettings,
     best: PhysicalFit,
-    /// Where the fits of pulled parameters begin; none where the best set's was not found in this way.
+    assembled: AssembledProgram,
+    /// Where the ends' programs begin.
     on_the_way: Option<OnTheWay>,
     quantile: f64,
-    information: DMatrix<f64>,
+    /// What the data leave of the best set, `ρ₁ − R₁ B π`.
+    left: DVector<f64>,
     covariance: Option<DMatrix<f64>>,
     mean_inflation: f64,
+    /// κ of each standard parameter, constraints aside.
+    inflations: Vec<f64>,
     /// Rough standard deviation of each standard parameter, constraints aside; large where no data are.
     deviations: Vec<f64>,
     sizes: Vec<f64>,
@@ -131,7 +137,13 @@ impl ConsistentIntervals {
             expect("columns of the covariance", base, covariance.ncols())?;
             finite("an entry of the covariance", covariance.as_slice())?;
         }
-        let (best, on_the_way) = physical_fit_near(problem, &settings.physical, None)?;
+        let (best, on_the_way) = physical_fit_on_the_way(problem, &settings.physical)?;
+        let weak = PhysicalSettings {
+            prior_weight: PRIOR_SHARE * settings.physical.prior_weight,
+            ..settings.physical.clone()
+        };
+        let assembled = AssembledProgram::new(problem, &weak);
+        let left = &problem.rotated - &problem.triangle * DVector::from_column_slice(&best.base_values);
         let information = problem.triangle.transpose() * &problem.triangle;
         let sizes = sizes(problem);
         // What is known of π without constraints, beside the weakest of priors: information in units of the sizes.
@@ -147,15 +159,24 @@ impl ConsistentIntervals {
             .map(|k| sizes[k] * inverse.as_ref().map_or(1.0, |inverse| inverse[(k, k)].max(0.0).sqrt()))
             .collect();
         let mean_inflation = covariance.map_or(1.0, |covariance| mean_inflation(covariance, &information));
+        let inflations = (0..sizes.len())
+            .map(|k| {
+                let (covariance, inverse) = (covariance?, inverse.as_ref()?);
+                inflation(problem, covariance, &(&problem.triangle * (&scaled * inverse.column(k))))
+            })
+            .map(|found| found.unwrap_or(mean_inflation))
+            .collect();
         Ok(Self {
             quantile: student_half_width(settings.level, degrees_of_freedom),
             problem: problem.clone(),
             covariance: covariance.cloned(),
             settings,
             best,
+            assembled,
             on_the_way,
-            information,
+            left,
             mean_inflation,
+            inflations,
             deviations,
             sizes,
         })
@@ -190,137 +211,129 @@ impl ConsistentIntervals {
         Ok(ConsistentInterval { value, lower, upper, held_by: [below, above] })
     }
 
-    /// One end. The parameter is pulled by a spring whose other end moves out until the data's cost has risen by the
-    /// threshold: √cost rises with the spring's end, in proportion as long as no constraint joins in.
+    /// One end: the farthest that the parameter goes while the data's cost stays below its threshold and everything is
+    /// physically consistent, a convex program of its own.
     fn end(&self, index: usize, side: f64) -> Result<(Option<f64>, IntervalEnd), PhysicalError> {
-        let (value, size) = (self.best.parameters[index], self.sizes[index]);
+        let Self { problem, best, assembled, quantile, .. } = self;
+        let (value, size) = (best.parameters[index], self.sizes[index]);
         let far = self.settings.open_beyond * size;
-        // Where data say little the spring is as soft as the reference is large, so that no fit starts far outside of
-        // what is physically consistent.
         let softness = self.deviations[index].clamp(1.0e-9 * size, size);
-        let guess = self.quantile * self.mean_inflation.sqrt();
-        // Unconstrained, a parameter with this deviation gives way by half of it.
-        let mut reach = 2.0 * guess * softness;
-        let mut wanted = None;
-        let mut below = Point { reach: 0.0, root: 0.0, parameter: value };
-        let mut above: Option<Point> = None;
-        // Where the solver gave up: a pull so strong that doubles cannot determine the cost beside it.
-        let mut hopeless = f64::INFINITY;
-        // Each fit begins near the one before, which the same spring pulled less or more.
-        let mut near = self.on_the_way.clone();
-        for _ in 0..self.settings.max_fits {
-            let Some((parameter, moved)) = self.pulled(index, 1.0 / softness, value + side * reach, &mut near)? else {
-                hopeless = reach;
-                if hopeless < 1.2 * below.reach {
-                    break;
-                }
-                reach = 0.5 * (below.reach + hopeless);
-                continue;
-            };
-            let root = (2.0 * (self.cost(&moved) - self.best.data_objective).max(0.0)).sqrt();
-            let wanted = *wanted.get_or_insert_with(|| self.quantile * self.inflation(&moved).sqrt());
-            let point = Point { reach, root, parameter };
-            if (root - wanted).abs() <= CLOSE * wanted {
-                return Ok((Some(parameter), IntervalEnd::Data));
-            }
-            let distance = (parameter - value).abs();
-            if root > wanted {
-                above = Some(point);
-            } else {
-                let still = (parameter - below.parameter).abs() <= STILL * distance.max(softness);
-                let last = std::mem::replace(&mut below, point);
-                if above.is_none() && distance >= far {
-                    return Ok((None, IntervalEnd::Open));
-                }
-                if above.is_none() && still && last.reach > 0.0 && reach >= 2.0 * last.reach {
-                    return Ok((Some(parameter), IntervalEnd::Constraint));
-                }
-            }
-            reach = match above {
-                Some(above) if (above.parameter - below.parameter).abs() <= CLOSE * (above.parameter - value).abs() => {
-                    return Ok((Some(between(below, above, wanted, |point| point.parameter)), IntervalEnd::Data));
-                }
-                Some(above) => between(below, above, wanted, |point| point.reach),
-                None if root > 0.1 * wanted => (reach * 1.1 * wanted / root).clamp(2.0 * reach, GROWTH * reach),
-                None => GROWTH * reach,
-            };
-            reach = reach.min(0.5 * (below.reach + hopeless));
+        let least = best.data_objective;
+        let rise = |inflation: f64| 0.5 * quantile.powi(2) * inflation;
+        let mut inflation = self.inflations[index];
+        let distance = |x: &DVector<f64>| side * (assembled.parameters(problem, x)[index] - value);
+        let unsettled = Ok((Some(value), IntervalEnd::Unsettled));
+        let Some(on_the_way) = &self.on_the_way else { return unsettled };
+        let Some(start) = on_the_way.start((least, least + rise(inflation))) else { return unsettled };
+        if distance(start) >= far {
+            return Ok((None, IntervalEnd::Open));
         }
-        let parameter = above
-            .map_or(below.parameter, |above| between(below, above, wanted.unwrap_or(guess), |point| point.parameter));
-        Ok((Some(parameter), IntervalEnd::Unsettled))
+
+        // The objective in units in which the limit's multiplier is about one. Nothing is looked for far beyond what
+        // counts as open.
+        let weight = quantile * inflation.sqrt() / softness;
+        let functional = assembled.functional(problem, &[(index, side)]);
+        let steepest = functional.iter().map(|(_, factor)| factor.abs()).fold(0.0, f64::max);
+        let length = functional.iter().map(|(_, factor)| factor * factor).sum::<f64>().sqrt();
+        let entries = functional.iter().map(|&(variable, factor)| (variable, -factor / length)).collect();
+        let mut program = assembled.program.clone();
+        for &(variable, factor) in &functional {
+            program.linear[variable] -= weight * factor;
+        }
+        program.rows.push(Row { entries, offset: (side * value + FARTHER * far) / length, label: usize::MAX });
+        program.data_limit = Some(least + rise(inflation));
+
+        let mut reached = 0.0;
+        let mut held_by = IntervalEnd::Unsettled;
+        let mut limits = 1;
+        let mut look = |seen: &Seen<'_>| {
+            reached = distance(seen.x);
+            // However far from the optimum: this set is consistent, and the data do not reject it.
+            if reached >= far {
+                held_by = IntervalEnd::Open;
+                return Look::Stop;
+            }
+            // How much farther the parameter may be, in units of the objective.
+            let (room, force) = seen.limit;
+            // The parameter goes with this power of the rise, for its slope is the multiplier: a half where no
+            // constraint joins in, nothing where they hold it alone.
+            let power = force * rise(inflation) / (weight * reached.max(LEAST_WIDTH * softness));
+            let is_free = power < room / rise(inflation);
+            let exact = |share: f64| weight * (share * reached).max(LEAST_WIDTH * softness);
+            let enough = exact(if is_free { STILL } else { CLOSE });
+            let is_balanced = seen.certificate.imbalance <= BALANCED * weight * steepest;
+            if !is_balanced || seen.certificate.absolute_gap() > enough {
+                return Look::On(LEAST_GAP * exact(STILL));
+            }
+            if is_free {
+                held_by = IntervalEnd::Constraint;
+                return Look::Stop;
+            }
+            let now = self.inflation(&(&self.left - seen.left));
+            let ratio = now / inflation;
+            if (ratio - 1.0).abs() > ALIKE && limits < self.settings.max_limits {
+                (inflation, limits) = (now, limits + 1);
+                return Look::Limit(least + rise(inflation));
+            }
+            held_by = IntervalEnd::Data;
+            reached *= ratio.powf(power.min(1.0));
+            Look::Stop
+        };
+        interior_point_within_limit(&mut program, (on_the_way, least), MOST_ITERATIONS, &mut look);
+        let [lower, upper] = self.own_limits(index);
+        // The best set is inside, whatever rounding makes of an end beside it.
+        let end = (value + side * reached.max(0.0)).max(lower.min(value)).min(upper.max(value));
+        Ok((Some(end).filter(|_| held_by != IntervalEnd::Open), held_by))
     }
 
-    /// The parameter and the shift of the base parameters from the best set, when a spring pulls; none when the solver
-    /// did not reach an optimum.
-    fn pulled(
-        &self,
-        index: usize,
-        stiffness: f64,
-        target: f64,
-        near: &mut Option<OnTheWay>,
-    ) -> Result<Option<(f64, DVector<f64>)>, PhysicalError> {
-        let Self { problem, best, .. } = self;
-        let (base, rows) = (problem.base.matrix(), problem.triangle.nrows());
-        let (own, all) = base.shape();
-        // The parameter itself as one more base parameter, measured to be at the target.
-        let mut matrix = DMatrix::zeros(own + 1, all);
-        matrix.rows_mut(0, own).copy_from(base);
-        matrix[(own, index)] = 1.0;
-        let mut triangle = DMatrix::zeros(rows + 1, own + 1);
-        triangle.view_mut((0, 0), (rows, own)).copy_from(&problem.triangle);
-        triangle[(rows, own)] = stiffness;
-        let rotated = problem.rotated.clone().push(stiffness * target);
-        let problem = PhysicalProblem { base: BaseMap::new(matrix)?, triangle, rotated, ..problem.clone() };
-        let (fit, next) = physical_fit_near(&problem, &self.settings.physical, near.as_ref())?;
-        *near = next.or_else(|| near.take());
-        let moved = DVector::from_fn(own, |k, _| fit.base_values[k] - best.base_values[k]);
-        Ok((fit.kkt_residual() <= SOLVED).then(|| (fit.parameters[index], moved)))
+    /// What a parameter can be whatever the others are: no mass and no moment of inertia is negative.
+    fn own_limits(&self, index: usize) -> [f64; 2] {
+        let bodies = &self.problem.bodies;
+        let Some(body) = bodies.get(index / 10) else {
+            let scalar = &self.problem.scalars[index - 10 * bodies.len()];
+            return [scalar.lower.unwrap_or(f64::NEG_INFINITY), scalar.upper.unwrap_or(f64::INFINITY)];
+        };
+        match index % 10 {
+            0 => body.mass_kg.unwrap_or([0.0, f64::INFINITY]),
+            4 | 7 | 9 => [0.0, f64::INFINITY],
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        }
     }
 
-    /// `½‖R₁ θ − ρ₁‖²` at a shift of the base parameters from the best set.
-    fn cost(&self, moved: &DVector<f64>) -> f64 {
-        let theta = DVector::from_column_slice(&self.best.base_values) + moved;
-        0.5 * (&self.problem.triangle * theta - &self.problem.rotated).norm_squared()
-    }
-
-    /// κ from the direction in which the base parameters gave way.
+    /// κ from how the data's rows gave way, R₁ times the shift of the base parameters.
     fn inflation(&self, moved: &DVector<f64>) -> f64 {
         let Some(covariance) = &self.covariance else { return 1.0 };
-        let direction = &self.information * moved;
-        let white = moved.dot(&direction);
-        if white < 1.0e-12 {
-            return self.mean_inflation;
-        }
-        let inflation = direction.dot(&(covariance * &direction)) / white;
-        if inflation.is_finite() && inflation > 0.0 { inflation } else { self.mean_inflation }
+        inflation(&self.problem, covariance, moved).unwrap_or(self.mean_inflation)
     }
 }
 
-/// Relative accuracy of √cost at an end that the data hold: a hundredth of the half width.
+/// The honest variance over the white one where rows move by `moved`; none where they hardly do.
+fn inflation(problem: &PhysicalProblem, covariance: &DMatrix<f64>, moved: &DVector<f64>) -> Option<f64> {
+    let direction = problem.triangle.tr_mul(moved);
+    let white = moved.norm_squared();
+    let inflation = direction.dot(&(covariance * &direction)) / white;
+    (white >= 1.0e-12 && inflation.is_finite() && inflation > 0.0).then_some(inflation)
+}
+
+/// Relative accuracy of an end: a hundredth of the half width, and of √cost there.
 const CLOSE: f64 = 0.01;
-/// A parameter that moves by less than this share while it is pulled twice as far is held by a constraint.
-const STILL: f64 = 1.0e-3;
-/// Largest certificate of a fit that counts: the pull's energy is a few thousand, the cost's rise a few units.
-const SOLVED: f64 = 1.0e-6;
-/// Largest growth of the pull from one fit to the next.
-const GROWTH: f64 = 8.0;
-
-/// One point of a profile.
-#[derive(Clone, Copy)]
-struct Point {
-    /// How far out the spring's end is.
-    reach: f64,
-    /// √(2 rise of the cost).
-    root: f64,
-    parameter: f64,
-}
-
-fn between(below: Point, above: Point, wanted: f64, of: impl Fn(&Point) -> f64) -> f64 {
-    // Not nearer to an end than a tenth: the secant of a bent curve creeps otherwise.
-    let share = ((wanted - below.root) / (above.root - below.root)).clamp(0.1, 0.9);
-    of(&below) + share * (of(&above) - of(&below))
-}
+/// Relative accuracy of an end that constraints alone hold.
+const STILL: f64 = 1.0e-4;
+/// Accuracy beside the deviation that the data alone leave, where the best set is at the end itself.
+const LEAST_WIDTH: f64 = 1.0e-7;
+/// μ stops where the gap is this share of what an end may be wrong by.
+const LEAST_GAP: f64 = 0.5;
+/// Largest imbalance of gradient and multipliers of a point that says anything, beside the objective's slope.
+const BALANCED: f64 = 1.0e-3;
+/// Thresholds that differ by this share are one: the end of the one is the other's to a few hundredths, by its slope.
+const ALIKE: f64 = 0.3;
+/// The last place that is looked at, beside where an end counts as open.
+const FARTHER: f64 = 1.1;
+/// Most iterations for one end.
+const MOST_ITERATIONS: usize = 200;
+/// Weight of the prior in the programs of the ends, as a share of the best set's. There it would hold parameters back
+/// as data do; a share ten times smaller moves ends by less than a hundredth.
+const PRIOR_SHARE: f64 = 1.0e-3;
 
 /// What is ordinary for each standard parameter: the reference's mass, its mass times its radius of gyration, its
 /// moment; a scalar's scale.
@@ -348,6 +361,7 @@ fn mean_inflation(covariance: &DMatrix<f64>, information: &DMatrix<f64>) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::consistent::BaseMap;
     use crate::consistent::{PhysicalBody, PhysicalScalar, rough_body};
     use crate::factor::TriangularFactor;
 

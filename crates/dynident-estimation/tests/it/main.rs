@@ -19,6 +19,7 @@ mod maximum_likelihood;
 mod noise_levels;
 mod physical_errors;
 mod physical_golden;
+mod physical_intervals;
 mod physical_problems;
 mod physical_routes;
 mod physical_verdicts;
