@@ -32,6 +32,8 @@ PANDA = ROOT / "robots/panda_arm7.urdf"
 SHORT_S, RUNS = 3.0, 3
 ROWS_OF_A_LOG, ROWS_OF_A_CHAIN = 2_000, 4_000
 CHUNK = 100_000
+# NumPy writes as many rows in some minutes.
+OWN_NOISE = 10_000_000
 HEADER = ["curve", "number", "threads", "processor_s", "wall_s", "memory_mib"]
 CALLS = ["rnea", "crba", "aba", "rnea_derivatives", "joint_torque_regressor", "rnea_batch", "crba_batch", "rnea_derivatives_batch", "regressor_batch"]
 
@@ -86,9 +88,13 @@ def torque(dynident, robot, scratch, arrays):
 
 
 def write_log(path, period, rows, rate_hz, seed):
-    """Time, positions, velocities, torques; noise of 1e-5 rad and 0.05 Nm. What is there already stays."""
+    """Time, positions, velocities, torques; noise of 1e-5 rad and 0.05 Nm. What is there already stays. Rows behind OWN_NOISE repeat the first ones, at times of their own."""
     if path.exists():
         return
+    if rows > OWN_NOISE:
+        first = path.with_suffix(".first")
+        write_log(first, period, OWN_NOISE, rate_hz, seed)
+        return repeat_log(first, path, rows, rate_hz)
     random = np.random.default_rng(seed)
     q, dq, tau = period
     joints, length = q.shape[1], len(q)
@@ -101,6 +107,22 @@ def write_log(path, period, rows, rate_hz, seed):
             own = at % length
             table = np.column_stack([at / rate_hz, q[own] + 1e-5 * noise[0], dq[own], tau[own] + 0.05 * noise[1]])
             np.savetxt(file, table, delimiter=",", fmt="%.9g")
+    unfinished.rename(path)
+
+
+def repeat_log(first, path, rows, rate_hz):
+    """The rows of a log again and again, with the time going on."""
+    unfinished = path.with_suffix(".part")
+    with open(unfinished, "wb") as file:
+        at = 0
+        while at < rows:
+            with open(first, "rb") as source:
+                header = next(source)
+                if at == 0:
+                    file.write(header)
+                for line in itertools.islice(source, rows - at):
+                    file.write(b"%.9g,%b" % (at / rate_hz, line.partition(b",")[2]))
+                    at += 1
     unfinished.rename(path)
 
 

@@ -74,7 +74,7 @@ use dynident_model::Model;
 use dynident_recording::ImportReport;
 use explanation::Explanation;
 use held_out_logs::HeldOutLogs;
-use motion_rows::{INSTANTS, MotionSamples};
+use motion_rows::{INSTANTS, MotionSamples, share_of_log};
 use reading::{CLEARLY_BETTER, Corrected};
 use search::rough_consistency;
 use torque_clock::TorqueClock;
@@ -169,8 +169,8 @@ fn diagnosed(
     let of_recording = |&index: &usize| MotionSamples::of_recording(logs, &model, index);
     let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
     let mut rows = MotionRows::empty(robot.dof());
-    for samples in &samples {
-        rows.append(&samples.instants(INSTANTS / training.len().max(1)));
+    for (place, one) in samples.iter().enumerate() {
+        rows.append(&one.instants(share_of_log(INSTANTS, (place, samples.len()))));
     }
     // Identification asks the logs for what the study leaves to them; no mistake has to explain it.
     let stated = robot;

@@ -11,6 +11,12 @@ use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 /// Instants that readings are compared on; more make it slower and not surer.
 pub(super) const INSTANTS: usize = 300;
 
+/// How many of `most` instants log number `place` of `logs` gives: as many as every other, and where there are more
+/// logs than instants one of every so many logs gives one.
+pub(super) fn share_of_log(most: usize, (place, logs): (usize, usize)) -> usize {
+    if logs <= most { most / logs.max(1) } else { (place + 1) * most / logs - place * most / logs }
+}
+
 /// Instants of a motion with its torques, all in SI and in the model's order of joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionRows {
@@ -258,6 +264,18 @@ impl MotionRows {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn instants_are_shared_by_any_number_of_logs() {
+        for logs in [1, 2, 7, 299, 300] {
+            assert!((0..logs).all(|place| share_of_log(300, (place, logs)) == 300 / logs));
+        }
+        for logs in [301, 450, 1000, 12_345] {
+            let shares: Vec<usize> = (0..logs).map(|place| share_of_log(300, (place, logs))).collect();
+            assert_eq!(shares.iter().sum::<usize>(), 300, "{logs}");
+            assert!(shares.iter().all(|&share| share <= 1));
+        }
+    }
 
     #[test]
     fn what_does_not_count_stands_on_the_line_between_what_does() {

@@ -11,6 +11,10 @@ pub(super) struct Span(DMatrix<f64>);
 impl Span {
     /// Of these columns; none where there are no rows.
     pub(super) fn new(mut columns: DMatrix<f64>) -> Option<Self> {
+        // Of nothing there is no decomposition.
+        if columns.is_empty() {
+            return None;
+        }
         for mut column in columns.column_iter_mut() {
             let size = column.norm();
             if size > 0.0 {
@@ -27,5 +31,16 @@ impl Span {
     /// What of a vector lies outside.
     pub(super) fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
         vector - &self.0 * self.0.tr_mul(vector)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_rows_span_nothing() {
+        assert!(Span::new(DMatrix::zeros(0, 4)).is_none());
+        assert!(Span::new(DMatrix::zeros(3, 0)).is_none());
     }
 }

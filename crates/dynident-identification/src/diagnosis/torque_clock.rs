@@ -4,7 +4,7 @@
 use super::explanation::Explanation;
 use super::joint_fits::{JointFits, SharedMotion};
 use super::mistake::{Channels, Mistake};
-use super::motion_rows::{MotionRows, MotionSamples};
+use super::motion_rows::{MotionRows, MotionSamples, share_of_log};
 use super::numbers::least_by_thirds;
 use super::reading::{CLEARLY_BETTER, Corrected, Reading};
 use crate::consistent::ConsistencySettings;
@@ -79,8 +79,9 @@ impl<'a> TorqueClock<'a> {
         let lags: Vec<f64> =
             (0..self.taken_off_s.len()).map(|joint| if joints.contains(&joint) { lag_s } else { 0.0 }).collect();
         let mut rows = MotionRows::empty(lags.len());
-        for samples in self.samples {
-            rows.append(&samples.shifted(channels, &lags, self.reach_s, most / self.samples.len().max(1)));
+        for (place, samples) in self.samples.iter().enumerate() {
+            let share = share_of_log(most, (place, self.samples.len()));
+            rows.append(&samples.shifted(channels, &lags, self.reach_s, share));
         }
         rows
     }

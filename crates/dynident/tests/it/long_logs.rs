@@ -110,3 +110,45 @@ fn a_long_log_is_chosen_from_by_an_excerpt_and_fitted_by_all_rows() {
     let error = one.result.validation[0].model.rmse_nm;
     assert!(error < 2.0 * 0.12 * NOISE, "{error}");
 }
+
+/// More logs than the instants that mistakes are looked for on: one of every so many gives one.
+#[test]
+fn hundreds_of_short_logs_are_one_identification() {
+    /// Each two seconds at 100 Hz of another part of the motion.
+    const LOGS: usize = 305;
+    const ROWS_OF_EACH: usize = 200;
+    let folder = tempfile::tempdir().unwrap();
+    let arm = folder.path().join("arm.urdf");
+    std::fs::write(&arm, ARM).unwrap();
+    let model = load_robot(&arm).unwrap().model;
+    let (mut workspace, mut random) = (Workspace::new(&model), Random(5));
+    let names = ["t", "q1", "q2", "tau1", "tau2"].map(str::to_owned).to_vec();
+    let mut text = STUDY.split("[[log]]").next().unwrap().to_owned();
+    text += "[drive]\nviscous = true\ncoulomb = \"none\"\noffset = false\n";
+    for place in 0..LOGS {
+        text += &format!("[[log]]\nfile = \"{place}.csv\"\n");
+    }
+    let mut job = Job::new(folder.path(), &text);
+    for (place, log) in job.study.log.iter_mut().enumerate() {
+        let mut values = Vec::with_capacity(5 * ROWS_OF_EACH);
+        for k in 0..ROWS_OF_EACH {
+            let (own, t) = (k as f64 / 100.0, 1.7 * place as f64 + k as f64 / 100.0);
+            let wave = |a: f64, w: f64| {
+                let (s, c) = (w * t).sin_cos();
+                [a * s, a * w * c, -a * w * w * s]
+            };
+            let (a, b) = (wave(0.8, 3.1), wave(0.7, 4.3));
+            let tau = inverse_dynamics(&model, &mut workspace, &[a[0], b[0]], &[a[1], b[1]], &[a[2], b[2]]);
+            let noise = |random: &mut Random| 0.02 * random.normal();
+            let shoulder = tau[0] + VISCOUS[0] * a[1] + noise(&mut random);
+            let elbow = tau[1] + VISCOUS[1] * b[1] + noise(&mut random);
+            values.extend([own, a[0], b[0], shoulder, elbow]);
+        }
+        log.samples = Some(MemoryLog::row_major(&place.to_string(), Some(names.clone()), 5, values).unwrap());
+    }
+    let found = dynident::identify(&job.study, &job.path, &Job::options(2)).unwrap();
+    for (symbol, truth) in [("fv1", VISCOUS[0]), ("fv2", VISCOUS[1])] {
+        let (found, bar) = value(&found, symbol);
+        assert!((found - truth).abs() < 2.0 * bar.max(1.0e-3 * truth), "{symbol}: {found} +- {bar}, {truth}");
+    }
+}
