@@ -123,11 +123,10 @@ fn hundreds_of_short_logs_are_one_identification() {
     let model = load_robot(&arm).unwrap().model;
     let (mut workspace, mut random) = (Workspace::new(&model), Random(5));
     let names = ["t", "q1", "q2", "tau1", "tau2"].map(str::to_owned).to_vec();
-    let mut text = STUDY.split("[[log]]").next().unwrap().to_owned();
-    text += "[drive]\nviscous = true\ncoulomb = \"none\"\noffset = false\n";
-    for place in 0..LOGS {
-        text += &format!("[[log]]\nfile = \"{place}.csv\"\n");
-    }
+    let robot = STUDY.split("[[log]]").next().unwrap();
+    let drive = "[drive]\nviscous = true\ncoulomb = \"none\"\noffset = false\n";
+    let logs: Vec<String> = (0..LOGS).map(|place| format!("[[log]]\nfile = \"{place}.csv\"\n")).collect();
+    let text = format!("{robot}{drive}{}", logs.concat());
     let mut job = Job::new(folder.path(), &text);
     for (place, log) in job.study.log.iter_mut().enumerate() {
         let mut values = Vec::with_capacity(5 * ROWS_OF_EACH);
