@@ -88,7 +88,7 @@ impl AssembledProgram {
     }
 
     /// A constraint on standard parameters as one on variables, of unit length.
-    fn row(&self, problem: &PhysicalProblem, entries: &[(usize, f64)], offset: f64, label: usize) -> Row {
+    pub(super) fn row(&self, problem: &PhysicalProblem, entries: &[(usize, f64)], offset: f64, label: usize) -> Row {
         let found = self.functional(problem, entries);
         let length = found.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
         let scale = if length > 0.0 { 1.0 / length } else { 1.0 };

@@ -8,7 +8,7 @@
 //! With multipliers Z_k ⪰ 0 and z_l ≥ 0 the optimum is where the gradient of the smooth part equals `Σ M_kᵀ vec(Z_k) +
 //! Σ a_l z_l`, where `S_k Z_k = γ_k 1`, and `s_l z_l = 0` (Boyd and Vandenberghe, Convex Optimization, 5.9.2). A block
 //! with γ > 0 is an entropic prior: its own barrier keeps it inside, and it stops on its central path at γ instead of
-//! zero.
+//! zero. A program can limit the data's squares in place of minimising them: one more constraint, convex as well.
 
 use super::cone::log_determinant;
 use super::coordinates::{Vector10, matrix_of, vector_of};

@@ -15,7 +15,7 @@
 
 mod data_limit;
 
-pub(super) use data_limit::{Look, OnTheWay, Seen, interior_point_on_the_way, interior_point_within_limit};
+pub(super) use data_limit::{Iterate, Next, OnTheWay, interior_point_on_the_way, interior_point_within_limit};
 
 use super::cone::Scaling;
 use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
@@ -383,7 +383,11 @@ impl<'a> Newton<'a> {
         let frame_at = |first: usize| state.cones.iter().find(|cone| cone.owner == Some(first));
         // Squares that are limited count by their multiplier.
         let limiting = program.data_limit.and_then(|_| state.rows.last()).map(|pair| pair.force);
-        rows.wide.push(rows.framed(&program.data) * limiting.map_or(1.0, f64::sqrt));
+        let mut data = rows.framed(&program.data);
+        if let Some(force) = limiting {
+            data *= force.sqrt();
+        }
+        rows.wide.push(data);
         for term in &program.local {
             let framed = rows.framed_part(term.first, &term.matrix);
             rows.local.push(LocalRows { first: term.first, matrix: framed });
@@ -437,7 +441,7 @@ impl<'a> Newton<'a> {
             state,
             framed_rows,
             singles,
-            data_rest: if limiting.is_some() { data_rest * 0.0 } else { data_rest.clone() },
+            data_rest: if limiting.is_some() { DVector::zeros(data_rest.len()) } else { data_rest.clone() },
             local_rest: local_rest.collect(),
             linear,
             system,

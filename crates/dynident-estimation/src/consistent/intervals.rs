@@ -2,10 +2,9 @@
 //! inertia, a friction go before the data object, every body and term staying physically consistent?
 
 use super::assembly::AssembledProgram;
-use super::conic::Row;
 use super::description::{PhysicalProblem, expect, finite};
 use super::fit::{PhysicalFit, physical_fit_on_the_way};
-use super::interior_point::{Look, OnTheWay, Seen, interior_point_within_limit};
+use super::interior_point::{Iterate, Next, OnTheWay, interior_point_within_limit};
 use super::{PhysicalError, PhysicalSettings};
 use crate::uncertainty::student_half_width;
 use nalgebra::{DMatrix, DVector};
@@ -17,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct IntervalSettings {
     /// Confidence level of each interval. Default 0.95.
     pub level: f64,
-    /// The solver, its margin and its prior. The prior only chooses among bodies that the data and the pull leave
+    /// The solver, its margin and its prior. The prior only chooses among bodies that the data leave
     /// alike; its weight is far below that of a fit: 1e-5 by default.
     pub physical: PhysicalSettings,
     /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's
@@ -191,7 +190,7 @@ impl ConsistentIntervals {
     /// has no width.
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] if there is no such parameter, and those of [`physical_fit`](super::physical_fit).
+    /// [`PhysicalError::Mismatch`] if there is no such parameter.
     pub fn of(&self, index: usize) -> Result<ConsistentInterval, PhysicalError> {
         if index >= self.sizes.len() {
             return Err(PhysicalError::Mismatch {
@@ -206,14 +205,14 @@ impl ConsistentIntervals {
             let held_by = [IntervalEnd::Constraint; 2];
             return Ok(ConsistentInterval { value, lower: Some(value), upper: Some(value), held_by });
         }
-        let (lower, below) = self.end(index, -1.0)?;
-        let (upper, above) = self.end(index, 1.0)?;
+        let (lower, below) = self.end(index, -1.0);
+        let (upper, above) = self.end(index, 1.0);
         Ok(ConsistentInterval { value, lower, upper, held_by: [below, above] })
     }
 
     /// One end: the farthest that the parameter goes while the data's cost stays below its threshold and everything is
     /// physically consistent, a convex program of its own.
-    fn end(&self, index: usize, side: f64) -> Result<(Option<f64>, IntervalEnd), PhysicalError> {
+    fn end(&self, index: usize, side: f64) -> (Option<f64>, IntervalEnd) {
         let Self { problem, best, assembled, quantile, .. } = self;
         let (value, size) = (best.parameters[index], self.sizes[index]);
         let far = self.settings.open_beyond * size;
@@ -222,11 +221,12 @@ impl ConsistentIntervals {
         let rise = |inflation: f64| 0.5 * quantile.powi(2) * inflation;
         let mut inflation = self.inflations[index];
         let distance = |x: &DVector<f64>| side * (assembled.parameters(problem, x)[index] - value);
-        let unsettled = Ok((Some(value), IntervalEnd::Unsettled));
-        let Some(on_the_way) = &self.on_the_way else { return unsettled };
-        let Some(start) = on_the_way.start((least, least + rise(inflation))) else { return unsettled };
-        if distance(start) >= far {
-            return Ok((None, IntervalEnd::Open));
+        let Some(on_the_way) = &self.on_the_way else { return (Some(value), IntervalEnd::Unsettled) };
+        let begins_beyond = |inflation: f64| {
+            on_the_way.start((least, least + rise(inflation))).is_some_and(|start| distance(start) >= far)
+        };
+        if begins_beyond(inflation) {
+            return (None, IntervalEnd::Open);
         }
 
         // The objective in units in which the limit's multiplier is about one. Nothing is looked for far beyond what
@@ -234,56 +234,58 @@ impl ConsistentIntervals {
         let weight = quantile * inflation.sqrt() / softness;
         let functional = assembled.functional(problem, &[(index, side)]);
         let steepest = functional.iter().map(|(_, factor)| factor.abs()).fold(0.0, f64::max);
-        let length = functional.iter().map(|(_, factor)| factor * factor).sum::<f64>().sqrt();
-        let entries = functional.iter().map(|&(variable, factor)| (variable, -factor / length)).collect();
         let mut program = assembled.program.clone();
         for &(variable, factor) in &functional {
             program.linear[variable] -= weight * factor;
         }
-        program.rows.push(Row { entries, offset: (side * value + FARTHER * far) / length, label: usize::MAX });
+        program.rows.push(assembled.row(problem, &[(index, -side)], side * value + FARTHER * far, usize::MAX));
         program.data_limit = Some(least + rise(inflation));
 
         let mut reached = 0.0;
         let mut held_by = IntervalEnd::Unsettled;
         let mut limits = 1;
-        let mut look = |seen: &Seen<'_>| {
+        let mut look = |seen: &Iterate<'_>| {
             reached = distance(seen.x);
             // However far from the optimum: this set is consistent, and the data do not reject it.
             if reached >= far {
                 held_by = IntervalEnd::Open;
-                return Look::Stop;
+                return Next::Stop;
             }
-            // How much farther the parameter may be, in units of the objective.
             let (room, force) = seen.limit;
             // The parameter goes with this power of the rise, for its slope is the multiplier: a half where no
             // constraint joins in, nothing where they hold it alone.
             let power = force * rise(inflation) / (weight * reached.max(LEAST_WIDTH * softness));
             let is_free = power < room / rise(inflation);
+            // How much farther the parameter may be, in units of the objective.
             let exact = |share: f64| weight * (share * reached).max(LEAST_WIDTH * softness);
             let enough = exact(if is_free { STILL } else { CLOSE });
             let is_balanced = seen.certificate.imbalance <= BALANCED * weight * steepest;
             if !is_balanced || seen.certificate.absolute_gap() > enough {
-                return Look::On(LEAST_GAP * exact(STILL));
+                return Next::On(LEAST_GAP * exact(STILL));
             }
             if is_free {
                 held_by = IntervalEnd::Constraint;
-                return Look::Stop;
+                return Next::Stop;
             }
             let now = self.inflation(&(&self.left - seen.left));
             let ratio = now / inflation;
             if (ratio - 1.0).abs() > ALIKE && limits < self.settings.max_limits {
                 (inflation, limits) = (now, limits + 1);
-                return Look::Limit(least + rise(inflation));
+                if begins_beyond(inflation) {
+                    held_by = IntervalEnd::Open;
+                    return Next::Stop;
+                }
+                return Next::Limit(least + rise(inflation));
             }
             held_by = IntervalEnd::Data;
             reached *= ratio.powf(power.min(1.0));
-            Look::Stop
+            Next::Stop
         };
         interior_point_within_limit(&mut program, (on_the_way, least), MOST_ITERATIONS, &mut look);
         let [lower, upper] = self.own_limits(index);
         // The best set is inside, whatever rounding makes of an end beside it.
         let end = (value + side * reached.max(0.0)).max(lower.min(value)).min(upper.max(value));
-        Ok((Some(end).filter(|_| held_by != IntervalEnd::Open), held_by))
+        (Some(end).filter(|_| held_by != IntervalEnd::Open), held_by)
     }
 
     /// What a parameter can be whatever the others are: no mass and no moment of inertia is negative.
@@ -361,8 +363,7 @@ fn mean_inflation(covariance: &DMatrix<f64>, information: &DMatrix<f64>) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::consistent::BaseMap;
-    use crate::consistent::{PhysicalBody, PhysicalScalar, rough_body};
+    use crate::consistent::{BaseMap, PhysicalBody, PhysicalScalar, rough_body};
     use crate::factor::TriangularFactor;
 
     /// Free quantile of ordinary intervals at many degrees of freedom.

@@ -71,7 +71,7 @@ const KEPT_ROOM: f64 = 0.1;
 const LARGEST_PRODUCT: f64 = 50.0;
 
 /// What a point on the way to the farthest one looks like.
-pub(in crate::consistent) struct Seen<'a> {
+pub(in crate::consistent) struct Iterate<'a> {
     pub(in crate::consistent) x: &'a DVector<f64>,
     /// `b − A x`.
     pub(in crate::consistent) left: &'a DVector<f64>,
@@ -82,7 +82,7 @@ pub(in crate::consistent) struct Seen<'a> {
 
 /// What is to be done there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::consistent) enum Look {
+pub(in crate::consistent) enum Next {
     /// Go on, to a duality gap no less than this.
     On(f64),
     /// The limit is another.
@@ -93,13 +93,13 @@ pub(in crate::consistent) enum Look {
 
 /// Follows the path of a program with a limit of its data from where another program, without the limit and without the
 /// last rows, was on its way; its least squares are `least`. `look` sees every point, each of which keeps the limit. It
-/// ends at [`Look::Stop`], and where double precision allows no step any more, iterations are used up, or no point of
+/// ends at [`Next::Stop`], and where double precision allows no step any more, iterations are used up, or no point of
 /// the way is inside.
 pub(in crate::consistent) fn interior_point_within_limit(
     program: &mut Program,
     (way, least): (&OnTheWay, f64),
     max_iterations: usize,
-    look: &mut dyn FnMut(&Seen<'_>) -> Look,
+    look: &mut dyn FnMut(&Iterate<'_>) -> Next,
 ) {
     let Some(mut state) = State::within_limit(program, way, least) else { return };
     let mut least_gap = 0.0;
@@ -111,10 +111,10 @@ pub(in crate::consistent) fn interior_point_within_limit(
             return;
         };
         let left = state.x.data_rest(&program.data, &program.target);
-        match look(&Seen { x: &state.x.high, left, limit: (pair.slack, pair.force), certificate }) {
-            Look::On(gap) => least_gap = gap,
-            Look::Stop => return,
-            Look::Limit(limit) => {
+        match look(&Iterate { x: &state.x.high, left, limit: (pair.slack, pair.force), certificate }) {
+            Next::On(gap) => least_gap = gap,
+            Next::Stop => return,
+            Next::Limit(limit) => {
                 program.data_limit = Some(limit);
                 let slack = limit - program.data_squares(&state.x);
                 let mean = state.products() / state.degree() as f64;
