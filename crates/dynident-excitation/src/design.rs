@@ -23,7 +23,7 @@ use crate::criteria::Criterion;
 use crate::family::Family;
 use crate::limits::LimitSet;
 use crate::optimisers::OptimiserError;
-use assess::assess;
+use assess::{Assessment, assess};
 use clear_starts::Starts;
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -33,7 +33,7 @@ use effort::{Effort, most_of_polishes};
 use nalgebra::DMatrix;
 use restarts::Neighbourhood;
 use restoration::restored;
-use rounds::{Candidate, Rounds, Worth};
+use rounds::{Candidate, POLISHED, Rounds, Worth};
 use serde::{Deserialize, Serialize};
 use shrunk::shrunk;
 pub use single_change::single_changes;
@@ -286,9 +286,20 @@ fn timed(
         if whole || later(POLISH_SHARE) {
             break;
         }
+        // A hair outside is made smaller by as much, if that costs next to nothing.
+        if let Some((ended, worst)) = outside.as_ref().filter(|(ended, _)| ended.violation < HAIR_OUTSIDE)
+            && let Some(smaller) = shrunk(task, criterion, (ended, worst), [&fine, &logged])
+            && loss(criterion, ended, &smaller) < LEAST_LOSS * criterion.scale(task.layout.columns().len())
+        {
+            outside = None;
+            if smaller.better_than(&kept) {
+                kept = smaller;
+            }
+            break;
+        }
         for (margin, c) in margins.iter_mut().zip(&worst) {
             // A little more than what is broken, and a hair for the optimiser's own tolerance.
-            *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
+            *margin += if *c > 0.0 { 1.2 * c + 2.0 * POLISHED } else { 0.0 };
         }
     }
     // What still breaks a limit is taken back inside: made smaller, or a hair towards a motion that the search saw keep
@@ -341,11 +352,22 @@ const INSIDE: f64 = 1e-4;
 const UNFOLLOWED_ROUNDS: usize = 2;
 const MANY_ROUNDS: usize = 8;
 
+/// Violation between samples after a polish that is not worth another one, where the motion made smaller loses less
+/// than the second of these, in the criterion's scale.
+const HAIR_OUTSIDE: f64 = 3e-4;
+const LEAST_LOSS: f64 = 1e-3;
+
 /// Polishes at most.
 const POLISHES: usize = 6;
 
 /// Evaluations of a polish once the time is up: enough to come back inside the limits.
 const LAST_EVALUATIONS: usize = 300;
+
+/// What the smooth criterion of `smaller` is above that of `larger`; infinite where either has none.
+fn loss(criterion: &dyn Criterion, larger: &Assessment, smaller: &Assessment) -> f64 {
+    let value = |of: &Assessment| criterion.value_and_derivative(&of.information).map(|(value, _)| value);
+    value(smaller).zip(value(larger)).map_or(f64::INFINITY, |(smaller, larger)| smaller - larger)
+}
 
 /// `count` equal steps from 0 to the duration, both ends included.
 pub fn grid(duration_s: f64, count: usize) -> Vec<f64> {

@@ -331,9 +331,22 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         if i < self.equalities { self.c[i].abs() } else { self.c[i].max(0.0) }
     }
 
-    /// Keeps the point if it is better: feasible before infeasible, then by value or violation.
-    fn record(&mut self, x: &[f64]) {
-        let violation = (0..self.c.len()).fold(0.0, |worst: f64, i| worst.max(self.violation_of(i)));
+    /// Takes up the constraints at the current c: their forces into the weights. Returns what they add to the augmented
+    /// Lagrangian, which is not finite where a constraint is not, and the largest violation.
+    fn push(&mut self) -> (f64, f64) {
+        let (equal, above) = self.c.split_at(self.equalities);
+        let (of_equal, of_above) = self.multipliers.split_at(self.equalities);
+        let (to_equal, to_above) = self.weights.split_at_mut(self.equalities);
+        let mut sums = PushSums::default();
+        sums.take((equal, of_equal, to_equal), self.penalty, |force| force, f64::abs);
+        sums.take((above, of_above, to_above), self.penalty, |force| force.max(0.0), |c| c);
+        let (squares, worst) = sums.of_all_lanes();
+        (squares / (2.0 * self.penalty), worst)
+    }
+
+    /// Keeps the point, whose largest violation is `violation`, if it is better: feasible before infeasible, then by
+    /// value or violation.
+    fn record(&mut self, x: &[f64], violation: f64) {
         let tolerance = self.settings.feasibility_tolerance;
         let better = if violation <= tolerance {
             self.best_violation > tolerance || self.objective < self.best_value
@@ -364,22 +377,64 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
     }
 }
 
+/// Sums over constraints, of which there are thousands: each lane has its own, so that they are made side by side.
+#[derive(Default)]
+struct PushSums {
+    /// `w² - λ²`.
+    squares: [f64; LANES],
+    /// `c - c`: zero, or no number where c is none.
+    undefined: [f64; LANES],
+    worst: [f64; LANES],
+}
+
+const LANES: usize = 8;
+
+impl PushSums {
+    /// Makes the weights `push(λ + ρ c)` of constraints `c` with multipliers `λ`.
+    fn take(
+        &mut self,
+        (c, multipliers, weights): (&[f64], &[f64], &mut [f64]),
+        penalty: f64,
+        push: impl Fn(f64) -> f64,
+        violation: impl Fn(f64) -> f64,
+    ) {
+        let mut one = |lane: usize, c: f64, multiplier: f64| {
+            let weight = push(multiplier + penalty * c);
+            self.squares[lane] += weight * weight - multiplier * multiplier;
+            self.undefined[lane] += c - c;
+            self.worst[lane] = self.worst[lane].max(violation(c));
+            weight
+        };
+        let (whole, rest) = c.as_chunks::<LANES>();
+        let (multipliers, of_rest) = multipliers.as_chunks::<LANES>();
+        let (weights, to_rest) = weights.as_chunks_mut::<LANES>();
+        for ((c, multipliers), weights) in whole.iter().zip(multipliers).zip(weights) {
+            for lane in 0..LANES {
+                weights[lane] = one(lane, c[lane], multipliers[lane]);
+            }
+        }
+        for (lane, ((c, multiplier), weight)) in rest.iter().zip(of_rest).zip(to_rest).enumerate() {
+            *weight = one(lane, *c, *multiplier);
+        }
+    }
+
+    /// The sum of squares, not finite where a constraint is not, and the largest violation.
+    fn of_all_lanes(&self) -> (f64, f64) {
+        let squares: f64 = self.squares.iter().zip(&self.undefined).map(|(a, b)| a + b).sum();
+        (squares, self.worst.iter().copied().fold(0.0, f64::max))
+    }
+}
+
 impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
     fn value(&mut self, x: &[f64]) -> f64 {
         self.objective = self.problem.values(x, &mut self.c);
         self.evaluations += 1;
-        let mut value = self.objective;
-        for i in 0..self.c.len() {
-            let (c, multiplier) = (self.c[i], self.multipliers[i]);
-            let force = multiplier + self.penalty * c;
-            self.weights[i] = if i < self.equalities { force } else { force.max(0.0) };
-            value += (self.weights[i] * self.weights[i] - multiplier * multiplier) / (2.0 * self.penalty);
-        }
-        // NaN vanishes in `max`, so every constraint is asked.
-        if !value.is_finite() || self.c.iter().any(|c| !c.is_finite()) {
+        let (pushing, violation) = self.push();
+        let value = self.objective + pushing;
+        if !value.is_finite() {
             return f64::NAN;
         }
-        self.record(x);
+        self.record(x, violation);
         let progress = Progress {
             best: &self.best,
             value: self.best_value,
@@ -395,13 +450,9 @@ impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
         self.problem.gradient(&self.weights, gradient);
         // A rejected trial may follow; the curvature belongs to the point of the gradient.
         self.curvature.clear();
-        self.curvature.extend(
-            self.weights.iter().enumerate().map(
-                |(i, weight)| {
-                    if i < self.equalities || *weight > 0.0 { self.penalty } else { 0.0 }
-                },
-            ),
-        );
+        let (equal, above) = self.weights.split_at(self.equalities);
+        self.curvature.resize(equal.len(), self.penalty);
+        self.curvature.extend(above.iter().map(|weight| if *weight > 0.0 { self.penalty } else { 0.0 }));
     }
 
     fn prepare_metric(&mut self, gradient: &[f64], free: &[bool], last: Option<Step<'_>>) -> bool {
