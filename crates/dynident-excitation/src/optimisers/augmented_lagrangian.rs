@@ -382,7 +382,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
 struct PushSums {
     /// `w² - λ²`.
     squares: [f64; LANES],
-    /// `c - c`: zero, or no number where c is none.
+    /// `0 c`: zero, or no number where c is not a finite one.
     undefined: [f64; LANES],
     worst: [f64; LANES],
 }
@@ -401,7 +401,7 @@ impl PushSums {
         let mut one = |lane: usize, c: f64, multiplier: f64| {
             let weight = push(multiplier + penalty * c);
             self.squares[lane] += weight * weight - multiplier * multiplier;
-            self.undefined[lane] += c - c;
+            self.undefined[lane] += 0.0 * c;
             self.worst[lane] = self.worst[lane].max(violation(c));
             weight
         };
