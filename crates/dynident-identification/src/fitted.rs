@@ -9,9 +9,11 @@ use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_erro
 use crate::likelihood::schwarz;
 use crate::one_fit::{Choices, Fitted, Job, Known, StageTimes, fitted_once};
 use crate::payload::{Payload, free_gains};
+use crate::recording::Recording;
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use dynident_recording::log::OneOrMany;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Rows and estimate, with the lag of the torque, what varies between logs and the constants of chosen friction in its
@@ -24,7 +26,11 @@ pub(crate) fn fitted<'a>(
 ) -> Result<Fitted<'a>, IdentificationError> {
     let is_model = job.arm().is_none();
     let mut found = match choices_of_excerpt(task, chosen, execution, job)? {
-        Some(choices) => with_choices(task, &choices, chosen, execution)?,
+        Some((choices, excerpts)) => {
+            let mut found = with_choices(task, &choices, chosen, execution)?;
+            found.logs = found.logs.with_excerpts(Arc::new(excerpts));
+            found
+        }
         None => without_lag(task, chosen, execution, job)?,
     };
     if is_model && found.settings.estimation.estimator.reads_filtered_rows() {
@@ -41,14 +47,14 @@ pub(crate) fn fitted<'a>(
     Ok(found)
 }
 
-/// What an [excerpt](crate::excerpt) of long recordings chooses; none where they are not long, and where instruments
+/// What an [excerpt](crate::excerpt) of long recordings chooses, and the excerpt; none where they are not long, and where instruments
 /// from outside or an arm that is known leave little to choose.
 fn choices_of_excerpt(
     task: &IdentificationTask,
     chosen: &[usize],
     execution: Execution<'_>,
     job: &Job<'_, '_>,
-) -> Result<Option<Choices>, IdentificationError> {
+) -> Result<Option<(Choices, Vec<Recording>)>, IdentificationError> {
     let IdentificationTask { robot, recordings, payloads, settings } = task;
     if !job.is_plain() || settings.gains == GainChoice::Unknown {
         return Ok(None);
@@ -61,7 +67,7 @@ fn choices_of_excerpt(
     // What is wrong with recordings, or too little in them, their whole says.
     let Ok(found) = without_lag(&task, chosen, execution, &mut Job::Model(None)) else { return Ok(None) };
     let (model, joints) = found.friction;
-    Ok(Some(Choices {
+    let choices = Choices {
         robot: found.robot,
         drive_inertia: found.drive_inertia,
         motion_hz: found.logs.motion_hz(),
@@ -75,7 +81,8 @@ fn choices_of_excerpt(
         is_of_excerpt: true,
         lag: found.lag,
         times: StageTimes { logs_s: found.times.logs_s + read_s, ..found.times },
-    }))
+    };
+    Ok(Some((choices, task.recordings)))
 }
 
 /// Rows and estimate of all rows with what an excerpt of them chose; of the lag and of the constants of friction what

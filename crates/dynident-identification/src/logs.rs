@@ -47,6 +47,8 @@ pub struct Logs<'a> {
     pub execution: Execution<'a>,
     /// Empty where nothing is kept between passes.
     kept: Arc<Vec<OnceLock<KeptLog>>>,
+    /// The same recordings with excerpts of long ones; empty where there are none.
+    excerpts: Arc<Vec<Recording>>,
     /// What the spectra of the deciding logs say, where the cut-off was left to them.
     spectra: Vec<LogSpectrum>,
     /// The cut-off of the torque's motion band, where the fit has another.
@@ -100,7 +102,8 @@ impl<'a> Logs<'a> {
             }
         }
         let kept = unread(recordings);
-        Ok(Self { recordings, motion, filter, execution, kept, spectra, motion_hz: None, torque_hz: None })
+        let excerpts = Arc::default();
+        Ok(Self { recordings, motion, filter, execution, kept, excerpts, spectra, motion_hz: None, torque_hz: None })
     }
 
     /// The same with the cut-off `cutoff_hz` where it was left to the data; held-out figures stay those of the motion's
@@ -133,6 +136,18 @@ impl<'a> Logs<'a> {
             self.kept = Arc::clone(&other.kept);
         }
         self
+    }
+
+    /// The same with [excerpts](crate::excerpt) for [looks at some instants](Self::pass_for_instants).
+    #[must_use]
+    pub(crate) fn with_excerpts(mut self, excerpts: Arc<Vec<Recording>>) -> Self {
+        self.excerpts = excerpts;
+        self
+    }
+
+    /// What was given to [`with_excerpts`](Self::with_excerpts); empty where nothing was.
+    pub(crate) fn excerpts(&self) -> Arc<Vec<Recording>> {
+        Arc::clone(&self.excerpts)
     }
 
     /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
@@ -213,6 +228,17 @@ impl<'a> Logs<'a> {
         }
     }
 
+    /// A pass that is asked for some instants of recording number `index`: of one whose motion is not kept over its
+    /// excerpt, where it has one, so that a long log is not read again.
+    pub(crate) fn pass_for_instants<'p>(&'p self, model: &'p RegressorModel, index: usize) -> LogPass<'p> {
+        let pass = self.pass(model, index);
+        let is_kept = pass.kept.is_some_and(|kept| kept.get().is_some());
+        match self.excerpts.get(index) {
+            Some(recording) if recording.whole.is_some() && !is_kept => LogPass { recording, kept: None, ..pass },
+            _ => pass,
+        }
+    }
+
     /// Begins a stage over some recordings.
     pub(crate) fn begin(&self, stage: &str, indices: &[usize]) {
         let rows = indices.iter().map(|&index| self.recordings[index].estimated_rows()).sum();
@@ -233,4 +259,48 @@ fn unread(recordings: &[Recording]) -> Arc<Vec<OnceLock<KeptLog>>> {
 /// Places of the recordings with this role.
 pub(crate) fn of_role(recordings: &[Recording], role: Role) -> Vec<usize> {
     (0..recordings.len()).filter(|&index| recordings[index].role == role).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::excerpt::excerpts;
+    use crate::settings::IdentificationSettings;
+    use dynident_dynamics::ParametricModel;
+    use dynident_recording::JointSamples;
+
+    #[test]
+    fn instants_of_a_long_log_that_is_not_kept_are_of_its_excerpt() {
+        let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/planar2r.urdf");
+        let model = RegressorModel::from(
+            ParametricModel::new(dynident_model::load_robot(robot).unwrap().model, Vec::new()).unwrap(),
+        );
+        let rows = 450_000;
+        let columns = |scale: f64| -> Vec<Vec<f64>> {
+            let wave = |joint: usize, row: usize| scale * (0.9e-3 * row as f64 + joint as f64).sin();
+            (0..model.dof()).map(|joint| (0..rows).map(|row| wave(joint, row)).collect()).collect()
+        };
+        let samples = JointSamples::at_rate(1000.0, columns(1.0), columns(10.0));
+        let recordings = vec![Recording::training("log", samples.into_log("log", &model.joint_names()).unwrap())];
+        let settings = IdentificationSettings::default();
+        let made = excerpts(&recordings, &settings, &[0], Execution::default()).unwrap().unwrap();
+        let execution = Execution::default();
+        let logs = Logs::new(model.model(), &recordings, settings.filters(), &[0], None, execution).unwrap();
+        let logs = logs.with_excerpts(Arc::new(made));
+        let rows_of = |pass: LogPass<'_>| {
+            let mut rows = 0;
+            pass.each_block(&mut |block| {
+                rows += block.rows;
+                Ok(())
+            })
+            .unwrap();
+            rows
+        };
+        let of_excerpt = rows_of(logs.pass_for_instants(&model, 0));
+        assert!((50_000..=200_000).contains(&of_excerpt), "{of_excerpt}");
+        // Once the motion of all rows is at hand these are as good, and more.
+        let all = rows_of(logs.pass(&model, 0));
+        assert!(all > 440_000 && rows_of(logs.pass_for_instants(&model, 0)) == all, "{all}");
+        assert_eq!(rows_of(logs.without_keeping().pass_for_instants(&model, 0)), of_excerpt);
+    }
 }

@@ -149,6 +149,7 @@ pub fn diagnose(
     for share in SLOWER {
         let (model, cutoff_hz) = (robot.model(), Some(share * cutoff_hz));
         let slower = Logs::new(model, logs.recordings, settings.filters(), training, cutoff_hz, logs.execution)?;
+        let slower = slower.with_excerpts(logs.excerpts());
         let again = diagnosed((&slower, settings), robot, training, None)?;
         let is_noise_alone = found.is_unexplained() && !again.is_unexplained();
         if again.search.best.is_some() || is_noise_alone {

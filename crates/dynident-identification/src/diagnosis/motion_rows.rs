@@ -54,12 +54,13 @@ pub(super) struct MotionSamples {
 const INVENTED: f64 = 0.3;
 
 impl MotionSamples {
-    /// Recording number `index`.
+    /// Recording number `index`, of a long one its excerpt.
     ///
     /// # Errors
     /// A recording that cannot be read.
     pub(super) fn of_recording(logs: &Logs<'_>, model: &RegressorModel, index: usize) -> Result<Self, LogError> {
-        let recording = &logs.recordings[index];
+        let pass = logs.pass_for_instants(model, index);
+        let recording = pass.recording;
         let places = recording.places(model.model())?;
         let joints = places.len();
         let mut rows = MotionRows::empty(joints);
@@ -127,7 +128,7 @@ impl MotionSamples {
             }
             Ok(())
         };
-        logs.pass(model, index).each_block(&mut take)?;
+        pass.each_block(&mut take)?;
         Ok(Self { rows, pieces, spacing_s, rows_of_fit, invented })
     }
 

@@ -20,7 +20,7 @@ pub(super) fn torque_of_noise(
 ) -> Result<Vec<f64>, LogError> {
     let mut squares = vec![0.0; model.dof()];
     for &index in training {
-        let pass = logs.pass(model, index);
+        let pass = logs.pass_for_instants(model, index);
         let Some(report) = pass.each_block(&mut |_| Ok(()))? else { continue };
         let filter = denser(logs, report.rate_hz);
         let pass = LogPass { filter: &filter, ..pass };
