@@ -3,7 +3,7 @@
 use crate::consistent::nominal_covariance;
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
-use crate::examination::{Evidence, PriorAgreement};
+use crate::examination::PriorAgreement;
 use crate::execution::Execution;
 use crate::friction::JointFriction;
 use crate::log_noise::{LogNoise, weighted_by_log};
@@ -44,7 +44,8 @@ pub struct LogFactors {
     /// What noise of the positions adds to the rows, one factor for each joint: known once the model is chosen, and
     /// where the recording shows its noise.
     pub noise: Option<Vec<SegmentedFactor>>,
-    /// How well the nominal values explain it, where they are known and torque is in newton metres.
+    /// How well the nominal values explain it, where they are known and torque is in newton metres: what
+    /// [`training_rows`] says of the model that it is given.
     pub nominal_agreement: Option<PriorAgreement>,
 }
 
@@ -98,6 +99,12 @@ pub fn training_rows(
     let mut fitted = job.with_gains(job.fit(model)?)?;
     if settings.log_noise == LogNoise::Own && fitted.gains.is_none() {
         fitted.problem = weighted_by_log(&settings.estimation, fitted.problem)?;
+    }
+    // Torque in a unit that nobody knows says nothing about the description.
+    if let Some(nominal) = fitted.model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated) {
+        for log in &mut fitted.logs {
+            log.nominal_agreement = Some(PriorAgreement::of_factors(&fitted.model, &log.factors, nominal));
+        }
     }
     Ok(fitted)
 }
@@ -417,18 +424,17 @@ impl LogFactors {
 }
 
 /// Makes a factor for each joint.
-struct FactorConsumer<'a>(Vec<JointFactor<'a>>);
+struct FactorConsumer(Vec<JointFactor>);
 
 /// The factor of one joint in the making.
-struct JointFactor<'a> {
+struct JointFactor {
     log: String,
     factor: SegmentedFactor,
     block: RowBlock,
-    evidence: Option<Evidence<'a>>,
     counted: Vec<f64>,
 }
 
-impl RowConsumer for FactorConsumer<'_> {
+impl RowConsumer for FactorConsumer {
     fn reads_samples(&self) -> bool {
         false
     }
@@ -442,15 +448,12 @@ impl RowConsumer for FactorConsumer<'_> {
     }
 }
 
-impl RowConsumer for JointFactor<'_> {
+impl RowConsumer for JointFactor {
     fn reads_samples(&self) -> bool {
         false
     }
 
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        if let Some(evidence) = &mut self.evidence {
-            evidence.filtered(rows);
-        }
         let rows = rows.counted(&mut self.counted);
         self.block
             .push(rows.panel, rows.rows, |panel, rows| self.factor.absorb(panel, rows))
@@ -470,25 +473,19 @@ pub fn log_factors(
 ) -> Result<LogFactors, LogError> {
     let log = logs.recordings[index].label();
     let in_rows = |source| LogError::Rows { log: log.clone(), source };
-    // Torque in a unit that nobody knows says nothing about the description.
-    let nominal = model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated);
     let joint = |joint: usize| {
         let columns = model.layout().joint_columns(joint);
         let factor = SegmentedFactor::new(columns.len(), settings.estimation.segments).map_err(in_rows)?;
-        let evidence = nominal.map(|nominal| Evidence::new((model, joint), nominal));
         let block = RowBlock::new(columns.len() + 1);
-        Ok(JointFactor { log: log.clone(), factor, block, evidence, counted: Vec::new() })
+        Ok(JointFactor { log: log.clone(), factor, block, counted: Vec::new() })
     };
     let mut consumer = FactorConsumer((0..model.dof()).map(joint).collect::<Result<_, LogError>>()?);
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
     let statistics = pass.run(&mut consumer)?;
     let mut factors = Vec::with_capacity(model.dof());
-    let mut evidence = Vec::new();
-    for JointFactor { mut factor, block, evidence: own, .. } in consumer.0 {
+    for JointFactor { mut factor, block, .. } in consumer.0 {
         block.finish(|panel, rows| factor.absorb(panel, rows)).map_err(in_rows)?;
         factors.push(factor);
-        evidence.extend(own);
     }
-    let nominal_agreement = nominal.map(|_| PriorAgreement::of(model.joint_names().iter().zip(&evidence)));
-    Ok(LogFactors { index, factors, statistics, noise: None, nominal_agreement })
+    Ok(LogFactors { index, factors, statistics, noise: None, nominal_agreement: None })
 }

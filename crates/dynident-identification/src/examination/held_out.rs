@@ -1,7 +1,7 @@
 //! A model against a recording that was not used for its fit.
 
 use super::motion_band::MotionBand;
-use super::nominal_agreement::{Evidence, PriorAgreement};
+use super::nominal_agreement::{AgreementRows, PriorAgreement};
 use super::residuals::{JointResiduals, JointWatch, Uncertainty};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
@@ -64,7 +64,7 @@ struct Test<'a> {
     prior: Option<(&'a [f64], Validation)>,
     motion_band: Option<MotionBand<'a>>,
     /// Joint by joint; none without nominal values.
-    evidence: Option<Vec<Evidence<'a>>>,
+    agreement: Option<Vec<AgreementRows<'a>>>,
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
@@ -84,8 +84,8 @@ impl Test<'_> {
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
             added.map_err(|source| LogError::Rows { log: self.log.clone(), source })?;
         }
-        if let Some(evidence) = &mut self.evidence {
-            evidence[rows.joint].filtered(rows);
+        if let Some(agreement) = &mut self.agreement {
+            agreement[rows.joint].filtered(rows).map_err(|source| self.failed(source))?;
         }
         Ok(())
     }
@@ -187,7 +187,8 @@ pub(crate) fn tested_on(
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
-        evidence: nominal.map(|nominal| (0..model.dof()).map(|joint| Evidence::new((model, joint), nominal)).collect()),
+        agreement: nominal
+            .map(|nominal| (0..model.dof()).map(|joint| AgreementRows::new((model, joint), nominal)).collect()),
         delay: DelayCheck::new(model, theta),
         trace: traced.then(|| TraceConsumer::new(model, physical.unwrap_or(theta))),
         buffer: Vec::new(),
@@ -221,7 +222,7 @@ pub(crate) fn tested_on(
             prior: tested_prior,
             residuals,
         },
-        nominal_agreement: test.evidence.map(|evidence| PriorAgreement::of(joints.iter().zip(&evidence))),
+        nominal_agreement: test.agreement.map(|rows| PriorAgreement::of_rows(model, &rows)),
         delays: lags_after_pass(test.delay, (logs, settings), index)?,
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,

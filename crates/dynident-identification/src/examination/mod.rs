@@ -25,4 +25,3 @@ pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;
 
 pub(crate) use held_out::tested_on;
-pub(crate) use nominal_agreement::Evidence;

@@ -4,7 +4,11 @@
 
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, predicted_torque};
+use dynident_dynamics::Column;
+use dynident_estimation::{EstimationError, FactorWorkspace, SegmentedFactor, TriangularFactor};
+use dynident_model::terms::TorqueTerm;
 use dynident_recording::{Finding, Level};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 /// The other sign counts as right when it leaves less than this share of what the given sign leaves.
@@ -21,7 +25,7 @@ pub struct PriorAgreement {
     pub residual_percent: Option<f64>,
     /// `100 ‖-τ - τ_prior‖ / ‖τ‖`, all joints stacked.
     pub residual_percent_if_reversed: Option<f64>,
-    /// Joints whose torque fits far better with the opposite sign.
+    /// Joints whose torque fits far better with the opposite sign, each with friction and offset that suit it.
     pub reversed_joints: Vec<String>,
 }
 
@@ -38,65 +42,188 @@ impl PriorAgreement {
     }
 }
 
+/// Squares of one joint's torque and of what the nominal values leave of it, with the given sign and with the other.
 #[derive(Clone, Copy, Default)]
-struct Products {
-    measured: f64,
-    predicted: f64,
-    mixed: f64,
+struct JointAgreement {
+    torque: f64,
+    left: [f64; 2],
+    /// What is left beside friction that suits the torque best.
+    left_beside_friction: [f64; 2],
 }
 
-impl Products {
-    /// `100 ‖τ − sign · τ_prior‖ / ‖τ‖`; none without torque.
-    fn residual_percent(&self, sign: f64) -> Option<f64> {
-        let share = (self.measured - 2.0 * sign * self.mixed + self.predicted) / self.measured;
-        (self.measured > 0.0).then(|| 100.0 * share.max(0.0).sqrt())
-    }
-
-    fn is_reversed(&self) -> bool {
-        let both = self.residual_percent(1.0).zip(self.residual_percent(-1.0));
-        both.is_some_and(|(given, other)| other < CLEARLY_BETTER * given)
-    }
-}
-
-/// Gathers the evidence of one joint while its rows pass.
-pub(crate) struct Evidence<'a> {
-    columns: &'a [usize],
-    prior: &'a [f64],
-    products: Products,
-    predicted: Vec<f64>,
-}
-
-impl<'a> Evidence<'a> {
-    /// For rows of a joint of the model, with the nominal values of all its columns.
-    pub(crate) fn new((model, joint): (&'a RegressorModel, usize), prior: &'a [f64]) -> Self {
-        let columns = model.layout().joint_columns(joint);
-        Self { columns, prior, products: Products::default(), predicted: Vec::new() }
-    }
-
-    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
-        predicted_torque(rows.panel, rows.rows, self.columns, self.prior, &mut self.predicted);
-        let measured = &rows.panel[self.columns.len() * rows.rows..];
-        for (p, m) in self.predicted.iter().zip(measured) {
-            self.products.measured += m * m;
-            self.products.predicted += p * p;
-            self.products.mixed += m * p;
+impl JointAgreement {
+    /// Of the rows behind a factor, with the nominal values of its columns; those in `friction` may have other ones.
+    fn of(factor: &TriangularFactor, nominal: &[f64], friction: &OwnFriction) -> Self {
+        let size = factor.columns() + 1;
+        let column = |column: usize| DVector::from_fn(size, |row, _| factor.entry(row, column));
+        let torque = column(size - 1);
+        let mut predicted = DVector::zeros(size);
+        for (place, value) in nominal.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            predicted.axpy(*value, &column(place), 1.0);
         }
+        let mut left = [&torque - &predicted, -&torque - &predicted];
+        let squares = left.each_ref().map(DVector::norm_squared);
+        let free = orthonormal(friction.free.iter().map(|&place| column(place)));
+        let mut nonnegative: Vec<DVector<f64>> = friction.nonnegative.iter().map(|&place| column(place)).collect();
+        for vector in left.iter_mut().chain(&mut nonnegative) {
+            for direction in &free {
+                let share = direction.dot(vector);
+                vector.axpy(-share, direction, 1.0);
+            }
+        }
+        let left_beside_friction = left.map(|left| left_by_nonnegative(&nonnegative, left));
+        Self { torque: torque.norm_squared(), left: squares, left_beside_friction }
+    }
+
+    /// Whether the torque fits far better with the opposite sign beside friction that suits either: in seconds of one
+    /// phase of a motion friction may stand against the bodies, but never drives.
+    fn is_reversed(&self) -> bool {
+        let [given, other] = self.left_beside_friction;
+        other < CLEARLY_BETTER * CLEARLY_BETTER * given
+    }
+}
+
+/// Which of the columns of a joint are its own friction and offset.
+#[derive(Default)]
+struct OwnFriction {
+    /// Those whose parameters are never negative.
+    nonnegative: Vec<usize>,
+    free: Vec<usize>,
+}
+
+impl OwnFriction {
+    fn of(model: &RegressorModel, joint: usize) -> Self {
+        let mut found = Self::default();
+        for (place, &column) in model.layout().joint_columns(joint).iter().enumerate() {
+            match &model.layout().columns()[column] {
+                Column::Term(term) if term.is_joint_friction() && term.is_nonnegative() => {
+                    found.nonnegative.push(place)
+                }
+                Column::Term(term) if term.is_joint_friction() || matches!(term, TorqueTerm::Offset(_)) => {
+                    found.free.push(place);
+                }
+                Column::Term(_) | Column::Body { .. } => {}
+            }
+        }
+        found
+    }
+}
+
+/// Most rounds over all columns, and the share of what is left below which a round is the last.
+const ROUNDS: usize = 200;
+const SETTLED: f64 = 1e-6;
+
+/// `min ‖r − N c‖²` over `c ≥ 0`, coordinate by coordinate.
+fn left_by_nonnegative(columns: &[DVector<f64>], mut left: DVector<f64>) -> f64 {
+    let mut values = vec![0.0; columns.len()];
+    let mut squares = left.norm_squared();
+    for _ in 0..ROUNDS {
+        for (column, value) in columns.iter().zip(&mut values) {
+            let own = column.norm_squared();
+            if own > 0.0 {
+                let next = f64::max(*value + column.dot(&left) / own, 0.0);
+                left.axpy(*value - next, column, 1.0);
+                *value = next;
+            }
+        }
+        let before = core::mem::replace(&mut squares, left.norm_squared());
+        if squares >= (1.0 - SETTLED) * before {
+            break;
+        }
+    }
+    squares
+}
+
+/// Columns of which another is a sum up to this share of its norm say nothing beside them.
+const DEPENDENT: f64 = 1e-8;
+
+/// An orthonormal basis of some columns, by Gram and Schmidt, each column twice.
+fn orthonormal(columns: impl Iterator<Item = DVector<f64>>) -> Vec<DVector<f64>> {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    for mut column in columns {
+        let norm = column.norm();
+        for _ in 0..2 {
+            for direction in &basis {
+                let share = direction.dot(&column);
+                column.axpy(-share, direction, 1.0);
+            }
+        }
+        if column.norm() > DEPENDENT * norm {
+            basis.push(column.normalize());
+        }
+    }
+    basis
+}
+
+/// Rows of one joint for their agreement with nominal values, while they pass.
+pub(crate) struct AgreementRows<'a> {
+    columns: &'a [usize],
+    nominal: &'a [f64],
+    friction: OwnFriction,
+    /// Of the columns of friction, those that are never negative first, the predicted torque and the torque.
+    factor: TriangularFactor,
+    workspace: FactorWorkspace,
+    predicted: Vec<f64>,
+    panel: Vec<f64>,
+}
+
+impl<'a> AgreementRows<'a> {
+    /// For rows of a joint of the model, with the nominal values of all its columns.
+    pub(crate) fn new((model, joint): (&'a RegressorModel, usize), nominal: &'a [f64]) -> Self {
+        let friction = OwnFriction::of(model, joint);
+        let factor = TriangularFactor::new(friction.nonnegative.len() + friction.free.len() + 1);
+        let columns = model.layout().joint_columns(joint);
+        let workspace = FactorWorkspace::default();
+        Self { columns, nominal, friction, factor, workspace, predicted: Vec::new(), panel: Vec::new() }
+    }
+
+    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), EstimationError> {
+        predicted_torque(rows.panel, rows.rows, self.columns, self.nominal, &mut self.predicted);
+        self.panel.clear();
+        let column = |place: usize| &rows.panel[place * rows.rows..(place + 1) * rows.rows];
+        for &place in self.friction.nonnegative.iter().chain(&self.friction.free) {
+            self.panel.extend_from_slice(column(place));
+        }
+        self.panel.extend_from_slice(&self.predicted);
+        self.panel.extend_from_slice(column(self.columns.len()));
+        self.factor.absorb_with(&mut self.workspace, &self.panel, rows.rows)
+    }
+
+    fn agreement(&self) -> JointAgreement {
+        let (first, last) = (self.friction.nonnegative.len(), self.factor.columns() - 1);
+        let friction = OwnFriction { nonnegative: (0..first).collect(), free: (first..last).collect() };
+        let mut nominal = vec![0.0; last + 1];
+        nominal[last] = 1.0;
+        JointAgreement::of(&self.factor, &nominal, &friction)
     }
 }
 
 impl PriorAgreement {
-    /// What all joints' evidence says, joint by joint with its name.
-    pub(crate) fn of<'e>(joints: impl IntoIterator<Item = (&'e String, &'e Evidence<'e>)>) -> Self {
-        let (mut total, mut reversed_joints) = (Products::default(), Vec::new());
-        for (name, Evidence { products, .. }) in joints {
-            total.measured += products.measured;
-            total.predicted += products.predicted;
-            total.mixed += products.mixed;
-            if products.is_reversed() {
-                reversed_joints.push(name.clone());
+    /// Of rows that have passed, joint by joint.
+    pub(crate) fn of_rows(model: &RegressorModel, joints: &[AgreementRows<'_>]) -> Self {
+        Self::of_joints(model, joints.iter().map(AgreementRows::agreement))
+    }
+
+    /// Of the rows behind factors of all columns, joint by joint, with the nominal values of the columns.
+    pub(crate) fn of_factors(model: &RegressorModel, factors: &[SegmentedFactor], nominal: &[f64]) -> Self {
+        let of_joint = |(joint, factor): (usize, &SegmentedFactor)| {
+            let own: Vec<f64> = model.layout().joint_columns(joint).iter().map(|&column| nominal[column]).collect();
+            JointAgreement::of(factor.total(), &own, &OwnFriction::of(model, joint))
+        };
+        Self::of_joints(model, factors.iter().enumerate().map(of_joint))
+    }
+
+    fn of_joints(model: &RegressorModel, joints: impl Iterator<Item = JointAgreement>) -> Self {
+        let (mut torque, mut left, mut reversed_joints) = (0.0, [0.0; 2], Vec::new());
+        for (name, joint) in model.joint_names().into_iter().zip(joints) {
+            torque += joint.torque;
+            left = [left[0] + joint.left[0], left[1] + joint.left[1]];
+            if joint.is_reversed() {
+                reversed_joints.push(name);
             }
         }
-        let [residual_percent, residual_percent_if_reversed] = [1.0, -1.0].map(|sign| total.residual_percent(sign));
+        let percent = |left: f64| (torque > 0.0).then(|| 100.0 * (left / torque).sqrt());
+        let [residual_percent, residual_percent_if_reversed] = left.map(percent);
         Self { residual_percent, residual_percent_if_reversed, reversed_joints }
     }
 }
@@ -125,4 +252,74 @@ pub fn agreement_findings(agreement: &PriorAgreement) -> Vec<Finding> {
         }
     }
     findings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns: a body's, friction, an offset; rows of a joint that goes one way only.
+    fn columns() -> [Vec<f64>; 3] {
+        let body = |k: u32| 1.0 + 0.3 * (0.7 * f64::from(k)).sin();
+        let velocity = |k: u32| -0.5 - 0.1 * (0.2 * f64::from(k)).cos();
+        let of = |column: &dyn Fn(u32) -> f64| (0..40).map(column).collect();
+        [of(&body), of(&velocity), of(&|_| 1.0)]
+    }
+
+    /// Nominally the body's column counts 1 and nothing is known of the others; the joint's parameters are `truth`.
+    fn agreement(truth: [f64; 3], sign: f64) -> JointAgreement {
+        let columns = columns();
+        let torque = (0..40).map(|k| sign * truth.iter().zip(&columns).map(|(value, own)| value * own[k]).sum::<f64>());
+        let panel: Vec<f64> = columns.iter().flatten().copied().chain(torque).collect();
+        let factor = TriangularFactor::from_rows(3, &panel, 40).unwrap();
+        JointAgreement::of(&factor, &[1.0, 0.0, 0.0], &OwnFriction { nonnegative: vec![1], free: vec![2] })
+    }
+
+    #[test]
+    fn friction_that_stands_against_the_bodies_is_no_other_sign() {
+        let honest = agreement([1.0, 2.0, -0.8], 1.0);
+        // By the bodies alone it is the other sign that fits far better.
+        assert!(honest.left[1] < CLEARLY_BETTER * CLEARLY_BETTER * honest.left[0], "{:?}", honest.left);
+        assert!(honest.left_beside_friction[0] < 1e-12 * honest.torque);
+        assert!(!honest.is_reversed());
+    }
+
+    #[test]
+    fn the_other_sign_is_seen_beside_friction() {
+        for truth in [[1.0, 0.3, 0.1], [1.2, 0.3, 0.0], [0.8, 0.0, -0.1], [0.3, 5.0, 0.1]] {
+            assert!(agreement(truth, -1.0).is_reversed(), "{truth:?}");
+            assert!(!agreement(truth, 1.0).is_reversed(), "{truth:?}");
+        }
+    }
+
+    #[test]
+    fn nonnegative_parameters_leave_what_the_best_of_all_subsets_leaves() {
+        let columns = [[1.0, 0.2, 0.0], [0.9, 0.4, 0.1], [-0.3, 1.0, 0.5]].map(|c| DVector::from_vec(c.to_vec()));
+        for torque in [[1.0, 0.0, 0.0], [-1.0, 0.5, 0.2], [0.3, -2.0, 1.0], [2.0, 1.0, -1.0]] {
+            let torque = DVector::from_vec(torque.to_vec());
+            let of_subset = |subset: u32| -> Option<f64> {
+                let own: Vec<_> =
+                    (0..3).filter(|k| subset >> k & 1 == 1).map(|k| columns[k as usize].clone()).collect();
+                if own.is_empty() {
+                    return Some(torque.norm_squared());
+                }
+                let matrix = nalgebra::DMatrix::from_columns(&own);
+                let values = matrix.clone().svd(true, true).solve(&torque, 1e-12).ok()?;
+                values.iter().all(|value| *value >= 0.0).then(|| (&torque - matrix * values).norm_squared())
+            };
+            let best = (0..8).filter_map(of_subset).fold(f64::INFINITY, f64::min);
+            let left = left_by_nonnegative(&columns, torque.clone());
+            // A round that gains a millionth is the last: of slow rounds a hundred more may gain as much each.
+            assert!(left >= best - 1e-12 && left <= best + 1e-4 * torque.norm_squared(), "{left} {best}");
+        }
+    }
+
+    #[test]
+    fn columns_that_say_the_same_are_one_direction() {
+        let column = DVector::from_vec(vec![1.0, 2.0, 2.0]);
+        let columns = [column.clone(), -2.0 * &column, DVector::zeros(3), DVector::from_vec(vec![0.0, 1.0, 0.0])];
+        let basis = orthonormal(columns.into_iter());
+        assert_eq!(basis.len(), 2);
+        assert!(basis[0].dot(&basis[1]).abs() < 1e-15 && (basis[1].norm() - 1.0).abs() < 1e-15);
+    }
 }
