@@ -47,8 +47,8 @@ pub(crate) fn fitted<'a>(
     Ok(found)
 }
 
-/// What an [excerpt](crate::excerpt) of long recordings chooses, and the excerpt; none where they are not long, and where instruments
-/// from outside or an arm that is known leave little to choose.
+/// What an [excerpt](crate::excerpt) of long recordings chooses, and the excerpt; none where they are not long, and
+/// where instruments from outside or an arm that is known leave little to choose.
 fn choices_of_excerpt(
     task: &IdentificationTask,
     chosen: &[usize],
