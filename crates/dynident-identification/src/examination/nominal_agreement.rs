@@ -97,7 +97,7 @@ impl OwnFriction {
         for (place, &column) in model.layout().joint_columns(joint).iter().enumerate() {
             match &model.layout().columns()[column] {
                 Column::Term(term) if term.is_joint_friction() && term.is_nonnegative() => {
-                    found.nonnegative.push(place)
+                    found.nonnegative.push(place);
                 }
                 Column::Term(term) if term.is_joint_friction() || matches!(term, TorqueTerm::Offset(_)) => {
                     found.free.push(place);
