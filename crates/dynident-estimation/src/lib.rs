@@ -57,7 +57,7 @@ pub mod uncertainty;
 pub use diagnostics::{
     CorrelatedPair, CrossValidation, EssentialEnd, EssentialReport, EssentialSettings, FoldErrors, JointFolds,
     Normality, NormalityReport, SpeedRanges, SpeedRangesReport, Validation, ValidationReport, Whiteness,
-    WhitenessReport, essential, left_out_ratios, strongest_correlations,
+    WhitenessReport, essential, left_out_ratios, nonnegative_least_squares, strongest_correlations,
 };
 pub use error::EstimationError;
 pub use factor::{

@@ -21,6 +21,7 @@ pub use essential::{
     strongest_correlations,
 };
 pub use left_out_blocks::left_out_ratios;
+pub use nonnegative::nonnegative_least_squares;
 pub use normality::{Normality, NormalityReport};
 pub use speed_ranges::{SpeedRangeFigures, SpeedRanges, SpeedRangesReport};
 pub use validation::{JointValidation, Validation, ValidationReport};

@@ -6,12 +6,12 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// The active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23, with the free unknowns
 /// never active. A column that others explain up to 1e-10 of its norm is left out (zero). Always ends: after `4 n + 10`
-/// changes of the set the last feasible point is returned.
-pub(crate) fn nonnegative_least_squares(
-    gram: &DMatrix<f64>,
-    right: &DVector<f64>,
-    nonnegative: &[bool],
-) -> DVector<f64> {
+/// changes of the set the last feasible point is returned. `gram` is n × n, `right` and `nonnegative` have n entries,
+/// in whatever units A and b have.
+///
+/// # Panics
+/// Where sizes differ.
+pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonnegative: &[bool]) -> DVector<f64> {
     let n = right.len();
     // Unit diagonal, so that one tolerance fits all.
     let scale = DVector::from_fn(n, |k, _| if gram[(k, k)] > 0.0 { gram[(k, k)].sqrt() } else { 0.0 });

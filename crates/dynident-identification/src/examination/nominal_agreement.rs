@@ -5,10 +5,12 @@
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, predicted_torque};
 use dynident_dynamics::Column;
-use dynident_estimation::{EstimationError, FactorWorkspace, SegmentedFactor, TriangularFactor};
+use dynident_estimation::{
+    EstimationError, FactorWorkspace, SegmentedFactor, TriangularFactor, nonnegative_least_squares,
+};
 use dynident_model::terms::TorqueTerm;
 use dynident_recording::{Finding, Level};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// The other sign counts as right when it leaves less than this share of what the given sign leaves.
@@ -61,17 +63,15 @@ impl JointAgreement {
         for (place, value) in nominal.iter().enumerate().filter(|(_, value)| **value != 0.0) {
             predicted.axpy(*value, &column(place), 1.0);
         }
-        let mut left = [&torque - &predicted, -&torque - &predicted];
+        let left = [&torque - &predicted, -&torque - &predicted];
+        let columns = DMatrix::from_fn(size, friction.columns.len(), |row, k| factor.entry(row, friction.columns[k]));
+        let gram = columns.tr_mul(&columns);
+        let beside_friction = |left: &DVector<f64>| {
+            let values = nonnegative_least_squares(&gram, &columns.tr_mul(left), &friction.is_nonnegative);
+            (left - &columns * values).norm_squared()
+        };
+        let left_beside_friction = left.each_ref().map(beside_friction);
         let squares = left.each_ref().map(DVector::norm_squared);
-        let free = orthonormal(friction.free.iter().map(|&place| column(place)));
-        let mut nonnegative: Vec<DVector<f64>> = friction.nonnegative.iter().map(|&place| column(place)).collect();
-        for vector in left.iter_mut().chain(&mut nonnegative) {
-            for direction in &free {
-                let share = direction.dot(vector);
-                vector.axpy(-share, direction, 1.0);
-            }
-        }
-        let left_beside_friction = left.map(|left| left_by_nonnegative(&nonnegative, left));
         Self { torque: torque.norm_squared(), left: squares, left_beside_friction }
     }
 
@@ -84,75 +84,23 @@ impl JointAgreement {
 }
 
 /// Which of the columns of a joint are its own friction and offset.
-#[derive(Default)]
 struct OwnFriction {
+    columns: Vec<usize>,
     /// Those whose parameters are never negative.
-    nonnegative: Vec<usize>,
-    free: Vec<usize>,
+    is_nonnegative: Vec<bool>,
 }
 
 impl OwnFriction {
     fn of(model: &RegressorModel, joint: usize) -> Self {
-        let mut found = Self::default();
-        for (place, &column) in model.layout().joint_columns(joint).iter().enumerate() {
-            match &model.layout().columns()[column] {
-                Column::Term(term) if term.is_joint_friction() && term.is_nonnegative() => {
-                    found.nonnegative.push(place);
-                }
-                Column::Term(term) if term.is_joint_friction() || matches!(term, TorqueTerm::Offset(_)) => {
-                    found.free.push(place);
-                }
-                Column::Term(_) | Column::Body { .. } => {}
+        let term = |(place, &column): (usize, &usize)| match &model.layout().columns()[column] {
+            Column::Term(term) if term.is_joint_friction() || matches!(term, TorqueTerm::Offset(_)) => {
+                Some((place, term.is_nonnegative()))
             }
-        }
-        found
+            Column::Term(_) | Column::Body { .. } => None,
+        };
+        let (columns, is_nonnegative) = model.layout().joint_columns(joint).iter().enumerate().filter_map(term).unzip();
+        Self { columns, is_nonnegative }
     }
-}
-
-/// Most rounds over all columns, and the share of what is left below which a round is the last.
-const ROUNDS: usize = 200;
-const SETTLED: f64 = 1e-6;
-
-/// `min ‖r − N c‖²` over `c ≥ 0`, coordinate by coordinate.
-fn left_by_nonnegative(columns: &[DVector<f64>], mut left: DVector<f64>) -> f64 {
-    let mut values = vec![0.0; columns.len()];
-    let mut squares = left.norm_squared();
-    for _ in 0..ROUNDS {
-        for (column, value) in columns.iter().zip(&mut values) {
-            let own = column.norm_squared();
-            if own > 0.0 {
-                let next = f64::max(*value + column.dot(&left) / own, 0.0);
-                left.axpy(*value - next, column, 1.0);
-                *value = next;
-            }
-        }
-        let before = core::mem::replace(&mut squares, left.norm_squared());
-        if squares >= (1.0 - SETTLED) * before {
-            break;
-        }
-    }
-    squares
-}
-
-/// Columns of which another is a sum up to this share of its norm say nothing beside them.
-const DEPENDENT: f64 = 1e-8;
-
-/// An orthonormal basis of some columns, by Gram and Schmidt, each column twice.
-fn orthonormal(columns: impl Iterator<Item = DVector<f64>>) -> Vec<DVector<f64>> {
-    let mut basis: Vec<DVector<f64>> = Vec::new();
-    for mut column in columns {
-        let norm = column.norm();
-        for _ in 0..2 {
-            for direction in &basis {
-                let share = direction.dot(&column);
-                column.axpy(-share, direction, 1.0);
-            }
-        }
-        if column.norm() > DEPENDENT * norm {
-            basis.push(column.normalize());
-        }
-    }
-    basis
 }
 
 /// Rows of one joint for their agreement with nominal values, while they pass.
@@ -160,7 +108,7 @@ pub(crate) struct AgreementRows<'a> {
     columns: &'a [usize],
     nominal: &'a [f64],
     friction: OwnFriction,
-    /// Of the columns of friction, those that are never negative first, the predicted torque and the torque.
+    /// Of the columns of friction, the predicted torque and the torque.
     factor: TriangularFactor,
     workspace: FactorWorkspace,
     predicted: Vec<f64>,
@@ -171,7 +119,7 @@ impl<'a> AgreementRows<'a> {
     /// For rows of a joint of the model, with the nominal values of all its columns.
     pub(crate) fn new((model, joint): (&'a RegressorModel, usize), nominal: &'a [f64]) -> Self {
         let friction = OwnFriction::of(model, joint);
-        let factor = TriangularFactor::new(friction.nonnegative.len() + friction.free.len() + 1);
+        let factor = TriangularFactor::new(friction.columns.len() + 1);
         let columns = model.layout().joint_columns(joint);
         let workspace = FactorWorkspace::default();
         Self { columns, nominal, friction, factor, workspace, predicted: Vec::new(), panel: Vec::new() }
@@ -181,7 +129,7 @@ impl<'a> AgreementRows<'a> {
         predicted_torque(rows.panel, rows.rows, self.columns, self.nominal, &mut self.predicted);
         self.panel.clear();
         let column = |place: usize| &rows.panel[place * rows.rows..(place + 1) * rows.rows];
-        for &place in self.friction.nonnegative.iter().chain(&self.friction.free) {
+        for &place in &self.friction.columns {
             self.panel.extend_from_slice(column(place));
         }
         self.panel.extend_from_slice(&self.predicted);
@@ -190,8 +138,9 @@ impl<'a> AgreementRows<'a> {
     }
 
     fn agreement(&self) -> JointAgreement {
-        let (first, last) = (self.friction.nonnegative.len(), self.factor.columns() - 1);
-        let friction = OwnFriction { nonnegative: (0..first).collect(), free: (first..last).collect() };
+        let last = self.friction.columns.len();
+        let friction =
+            OwnFriction { columns: (0..last).collect(), is_nonnegative: self.friction.is_nonnegative.clone() };
         let mut nominal = vec![0.0; last + 1];
         nominal[last] = 1.0;
         JointAgreement::of(&self.factor, &nominal, &friction)
@@ -272,7 +221,11 @@ mod tests {
         let torque = (0..40).map(|k| sign * truth.iter().zip(&columns).map(|(value, own)| value * own[k]).sum::<f64>());
         let panel: Vec<f64> = columns.iter().flatten().copied().chain(torque).collect();
         let factor = TriangularFactor::from_rows(3, &panel, 40).unwrap();
-        JointAgreement::of(&factor, &[1.0, 0.0, 0.0], &OwnFriction { nonnegative: vec![1], free: vec![2] })
+        JointAgreement::of(
+            &factor,
+            &[1.0, 0.0, 0.0],
+            &OwnFriction { columns: vec![1, 2], is_nonnegative: vec![true, false] },
+        )
     }
 
     #[test]
@@ -290,36 +243,5 @@ mod tests {
             assert!(agreement(truth, -1.0).is_reversed(), "{truth:?}");
             assert!(!agreement(truth, 1.0).is_reversed(), "{truth:?}");
         }
-    }
-
-    #[test]
-    fn nonnegative_parameters_leave_what_the_best_of_all_subsets_leaves() {
-        let columns = [[1.0, 0.2, 0.0], [0.9, 0.4, 0.1], [-0.3, 1.0, 0.5]].map(|c| DVector::from_vec(c.to_vec()));
-        for torque in [[1.0, 0.0, 0.0], [-1.0, 0.5, 0.2], [0.3, -2.0, 1.0], [2.0, 1.0, -1.0]] {
-            let torque = DVector::from_vec(torque.to_vec());
-            let of_subset = |subset: u32| -> Option<f64> {
-                let own: Vec<_> =
-                    (0..3).filter(|k| subset >> k & 1 == 1).map(|k| columns[k as usize].clone()).collect();
-                if own.is_empty() {
-                    return Some(torque.norm_squared());
-                }
-                let matrix = nalgebra::DMatrix::from_columns(&own);
-                let values = matrix.clone().svd(true, true).solve(&torque, 1e-12).ok()?;
-                values.iter().all(|value| *value >= 0.0).then(|| (&torque - matrix * values).norm_squared())
-            };
-            let best = (0..8).filter_map(of_subset).fold(f64::INFINITY, f64::min);
-            let left = left_by_nonnegative(&columns, torque.clone());
-            // A round that gains a millionth is the last: of slow rounds a hundred more may gain as much each.
-            assert!(left >= best - 1e-12 && left <= best + 1e-4 * torque.norm_squared(), "{left} {best}");
-        }
-    }
-
-    #[test]
-    fn columns_that_say_the_same_are_one_direction() {
-        let column = DVector::from_vec(vec![1.0, 2.0, 2.0]);
-        let columns = [column.clone(), -2.0 * &column, DVector::zeros(3), DVector::from_vec(vec![0.0, 1.0, 0.0])];
-        let basis = orthonormal(columns.into_iter());
-        assert_eq!(basis.len(), 2);
-        assert!(basis[0].dot(&basis[1]).abs() < 1e-15 && (basis[1].norm() - 1.0).abs() < 1e-15);
     }
 }
