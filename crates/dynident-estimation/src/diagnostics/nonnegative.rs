@@ -2,10 +2,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// A column of which others leave a share with a smaller square has no value of its own.
+const LEAST_SHARE: f64 = 1.0e-12;
+
 /// `argmin ‖A x − b‖²` with `x_k ≥ 0` where `nonnegative[k]`, from `gram = AᵀA` and `right = Aᵀb`.
 ///
 /// The active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23, with the free unknowns
-/// never active. A column that others explain up to 1e-10 of its norm is left out (zero). Always ends: after `4 n + 10`
+/// never active. A column that others explain up to 1e-6 of its norm is left out (zero). Always ends: after `4 n + 10`
 /// changes of the set the last feasible point is returned. `gram` is n × n, `right` and `nonnegative` have n entries,
 /// in whatever units A and b have.
 ///
@@ -14,64 +17,63 @@ use nalgebra::{DMatrix, DVector};
 pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonnegative: &[bool]) -> DVector<f64> {
     let n = right.len();
     // Unit diagonal, so that one tolerance fits all.
-    let scale = DVector::from_fn(n, |k, _| if gram[(k, k)] > 0.0 { gram[(k, k)].sqrt() } else { 0.0 });
+    let scale: Vec<f64> = (0..n).map(|k| if gram[(k, k)] > 0.0 { gram[(k, k)].sqrt() } else { 0.0 }).collect();
     let usable = |k: usize| scale[k] > 0.0;
-    let gram =
-        DMatrix::from_fn(n, n, |i, j| if usable(i) && usable(j) { gram[(i, j)] / (scale[i] * scale[j]) } else { 0.0 });
-    let right = DVector::from_fn(n, |k, _| if usable(k) { right[k] / scale[k] } else { 0.0 });
-    let mut passive: Vec<usize> = Vec::new();
+    let scaled = |i: usize, j: usize| if usable(i) && usable(j) { gram[(i, j)] / (scale[i] * scale[j]) } else { 0.0 };
+    let matrix: Vec<f64> = (0..n * n).map(|at| scaled(at / n, at % n)).collect();
+    let right: Vec<f64> = (0..n).map(|k| if usable(k) { right[k] / scale[k] } else { 0.0 }).collect();
+    let mut passive = PassiveSet::new((&matrix, &right));
     for k in 0..n {
         if usable(k) && !nonnegative[k] {
-            passive.push(k);
-            if solved(&gram, &right, &passive).is_none() {
-                passive.pop();
-            }
+            passive.push(k, LEAST_SHARE);
         }
     }
-    let mut x = DVector::zeros(n);
-    put(&mut x, &passive, &solved(&gram, &right, &passive).unwrap_or_default());
-    let size = right.amax().max(f64::MIN_POSITIVE);
+    let mut x = vec![0.0; n];
+    let mut target = Vec::with_capacity(n);
+    passive.solve(&mut target);
+    passive.places.iter().zip(&target).for_each(|(&k, value)| x[k] = *value);
+    let size = right.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
     let mut refused = vec![false; n];
     for _ in 0..4 * n + 10 {
-        let gradient = &right - &gram * &x;
+        // The unknown that lowers the misfit fastest; the first of equals.
+        let gradient = |k: usize| right[k] - matrix[k * n..(k + 1) * n].iter().zip(&x).map(|(a, x)| a * x).sum::<f64>();
         let enters = (0..n)
-            .filter(|k| nonnegative[*k] && usable(*k) && !refused[*k] && !passive.contains(k))
-            .filter(|k| gradient[*k] > 1.0e-12 * size)
-            .max_by(|a, b| gradient[*a].total_cmp(&gradient[*b]).then(b.cmp(a)));
-        let Some(enters) = enters else { break };
-        passive.push(enters);
+            .filter(|k| nonnegative[*k] && usable(*k) && !refused[*k] && !passive.places.contains(k))
+            .map(|k| (k, gradient(k)))
+            .filter(|(_, gradient)| *gradient > 1.0e-12 * size)
+            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        let Some((enters, _)) = enters else { break };
+        if !passive.push(enters, LEAST_SHARE) {
+            // Dependent on those that are in already.
+            refused[enters] = true;
+            continue;
+        }
         // Back from the unconstrained point until all are feasible again.
         loop {
-            let Some(target) = solved(&gram, &right, &passive) else {
-                // Dependent on those that are in already.
-                refused[enters] = true;
-                passive.retain(|&k| k != enters);
-                break;
-            };
-            let negative = |at: usize| nonnegative[passive[at]] && target[at] <= 0.0;
-            let step = (0..passive.len())
-                .filter(|&at| negative(at))
-                .map(|at| {
-                    let from = x[passive[at]];
-                    if from - target[at] > 0.0 { from / (from - target[at]) } else { 0.0 }
-                })
-                .fold(1.0_f64, f64::min);
-            let blocked = (0..passive.len()).any(negative);
-            for (at, &k) in passive.iter().enumerate() {
-                x[k] += step * (target[at] - x[k]);
-            }
-            if !blocked {
+            passive.solve(&mut target);
+            let own = || passive.places.iter().copied().zip(target.iter().copied());
+            let negative = |k: usize, target: f64| nonnegative[k] && target <= 0.0;
+            let to_zero = |(k, target): (usize, f64)| if x[k] > target { x[k] / (x[k] - target) } else { 0.0 };
+            let blocked = own().filter(|&(k, target)| negative(k, target));
+            let is_blocked = blocked.clone().next().is_some();
+            let step = blocked.map(to_zero).fold(1.0_f64, f64::min);
+            passive.places.iter().zip(&target).for_each(|(&k, target)| x[k] += step * (target - x[k]));
+            if !is_blocked {
                 break;
             }
-            let leaving: Vec<usize> = (0..passive.len())
-                .filter(|&at| negative(at) && x[passive[at]] <= 1.0e-14 * (1.0 + target[at].abs()))
-                .map(|at| passive[at])
+            let leaves = |k: usize, target: f64| negative(k, target) && x[k] <= 1.0e-14 * (1.0 + target.abs());
+            let leaving: Vec<usize> = passive
+                .places
+                .iter()
+                .zip(&target)
+                .filter(|(k, target)| leaves(**k, **target))
+                .map(|(k, _)| *k)
                 .collect();
             for &k in &leaving {
                 x[k] = 0.0;
                 refused[k] |= k == enters;
             }
-            passive.retain(|k| !leaving.contains(k));
+            passive.remove(&leaving);
             if leaving.is_empty() {
                 break;
             }
@@ -80,25 +82,73 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
     DVector::from_fn(n, |k, _| if usable(k) { x[k] / scale[k] } else { 0.0 })
 }
 
-fn put(x: &mut DVector<f64>, places: &[usize], values: &[f64]) {
-    for (&place, &value) in places.iter().zip(values) {
-        x[place] = value;
-    }
+/// The unknowns that are not held at zero, and Cholesky's factor of their part of the matrix: one that enters is one
+/// more row.
+struct PassiveSet<'a> {
+    /// The matrix by rows, and the right side.
+    problem: (&'a [f64], &'a [f64]),
+    places: Vec<usize>,
+    /// Rows of L, row k with k + 1 entries.
+    factor: Vec<f64>,
+    /// `L⁻¹ b`.
+    forward: Vec<f64>,
 }
 
-/// The unconstrained solution on some unknowns; none when their columns are dependent.
-fn solved(gram: &DMatrix<f64>, right: &DVector<f64>, places: &[usize]) -> Option<Vec<f64>> {
-    if places.is_empty() {
-        return Some(Vec::new());
+impl<'a> PassiveSet<'a> {
+    fn new(problem: (&'a [f64], &'a [f64])) -> Self {
+        let n = problem.1.len();
+        let (places, forward) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        Self { problem, places, factor: Vec::with_capacity(n * (n + 1) / 2), forward }
     }
-    let part = DMatrix::from_fn(places.len(), places.len(), |i, j| gram[(places[i], places[j])]);
-    let factor = part.cholesky()?;
-    // Squares of the shares that earlier columns leave.
-    if factor.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < 1.0e-12) {
-        return None;
+
+    /// Lets unknown `k` in, if those in leave it a share whose square is `least`; says whether they do.
+    fn push(&mut self, k: usize, least: f64) -> bool {
+        let (matrix, right) = self.problem;
+        let (n, start) = (right.len(), self.factor.len());
+        let mut before = 0;
+        for (row, &place) in self.places.iter().enumerate() {
+            let (above, own) = self.factor.split_at(start);
+            let entries = &above[before..=before + row];
+            let rest = entries.iter().zip(own).fold(matrix[k * n + place], |rest, (a, b)| rest - a * b);
+            self.factor.push(rest / entries[row]);
+            before += row + 1;
+        }
+        let own = &self.factor[start..];
+        let pivot = own.iter().fold(matrix[k * n + k], |rest, entry| rest - entry * entry);
+        if pivot.is_nan() || pivot < least {
+            self.factor.truncate(start);
+            return false;
+        }
+        let rest = own.iter().zip(&self.forward).fold(right[k], |rest, (a, b)| rest - a * b);
+        self.forward.push(rest / pivot.sqrt());
+        self.factor.push(pivot.sqrt());
+        self.places.push(k);
+        true
     }
-    let solution = factor.solve(&DVector::from_fn(places.len(), |i, _| right[places[i]]));
-    Some(solution.iter().copied().collect())
+
+    /// Takes unknowns out.
+    fn remove(&mut self, leaving: &[usize]) {
+        let Some(first) = self.places.iter().position(|k| leaving.contains(k)) else { return };
+        let behind = self.places.split_off(first);
+        self.factor.truncate(first * (first + 1) / 2);
+        self.forward.truncate(first);
+        behind.into_iter().filter(|k| !leaving.contains(k)).for_each(|k| {
+            // Independent of more than these: of these, too.
+            self.push(k, f64::MIN_POSITIVE);
+        });
+    }
+
+    /// The unconstrained solution on these unknowns, in their order.
+    fn solve(&self, solution: &mut Vec<f64>) {
+        solution.clear();
+        solution.extend_from_slice(&self.forward);
+        for row in (0..solution.len()).rev() {
+            let entries = &self.factor[row * (row + 1) / 2..=row * (row + 1) / 2 + row];
+            let own = solution[row] / entries[row];
+            solution[row] = own;
+            solution.iter_mut().zip(&entries[..row]).for_each(|(above, entry)| *above -= entry * own);
+        }
+    }
 }
 
 #[cfg(test)]
