@@ -3,9 +3,9 @@
 use dynident_estimation::{Estimate, LinearProblem};
 
 /// −2 ln of the likelihood with every joint's noise as found, `Σ_j n_j ln σ_j²`, up to a constant of the rows.
-pub(crate) fn deviance(problem: &LinearProblem, fit: &Estimate) -> f64 {
+pub(crate) fn deviance(problem: &LinearProblem, joint_sigma: &[f64]) -> f64 {
     let of_joint = |(rows, sigma): (usize, &f64)| deviance_of_joint(rows, *sigma);
-    problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
+    problem.joint_rows().into_iter().zip(joint_sigma).map(of_joint).sum()
 }
 
 /// That of one joint whose n rows leave noise of `sigma`.
@@ -38,7 +38,7 @@ impl JointScore {
 pub fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
     let rows = problem.joint_rows().into_iter().sum::<usize>().max(1) as f64;
     let free = (fit.values.len() - fit.rank.fixed.len()) as f64;
-    deviance(problem, fit) + free * rows.ln()
+    deviance(problem, &fit.joint_sigma) + free * rows.ln()
 }
 
 #[cfg(test)]

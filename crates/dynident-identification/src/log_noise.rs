@@ -1,7 +1,7 @@
 //! Noise of every joint log by log: a log that shows the model worse than another counts less.
 
 use crate::estimators::{EstimationSettings, Estimator};
-use dynident_estimation::{CovarianceMethod, EstimationError, LinearProblem, WeightedSettings, weighted_least_squares};
+use dynident_estimation::{EstimationError, LinearProblem, weighted_values};
 
 /// Passes at most, and the change of a noise level, as a share of it, at which they have settled.
 const PASSES: usize = 20;
@@ -35,12 +35,10 @@ pub(crate) fn weighted_by_log(
     if logs < 2 || matches!(settings.estimator, Estimator::Ordinary | Estimator::Function(_)) {
         return Ok(problem);
     }
-    // No error bars are wanted on the way.
-    let white = WeightedSettings { covariance: CovarianceMethod::White, ..settings.weighted() };
     let mut weights = vec![vec![1.0_f64; joints]; logs];
     for _ in 0..PASSES {
         let weighted = problem.clone().with_log_weights(|log, joint| weights[log][joint])?;
-        let theta = weighted_least_squares(&weighted, &white)?.values;
+        let theta = weighted_values(&weighted, &settings.weighted())?.values;
         let next = weights_by(&problem, &theta)?;
         let change = |(old, new): (&Vec<f64>, &Vec<f64>)| {
             old.iter().zip(new).fold(0.0_f64, |most, (old, new)| most.max((new / old - 1.0).abs()))

@@ -191,7 +191,8 @@ impl<'a> Logs<'a> {
             return Ok(estimated as f64);
         }
         let mut rows = 0;
-        self.pass(model, index).each_block(&mut |block| {
+        let pass = LogPass { reader_thread: self.execution.parallel(), ..self.pass(model, index) };
+        pass.each_block(&mut |block| {
             rows += block.rows;
             Ok(())
         })?;

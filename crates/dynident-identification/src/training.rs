@@ -15,8 +15,8 @@ use crate::rows::{JointRows, LogPass, LogStatistics, ParallelFilterSettings, Row
 use crate::settings::{GainChoice, IdentificationSettings};
 use dynident_dynamics::Column;
 use dynident_estimation::{
-    CovarianceMethod, Estimate, EstimationError, LinearProblem, SegmentedFactor, Unexcited, WeightedSettings,
-    ordinary_least_squares, unexcited_columns, weighted_least_squares,
+    CovarianceMethod, Estimate, EstimationError, LinearProblem, OrdinarySettings, SegmentedFactor, Unexcited,
+    WeightedValues, ordinary_least_squares, unexcited_columns, weighted_least_squares, weighted_values,
 };
 use dynident_recording::{MotionBlock, MotionSettings};
 use nalgebra::{DMatrix, DVector};
@@ -109,7 +109,8 @@ pub fn training_rows(
     Ok(fitted)
 }
 
-/// Weighted least squares (ordinary where the study asks for it) with the stated terms on pieces of a motion.
+/// The values of weighted least squares (ordinary where the study asks for it) with the stated terms on pieces of a
+/// motion.
 ///
 /// # Errors
 /// Rows that do not carry an estimate.
@@ -117,16 +118,15 @@ pub(crate) fn plain_fit(
     model: RegressorModel,
     pieces: Vec<MotionBlock>,
     filter: &ParallelFilterSettings,
-    settings: &IdentificationSettings,
-) -> Result<Estimate, IdentificationError> {
+    (settings, execution): (&IdentificationSettings, Execution<'_>),
+) -> Result<Vec<f64>, IdentificationError> {
     let recordings: Vec<Recording> = pieces.into_iter().map(of_piece).collect();
     let all: Vec<usize> = (0..recordings.len()).collect();
-    let alone = Execution { threads: 1, ..Execution::default() };
     let motion = MotionSettings::default();
-    let logs = Logs::new(model.model(), &recordings, (&motion, filter), &[], None, alone)?;
+    let logs = Logs::new(model.model(), &recordings, (&motion, filter), &[], None, execution)?;
     let job = TrainingPasses { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
     let rows = job.rows_once(model)?;
-    Ok(plain_estimate(&settings.estimation, &rows.problem)?)
+    Ok(plain_values(&settings.estimation, &rows.problem)?.values)
 }
 
 /// A piece of a motion as a recording.
@@ -157,7 +157,7 @@ impl TrainingPasses<'_> {
         }
         for _ in 0..LOAD_PASSES {
             let started = Instant::now();
-            let plain = plain_estimate(&self.settings.estimation, &found.problem)?;
+            let plain = plain_values(&self.settings.estimation, &found.problem)?;
             let estimated_s = started.elapsed().as_secs_f64();
             let with_load = found.model.clone().with_load_of_estimate(&found.model, &plain.values);
             let has_settled = load_has_settled(&found, &with_load);
@@ -328,8 +328,7 @@ impl TrainingPasses<'_> {
         model: &RegressorModel,
         (problem, noise): (&LinearProblem, &LinearProblem),
     ) -> Result<Unexcited, EstimationError> {
-        let first = WeightedSettings { covariance: CovarianceMethod::White, ..self.settings.estimation.weighted() };
-        let weights = match weighted_least_squares(problem, &first) {
+        let weights = match weighted_values(problem, &self.settings.estimation.weighted()) {
             Ok(first) => first.joint_sigma.iter().map(|sigma| sigma.recip()).collect(),
             // What is wrong is said where the estimate itself is made.
             Err(_) => vec![1.0; problem.joints().len()],
@@ -388,7 +387,20 @@ fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, 
     problem.with_prior(mean, information)
 }
 
-/// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
+/// The values that friction is chosen and loads are taken by, and the noise of the joints there.
+pub(crate) fn plain_values(
+    settings: &EstimationSettings,
+    problem: &LinearProblem,
+) -> Result<WeightedValues, EstimationError> {
+    if !matches!(settings.estimator, Estimator::Ordinary) {
+        return weighted_values(problem, &settings.weighted());
+    }
+    let white = OrdinarySettings { covariance: CovarianceMethod::White, ..settings.ordinary() };
+    let Estimate { values, joint_sigma, iterations, .. } = ordinary_least_squares(problem, &white)?;
+    Ok(WeightedValues { values, joint_sigma, iterations, converged: true })
+}
+
+/// The estimate with these values.
 pub(crate) fn plain_estimate(
     settings: &EstimationSettings,
     problem: &LinearProblem,
@@ -402,7 +414,7 @@ pub(crate) fn plain_estimate(
 impl LogFactors {
     /// The same rows, each joint's as one segment: all that values and bars by white noise need.
     pub(crate) fn as_one_segment(&self) -> Self {
-        let factors = self.factors.iter().map(SegmentedFactor::as_one_segment).collect();
+        let factors = self.factors.par_iter().map(SegmentedFactor::as_one_segment).collect();
         let (statistics, nominal_agreement) = (self.statistics.clone(), self.nominal_agreement.clone());
         Self { index: self.index, factors, statistics, noise: self.noise.clone(), nominal_agreement }
     }

@@ -24,7 +24,7 @@ pub use instrumented::InstrumentedProblem;
 pub(crate) use problem::StackedProblem;
 pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
-pub(crate) use rank::{Solution, Split, report, solve, solved_values, split};
+pub(crate) use rank::{Solution, SolvedValues, Split, report, solve, solved_values, split};
 pub use recursive::RecursiveFactor;
 pub(crate) use reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 pub(crate) use segmented::ReducedRows;

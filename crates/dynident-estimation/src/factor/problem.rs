@@ -345,6 +345,19 @@ impl StackedProblem<'_> {
         }
         Ok((residual, torque))
     }
+
+    /// `W_jᵀ(τ_j − W_j θ)` of every joint over all logs and columns, without weights or prior.
+    pub(crate) fn joint_scores(&self, theta: &[f64]) -> Vec<DVector<f64>> {
+        let mut scores = vec![DVector::zeros(self.problem.columns.len()); self.problem.joints.len()];
+        for (first, total) in &self.stacks {
+            let equation = &self.problem.equations[*first];
+            let score = total.score(&equation.local(theta));
+            for (&column, own) in equation.columns.iter().zip(score.iter()) {
+                scores[equation.joint][column] += own;
+            }
+        }
+        scores
+    }
 }
 
 impl JointRows {

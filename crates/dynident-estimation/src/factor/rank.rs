@@ -5,7 +5,7 @@ use super::triangular::{FactorWorkspace, TriangularFactor};
 use crate::error::{EstimationError, within};
 use dynident_dynamics::independent_columns;
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// When a column counts as excited.
@@ -150,6 +150,20 @@ pub(crate) struct SolvedValues {
 }
 
 impl SolvedValues {
+    /// `R⁻ᵀ v` for one value per free column.
+    pub(crate) fn whitened(&self, values: &DVector<f64>) -> DVector<f64> {
+        let mut whitened = DVector::from_fn(values.len(), |row, _| values[row] / self.scales[row]);
+        for row in 0..whitened.len() {
+            let entries = self.reduced.row(row);
+            let own = whitened[row] / entries[0];
+            whitened[row] = own;
+            for (below, entry) in whitened.iter_mut().skip(row + 1).zip(&entries[1..]) {
+                *below -= entry * own;
+            }
+        }
+        whitened
+    }
+
     /// The values with their inverse triangle.
     pub(crate) fn with_inverse(self) -> Solution {
         let mut inverse = dispatch(Level::detect(), Inverse { triangle: &self.reduced });

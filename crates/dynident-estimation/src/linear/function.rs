@@ -1,7 +1,7 @@
 //! A caller's own estimator: any rule that makes values of the rows `[W | τ]`.
 
 use super::ordinary::OrdinarySettings;
-use super::weighted::{WeightedSettings, weighted_least_squares};
+use super::weighted::{WeightedSettings, weighted_values};
 use crate::error::{EstimationError, expect};
 use crate::factor::{LinearProblem, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom, student_half_width};
@@ -80,8 +80,7 @@ pub fn estimate_by(
             }
         }
     }
-    let white =
-        WeightedSettings { rank: settings.rank, covariance: CovarianceMethod::White, ..WeightedSettings::default() };
+    let weighted = WeightedSettings { rank: settings.rank, ..WeightedSettings::default() };
     let rows = EstimatorRows {
         names: split.free.iter().map(|&column| problem.columns()[column].clone()).collect(),
         joints: problem.joints().to_vec(),
@@ -89,7 +88,7 @@ pub fn estimate_by(
         torque,
         joint_of_row: (0..joints).flat_map(|joint| core::iter::repeat_n(joint, each)).collect(),
         samples: problem.joint_rows(),
-        joint_sigma: weighted_least_squares(problem, &white)?.joint_sigma,
+        joint_sigma: weighted_values(problem, &weighted)?.joint_sigma,
     };
     let own = rule(&rows);
     check(name, &own, rows.names.len())?;

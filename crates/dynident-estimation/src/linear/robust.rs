@@ -1,6 +1,6 @@
 //! Iteratively reweighted least squares: rows that no noise explains lose their say.
 
-use super::weighted::{WeightedSettings, weighted_least_squares};
+use super::weighted::{WeightedSettings, weighted_values};
 use crate::error::{EstimationError, require, within};
 use crate::factor::{JointRows, LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
@@ -244,13 +244,8 @@ pub fn robust_least_squares<E: From<EstimationError>>(
     mut pass: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<RobustEstimate, E> {
     settings.validate()?;
-    let start = WeightedSettings {
-        rank: settings.rank,
-        covariance: CovarianceMethod::White,
-        tolerance: 1.0e-3,
-        ..Default::default()
-    };
-    let mut theta = weighted_least_squares(problem, &start)?.values;
+    let start = WeightedSettings { rank: settings.rank, tolerance: 1.0e-3, ..WeightedSettings::default() };
+    let mut theta = weighted_values(problem, &start)?.values;
     let floors = scale_floors(problem);
     let mut scales = vec![f64::INFINITY; floors.len()];
     // Tukey's weights have several solutions: Huber's, which has one, comes first.

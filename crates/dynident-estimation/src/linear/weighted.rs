@@ -1,7 +1,9 @@
 //! Weighted least squares: the rows of each joint count by that joint's own noise.
 
+use super::noise_step::newton_weights;
 use crate::error::{EstimationError, require, within};
-use crate::factor::{LinearProblem, RankSettings, solved_values, split};
+use crate::factor::{LinearProblem, RankSettings, SolvedValues, Split, StackedProblem, TriangularFactor};
+use crate::factor::{solved_values, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use serde::{Deserialize, Serialize};
 
@@ -47,13 +49,27 @@ impl WeightedSettings {
 /// residual is rounding error, and weights made of it would wander for ever.
 const SMALLEST_SIGMA: f64 = 1.0e-9;
 
+/// What weighted least squares finds before anything is said of its accuracy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightedValues {
+    /// One value per column; a column that is not excited has its fallback value.
+    pub values: Vec<f64>,
+    /// For every joint the standard deviation of its residual, as in [`Estimate::joint_sigma`].
+    pub joint_sigma: Vec<f64>,
+    /// Solutions made.
+    pub iterations: usize,
+    /// Whether the noise of the joints settled within the iterations allowed.
+    pub converged: bool,
+}
+
 /// `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1 until the
 /// σ_j settle; N_j are the joint's rows, p the estimated columns, n the joints. A [prior](LinearProblem::with_prior)
 /// adds `‖S(θ − m)‖²`.
 ///
 /// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. Which columns are excited is decided once, on the
-/// first solution. Gautier, "Dynamic identification of robots with power model", ICRA 1997; Swevers, Verdonck and De
-/// Schutter, IEEE Control Systems Magazine 27 (2007) 58.
+/// first solution. Behind the second solution the σ_j move by Newton's step as long as it brings them nearer. Gautier,
+/// "Dynamic identification of robots with power model", ICRA 1997; Swevers, Verdonck and De Schutter, IEEE Control
+/// Systems Magazine 27 (2007) 58.
 ///
 /// # Errors
 /// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
@@ -64,37 +80,74 @@ pub fn weighted_least_squares(
     problem: &LinearProblem,
     settings: &WeightedSettings,
 ) -> Result<Estimate, EstimationError> {
-    settings.validate()?;
     let stacked = problem.stacked();
-    let mut weights = vec![1.0; problem.joints().len()];
-    let mut triangle = stacked.combined(&weights)?;
-    let split = split(&triangle, &settings.rank, problem.unexcited());
-    let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
-    let mut solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
-    let mut joint_sigma;
-    let (mut iterations, mut converged) = (1, false);
-    loop {
-        let (squares, torque) = stacked.joint_squares(&solution.values)?;
-        joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
-        // From the second solution on, the weights in use are the last σ's reciprocals.
-        if iterations > 1 {
-            converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
-        }
-        if converged || iterations == settings.max_iterations {
-            break;
-        }
-        for (weight, sigma) in weights.iter_mut().zip(&joint_sigma) {
-            *weight = 1.0 / sigma;
-        }
-        triangle = stacked.combined(&weights)?;
-        solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
-        iterations += 1;
-    }
+    let Iterated { triangle, split, solution, weights, joint_sigma, iterations, converged } =
+        iterated(&stacked, settings)?;
     // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
     // came first.
     let solution = solution.with_inverse();
     PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
+}
+
+/// The values and the noise of [`weighted_least_squares`], without bars and rank report: a tenth to a half of its time.
+///
+/// # Errors
+/// As [`weighted_least_squares`]; [`EstimationError::Overflow`] for a value that is not finite.
+pub fn weighted_values(
+    problem: &LinearProblem,
+    settings: &WeightedSettings,
+) -> Result<WeightedValues, EstimationError> {
+    let Iterated { solution, joint_sigma, iterations, converged, .. } = iterated(&problem.stacked(), settings)?;
+    let values = solution.values;
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(column) => Err(EstimationError::Overflow { name: problem.columns()[column].clone() }),
+        None => Ok(WeightedValues { values, joint_sigma, iterations, converged }),
+    }
+}
+
+/// Where the iteration ended.
+struct Iterated {
+    triangle: TriangularFactor,
+    split: Split,
+    solution: SolvedValues,
+    /// `1/σ_j` of the last solution.
+    weights: Vec<f64>,
+    joint_sigma: Vec<f64>,
+    iterations: usize,
+    converged: bool,
+}
+
+fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result<Iterated, EstimationError> {
+    settings.validate()?;
+    let problem = stacked.problem;
+    let mut weights = vec![1.0; problem.joints().len()];
+    let mut triangle = stacked.combined(&weights)?;
+    let split = split(&triangle, &settings.rank, problem.unexcited());
+    let degrees_of_freedom = joint_degrees_of_freedom(stacked, split.free.len())?;
+    let mut solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
+    let mut iterations = 1;
+    let (mut last_change, mut is_newton, mut newton_helps) = (f64::INFINITY, false, true);
+    let (joint_sigma, converged) = loop {
+        let (squares, torque) = stacked.joint_squares(&solution.values)?;
+        let joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
+        // From the second solution on, the weights in use are the last σ's reciprocals.
+        let change = if iterations > 1 { noise_change(&joint_sigma, &weights) } else { f64::INFINITY };
+        let has_settled = change <= settings.tolerance;
+        if has_settled || iterations == settings.max_iterations {
+            break (joint_sigma, has_settled);
+        }
+        // Newton's step from weights that are not those of the start; one that does not lead nearer is the last.
+        newton_helps &= !is_newton || change <= 0.5 * last_change;
+        let newton = || newton_weights((stacked, &split), &solution, (&weights, &joint_sigma), &degrees_of_freedom);
+        let next = if iterations > 1 && newton_helps { newton() } else { None };
+        (last_change, is_newton) = (change, next.is_some());
+        weights = next.unwrap_or_else(|| joint_sigma.iter().map(|sigma| sigma.recip()).collect());
+        triangle = stacked.combined(&weights)?;
+        solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
+        iterations += 1;
+    };
+    Ok(Iterated { triangle, split, solution, weights, joint_sigma, iterations, converged })
 }
 
 /// Largest relative change from the noise that the weights stand for to the noise that was found with them.

@@ -28,3 +28,4 @@ mod simulated;
 mod spline_motion;
 mod stored_factor;
 mod validation;
+mod weighted;

@@ -12,12 +12,13 @@ mod stand_in;
 mod thinned;
 
 use crate::error::IdentificationError;
+use crate::execution::Execution;
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::training::plain_fit;
-use dynident_estimation::{CovarianceMethod, SegmentSettings};
+use dynident_estimation::SegmentSettings;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use stand_in::StandIn;
@@ -101,14 +102,15 @@ pub fn choose_cutoff(
     let above = ((highest / motion_hz).ln() / STEP.ln()).floor() as i32;
     let ladder: Vec<f64> = (-below..=above).map(|step| motion_hz * STEP.powi(step)).collect();
     let plain = plain_settings(settings);
+    let alone = Execution { threads: 1, ..Execution::default() };
     let tried: Vec<Option<f64>> = ladder
         .par_iter()
         .map(|&cutoff_hz| {
             let filter = filter_of_copy(&stand_in, cutoff_hz);
             let (mut sum, mut copies) = (0.0, 0.0);
             for pieces in stand_in.copies(&settings.motion, cutoff_hz).ok()? {
-                let estimate = plain_fit(model.clone(), pieces?, &filter, &plain).ok()?;
-                sum += stand_in.square_error(model, &estimate.values);
+                let values = plain_fit(model.clone(), pieces?, &filter, (&plain, alone)).ok()?;
+                sum += stand_in.square_error(model, &values);
                 copies += 1.0;
             }
             Some(f64::sqrt(sum / copies)).filter(|error| error.is_finite())
@@ -134,7 +136,6 @@ pub fn choose_cutoff(
 fn plain_settings(settings: &IdentificationSettings) -> IdentificationSettings {
     let mut plain = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
     // No error bars are wanted.
-    plain.estimation.covariance = CovarianceMethod::White;
     plain.estimation.segments = SegmentSettings { max_segments: 2, first_length_rows: 1024 };
     plain
 }

@@ -2,6 +2,7 @@
 
 use super::thinned::Thinned;
 use crate::error::IdentificationError;
+use crate::execution::Execution;
 use crate::logs::{LogSpectrum, Logs};
 use crate::recording::{LogError, Samples};
 use crate::regressor_model::RegressorModel;
@@ -15,6 +16,7 @@ use dynident_recording::{
     Place, SampleRanges,
 };
 use nalgebra::{DMatrix, DMatrixView, DVector};
+use rayon::prelude::*;
 
 /// Samples a second of the copy, in units of the highest candidate.
 const RATE: f64 = 4.0;
@@ -126,6 +128,9 @@ impl StandIn {
             };
             let named = |source| LogError::recording(&recording.name, source);
             let mut stream = MotionStream::with_differentiator(log, &motion, |_| build()).map_err(named)?;
+            if logs.execution.parallel() {
+                stream = stream.read_beside();
+            }
             // One filter for the torque; the motion without its noise has nothing to lose by being thinned out.
             let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
             let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
@@ -166,7 +171,7 @@ impl StandIn {
         if let Ok(reference) = reference {
             stand_in.take_motion_noise(model, &JointByJoint(reference))?;
         }
-        stand_in.copies = (0..COPIES).map(|copy| stand_in.measured(copy)).collect();
+        stand_in.copies = (0..COPIES).into_par_iter().map(|copy| stand_in.measured(copy)).collect();
         Ok(Some(stand_in))
     }
 
@@ -242,10 +247,12 @@ impl StandIn {
             transition_hz: Some(gain_half_hz.min(0.5 * rate_hz - gain_half_hz)),
             ..ParallelFilterSettings::default()
         };
-        let Ok(estimate) = plain_fit(model.clone(), measured.clone(), &filter, &super::plain_settings(settings)) else {
+        let execution = Execution { threads: logs.execution.threads, ..Execution::default() };
+        let plain = super::plain_settings(settings);
+        let Ok(values) = plain_fit(model.clone(), measured.clone(), &filter, (&plain, execution)) else {
             return Ok(None);
         };
-        let theta = estimate.values[..model.layout().columns().len()].to_vec();
+        let theta = values[..model.layout().columns().len()].to_vec();
         let mut pieces = Vec::with_capacity(measured.len());
         for mut block in measured {
             let torque = torque(model, &block, &theta)?;

@@ -202,7 +202,7 @@ fn friction_of_grid(
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
         let wide = with_terms(&first.model, further).with_load_of_estimate(&first.model, &plain.values);
-        let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain, &gains))?;
+        let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain.values, &gains))?;
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
     };
     // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.
@@ -217,7 +217,7 @@ fn friction_of_grid(
     };
     let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
     let joints = chosen_among(&candidates)?;
-    let model = with_friction_of(robot, &joints, (&first.model, &plain))?;
+    let model = with_friction_of(robot, &joints, (&first.model, &plain.values))?;
     Ok(GridFriction { model, joints, stated: (first, plain), gains })
 }
 

@@ -9,9 +9,9 @@ use crate::friction::{
 };
 use crate::likelihood::{JointScore, deviance};
 use crate::regressor_model::RegressorModel;
-use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate};
+use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate, plain_values};
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::{Estimate, LinearProblem};
+use dynident_estimation::{LinearProblem, WeightedValues};
 use dynident_model::terms::TorqueTerm;
 
 /// Passes over the recordings for the constants of chosen friction, at most, and one more where the last went too far.
@@ -41,7 +41,7 @@ struct ConstantsPass {
     merged: Vec<LogFactors>,
     /// Those without the columns beside them.
     problem: LinearProblem,
-    fit: Estimate,
+    fit: WeightedValues,
 }
 
 impl ConstantsPass {
@@ -72,9 +72,9 @@ impl ConstantsPass {
         gains: &[usize],
         (factors, estimation): (&[LogFactors], &EstimationSettings),
     ) -> Result<ConstantsStep, IdentificationError> {
-        let wide_problem = passes.free_problem(&self.wide, factors, (model, &self.fit, gains))?;
+        let wide_problem = passes.free_problem(&self.wide, factors, (model, &self.fit.values, gains))?;
         let solve = |problem: &LinearProblem| plain_estimate(estimation, problem);
-        Ok(constants.step((model, &self.fit), (&self.wide, &wide_problem), solve)?)
+        Ok(constants.step((model, &self.fit.values), (&self.wide, &wide_problem), solve)?)
     }
 }
 
@@ -233,7 +233,7 @@ pub(crate) fn one_step(
     take_intervals(joints, model, &constants, &step);
     let error = step.error().clone();
     let terms = constants.moved(&step.steps);
-    Ok(Some((with_chosen(robot, joints, &terms, (model, &measured.fit))?, error)))
+    Ok(Some((with_chosen(robot, joints, &terms, (model, &measured.fit.values))?, error)))
 }
 
 /// How well every joint's rows are explained by a model, with the terms and the constants of its friction as its own
@@ -275,13 +275,13 @@ pub(crate) fn with_constants(
 
         // A step that made the fit worse was too long; where no length makes it better the constants are found, and one
         // more pass there says which terms no row shows.
-        let misfit = misfit(&measured.problem, fit, equal_weights);
+        let misfit = misfit(&measured.problem, &fit.joint_sigma, equal_weights);
         if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit + NO_WORSE) {
             before.halvings += 1;
             are_found = before.halvings > MOST_HALVINGS || pass >= MOST_PASSES;
             before.steps.iter_mut().for_each(|step| *step *= if are_found { 0.0 } else { 0.5 });
             let terms = before.constants.moved(&before.steps);
-            model = with_chosen(robot, joints, &terms, (&model, fit))?;
+            model = with_chosen(robot, joints, &terms, (&model, &fit.values))?;
             last = last.filter(|_| !are_found);
             continue;
         }
@@ -291,7 +291,7 @@ pub(crate) fn with_constants(
             let step = measured.step_without_bars(passes, (&constants, &model), gains)?;
             if !step.may_have_settled() {
                 let terms = constants.moved(&step.steps);
-                model = with_chosen(robot, joints, &terms, (&model, fit))?;
+                model = with_chosen(robot, joints, &terms, (&model, &fit.values))?;
                 last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
                 continue;
             }
@@ -308,12 +308,12 @@ pub(crate) fn with_constants(
         let fewer = constants.without_weakest(weak, (&model, &measured.problem.column_norms()), &step);
         if pass >= MOST_PASSES {
             if !fewer.is_empty() {
-                model = with_chosen(robot, joints, &fewer, (&model, fit))?;
+                model = with_chosen(robot, joints, &fewer, (&model, &fit.values))?;
             }
             break;
         }
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
-            model = with_chosen(robot, joints, &fewer, (&model, fit))?;
+            model = with_chosen(robot, joints, &fewer, (&model, &fit.values))?;
             last = None;
             are_found = false;
             continue;
@@ -322,7 +322,7 @@ pub(crate) fn with_constants(
             break;
         }
         let terms = constants.moved(&step.steps);
-        model = with_chosen(robot, joints, &terms, (&model, fit))?;
+        model = with_chosen(robot, joints, &terms, (&model, &fit.values))?;
         last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
     }
     Ok((model, error))
@@ -333,13 +333,13 @@ fn with_chosen(
     robot: &ParametricModel,
     joints: &mut [JointFriction],
     terms: &[(usize, Vec<TorqueTerm>)],
-    (before, fit): (&RegressorModel, &Estimate),
+    (before, values): (&RegressorModel, &[f64]),
 ) -> Result<RegressorModel, IdentificationError> {
     for (joint, terms) in terms {
         let name = &before.model().joints()[*joint].name;
         joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.choose(terms));
     }
-    with_friction_of(robot, joints, (before, fit))
+    with_friction_of(robot, joints, (before, values))
 }
 
 impl TrainingPasses<'_> {
@@ -351,13 +351,13 @@ impl TrainingPasses<'_> {
         before: &RegressorModel,
     ) -> Result<RegressorModel, IdentificationError> {
         let (_, fit) = self.rows_and_fit(before)?;
-        with_friction_of(robot, joints, (before, &fit))
+        with_friction_of(robot, joints, (before, &fit.values))
     }
 
     /// The rows of a model and a fit without bars.
-    fn rows_and_fit(&self, model: &RegressorModel) -> Result<(Training, Estimate), IdentificationError> {
+    fn rows_and_fit(&self, model: &RegressorModel) -> Result<(Training, WeightedValues), IdentificationError> {
         let rows = self.rows_once(model.clone())?;
-        let fit = plain_estimate(&without_bars(self.settings), &rows.problem)?;
+        let fit = plain_values(&self.settings.estimation, &rows.problem)?;
         Ok((rows, fit))
     }
 
@@ -372,18 +372,18 @@ impl TrainingPasses<'_> {
         let merged: Vec<LogFactors> = factors.iter().map(LogFactors::as_one_segment).collect();
         let own = merged.iter().map(|log| log.clone().of(&wide, model)).collect::<Result<Vec<_>, _>>()?;
         let problem = self.stated_problem(model, &self.columns(model)?, &own)?;
-        let fit = plain_estimate(&without_bars(self.settings), &problem)?;
+        let fit = plain_values(&self.settings.estimation, &problem)?;
         Ok(ConstantsPass { wide, factors, merged, problem, fit })
     }
 }
 
 /// What a fit leaves: its deviance; where joints count alike that of all rows together, `N ln(Σ N_j σ_j²)`.
-fn misfit(problem: &LinearProblem, fit: &Estimate, equal_weights: bool) -> f64 {
+fn misfit(problem: &LinearProblem, joint_sigma: &[f64], equal_weights: bool) -> f64 {
     if !equal_weights {
-        return deviance(problem, fit);
+        return deviance(problem, joint_sigma);
     }
     let rows = problem.joint_rows();
     let of_joint = |(rows, sigma): (&usize, &f64)| *rows as f64 * sigma * sigma;
-    let squares: f64 = rows.iter().zip(&fit.joint_sigma).map(of_joint).sum();
+    let squares: f64 = rows.iter().zip(joint_sigma).map(of_joint).sum();
     rows.iter().sum::<usize>() as f64 * squares.max(f64::MIN_POSITIVE).ln()
 }

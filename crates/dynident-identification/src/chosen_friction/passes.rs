@@ -8,7 +8,7 @@ use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::training::{LogFactors, TrainingPasses};
 use dynident_dynamics::{Column, ParametricModel};
-use dynident_estimation::{CovarianceMethod, Estimate, LinearProblem};
+use dynident_estimation::{CovarianceMethod, LinearProblem};
 use dynident_model::terms::TorqueTerm;
 
 /// Settings of a fit whose error bars nobody wants.
@@ -32,28 +32,28 @@ pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = Tor
 pub(crate) fn with_friction_of(
     robot: &ParametricModel,
     joints: &[JointFriction],
-    (before, fit): (&RegressorModel, &Estimate),
+    (before, values): (&RegressorModel, &[f64]),
 ) -> Result<RegressorModel, IdentificationError> {
     let torque_gains = before.torque_gains.clone();
     let next = RegressorModel { torque_gains, ..RegressorModel::from(chosen_model(robot, joints)?) };
-    Ok(next.with_load_of_estimate(before, &fit.values))
+    Ok(next.with_load_of_estimate(before, values))
 }
 
 impl TrainingPasses<'_> {
-    /// The rows of `wide`, with the `free` gains of some joints as unknowns about `fit`, whose columns are those of
-    /// `model` and what logs add to them.
+    /// The rows of `wide`, with the `free` gains of some joints as unknowns about the values `fitted` to the columns
+    /// of `model` and to those that logs add to them.
     pub(crate) fn free_problem(
         &self,
         wide: &RegressorModel,
         factors: &[LogFactors],
-        (model, fit, free): (&RegressorModel, &Estimate, &[usize]),
+        (model, fitted, free): (&RegressorModel, &[f64], &[usize]),
     ) -> Result<LinearProblem, IdentificationError> {
         let columns = self.columns(wide)?;
         let problem = self.stated_problem(wide, &columns, factors)?;
         let (base, wide_base) = (model.layout().columns().len(), wide.layout().columns().len());
-        let mut values = fit.values[..base].to_vec();
+        let mut values = fitted[..base].to_vec();
         values.resize(wide_base, 0.0);
-        values.extend_from_slice(&fit.values[base..]);
+        values.extend_from_slice(&fitted[base..]);
         let known: Vec<Vec<f64>> = self.training.iter().map(|&log| columns.known(log)).collect();
         Ok(with_free_gains(problem, free, (&known, &values))?)
     }

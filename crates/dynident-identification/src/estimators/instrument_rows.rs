@@ -4,6 +4,7 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::{LogError, Samples};
+use crate::regressor_model::RegressorModel;
 use crate::rows::{JointFilters, LogPass, PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque, set_aside};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, SegmentedFactor};
@@ -77,17 +78,40 @@ struct InstrumentedRows<'r, 'a> {
     /// Made with the first block, which knows the rate.
     filters: Option<JointFilters>,
     factors: Vec<SegmentedFactor>,
-    workspace: BatchWorkspace,
-    /// What friction remembers of either motion, instruments first.
-    histories: [TermHistory; 2],
-    panels: [Panels; 2],
+    /// What makes the rows of either motion, instruments first.
+    sides: [Side; 2],
     other: MotionBlock,
-    motion: [Vec<f64>; 3],
     temperature_c: Vec<f64>,
     panel: Vec<f64>,
     slow: Vec<f64>,
     counted: Vec<f64>,
     segment: usize,
+}
+
+/// What makes the rows of one motion.
+struct Side {
+    workspace: BatchWorkspace,
+    /// What friction remembers.
+    history: TermHistory,
+    panels: Panels,
+    motion: [Vec<f64>; 3],
+}
+
+impl Side {
+    fn new(model: &RegressorModel) -> Self {
+        let (workspace, history) =
+            (BatchWorkspace::new(model.model()), TermHistory::new(model.load_parameters.clone()));
+        Self { workspace, history, panels: Panels::default(), motion: Default::default() }
+    }
+
+    /// The panels of some samples of `block`, whose joints stand at `places`.
+    fn make(&mut self, model: &RegressorModel, block: &MotionBlock, places: &[usize], (from, samples): (usize, usize)) {
+        in_model_order(block, places, from, samples, &mut self.motion);
+        let [q, dq, ddq] = &self.motion;
+        let motion = JointMotion { samples, q, dq, ddq };
+        let (history, panels) = (&mut self.history, &mut self.panels);
+        regressor_panels_following(model.model(), &mut self.workspace, model.layout(), &motion, history, panels);
+    }
 }
 
 impl<'r, 'a> InstrumentedRows<'r, 'a> {
@@ -103,7 +127,6 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             .map(|width| SegmentedFactor::new(*width, rows.settings.segments))
             .collect::<Result<Vec<_>, _>>()
             .map_err(|source: EstimationError| LogError::Rows { log: label.clone(), source })?;
-        let history = || TermHistory::new(rows.model.load_parameters.clone());
         Ok(Self {
             rows,
             log: recording.name.clone(),
@@ -114,11 +137,8 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             widths,
             filters: None,
             factors,
-            workspace: BatchWorkspace::new(model),
-            histories: [history(), history()],
-            panels: Default::default(),
+            sides: [Side::new(rows.model), Side::new(rows.model)],
             other: MotionBlock::default(),
-            motion: Default::default(),
             temperature_c: Vec::new(),
             panel: Vec::new(),
             slow: Vec::new(),
@@ -154,10 +174,10 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
         let filters = self.filters.insert(filters);
         if measured.segment != self.segment {
             self.segment = measured.segment;
-            self.histories.iter_mut().for_each(TermHistory::restart);
+            self.sides.iter_mut().for_each(|side| side.history.restart());
             filters.restart();
         }
-        let (model, layout) = (self.rows.model.model(), self.rows.model.layout());
+        let layout = self.rows.model.layout();
         for from in (0..measured.rows).step_by(PANEL_SAMPLES) {
             let samples = PANEL_SAMPLES.min(measured.rows - from);
             if !measured.temperature_c.is_empty() {
@@ -166,21 +186,16 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     let temperature = measured.joint(&measured.temperature_c, place);
                     self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
                 }
-                self.histories.iter_mut().for_each(|history| history.set_temperature(&self.temperature_c));
+                self.sides.iter_mut().for_each(|side| side.history.set_temperature(&self.temperature_c));
             }
-            for ((block, history), panels) in
-                [&self.other, measured].into_iter().zip(&mut self.histories).zip(&mut self.panels)
-            {
-                in_model_order(block, &self.places, from, samples, &mut self.motion);
-                let [q, dq, ddq] = &self.motion;
-                let motion = JointMotion { samples, q, dq, ddq };
-                regressor_panels_following(model, &mut self.workspace, layout, &motion, history, panels);
-            }
+            let (model, places, run) = (self.rows.model, &self.places, (from, samples));
+            let [other, own] = &mut self.sides;
+            rayon::join(|| other.make(model, &self.other, places, run), || own.make(model, measured, places, run));
             for (joint, &place) in self.places.iter().enumerate() {
                 let columns = layout.joint_columns(joint);
                 let gain = self.rows.model.torque_gains.get(joint).copied().unwrap_or(1.0);
                 let torque = &measured.joint(measured.fitted_tau(), place)[from..from + samples];
-                let [other, own] = &self.panels;
+                let [other, own] = [&self.sides[0].panels, &self.sides[1].panels];
                 self.panel.clear();
                 if let Some(theta) = self.theta {
                     predicted_torque(other.joint(joint), samples, columns, theta, &mut self.slow);

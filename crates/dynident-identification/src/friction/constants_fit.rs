@@ -224,19 +224,19 @@ impl FrictionConstants {
         self.axes.iter().flat_map(of_axis).collect()
     }
 
-    /// The step that the rows ask for, with its covariance by `solve`. `fit` is the estimate with the constants as they
-    /// are, over the columns of `model` and then those of loads; `wide_problem` has in addition the columns of `wide`,
+    /// The step that the rows ask for, with its covariance by `solve`. `fitted` are the values with the constants as
+    /// they are, over the columns of `model` and then those of loads; `wide_problem` has in addition the columns of `wide`,
     /// all [`neighbours`](Self::neighbours) among them.
     ///
     /// # Errors
     /// Rows that do not carry an estimate.
     pub(crate) fn step(
         &self,
-        (model, fit): (&RegressorModel, &Estimate),
+        (model, fitted): (&RegressorModel, &[f64]),
         (wide, wide_problem): (&RegressorModel, &LinearProblem),
         solve: impl Fn(&LinearProblem) -> Result<Estimate, EstimationError>,
     ) -> Result<ConstantsStep, EstimationError> {
-        let problem = self.linearised((model, fit), (wide, wide_problem))?;
+        let problem = self.linearised((model, fitted), (wide, wide_problem))?;
         let found = solve(&problem)?;
         let (count, own) = (problem.columns().len() - self.axes.len(), self.axes.len());
         let furthest = |joint: usize| {
@@ -269,7 +269,7 @@ impl FrictionConstants {
     /// `[Y(c) | ∂(Y θ)/∂c]`: the model's columns, those of loads, and one for each constant.
     fn linearised(
         &self,
-        (model, fit): (&RegressorModel, &Estimate),
+        (model, fitted): (&RegressorModel, &[f64]),
         (wide, wide_problem): (&RegressorModel, &LinearProblem),
     ) -> Result<LinearProblem, EstimationError> {
         let (own, further) = (model.layout().columns().len(), wide.layout().columns().len());
@@ -294,7 +294,7 @@ impl FrictionConstants {
                 let mut of_axis = Vec::new();
                 for &number in &axis.terms {
                     let centre = place(&self.joints[axis.joint].1[number]);
-                    let value = centre.and_then(|centre| fit.values.get(centre)).copied().unwrap_or(0.0);
+                    let value = centre.and_then(|centre| fitted.get(centre)).copied().unwrap_or(0.0);
                     for step in [-STEP, STEP] {
                         if let Some(beside) = place(&self.beside(axis, number, step)) {
                             of_axis.push((beside, value * step / (2.0 * STEP * STEP)));

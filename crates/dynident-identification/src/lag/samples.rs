@@ -10,6 +10,9 @@ use dynident_recording::{DecimationSettings, Decimator, best_lag};
 
 /// Samples that are looked at: some tens of seconds of any log.
 pub(crate) const DELAY_SAMPLES: usize = 20_000;
+/// Samples of a low-passed signal that are compared, in a period of its cut-off: a parabola through three of them finds
+/// a peak within a thousandth of the period.
+const COMPARED: f64 = 20.0;
 /// Numbers that are kept at most, 64 MB.
 const MOST_NUMBERS: usize = 8_000_000;
 
@@ -82,7 +85,8 @@ impl<'a> DelayCheck<'a> {
     /// Where to begin: the best match of prediction and torque, where a shift matters; samples.
     pub(crate) fn coarse(&self, joint: usize, cutoff_hz: Option<f64>, longest_s: f64) -> Option<f64> {
         let piece = self.pieces.iter().max_by_key(|piece| piece.measured[joint].len())?;
-        let settings = DecimationSettings { factor: 1, cutoff_hz, ..DecimationSettings::default() };
+        let factor = cutoff_hz.map_or(1, |hz| (self.rate_hz / (COMPARED * hz)).clamp(1.0, 1000.0) as usize);
+        let settings = DecimationSettings { factor, cutoff_hz, ..DecimationSettings::default() };
         let smooth = |signal: &[f64]| -> Option<Vec<f64>> {
             let mut out = Vec::new();
             let rows = Decimator::new(&settings, self.rate_hz, 1).ok()?.push(signal, signal.len(), &mut out);
@@ -90,9 +94,10 @@ impl<'a> DelayCheck<'a> {
             Some(out)
         };
         let (model, measured) = (smooth(&piece.model[joint])?, smooth(&piece.measured[joint])?);
-        let longest = (longest_s * self.rate_hz).ceil() as usize;
-        let lag = best_lag(&model, &measured, longest, self.rate_hz)?;
-        lag.matters().then_some(lag.samples)
+        let rate_hz = self.rate_hz / factor as f64;
+        let longest = (longest_s * rate_hz).ceil() as usize;
+        let lag = best_lag(&model, &measured, longest, rate_hz)?;
+        lag.matters().then_some(lag.samples * factor as f64)
     }
 
     /// A joint's rows about a lag of `shift` samples.

@@ -9,6 +9,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_estimation::{SegmentSettings, SegmentedFactor};
 use dynident_model::sample::Random;
 use dynident_recording::{Derivatives, Differentiator, ImportReport, MotionBlock, Place};
+use rayon::prelude::*;
 
 /// Samples that are looked at: a power from so many is right within a tenth or so, which costs some milliseconds.
 const SAMPLES: usize = 4096;
@@ -54,37 +55,43 @@ pub(crate) fn noise_factors(
     let (rate_hz, in_filter) = (report.rate_hz, |source| LogError::Filter { log: name.clone(), source });
     let filter = pass.filter.decimation(rate_hz, pass.torque_hz.or_else(|| motion_band_hz(pass.motion)));
     let places = pass.recording.places(model.model())?;
-    let mut builder = RowBuilder::new(model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
-    let (pieces, read) = pass.some_pieces(SAMPLES, (SAMPLES / 4).max(4 * builder.needed()))?;
+    let builder = || RowBuilder::new(model, &places, rate_hz, filter.as_ref()).map_err(in_filter);
+    let (pieces, read) = pass.some_pieces(SAMPLES, (SAMPLES / 4).max(4 * builder()?.needed()))?;
     let samples: usize = pieces.iter().map(|piece| piece.rows).sum();
     let differentiator = settings.build_following(report.cutoff.cutoff_hz, None).map_err(in_filter)?;
     let repeats = (SAMPLES / samples.max(1)).clamp(1, MOST_REPEATS);
     let mut random = Random::new(SEED);
-    let mut difference = Difference { rows: vec![Vec::new(); model.dof()], ..Difference::default() };
-    for repeat in 0..repeats {
-        let noise = Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, (rate_hz, read, samples))
-            .map_err(in_filter)?;
-        let mut from = 0;
-        for piece in &pieces {
-            // A segment of its own each time, so that no filter goes on from one to the next.
-            let segment = 2 * (piece.segment + repeat * pieces.len()) + 1;
-            difference.noisy = true;
-            builder.take(&MotionBlock { segment, ..noise.on(piece, from) }, &mut difference)?;
-            difference.noisy = false;
-            builder.take(&MotionBlock { segment: segment + 1, ..piece.clone() }, &mut difference)?;
-            difference.taken.clear();
-            from += piece.rows;
+    let noise = |_| Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, (rate_hz, read, samples));
+    let noise: Vec<Noise> = (0..repeats).map(noise).collect::<Result<_, _>>().map_err(in_filter)?;
+    // The rows with noise and those without, side by side: the same samples give the same panels in the same order.
+    let rows = |block: &(dyn Fn(usize, &MotionBlock, usize) -> MotionBlock + Sync)| -> Result<JointPanels, LogError> {
+        let (mut builder, mut panels) = (builder()?, JointPanels(vec![Vec::new(); model.dof()]));
+        for repeat in 0..repeats {
+            let mut from = 0;
+            for piece in &pieces {
+                // A segment of its own each time, so that no filter goes on from one to the next.
+                let segment = piece.segment + repeat * pieces.len() + 1;
+                builder.take(&MotionBlock { segment, ..block(repeat, piece, from) }, &mut panels)?;
+                from += piece.rows;
+            }
         }
-    }
-    for ((factor, rows), &columns) in factors.iter_mut().zip(&difference.rows).zip(&columns) {
-        let count: usize = rows.iter().map(|panel| panel.len() / (columns + 1)).sum();
+        Ok(panels)
+    };
+    let noisy = || rows(&|repeat, piece, from| noise[repeat].on(piece, from));
+    let (noisy, plain) = rayon::join(noisy, || rows(&|_, piece, _| piece.clone()));
+    let (noisy, plain) = (noisy?.0, plain?.0);
+    let all = factors.par_iter_mut().zip(noisy).zip(plain).zip(&columns);
+    all.try_for_each(|(((factor, noisy), plain), &columns)| {
+        let count: usize = plain.iter().map(|panel| panel.len() / (columns + 1)).sum();
         let weight = (filtered_rows as f64 / count.max(1) as f64).sqrt();
-        for panel in rows {
-            let scaled: Vec<f64> = panel.iter().map(|x| weight * x).collect();
-            factor.absorb(&scaled, panel.len() / (columns + 1)).map_err(in_rows)?;
+        for (noisy, plain) in noisy.iter().zip(&plain) {
+            let scaled: Vec<f64> = noisy.iter().zip(plain).map(|(noisy, plain)| weight * (noisy - plain)).collect();
+            factor.absorb(&scaled, scaled.len() / (columns + 1))?;
         }
         *factor = factor.as_one_segment();
-    }
+        Ok(())
+    })
+    .map_err(in_rows)?;
     Ok(Some(factors))
 }
 
@@ -134,31 +141,12 @@ impl Noise {
     }
 }
 
-/// Panels with noise first, from which those without are taken off.
-#[derive(Default)]
-struct Difference {
-    /// Whether panels with noise come.
-    noisy: bool,
-    /// Panels with noise of the piece at hand: the joint, and its number among the joint's panels.
-    taken: Vec<(usize, usize)>,
-    /// Differences of every joint, panel by panel.
-    rows: Vec<Vec<Vec<f64>>>,
-}
+/// The rows of every joint, panel by panel.
+struct JointPanels(Vec<Vec<Vec<f64>>>);
 
-impl RowConsumer for Difference {
+impl RowConsumer for JointPanels {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        if self.noisy {
-            self.taken.push((rows.joint, self.rows[rows.joint].len()));
-            self.rows[rows.joint].push(rows.panel.to_vec());
-            return Ok(());
-        }
-        // The same samples give the same panels in the same order.
-        if let Some(place) = self.taken.iter().position(|(joint, _)| *joint == rows.joint) {
-            let (joint, number) = self.taken.remove(place);
-            for (noisy, plain) in self.rows[joint][number].iter_mut().zip(rows.panel) {
-                *noisy -= plain;
-            }
-        }
+        self.0[rows.joint].push(rows.panel.to_vec());
         Ok(())
     }
 }

@@ -258,6 +258,9 @@ impl LogPass<'_> {
             _ => {
                 let stream = self.recording.open(self.model.model(), self.motion)?;
                 let mut stream = stream.ok_or_else(|| LogError::NoSamples { log: name.clone() })?;
+                if self.reader_thread && self.most_samples.is_none() {
+                    stream = stream.read_beside();
+                }
                 let mut keeper = self.block_cache();
                 let mut block = MotionBlock::default();
                 while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {

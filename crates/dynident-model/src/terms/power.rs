@@ -50,7 +50,11 @@ impl PowerExponent {
 
 impl VelocityFunction for Power {
     fn value(&self, dq: f64) -> f64 {
-        dq * dq.hypot(self.rounding).powf(self.exponent.value() - 1.0)
+        let square = dq * dq + self.rounding * self.rounding;
+        match self.exponent {
+            PowerExponent::CubeRoot => dq / square.cbrt(),
+            PowerExponent::Quadratic => dq * square.sqrt(),
+        }
     }
 
     fn slope(&self, dq: f64) -> f64 {
