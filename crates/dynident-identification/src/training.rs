@@ -396,8 +396,8 @@ pub(crate) fn plain_values(
         return weighted_values(problem, &settings.weighted());
     }
     let white = OrdinarySettings { covariance: CovarianceMethod::White, ..settings.ordinary() };
-    let Estimate { values, joint_sigma, iterations, .. } = ordinary_least_squares(problem, &white)?;
-    Ok(WeightedValues { values, joint_sigma, iterations, converged: true })
+    let Estimate { values, joint_sigma, std: white_std, iterations, .. } = ordinary_least_squares(problem, &white)?;
+    Ok(WeightedValues { values, joint_sigma, white_std, iterations, converged: true })
 }
 
 /// The estimate with these values.
@@ -421,7 +421,7 @@ impl LogFactors {
 
     /// The same rows as another model sees them, whose columns are among those of `wide`.
     pub(crate) fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
-        for (joint, factor) in self.factors.iter_mut().enumerate() {
+        self.factors.par_iter_mut().enumerate().try_for_each(|(joint, factor)| {
             let seen = wide.layout().joint_columns(joint);
             // A column that is not there gets a number out of range, which the selection refuses.
             let place = |&column: &usize| {
@@ -430,7 +430,8 @@ impl LogFactors {
             };
             let places: Vec<usize> = model.layout().joint_columns(joint).iter().map(place).collect();
             *factor = factor.selected(&places)?;
-        }
+            Ok(())
+        })?;
         Ok(self)
     }
 }

@@ -194,16 +194,18 @@ pub(crate) fn solved_values(
         known[column] = fallback[column];
     }
     let torque = triangle.residual(&known);
-    // Triangular again after columns were left out; nothing changes when none was.
-    let mut reduced = TriangularFactor::new(free);
-    reduced.absorb_entries(&mut FactorWorkspace::default(), size, |row, column| {
-        if column == free {
-            torque[row]
-        } else {
-            let column = split.free[column];
-            triangle.entry(row, column) / scales[column]
-        }
-    });
+    let scaled = |row: usize, column: usize| match split.free.get(column) {
+        Some(&column) => triangle.entry(row, column) / scales[column],
+        None => torque.get(row).copied().unwrap_or(0.0),
+    };
+    let reduced = if split.fixed.is_empty() {
+        TriangularFactor::from_entries(free, 0, scaled)
+    } else {
+        // Triangular again after columns were left out.
+        let mut reduced = TriangularFactor::new(free);
+        reduced.absorb_entries(&mut FactorWorkspace::default(), size, scaled);
+        reduced
+    };
     let mut solution = vec![0.0; free];
     for row in (0..free).rev() {
         let entries = reduced.row(row);

@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, DVector};
 /// Furthest that a step goes in the logarithm of any `λ_j`: further away the tangent says nothing.
 const FURTHEST: f64 = 1.5;
 
-/// The weights `1/σ_j` after Newton's step from those that `solution` was found with, where it left `joint_sigma`; `None`
-/// where the step is too far or not defined.
+/// The weights `1/σ_j` after Newton's step from those that `solution` was found with, where it left `joint_sigma`;
+/// `None` where the step is too far or not defined.
 pub(super) fn newton_weights(
     (stacked, split): (&StackedProblem<'_>, &Split),
     solution: &SolvedValues,

@@ -91,4 +91,8 @@ fn values_alone_are_those_of_the_estimate() {
     assert_eq!(values.values, estimate.values);
     assert_eq!(values.joint_sigma, estimate.joint_sigma);
     assert_eq!(values.iterations, estimate.iterations);
+    for (column, std) in values.white_std.iter().enumerate() {
+        let other = estimate.covariance_white[(column, column)].sqrt();
+        assert!((std / other - 1.0).abs() < 1.0e-12, "{std} {other}");
+    }
 }

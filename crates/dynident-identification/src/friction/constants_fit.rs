@@ -15,9 +15,10 @@ use super::constants::{at, coordinates, step_of, value_at};
 use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
-use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, LinearProblem};
+use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, JointRows, LinearProblem, SegmentedFactor};
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Half the distance of the columns that a derivative is the difference of, in units of a constant's logarithm.
 const STEP: f64 = 0.1;
@@ -225,8 +226,8 @@ impl FrictionConstants {
     }
 
     /// The step that the rows ask for, with its covariance by `solve`. `fitted` are the values with the constants as
-    /// they are, over the columns of `model` and then those of loads; `wide_problem` has in addition the columns of `wide`,
-    /// all [`neighbours`](Self::neighbours) among them.
+    /// they are, over the columns of `model` and then those of loads; `wide_problem` has in addition the columns of
+    /// `wide`, all [`neighbours`](Self::neighbours) among them.
     ///
     /// # Errors
     /// Rows that do not carry an estimate.
@@ -312,7 +313,7 @@ impl FrictionConstants {
         };
         let mut problem =
             LinearProblem::new(names, wide_problem.joints().to_vec()).with_fallback(padded(wide_problem.fallback()))?;
-        for rows in wide_problem.equations() {
+        let mapped = |rows: &JointRows| -> Result<(Vec<usize>, SegmentedFactor), EstimationError> {
             let local = |column: usize| rows.columns.iter().position(|own| *own == column);
             let of_model: Vec<(usize, usize)> =
                 rows.columns.iter().enumerate().filter_map(|(local, &column)| Some((local, kept(column)?))).collect();
@@ -331,7 +332,11 @@ impl FrictionConstants {
             }
             map[(rows.columns.len(), of_model.len() + axes.len())] = 1.0;
             let columns = of_model.iter().map(|(_, column)| *column).chain(axes.iter().map(|axis| count + axis));
-            problem.add(&wide_problem.logs()[rows.log], rows.joint, columns.collect(), rows.factor.mapped(&map)?)?;
+            Ok((columns.collect(), rows.factor.mapped(&map)?))
+        };
+        let all = wide_problem.equations().par_iter().map(mapped).collect::<Result<Vec<_>, _>>()?;
+        for (rows, (columns, factor)) in wide_problem.equations().iter().zip(all) {
+            problem.add(&wide_problem.logs()[rows.log], rows.joint, columns, factor)?;
         }
 
         // What is known beforehand: of parameters as before, of constants that they are somewhere near.

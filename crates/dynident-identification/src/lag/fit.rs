@@ -16,8 +16,8 @@ use crate::log_noise::{LogNoise, weighted_by_log};
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
-    CovarianceMethod, Estimate, EstimationError, LinearProblem, SegmentedFactor, WeightedSettings,
-    weighted_least_squares,
+    Estimate, EstimationError, LinearProblem, SegmentedFactor, WeightedSettings, weighted_least_squares,
+    weighted_values,
 };
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -135,15 +135,15 @@ fn fitted(
         LogNoise::Own => weighted_by_log(settings, problem),
     };
     let mut samples = Samples::new((checks, unknowns), with, (0..dof).into_par_iter().map(start).collect())?;
-    let quick =
-        WeightedSettings { rank: settings.rank, covariance: CovarianceMethod::White, ..WeightedSettings::default() };
+    let last_step =
+        WeightedSettings { rank: settings.rank, covariance: settings.covariance, ..WeightedSettings::default() };
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
     for _ in 0..MOST_STEPS {
-        let step = weighted_least_squares(&weighted(samples.problem(|rows| &rows.merged)?)?, &quick)?;
+        let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &last_step)?;
         let mut has_settled = true;
         for joint in 0..dof {
-            let (rest, std) = (step.values[first + joint], step.std[first + joint]);
+            let (rest, std) = (step.values[first + joint], step.white_std[first + joint]);
             has_settled &= rest.abs() <= (SETTLED.0 * std).max(SETTLED.1 / fastest_hz);
             samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-longest_s, longest_s);
         }
@@ -152,7 +152,6 @@ fn fitted(
             break;
         }
     }
-    let last_step = WeightedSettings { covariance: settings.covariance, ..quick };
     let last = weighted_least_squares(&weighted(samples.problem(|rows| &rows.factor)?)?, &last_step)?;
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
