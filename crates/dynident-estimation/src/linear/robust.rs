@@ -205,7 +205,7 @@ const SMALLEST_SCALE: f64 = 1.0e-9;
 /// `θ` with `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0`, `u_i = (τ_i − W_i θ)/s_j`, `s_j = median |τ_i − W_i θ| / 0.6745`
 /// over joint j's rows.
 ///
-/// Starts from [`weighted_least_squares`] on `problem`'s factors; then every pass over the rows gives residuals, scales
+/// Starts from [`weighted_values`] of `problem`'s factors; then every pass over the rows gives residuals, scales
 /// and the factors of the reweighted rows, from which the next θ follows. The scale of a pass is that of the θ before,
 /// which has the same limit and needs one pass each, not two; after a quarter of the passes scales stay. Regressors are
 /// never stored; residuals are, one number per row, for their median. `pass` hands every row that `problem` was made of
@@ -216,7 +216,7 @@ const SMALLEST_SCALE: f64 = 1.0e-9;
 /// outlier over its length, filter less.
 ///
 /// # Errors
-/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds;
+/// As [`weighted_values`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds;
 /// and whatever `pass` itself returns. Reaching `max_passes` is a status, not an error.
 ///
 /// ```
