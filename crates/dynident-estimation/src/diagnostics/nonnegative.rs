@@ -61,14 +61,8 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
             if !is_blocked {
                 break;
             }
-            let leaves = |k: usize, target: f64| negative(k, target) && x[k] <= 1.0e-14 * (1.0 + target.abs());
-            let leaving: Vec<usize> = passive
-                .places
-                .iter()
-                .zip(&target)
-                .filter(|(k, target)| leaves(**k, **target))
-                .map(|(k, _)| *k)
-                .collect();
+            let leaves = |&(k, target): &(usize, f64)| negative(k, target) && x[k] <= 1.0e-14 * (1.0 + target.abs());
+            let leaving: Vec<usize> = own().filter(leaves).map(|(k, _)| k).collect();
             for &k in &leaving {
                 x[k] = 0.0;
                 refused[k] |= k == enters;

@@ -32,9 +32,8 @@ pub(super) fn newton_weights(
     );
     let products = whitened.tr_mul(&whitened);
     let squares = |joint: usize| degrees_of_freedom[joint] * joint_sigma[joint].powi(2);
-    let slope = DMatrix::from_fn(joints, joints, |i, j| {
-        f64::from(u8::from(i == j)) - 2.0 * weights[j].powi(2) * products[(i, j)] / squares(i)
-    });
+    let answer = |i: usize, j: usize| 2.0 * weights[j].powi(2) * products[(i, j)] / squares(i);
+    let slope = DMatrix::identity(joints, joints) - DMatrix::from_fn(joints, joints, answer);
     let misfit = DVector::from_fn(joints, |joint, _| 2.0 * (weights[joint] * joint_sigma[joint]).ln());
     let step = slope.lu().solve(&misfit).filter(|step| step.iter().all(|by| by.abs() <= FURTHEST));
     step.map(|step| weights.iter().zip(step.iter()).map(|(weight, by)| weight * (-0.5 * by).exp()).collect())

@@ -2,8 +2,7 @@
 
 use super::noise_step::newton_weights;
 use crate::error::{EstimationError, require, within};
-use crate::factor::{LinearProblem, RankSettings, Solution, SolvedValues, Split, StackedProblem, TriangularFactor};
-use crate::factor::{solved_values, split};
+use crate::factor::{LinearProblem, RankSettings, Solution, StackedProblem, solved_values, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use serde::{Deserialize, Serialize};
 
@@ -84,13 +83,7 @@ pub fn weighted_least_squares(
     settings: &WeightedSettings,
 ) -> Result<Estimate, EstimationError> {
     let stacked = problem.stacked();
-    let Iterated { triangle, split, solution, weights, joint_sigma, iterations, converged } =
-        iterated(&stacked, settings)?;
-    // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
-    // came first.
-    let solution = solution.with_inverse();
-    PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
-        .into_estimate(&stacked, &settings.rank, settings.covariance)
+    iterated(&stacked, settings)?.into_estimate(&stacked, &settings.rank, settings.covariance)
 }
 
 /// The values and the noise of [`weighted_least_squares`], without bars that hold correlated errors and without a
@@ -102,8 +95,9 @@ pub fn weighted_values(
     problem: &LinearProblem,
     settings: &WeightedSettings,
 ) -> Result<WeightedValues, EstimationError> {
-    let Iterated { split, solution, joint_sigma, iterations, converged, .. } = iterated(&problem.stacked(), settings)?;
-    let Solution { values, inverse } = solution.with_inverse();
+    let PointEstimate { split, solution, joint_sigma, iterations, converged, .. } =
+        iterated(&problem.stacked(), settings)?;
+    let Solution { values, inverse } = solution;
     let mut white_std = vec![0.0; values.len()];
     for (row, &column) in split.free.iter().enumerate() {
         white_std[column] = inverse.row(row).norm();
@@ -114,19 +108,8 @@ pub fn weighted_values(
     }
 }
 
-/// Where the iteration ended.
-struct Iterated {
-    triangle: TriangularFactor,
-    split: Split,
-    solution: SolvedValues,
-    /// `1/σ_j` of the last solution.
-    weights: Vec<f64>,
-    joint_sigma: Vec<f64>,
-    iterations: usize,
-    converged: bool,
-}
-
-fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result<Iterated, EstimationError> {
+/// Solutions with the noise of the one before, until it has settled.
+fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result<PointEstimate, EstimationError> {
     settings.validate()?;
     let problem = stacked.problem;
     let mut weights = vec![1.0; problem.joints().len()];
@@ -139,7 +122,7 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
     let (joint_sigma, converged) = loop {
         let (squares, torque) = stacked.joint_squares(&solution.values)?;
         let joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
-        // From the second solution on, the weights in use are the last σ's reciprocals.
+        // The weights of the first solution stand for no noise.
         let change = if iterations > 1 { noise_change(&joint_sigma, &weights) } else { f64::INFINITY };
         let has_settled = change <= settings.tolerance;
         if has_settled || iterations == settings.max_iterations {
@@ -155,7 +138,10 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
         solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
         iterations += 1;
     };
-    Ok(Iterated { triangle, split, solution, weights, joint_sigma, iterations, converged })
+    // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
+    // came first.
+    let (solution, weighted_variance) = (solution.with_inverse(), 1.0);
+    Ok(PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance, iterations, converged })
 }
 
 /// Largest relative change from the noise that the weights stand for to the noise that was found with them.

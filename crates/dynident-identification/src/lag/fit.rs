@@ -16,8 +16,7 @@ use crate::log_noise::{LogNoise, weighted_by_log};
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
-    Estimate, EstimationError, LinearProblem, SegmentedFactor, WeightedSettings, weighted_least_squares,
-    weighted_values,
+    Estimate, EstimationError, LinearProblem, SegmentedFactor, weighted_least_squares, weighted_values,
 };
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -135,12 +134,10 @@ fn fitted(
         LogNoise::Own => weighted_by_log(settings, problem),
     };
     let mut samples = Samples::new((checks, unknowns), with, (0..dof).into_par_iter().map(start).collect())?;
-    let last_step =
-        WeightedSettings { rank: settings.rank, covariance: settings.covariance, ..WeightedSettings::default() };
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
     for _ in 0..MOST_STEPS {
-        let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &last_step)?;
+        let step = weighted_values(&weighted(samples.problem(|rows| &rows.merged)?)?, &settings.weighted())?;
         let mut has_settled = true;
         for joint in 0..dof {
             let (rest, std) = (step.values[first + joint], step.white_std[first + joint]);
@@ -152,7 +149,7 @@ fn fitted(
             break;
         }
     }
-    let last = weighted_least_squares(&weighted(samples.problem(|rows| &rows.factor)?)?, &last_step)?;
+    let last = weighted_least_squares(&weighted(samples.problem(|rows| &rows.factor)?)?, &settings.weighted())?;
     let joints = (0..dof).map(|joint| samples.joint_lag(&last, first + joint, longest_s, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
     let rows = (0..dof).map(of_joint).collect();
