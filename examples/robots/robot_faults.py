@@ -27,7 +27,7 @@ def add_options(parser):
     group.add_argument("--chatter-share", type=float, default=0.2, help="share of each second with chatter")
     group.add_argument("--log-scale", type=numbers, default=1.0, help="logged over true torque; negative: reversed sign")
     group.add_argument("--log-swap", type=numbers, help="J,K: the logged torques of two joints are exchanged")
-    group.add_argument("--log-without", default="", help="torques that the log lacks: gravity, friction, or both with a comma")
+    group.add_argument("--log-without", default="", help="what the log lacks, with commas between: the torques gravity and friction; speed, which is no fault")
     group.add_argument("--log-torque-delay", type=float, default=0.0, help="how late the log has torque, s")
     group.add_argument("--log-clock", type=float, default=1.0, help="seconds of the log's clock in one true second")
 

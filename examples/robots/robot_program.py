@@ -164,7 +164,10 @@ class Program:
         torque = self.channel.logged(sent, self.robot.gravity, self.robot.friction)
         if self.options.torque_noise:
             torque = torque + self.options.torque_noise * self.random.standard_normal(len(torque))
-        return torque, {"t_s": self.options.log_clock * time_s, "q": q.tolist(), "dq": dq.tolist(), "tau": torque.tolist()}
+        sample = {"t_s": self.options.log_clock * time_s, "q": q.tolist(), "dq": dq.tolist(), "tau": torque.tolist()}
+        if "speed" in self.channel.lacks:
+            del sample["dq"]
+        return torque, sample
 
     def note(self, message, largest, left, ended):
         """Writes what the robot really is and did."""
