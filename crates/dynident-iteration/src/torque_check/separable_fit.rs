@@ -18,7 +18,7 @@ const LEAST_RESIDUAL: f64 = 1e-4;
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Number of shared parameters.
-pub(super) const SHARED: usize = 4;
+pub(super) const SHARED: usize = 5;
 
 /// One joint's columns, each with the same number of rows.
 pub(super) type JointColumns = Vec<Vec<f64>>;
@@ -28,8 +28,8 @@ pub(super) type JointColumns = Vec<Vec<f64>>;
 pub(super) struct SharedParameter {
     pub(super) difference: f64,
     pub(super) expected: f64,
-    /// Whether it is estimated; otherwise it stays zero.
-    pub(super) is_free: bool,
+    /// Values at which the search may begin.
+    pub(super) starts: &'static [f64],
 }
 
 /// The solution.
@@ -49,9 +49,19 @@ pub(super) fn separable_fit(
     parameters: &[SharedParameter; SHARED],
     columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
 ) -> SeparableFit {
-    let mut shared = [0.0; SHARED];
-    let mut at = columns(&shared);
-    let mut residuals = projected(y, &at);
+    // The first parameter may have several minima: the search begins at the best of some values.
+    let starts = parameters[0].starts.iter().map(|start| {
+        let mut shared = [0.0; SHARED];
+        shared[0] = *start;
+        let at = columns(&shared);
+        let residuals = projected(y, &at);
+        (shared, at, residuals)
+    });
+    let share = |residuals: &[Vec<f64>]| -> f64 {
+        residuals.iter().zip(y).map(|(r, y)| square(r) / square(y).max(f64::MIN_POSITIVE)).sum()
+    };
+    let best = starts.min_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
+    let (mut shared, mut at, mut residuals) = best.unwrap_or_else(|| ([0.0; SHARED], Vec::new(), Vec::new()));
     let scale = |residuals: &[Vec<f64>]| -> Vec<f64> {
         let of_joint = |(r, y): (&Vec<f64>, &Vec<f64>)| rms(r).max(LEAST_RESIDUAL * rms(y)).max(f64::MIN_POSITIVE);
         residuals.iter().zip(y).map(of_joint).collect()
@@ -63,31 +73,25 @@ pub(super) fn separable_fit(
     let mut std = [f64::INFINITY; SHARED];
     for _ in 0..MOST_STEPS {
         let sigma = scale(&residuals);
-        let mut slopes: Vec<Option<Vec<Vec<f64>>>> = Vec::with_capacity(SHARED);
+        let mut slopes: Vec<Vec<Vec<f64>>> = Vec::with_capacity(SHARED);
         for (place, parameter) in parameters.iter().enumerate() {
-            if !parameter.is_free {
-                slopes.push(None);
-                continue;
-            }
             let mut beside = shared;
             beside[place] += parameter.difference;
             let moved = projected(y, &columns(&beside));
             let slope = |(moved, own): (&Vec<f64>, &Vec<f64>)| {
                 moved.iter().zip(own).map(|(a, b)| (a - b) / parameter.difference).collect()
             };
-            slopes.push(Some(moved.iter().zip(&residuals).map(slope).collect()));
+            slopes.push(moved.iter().zip(&residuals).map(slope).collect());
         }
         let mut normal = DMatrix::<f64>::zeros(SHARED, SHARED);
         let mut right = DVector::<f64>::zeros(SHARED);
         for (i, own) in slopes.iter().enumerate() {
             normal[(i, i)] += parameters[i].expected.powi(-2);
-            let Some(own) = own else { continue };
             right[i] -= shared[i] * parameters[i].expected.powi(-2);
             for joint in 0..y.len() {
                 let weight = sigma[joint].powi(-2);
                 right[i] -= weight * dot(&own[joint], &residuals[joint]);
                 for (k, other) in slopes.iter().enumerate() {
-                    let Some(other) = other else { continue };
                     normal[(i, k)] += weight * dot(&own[joint], &other[joint]);
                 }
             }
