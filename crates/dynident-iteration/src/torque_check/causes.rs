@@ -253,7 +253,8 @@ fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
     let settings = with.settings;
     let mut found = Vec::new();
     let lag_s = check.torque_lag_s + check.feedback_delay_s[0].min(0.0);
-    if lag_s.abs() > with.most_lag_s {
+    let lag_std_s = check.torque_lag_std_s.unwrap_or(f64::INFINITY);
+    if lag_s.abs() - settings.sigmas * lag_std_s > with.most_lag_s {
         found.push(TorqueCause::Delay { lag_s });
     }
     let clock_std = check.clock_percent_std.unwrap_or(f64::INFINITY);

@@ -16,6 +16,8 @@ const LEAST_EXPLAINED: f64 = 0.85;
 const CLEARLY_BETTER: f64 = 2.0;
 /// Share of the torque that the position error makes in drives whose logged torque has the wrong sign.
 const PUSHES: f64 = 0.3;
+/// Gravity is constant where it varies by less than this share.
+const CONSTANT: f64 = 0.05;
 /// Time blocks of the jackknife of a scale.
 const BLOCKS: usize = 10;
 /// Widths of the steps of friction that are tried, as shares of the joint's highest speed.
@@ -64,7 +66,7 @@ pub(super) struct Explanation {
     pub(super) commanded: Vec<f64>,
     /// Whether the difference matters.
     pub(super) matters: bool,
-    /// Whether the control law is completely known, so that a difference without a cause is one.
+    /// Whether a difference without a cause is reported: a large one from a completely known control law.
     pub(super) is_certain: bool,
     /// All candidates, the best first; empty where the difference does not matter.
     pub(super) candidates: Vec<Fitted>,
@@ -108,20 +110,25 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     let by_error = own_loop.first().map_or(0.0, |error| free[1] * rms(error));
     let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
     let difference_percent = 100.0 * rms(&difference) / size;
-    let matters = is_scaled || pushes_away || difference_percent > settings.difference_percent;
+    let lacks_weight = lacks_constant_gravity(data, joint, (&beside, settings.cause_percent));
+    let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.cause_percent;
     let mut out = Explanation {
         scale: scale_std.is_finite().then_some(scale),
         scale_std: scale_std.is_finite().then_some(scale_std),
         difference_percent,
         commanded: y.iter().zip(&difference).map(|(y, r)| y - r).collect(),
         matters,
-        is_certain: own_loop.is_empty(),
+        is_certain: own_loop.is_empty() && (is_scaled || difference_percent > settings.difference_percent),
         candidates: Vec::new(),
     };
     if !matters {
         return out;
     }
     let fitted = |candidate, value, left: &[f64]| Fitted { candidate, value, explained: 1.0 - square(left) / total };
+    if lacks_weight {
+        out.candidates = vec![Fitted { candidate: TorqueCandidate::Gravity, value: 1.0, explained: 1.0 }];
+        return out;
+    }
     let mut candidates = Vec::new();
     let left = residual_of(columns, y, &free);
     if pushes_away {
@@ -228,20 +235,35 @@ fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> 
     (!columns.is_empty()).then_some(columns)
 }
 
-/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
-/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
-fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
-    let robot = &data.task.robot;
-    let model = robot.model();
+/// Whether the constant that the log lacks is a gravity torque that does not change with the posture, as that of a
+/// vertical slide: half to twice that of the description, and more than the smallest share of the torque that matters.
+fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, (beside, percent): (&[f64], f64)) -> bool {
+    let nominal = nominal_gravity(data, joint);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let (weight, missing) = (mean(&nominal), -mean(beside));
+    let is_constant = rms(&centred(&nominal)) < CONSTANT * weight.abs();
+    is_constant
+        && 100.0 * missing.abs() > percent * rms(&data.torque[joint])
+        && (0.5..=2.0).contains(&(missing / weight))
+}
+
+/// The gravity torque of the description along the rows.
+fn nominal_gravity(data: &JointData<'_>, joint: usize) -> Vec<f64> {
+    let model = data.task.robot.model();
     let mut workspace = Workspace::new(model);
     let mut q = vec![0.0; model.dof()];
-    let nominal: Vec<f64> = (0..missing.len())
+    (0..data.torque[joint].len())
         .map(|row| {
             q.iter_mut().zip(data.q).for_each(|(to, from)| *to = from[row]);
             gravity_torque(model, &mut workspace, &q)[joint]
         })
-        .collect();
-    let (nominal, missing) = (centred(&nominal), centred(missing));
+        .collect()
+}
+
+/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
+/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
+fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
+    let (nominal, missing) = (centred(&nominal_gravity(data, joint)), centred(missing));
     let own = square(&nominal);
     own == 0.0 || (0.5..=2.0).contains(&(dot(&nominal, &missing) / own))
 }
