@@ -12,8 +12,9 @@ use serde::{Deserialize, Serialize};
 
 /// Rows per independent one: neighbouring rows share most of what the candidates leave.
 const CORRELATED_ROWS: f64 = 3.0;
-/// Independent rows that a candidate has beyond its unknowns, at least.
-const LEAST_FREEDOM: f64 = 4.0;
+/// Independent rows that a candidate has beyond its unknowns, at least. In a run of a few strokes everything looks like
+/// everything; only a torque that stays at its limit is known sooner.
+const LEAST_FREEDOM: f64 = 16.0;
 /// Share of the torque that the position error makes in drives whose logged torque has the wrong sign.
 const PUSHES: f64 = 0.3;
 /// Gravity is constant where it varies by less than this share.
@@ -74,7 +75,7 @@ pub(super) struct Explanation {
     pub(super) matters: bool,
     /// Square of the difference as a share of the square of the torque.
     pub(super) difference_share: f64,
-    /// Whether a difference without a cause is reported: a large one from a completely known control law.
+    /// Whether a difference without a cause is reported: one from a completely known control law.
     pub(super) is_certain: bool,
     /// All candidates, the best first; empty where the difference does not matter.
     pub(super) candidates: Vec<Fitted>,
@@ -108,9 +109,9 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     let by_error = own_loop.first().map_or(0.0, |error| free[1] * rms(error));
     let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
     let difference_percent = 100.0 * rms(&difference) / size;
-    let lacks_weight = difference_percent <= settings.cause_percent
-        && lacks_constant_gravity(data, joint, (&beside, settings.cause_percent));
-    let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.cause_percent;
+    let lacks_weight = difference_percent <= settings.difference_percent
+        && lacks_constant_gravity(data, joint, (&beside, settings.difference_percent));
+    let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.difference_percent;
     let mut out = Explanation {
         scale: scale_std.is_finite().then_some(scale),
         scale_std: scale_std.is_finite().then_some(scale_std),
@@ -118,7 +119,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
         commanded: y.iter().zip(&difference).map(|(y, r)| y - r).collect(),
         matters,
         difference_share: total / (size * size * y.len().max(1) as f64),
-        is_certain: own_loop.is_empty() && (is_scaled || difference_percent > settings.difference_percent),
+        is_certain: own_loop.is_empty(),
         candidates: Vec::new(),
     };
     if !matters {
@@ -143,7 +144,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
         let candidate = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
         candidates.extend(fitted(candidate, scale, &left, 1));
     }
-    candidates.extend(exchanged(data, joint, total));
+    candidates.extend(exchanged(data, joint, total).into_iter().filter(|_| independent >= LEAST_FREEDOM));
     // What is missing, beside the drives' own loop as it then fits.
     let missing = |extra: &[Vec<f64>]| {
         let all: Vec<Vec<f64>> = extra.iter().chain(own_loop).cloned().collect();

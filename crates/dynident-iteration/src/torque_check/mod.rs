@@ -60,10 +60,8 @@ pub struct TorqueCheckSettings {
     /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
     /// have at most 1.5.
     pub scale_percent: f64,
-    /// Difference between logged and commanded torque from which a cause is looked for, root mean square as a percentage
-    /// of the joint's torque. Default 5: correct logs of the campaign's robots have at most 2.
-    pub cause_percent: f64,
-    /// Largest difference of a known control law that may have no named cause, in the same measure. Default 15.
+    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
+    /// Default 5: correct logs of the campaign's robots have at most 2.
     pub difference_percent: f64,
     /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
     /// share, percent. Default 5.
@@ -78,8 +76,7 @@ impl Default for TorqueCheckSettings {
     fn default() -> Self {
         Self {
             scale_percent: 3.0,
-            cause_percent: 5.0,
-            difference_percent: 15.0,
+            difference_percent: 5.0,
             row_scale_percent: 5.0,
             clock_percent: 0.1,
             sigmas: 4.0,
@@ -95,7 +92,6 @@ impl TorqueCheckSettings {
     pub fn validate(&self) -> Result<(), SimulationError> {
         let settings = [
             ("torque_check.scale_percent", self.scale_percent),
-            ("torque_check.cause_percent", self.cause_percent),
             ("torque_check.difference_percent", self.difference_percent),
             ("torque_check.row_scale_percent", self.row_scale_percent),
             ("torque_check.clock_percent", self.clock_percent),
