@@ -37,7 +37,8 @@ pub(super) fn agreement(explanations: &[Explanation]) -> Agreement {
 /// candidate.
 fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
     let matters: Vec<&Explanation> = explanations.iter().filter(|own| own.matters).collect();
-    let find = |own: &Explanation, kind: TorqueCandidate| own.candidates.iter().copied().find(|one| one.candidate == kind);
+    let find =
+        |own: &Explanation, kind: TorqueCandidate| own.candidates.iter().copied().find(|one| one.candidate == kind);
     let left = |kind: TorqueCandidate| -> Option<f64> {
         let of_joint = |own: &&Explanation| {
             let found = find(own, kind).filter(|found| found.explained >= LEAST_EXPLAINED)?;

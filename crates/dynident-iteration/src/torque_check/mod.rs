@@ -74,13 +74,7 @@ pub struct TorqueCheckSettings {
 
 impl Default for TorqueCheckSettings {
     fn default() -> Self {
-        Self {
-            scale_percent: 3.0,
-            difference_percent: 5.0,
-            row_scale_percent: 5.0,
-            clock_percent: 0.1,
-            sigmas: 4.0,
-        }
+        Self { scale_percent: 3.0, difference_percent: 5.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
     }
 }
 
