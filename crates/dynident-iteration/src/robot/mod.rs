@@ -17,6 +17,7 @@ mod recorder;
 mod simulated;
 mod stop_reason;
 mod stop_signal;
+mod stream_watch;
 mod term_description;
 mod ways;
 mod workspace;
@@ -293,6 +294,14 @@ pub enum RobotFault {
     Hung {
         /// What was awaited.
         waiting_for: String,
+        /// The limit.
+        limit_s: f64,
+    },
+    /// Samples came in real time, and then none in the middle of the motion.
+    #[error(
+        "the robot program sent its samples in real time and then none for {limit_s:.2} s: look at the program; if such a pause is normal, give a larger limits.silence_s"
+    )]
+    Silent {
         /// The limit.
         limit_s: f64,
     },

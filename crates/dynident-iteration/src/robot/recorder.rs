@@ -76,6 +76,11 @@ impl<'a> Recorder<'a> {
         self.parts[self.at..].iter().map(|part| (part.reference.duration_s() - last(part)).max(0.0)).sum()
     }
 
+    /// Whether the part that is run now is recorded to its end: no further sample of it is due.
+    pub(super) fn is_at_end_of_part(&self) -> bool {
+        self.require_end().is_ok()
+    }
+
     /// Samples from here on are of this part.
     ///
     /// # Errors
