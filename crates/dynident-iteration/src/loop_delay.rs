@@ -12,8 +12,17 @@ const MARGIN: f64 = core::f64::consts::FRAC_PI_6;
 
 /// The highest natural frequency with that margin, rad/s; infinite without a delay.
 pub(crate) fn highest_omega(ratio: f64, delay_s: f64) -> f64 {
+    omega_with_margin(ratio, delay_s, MARGIN)
+}
+
+/// The natural frequency at which the loop becomes unstable, rad/s; infinite without a delay.
+pub(crate) fn unstable_omega(ratio: f64, delay_s: f64) -> f64 {
+    omega_with_margin(ratio, delay_s, 0.0)
+}
+
+fn omega_with_margin(ratio: f64, delay_s: f64, margin: f64) -> f64 {
     let crossover = (2.0 * ratio * ratio + ratio * (4.0 * ratio * ratio + 1.0).sqrt()).sqrt();
-    ((2.0 * crossover).atan() - MARGIN) / (crossover * delay_s)
+    ((2.0 * crossover).atan() - margin) / (crossover * delay_s)
 }
 
 /// The share of their natural frequencies `omega` (rad/s) at which joints under velocity gains `kd` (Nms/rad) in a

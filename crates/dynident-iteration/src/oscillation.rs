@@ -78,10 +78,25 @@ impl OscillationSettings {
         Ok(())
     }
 
+    /// What stops a run of a robot; none where nothing does.
+    pub fn limits(&self, model: &Model) -> Option<OscillationLimits> {
+        let (lowest_hz, speed_share) = (self.lowest_hz(model), 0.01 * self.speed_percent);
+        (speed_share > 0.0).then_some(OscillationLimits { lowest_hz, speed_share })
+    }
+
     /// The slowest oscillation of a robot, Hz.
     pub fn lowest_hz(&self, model: &Model) -> f64 {
         self.lowest_hz.unwrap_or_else(|| model.own_scale().hertz(LOWEST_HZ))
     }
+}
+
+/// What stops a run for an oscillation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OscillationLimits {
+    /// The slowest oscillation, Hz.
+    pub lowest_hz: f64,
+    /// The smallest amplitude of the velocity, as a share of the joint's highest in the trajectory.
+    pub speed_share: f64,
 }
 
 /// An oscillation of one joint.

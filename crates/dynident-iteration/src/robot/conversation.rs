@@ -77,6 +77,10 @@ pub(super) fn run(
                     let stopping = stopped(client, recorder, most, &breach.to_string());
                     return Ok(RobotStatus::LeftEnvelope { breach, stopping });
                 }
+                if let Some(oscillation) = recorder.look_for_oscillation() {
+                    let stopping = stopped(client, recorder, most, &oscillation.to_string());
+                    return Ok(RobotStatus::Oscillated { oscillation, stopping });
+                }
             }
             Heard::Message(ToHost::End { status: EndStatus::Stopped, reason }) => {
                 return Ok(RobotStatus::Stopped { reason });
@@ -192,6 +196,10 @@ pub(super) fn steps(
         if let Some(breach) = recorder.look(Some(&dq)) {
             let stopping = stopped(client, recorder, 0, &breach.to_string());
             return Ok(RobotStatus::LeftEnvelope { breach, stopping });
+        }
+        if let Some(oscillation) = recorder.look_for_oscillation() {
+            let stopping = stopped(client, recorder, 0, &oscillation.to_string());
+            return Ok(RobotStatus::Oscillated { oscillation, stopping });
         }
         let message = if sample + 1 < reference.samples() {
             ToClient::Torque { tau: in_client_order(client, &tau) }

@@ -9,6 +9,7 @@ mod identification;
 mod iteration;
 mod late_controllers;
 mod near_rest;
+mod oscillations;
 mod policy;
 mod pooling;
 mod redesign;
