@@ -183,12 +183,28 @@ pub struct FrictionSearch {
     /// other friction near rest alone (Stribeck, sigmoid, cube root, elements with hysteresis) is no candidate. True by
     /// default.
     pub rows_near_rest: bool,
+    /// Largest variance inflation with which Coulomb friction may differ by direction: what gravity, offset and all
+    /// other columns of the rows leave of the difference, `1 / (1 - R²)`. Where gravity is constant or the joint has an
+    /// offset, the difference is nearly a part of theirs: the rows near rest alone distinguish them, and the error bars
+    /// are as many times wider as the square root of this. Without a limit by default; an iteration, which does not
+    /// converge while a parameter is hardly known, takes [`MOST_INFLATION`](Self::MOST_INFLATION).
+    pub most_inflation: Option<f64>,
 }
 
 impl FrictionSearch {
+    /// The usual bound of a variance inflation in regression diagnostics.
+    pub const MOST_INFLATION: f64 = 10.0;
+
     /// The search for a joint's friction with the defaults.
     pub fn of(joint: impl Into<String>) -> Self {
-        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: None, rows_near_rest: true }
+        Self {
+            joint: joint.into(),
+            coulomb: None,
+            dead_band: 0.0,
+            width: None,
+            rows_near_rest: true,
+            most_inflation: None,
+        }
     }
 }
 

@@ -16,6 +16,7 @@ mod redesign;
 mod rehearsals;
 mod robots;
 mod run_offsets;
+mod scara;
 mod simulated_arm;
 mod stops;
 mod verdict;
