@@ -24,8 +24,8 @@ pub struct GainSettings {
     pub uncertainty_percent: f64,
     /// How late the controller may see or act, s.
     pub delay_s: f64,
-    /// Share of the typical inertia that a drive of which the description says nothing may have at least: with it the
-    /// loop still has to be stable.
+    /// Smallest share of the typical inertia that a drive without a described inertia may have: the loop has to be
+    /// stable with it.
     pub lightest_drive: f64,
     /// How late the controller may be where the inertia of a drive is not known, s.
     pub light_delay_s: f64,
@@ -99,8 +99,8 @@ pub fn lowered_bandwidths(
 /// gains are for. So `ω` is lowered, joint by joint and then for all together, until in every posture along the motions
 /// a robot with that delay keeps a phase margin of 30 degrees. It is never raised.
 ///
-/// Nor does anybody know how light a drive is of which the description says nothing: a gripper of 30 Nm has a tenth of
-/// the typical inertia, and its loop is then ten times as fast. So `ω` is lowered until the joint is stable with
+/// A drive without a described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
+/// typical inertia, and its loop is then ten times as fast. So `ω` is lowered until the joint is stable with
 /// `lightest_drive` of the typical inertia and a delay of `light_delay_s` as well, but not so far that typical friction
 /// (5 % of the effort limit, and as much at full velocity) would hold the joint 80 % of the default
 /// `envelope.tracking_error` from its path.

@@ -16,7 +16,7 @@ const LOWEST_HZ: f64 = 8.0;
 /// Alternations in a row that are an oscillation: eight periods.
 pub(crate) const SWINGS: usize = 16;
 /// Standard deviation of the periods over their mean, at most: noise has 0.4 to 0.7. Half a sample of rounding comes on
-/// top, for periods of at least so many samples.
+/// top, for periods of at least this many samples.
 const REGULAR: f64 = 0.12;
 const ROUNDING: f64 = 0.5;
 const ROUNDED: f64 = 5.0;
@@ -25,7 +25,7 @@ const ROUNDED: f64 = 5.0;
 const EVEN: f64 = 0.25;
 /// Threshold over the root mean square of the signal: a sine reaches 1.4, and of noise two thirds are inside.
 const THRESHOLD: f64 = 0.8;
-/// What swings farther than this many deviations of the noise is an oscillation without being regular.
+/// Irregular swings are an oscillation if they exceed this many standard deviations of the noise.
 const BEYOND_NOISE: f64 = 6.0;
 /// An oscillation whose last swings are smaller than this share of its first ones dies away.
 const SUSTAINED: f64 = 0.8;
@@ -78,7 +78,7 @@ impl OscillationSettings {
         Ok(())
     }
 
-    /// What stops a run of a robot; none where nothing does.
+    /// Limits that stop a run of a robot; `None` if `speed_percent` is 0.
     pub fn limits(&self, model: &Model) -> Option<OscillationLimits> {
         let (lowest_hz, speed_share) = (self.lowest_hz(model), 0.01 * self.speed_percent);
         (speed_share > 0.0).then_some(OscillationLimits { lowest_hz, speed_share })
@@ -90,7 +90,7 @@ impl OscillationSettings {
     }
 }
 
-/// What stops a run for an oscillation.
+/// Limits of a run: a joint that swings beyond them stops it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OscillationLimits {
     /// The slowest oscillation, Hz.
@@ -112,7 +112,7 @@ pub struct Oscillation {
     pub share: f64,
 }
 
-/// What an oscillation is looked for with.
+/// Thresholds of a search for oscillations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Search {
     /// The slowest, Hz.
@@ -411,8 +411,8 @@ mod tests {
         assert!((at_random.share - 0.2).abs() < 0.02 && at_random.amplitude > 10.0, "{at_random:?}");
     }
 
-    /// While it runs: a loop that swings with a constant size is seen within ten periods, one that rings and comes to
-    /// rest is not, and neither is noise at the threshold.
+    /// A loop that swings with a constant amplitude is found within ten periods. A loop that rings and settles is not,
+    /// and neither is noise of any size.
     #[test]
     fn a_running_joint_is_watched() {
         let seen = |deviation: &mut dyn FnMut(f64) -> f64| {

@@ -43,10 +43,10 @@ pub struct RehearsalSettings {
     /// study by default none where the gains are stated, or the robot waits for every torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
-    /// Least inertia of a drive of which the description says nothing, as a share of the typical one (which the effort
-    /// limit accelerates by 300 rad/s² of a usual arm): gains that are derived keep a joint stable down to it, and a
-    /// robot with such drives is simulated. Default 0.1; in a study by default 1 where the gains are stated, for they are
-    /// taken for ones that the robot has run under.
+    /// Least inertia of a drive without a described inertia, as a share of the typical one (which the effort limit
+    /// accelerates by 300 rad/s² of a usual arm): derived gains keep a joint stable down to it, and a robot with such
+    /// drives is simulated. Default 0.1; in a study by default 1 where the gains are stated, because the robot is
+    /// expected to have run with them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lightest_drive: Option<f64>,
     /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.
@@ -212,7 +212,7 @@ pub(crate) struct Rehearsed<'a> {
     pub(crate) believed: Option<&'a [f64]>,
     /// The same with drives that are as light as they may be; none where all are known.
     pub(crate) light: Option<&'a [f64]>,
-    /// What would stop a run for an oscillation.
+    /// Oscillation that would stop a run.
     pub(crate) oscillation: Option<OscillationLimits>,
     pub(crate) envelope: Option<&'a Envelope>,
 }
@@ -274,7 +274,7 @@ impl Rehearsed<'_> {
                     return Ok(Err(failure));
                 }
             }
-            // Whatever its delay is, no joint is to be too fast for the rate of its controller.
+            // Without a delay: the gains allow for it already, and no joint may be too fast for the controller's rate.
             if let Some(light) = self.light {
                 let one = Rehearsing { is_light: true, ..itself };
                 if let Err(failure) = self.simulate(light, (one, settings), &mut random, &mut shown)? {

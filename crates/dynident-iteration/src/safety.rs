@@ -14,7 +14,7 @@ pub struct SafetySettings {
     pub outside: bool,
     /// What no sample may leave. Default none.
     pub envelope: Option<Envelope>,
-    /// When a joint oscillates: what stops a run outside, and what is reported of a log.
+    /// Thresholds of oscillations: those that stop a run outside, and those that are reported for a log.
     pub oscillation: OscillationSettings,
     /// How every motion is rehearsed before it is commanded. Default not at all.
     pub rehearsal: Option<RehearsalSettings>,

@@ -15,7 +15,7 @@ use core::ops::Range;
 const PERIODS: usize = 4;
 /// Independent densities among the four of a window, under a Hann taper.
 const INDEPENDENT: f64 = 2.7;
-/// Fewest windows without a reversal that count alone.
+/// Fewest windows without a reversal that are used without the others.
 const FEWEST_WINDOWS: usize = 12;
 /// A joint reverses where a quarter of a window brings it less far than this share of the others' mean.
 const STANDS: f64 = 0.1;
@@ -103,7 +103,7 @@ fn octave_density((third, q): (&[f64], &[f64]), rate_hz: f64, [from_hz, to_hz]: 
     Some(densities[densities.len() / 4] / lower_quartile(independent))
 }
 
-/// The lower quartile of the mean of so many independent densities, over their mean.
+/// The lower quartile of the mean of `count` independent densities, divided by its expectation.
 fn lower_quartile(count: f64) -> f64 {
     (1.0 - 1.0 / (9.0 * count) - 0.6745 / (3.0 * count.sqrt())).powi(3)
 }

@@ -21,7 +21,7 @@ pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |_| true, 1.0)
 }
 
-/// The same where drives of which the description says nothing have this share of the typical inertia.
+/// The same with this share of the typical inertia at drives without a described one.
 pub(crate) fn with_light_drives(robot: &ParametricModel, share: f64) -> Option<Vec<f64>> {
     with_typical_inertia(robot).and_then(|_| filled_in(robot, |_| true, share))
 }

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// A line that says how far a search is.
 pub(crate) struct Search {
     line: Option<ProgressBar>,
-    /// What Ctrl-C does to the command, for the line.
+    /// The effect of Ctrl-C, for the line.
     interruption: &'static str,
 }
 

@@ -183,10 +183,10 @@ pub struct FrictionSearch {
     /// other friction near rest alone (Stribeck, sigmoid, cube root, elements with hysteresis) is no candidate. True by
     /// default.
     pub rows_near_rest: bool,
-    /// Largest variance inflation with which Coulomb friction may differ by direction: what gravity, offset and all
-    /// other columns of the rows leave of the difference, `1 / (1 - R²)`. Where gravity is constant or the joint has an
-    /// offset, the difference is nearly a part of theirs: the rows near rest alone distinguish them, and the error bars
-    /// are as many times wider as the square root of this. Without a limit by default; an iteration, which does not
+    /// Largest variance inflation with which Coulomb friction may differ by direction: `1 / (1 - R²)`, R² the share of
+    /// the difference that gravity, offset and all other columns explain. Where gravity is constant or the joint has an
+    /// offset, only the rows near rest distinguish the difference from them, and its error bar is wider by the square
+    /// root of the inflation. Without a limit by default; an iteration, which does not
     /// converge while a parameter is hardly known, takes [`MOST_INFLATION`](Self::MOST_INFLATION).
     pub most_inflation: Option<f64>,
 }

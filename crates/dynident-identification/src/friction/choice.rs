@@ -165,7 +165,8 @@ pub(super) fn further_columns(
 }
 
 /// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the
-/// stated terms, in which joints count alike if `equal_weights`. `most_inflation` is of each of the candidates' joints.
+/// stated terms, in which joints have equal weights if `equal_weights`; `most_inflation` has a number for each of the
+/// candidates' joints.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,

@@ -130,15 +130,15 @@ fn tuned(
         .unwrap_or_else(|| ScoredCandidate { kinds, places: Vec::new(), errors: folds.errors(&[], &[]) })
 }
 
-/// Variance inflation of the difference between both directions of the Coulomb step that a model has, beside its other
-/// columns and all that the joint has anyhow: `|s|` is constant but at rest, as gravity may be. 1 for a model without
-/// that step.
+/// Variance inflation of the difference between both directions of a model's Coulomb step, with the model's other
+/// columns and the common ones in the fit: `|s|` is constant except near rest, and so may be gravity. 1 for a model
+/// without that step.
 fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &ScoredCandidate) -> f64 {
     let steps = model.present(columns, FrictionKind::Coulomb);
     let whole: f64 = steps.iter().map(|(_, value)| value).sum();
     let (mut difference, mut sum) = (Vec::new(), Vec::new());
     for (place, value) in steps {
-        // A sign has no number on the grid: the narrowest smooth step stands for it.
+        // A sign has no number on the grid: the narrowest smooth step is taken in its place.
         let step = columns[place].grid.unwrap_or(0);
         let is_direction =
             |at: &usize| columns[*at].kind == FrictionKind::AsymmetricCoulomb && columns[*at].grid == Some(step);

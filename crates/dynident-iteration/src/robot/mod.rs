@@ -77,7 +77,7 @@ pub struct RunRequest<'a> {
     pub model: Option<&'a ControllerModel>,
     /// What no sample may leave; a run that does is stopped. None watches nothing.
     pub envelope: Option<&'a Envelope>,
-    /// What stops a run for an oscillation; none watches for none.
+    /// Oscillation that stops the run; `None` disables monitoring.
     pub oscillation: Option<OscillationLimits>,
     /// Who may ask for a stop.
     pub stop: Option<&'a StopSignal>,

@@ -129,7 +129,7 @@ pub struct IterationSection {
     pub envelope: EnvelopeSettings,
     /// How every motion of a robot outside is rehearsed before it is commanded.
     pub rehearsal: RehearsalSettings,
-    /// When a joint oscillates: what stops a run of a robot outside, and what is reported of a log.
+    /// Thresholds of oscillations: those that stop a run of a robot outside, and those that are reported for a log.
     pub oscillation: OscillationSettings,
     /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by
     /// default.
