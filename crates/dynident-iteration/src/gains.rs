@@ -1,6 +1,6 @@
 //! Gains of a first controller from the nominal model, its uncertainty, and a stated bandwidth.
 
-use crate::loop_delay::{highest_omega, share_of_all, unstable_omega};
+use crate::loop_delay::{highest_omega, highest_omega_if_light, share_of_all};
 use crate::posture::{at_sample, inertia_matrix};
 use crate::robot::{TRACKING_M, TRACKING_RAD};
 use crate::typical_drives::{FRICTION, TIMES_THE_LIGHTEST, with_light_drives, with_typical_drives, with_typical_inertia};
@@ -11,6 +11,10 @@ use dynident_simulation::controllers::{
 use dynident_simulation::{PerJoint, Reference, SimulationError, require};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+
+/// Damping of a joint whose drive may be too light for critical damping: half of the velocity gain, at the same
+/// stiffness.
+const LIGHT_DAMPING: f64 = 0.5;
 
 /// Postures of each motion that are looked at.
 const POSTURES: usize = 200;
@@ -100,9 +104,10 @@ pub fn lowered_bandwidths(
 /// a robot with that delay keeps a phase margin of 30 degrees. It is never raised.
 ///
 /// A drive without a described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
-/// typical inertia, and its loop is then ten times as fast. So `ω` is lowered until the joint is stable with
-/// `lightest_drive` of the typical inertia and a delay of `light_delay_s` as well, but not so far that typical friction
-/// (5 % of the effort limit, and as much at full velocity) would hold the joint 80 % of the default
+/// typical inertia, and its loop is then ten times as fast. With
+/// `lightest_drive` of the typical inertia and a delay of `light_delay_s` each joint keeps a phase margin of 15 degrees:
+/// where it would not, it gets half of the damping, and `ω` is lowered. It is not lowered so far that typical friction (5
+/// % of the effort limit, and as much at full velocity) would hold the joint 80 % of the default
 /// `envelope.tracking_error` from its path.
 ///
 /// # Errors
@@ -144,20 +149,26 @@ pub fn derived_controllers(
     let light = with_light_drives(robot, *lightest_drive).map(|light| mass_matrices(robot, references, &light));
     let light = light.transpose()?;
     let stiff = stiff_enough(robot, &matrices, left);
-    let stable = |omega: Vec<f64>, ratios: &dyn Fn(&[DMatrix<f64>]) -> Vec<f64>| -> Vec<f64> {
-        let Some(light) = &light else { return omega };
-        let highest = |(ratio, stiff): (f64, &f64)| unstable_omega(ratio, *light_delay_s).max(*stiff);
-        let highest = ratios(light).into_iter().zip(&stiff).map(highest);
-        omega.into_iter().zip(highest).map(|(omega, highest)| omega.min(highest)).collect()
+    // Natural frequencies and dampings.
+    let stable = |omega: Vec<f64>, ratios: &dyn Fn(&[DMatrix<f64>]) -> Vec<f64>| -> (Vec<f64>, Vec<f64>) {
+        let Some(light) = &light else { return (omega, vec![1.0; dof]) };
+        let of_joint = |((omega, ratio), stiff): ((f64, f64), &f64)| {
+            if omega <= highest_omega_if_light(ratio, *light_delay_s, 1.0) {
+                return (omega, 1.0);
+            }
+            let highest = highest_omega_if_light(ratio, *light_delay_s, LIGHT_DAMPING);
+            (omega.min(highest.max(*stiff)), LIGHT_DAMPING)
+        };
+        omega.into_iter().zip(ratios(light)).zip(&stiff).map(of_joint).unzip()
     };
-    let with_nominal = stable(lowered(&|_| drives), &|light| inertia_ratios(&matrices, light, dof));
+    let (with_nominal, nominal_damping) = stable(lowered(&|_| drives), &|light| inertia_ratios(&matrices, light, dof));
     // Joint PD in the posture where the joint is lightest, the others free.
     let pd_ratios = |matrices: &[DMatrix<f64>]| -> Vec<f64> {
         largest.iter().zip(lightest_inertia(matrices, dof)).map(|(most, least)| (most / least).max(1.0)).collect()
     };
     let own_ratios = pd_ratios(&matrices);
-    let mut alone = stable(lowered(&|joint| own_ratios[joint]), &pd_ratios);
-    let kd: Vec<f64> = alone.iter().zip(&largest).map(|(omega, inertia)| 2.0 * omega * inertia).collect();
+    let (mut alone, alone_damping) = stable(lowered(&|joint| own_ratios[joint]), &pd_ratios);
+    let kd: Vec<f64> = (0..dof).map(|joint| 2.0 * alone_damping[joint] * alone[joint] * largest[joint]).collect();
     let share = matrices.iter().filter_map(|matrix| share_of_all(matrix, &kd, &alone, delay_s)).fold(1.0, f64::min);
     for omega in &mut alone {
         *omega *= share;
@@ -166,21 +177,21 @@ pub fn derived_controllers(
     let each = |of: &dyn Fn(usize) -> f64| PerJoint::Each((0..dof).map(of).collect());
     let pd = JointPdSettings {
         kp: each(&|joint| alone[joint].powi(2) * left * largest[joint]),
-        kd: each(&|joint| 2.0 * alone[joint] * left * largest[joint]),
+        kd: each(&|joint| 2.0 * alone_damping[joint] * alone[joint] * left * largest[joint]),
     };
-    let computed = |omega: &[f64], share: f64| {
+    let computed = |omega: &[f64], damping: &[f64], share: f64| {
         ControllerSettings::ComputedTorque(ComputedTorqueSettings {
             kp: each(&|joint| share * omega[joint].powi(2)),
-            kd: each(&|joint| 2.0 * share.sqrt() * omega[joint]),
+            kd: each(&|joint| 2.0 * damping[joint] * share.sqrt() * omega[joint]),
             friction: FrictionCompensation::Reference,
         })
     };
     let in_hz = |omega: &[f64]| omega.iter().map(|omega| omega / core::f64::consts::TAU).collect();
     Ok(DerivedControllers {
         model_free: ControllerSettings::JointPd(pd),
-        first: computed(&with_nominal, left),
+        first: computed(&with_nominal, &nominal_damping, left),
         first_model,
-        model_based: computed(&with_model, 1.0),
+        model_based: computed(&with_model, &vec![1.0; dof], 1.0),
         model_free_hz: in_hz(&alone),
         first_hz: in_hz(&with_nominal),
         model_based_hz: in_hz(&with_model),
