@@ -3,7 +3,9 @@
 use crate::loop_delay::{highest_omega, highest_omega_if_light, share_of_all};
 use crate::posture::{at_sample, inertia_matrix};
 use crate::robot::{TRACKING_M, TRACKING_RAD};
-use crate::typical_drives::{FRICTION, TIMES_THE_LIGHTEST, with_light_drives, with_typical_drives, with_typical_inertia};
+use crate::typical_drives::{
+    FRICTION, TIMES_THE_LIGHTEST, with_light_drives, with_typical_drives, with_typical_inertia,
+};
 use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{
     ComputedTorqueSettings, ControllerModel, ControllerSettings, FrictionCompensation, JointPdSettings,

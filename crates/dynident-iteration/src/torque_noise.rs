@@ -17,6 +17,9 @@ const PERIODS: usize = 4;
 const INDEPENDENT: f64 = 2.7;
 /// Fewest windows without a reversal that are used without the others.
 const FEWEST_WINDOWS: usize = 12;
+/// An octave with this many times the density of the next one shows the motion: noise of the first order falls by 4, and
+/// the torque of a motion that fades by 16 and more.
+const STEEP: f64 = 8.0;
 /// A joint reverses where a quarter of a window brings it less far than this share of the others' mean.
 const STANDS: f64 = 0.1;
 
@@ -50,19 +53,22 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
     }
     // Third differences: what is left of the motion's slow torque would leak through the windows' tapers.
     let third: Vec<f64> = tau.windows(4).map(|x| x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).collect();
-    let mut variance = 0.0;
-    let mut lowest = None;
+    let mut octaves: Vec<([f64; 2], f64)> = Vec::new();
     // At least one octave, the highest one at worst.
     let mut from_hz = motion_hz.min(0.5 * nyquist_hz);
     while from_hz < 0.9 * nyquist_hz {
         let to_hz = if 2.2 * from_hz > nyquist_hz { nyquist_hz } else { 2.0 * from_hz };
         let Some(density) = octave_density((&third, q), rate_hz, [from_hz, to_hz]) else { break };
-        // The noise below the motion's end has the density of the first octave.
-        let width_hz = if lowest.is_none() { to_hz } else { to_hz - from_hz };
-        variance += density * width_hz;
-        lowest = lowest.or(Some(density));
+        octaves.push(([from_hz, to_hz], density));
         from_hz = to_hz;
     }
+    // Torque fades later than positions: it has the square of their frequencies, and products of several joints'.
+    let motion = octaves.windows(2).take_while(|two| two[0].1 > STEEP * two[1].1).count();
+    octaves.drain(..motion);
+    let lowest = octaves.first().map(|(_, density)| *density);
+    // The noise below the motion's end has the density of the first octave.
+    let below = octaves.first().map_or(0.0, |([from_hz, _], density)| from_hz * density);
+    let variance = below + octaves.iter().map(|([from_hz, to_hz], density)| (to_hz - from_hz) * density).sum::<f64>();
     let step = quantum(tau);
     let of_sample = variance.sqrt().max(step / 12.0_f64.sqrt());
     TorqueNoise { of_sample, density: lowest.unwrap_or(0.0).max(step * step / 12.0 / nyquist_hz) }
@@ -158,7 +164,10 @@ mod tests {
                 let [size, width] = self.coulomb;
                 (q, 30.0 * q.cos() + 2.0 * ddq + dq + size * (dq / width).tanh())
             };
-            (0..samples).map(pair).map(|(q, tau)| (q + 1e-5 * random.normal(), tau + self.noise * random.normal())).unzip()
+            (0..samples)
+                .map(pair)
+                .map(|(q, tau)| (q + 1e-5 * random.normal(), tau + self.noise * random.normal()))
+                .unzip()
         }
     }
 

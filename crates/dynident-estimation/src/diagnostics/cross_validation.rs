@@ -235,9 +235,9 @@ impl JointFolds {
     }
 
     /// Variance inflation of a combination `a` of candidate columns, given as (place in [`variable`](Self::variable),
-    /// factor), beside the common columns and the combinations `others`: `1 / (1 - R²)`, where R² is the share of
-    /// `‖W a‖²` that some combination of those makes over all rows. So many times larger is the variance of its
-    /// coefficient than without them. Infinite where they make all of it, 1 where they make none.
+    /// factor): the factor by which the common columns and the combinations `others` increase the variance of its
+    /// coefficient. It is `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that a combination of those columns explains
+    /// over all rows: 1 where they explain nothing, infinite where they explain all of it.
     ///
     /// Source: Belsley, Kuh and Welsch, *Regression Diagnostics*, 1980, section 3.1; not centred.
     ///
@@ -253,7 +253,7 @@ impl JointFolds {
         };
         let own = dense(combination);
         let whole = fold.square_of(self.common.len(), combination);
-        // What the common columns do not make of it, and then what the others do not make of that.
+        // The Gram matrix is that of the parts which the common columns do not explain.
         let mut basis: Vec<DVector<f64>> = Vec::with_capacity(others.len());
         let without = |mut vector: DVector<f64>, basis: &[DVector<f64>]| {
             for one in basis {

@@ -199,7 +199,8 @@ fn friction_of_grid(
     let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
     // All candidates as columns of one set of factors, from which each candidate model is a selection.
-    let most_inflation: Vec<f64> = searches.iter().map(|(_, search)| search.most_inflation.unwrap_or(f64::INFINITY)).collect();
+    let most_inflation: Vec<f64> =
+        searches.iter().map(|(_, search)| search.most_inflation.unwrap_or(f64::INFINITY)).collect();
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
         let wide = with_terms(&first.model, further).with_load_of_estimate(&first.model, &plain.values);

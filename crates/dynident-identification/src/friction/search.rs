@@ -175,11 +175,8 @@ fn add_terms(
     additions.dedup();
     let mut at = met.len();
     met.push(tuned(folds, columns, start, None));
-    let is_distinct = most_inflation == f64::INFINITY || {
-        let inflation = asymmetry_inflation(folds, columns, &met[at]);
-        eprintln!("INFLATION {inflation}");
-        inflation <= most_inflation
-    };
+    let is_distinct =
+        most_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &met[at]) <= most_inflation;
     additions.retain(|kind| is_distinct || *kind != FrictionKind::AsymmetricCoulomb);
     for _ in 0..MOST_ADDED {
         let start = met.len();

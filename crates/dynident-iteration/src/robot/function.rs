@@ -4,7 +4,9 @@ use super::envelope::EnvelopeWatch;
 use super::oscillation_watch::RunOscillations;
 use super::recorder::{empty_record, joint_major};
 use super::ways::{RunPart, WayRecords};
-use super::{Breach, Envelope, JointOscillation, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal, Stopping};
+use super::{
+    Breach, Envelope, JointOscillation, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal, Stopping,
+};
 use dynident_simulation::controllers::{Controller, Measured};
 use dynident_simulation::{Record, Reference, ReferenceSample, SimulationError};
 

@@ -23,12 +23,13 @@ mod term_description;
 mod ways;
 mod workspace;
 
-pub(crate) use envelope::{TRACKING_M, TRACKING_RAD};
 pub use envelope::{Envelope, EnvelopeSettings};
+pub(crate) use envelope::{TRACKING_M, TRACKING_RAD};
 pub use folder::{FolderRobot, FolderSettings};
 pub use function::{ControlledRun, FunctionRobot};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_table::{LogTableError, read_log_table};
+pub(crate) use oscillation_watch::RunOscillations;
 pub use process::ProcessRobot;
 pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
 pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost, WayFiles};
@@ -36,7 +37,6 @@ pub use simulated::SimulatedRobot;
 pub use stop_reason::{Breach, EnvelopeQuantity, JointOscillation, Stopping};
 pub use stop_signal::StopSignal;
 pub use ways::{RunPart, WayRecords, Ways};
-pub(crate) use oscillation_watch::RunOscillations;
 pub use workspace::{WatchedPoint, WorkspaceBox, WorkspaceSettings};
 
 use crate::oscillation::OscillationLimits;

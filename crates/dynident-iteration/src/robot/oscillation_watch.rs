@@ -60,9 +60,12 @@ impl RunOscillations {
         }
         let step_s = time_s - before_s;
         let pairs = self.newest.1.iter().zip(&before).map(|(new, old)| (new - old) / step_s);
-        let found = self.joints.iter_mut().zip(pairs).enumerate().find_map(|(joint, (watch, deviation))| {
-            Some((joint, watch.as_mut()?.add(deviation)?))
-        });
+        let found = self
+            .joints
+            .iter_mut()
+            .zip(pairs)
+            .enumerate()
+            .find_map(|(joint, (watch, deviation))| Some((joint, watch.as_mut()?.add(deviation)?)));
         found.map(|(joint, own)| {
             let (frequency_hz, amplitude) = (own.frequency_hz, own.amplitude);
             (joint, JointOscillation { joint: String::new(), frequency_hz, amplitude, time_s, part: RunPart::Motion })

@@ -127,10 +127,6 @@ fn a_slide_along_gravity_has_no_friction_by_direction() {
         let (iteration, outcome) = iterated(seed);
         let unmet: Vec<String> = outcome.shortfalls.iter().map(ToString::to_string).collect();
         let chosen = &outcome.runs[0].estimate.as_ref().unwrap().friction;
-        for joint in chosen {
-            eprintln!("{seed} {} {} {:?}", joint.joint, joint.chosen, joint.candidates.iter().map(|c| (&c.term, c.cv_error_nm)).collect::<Vec<_>>());
-        }
-        eprintln!("{seed} {} {} runs {unmet:?}", outcome.status, outcome.runs.len());
         let slide = &chosen[2];
         assert!(slide.terms.is_some() && slide.candidates.iter().all(|own| !own.term.contains("asymmetric coulomb")));
         // Joints whose axes gravity does not turn may have it.
@@ -139,7 +135,10 @@ fn a_slide_along_gravity_has_no_friction_by_direction() {
         let known = outcome.runs.last().unwrap().knowledge().unwrap();
         for (name, (value, std)) in robot.base().expressions().iter().zip(known.values.iter().zip(&known.std)) {
             let is_friction_of_slide = name.contains("fc3");
-            assert!(!is_friction_of_slide || (value - 8.0).abs() < (4.0 * std).max(1.0) && *std < 2.0, "{name}: {value} +- {std}");
+            assert!(
+                !is_friction_of_slide || (value - 8.0).abs() < (4.0 * std).max(1.0) && *std < 2.0,
+                "{name}: {value} +- {std}"
+            );
         }
         assert_eq!(outcome.status, IterationStatus::Converged, "{seed}: {unmet:?}");
     }

@@ -101,8 +101,12 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
         page.add(Text { paragraphs: Vec::new(), points });
     }
     let oscillating = file.oscillation_sentences().into_iter().map(|sentence| (Tone::Warning, sentence));
-    let points: Vec<(Tone, String)> =
-        file.lowered_bandwidths_sentence().map(|sentence| (Tone::Plain, sentence)).into_iter().chain(oscillating).collect();
+    let points: Vec<(Tone, String)> = file
+        .lowered_bandwidths_sentence()
+        .map(|sentence| (Tone::Plain, sentence))
+        .into_iter()
+        .chain(oscillating)
+        .collect();
     if !points.is_empty() {
         page.add(Text { paragraphs: Vec::new(), points });
     }

@@ -20,8 +20,8 @@ use dynident_identification::estimators::Estimator;
 use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
-    IterationSettings, OscillationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings, Scheme,
-    SettledSettings, StartWith,
+    IterationSettings, OscillationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings,
+    Scheme, SettledSettings, StartWith,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
