@@ -27,35 +27,49 @@ struct Arrival {
 pub(super) struct StreamWatch {
     /// The stated limit, s.
     silence_s: Option<f64>,
-    /// The first sample since the last silence, the newest one, and how many there are.
-    since: Option<(Arrival, Arrival, usize)>,
+    stream: Option<Stream>,
+}
+
+/// The samples so far.
+#[derive(Clone, Copy, Debug)]
+struct Stream {
+    first: Arrival,
+    last: Arrival,
+    samples: usize,
+    /// When the first sample arrived after the last silence longer than the limit.
+    since: Instant,
 }
 
 impl StreamWatch {
     pub(super) fn new(silence_s: Option<f64>) -> Self {
-        Self { silence_s, since: None }
+        Self { silence_s, stream: None }
     }
 
     /// A sample of the motion's time `motion_s` has arrived.
     pub(super) fn arrived(&mut self, at: Instant, motion_s: f64) {
         let new = Arrival { at, motion_s };
-        let known = self.since.filter(|(_, last, _)| at.duration_since(last.at) <= self.allowed());
-        self.since = Some(known.map_or((new, new, 1), |(first, _, samples)| (first, new, samples + 1)));
+        let allowed = self.allowed();
+        self.stream = Some(match self.stream {
+            None => Stream { first: new, last: new, samples: 1, since: at },
+            Some(Stream { first, last, samples, since }) => {
+                let since = if at.duration_since(last.at) > allowed { at } else { since };
+                Stream { first, last: new, samples: samples + 1, since }
+            }
+        });
     }
 
     /// The longest silence that is allowed, s; none where the program does not stream in real time.
     pub(super) fn limit_s(&self) -> Option<f64> {
-        let (first, last, _) = self.since?;
+        let Stream { first, last, since, .. } = self.stream?;
         let allowed = self.allowed();
-        let elapsed = last.at.duration_since(first.at);
-        let elapsed_s = elapsed.as_secs_f64();
+        let elapsed_s = last.at.duration_since(first.at).as_secs_f64();
         let apart_s = (last.motion_s - first.motion_s - elapsed_s).abs();
-        let is_real_time = apart_s <= LAG_S + DRIFT * elapsed_s;
-        (elapsed >= allowed.mul_f64(KNOWN_AFTER) && is_real_time).then_some(allowed.as_secs_f64())
+        let is_known = last.at.duration_since(since) >= allowed.mul_f64(KNOWN_AFTER);
+        (is_known && apart_s <= LAG_S + DRIFT * elapsed_s).then_some(allowed.as_secs_f64())
     }
 
     fn allowed(&self) -> Duration {
-        let period_s = self.since.map_or(0.0, |(first, last, samples)| {
+        let period_s = self.stream.map_or(0.0, |Stream { first, last, samples, .. }| {
             (last.motion_s - first.motion_s).max(0.0) / samples.saturating_sub(1).max(1) as f64
         });
         // At most a day: periods are numbers from outside.
@@ -91,6 +105,18 @@ mod tests {
             assert_eq!(limit(watched(None, (samples, 500.0, pace))), None, "{samples} {pace}");
         }
         assert_eq!(StreamWatch::new(None).limit_s(), None);
+    }
+
+    /// A program that was held up for half a second and then catches up still streams.
+    #[test]
+    fn a_stream_that_catches_up_goes_on() {
+        let (begin, mut watch) = (Instant::now(), StreamWatch::new(None));
+        for sample in 0..1000 {
+            let motion_s = f64::from(sample) / 500.0;
+            let held_up_s = if (0.5..1.0).contains(&motion_s) { 1.0 } else { motion_s };
+            watch.arrived(begin + Duration::from_secs_f64(held_up_s), motion_s);
+        }
+        assert!((watch.limit_s().unwrap() - 0.2).abs() < 1e-9);
     }
 
     /// A program that writes what it has once a second does not stream.
