@@ -422,7 +422,7 @@ mod tests {
     fn a_running_joint_is_watched() {
         let seen = |deviation: &mut dyn FnMut(f64) -> f64| {
             let mut watch = OscillationWatch::new(RATE_HZ, 8.0, 0.1).unwrap();
-            (0..5000).find_map(|k| Some((k, watch.add(deviation(k as f64 / RATE_HZ))?)))
+            (0..5000).find_map(|k| Some((k, watch.add(deviation(f64::from(k) / RATE_HZ))?)))
         };
         let (sample, found) = seen(&mut |t| 0.3 * (TAU * 43.0 * t).sin()).unwrap();
         assert!((found.frequency_hz - 43.0).abs() < 1.0 && (found.amplitude - 0.3).abs() < 0.03, "{found:?}");
@@ -449,10 +449,10 @@ mod tests {
     #[test]
     fn a_growing_oscillation_is_named() {
         let grows = |t: f64| 1e-3 * (20.0 * t).exp() * (TAU * 43.0 * t).sin();
-        let values: Vec<f64> = (0..200).map(|k| grows(k as f64 / RATE_HZ)).collect();
+        let values: Vec<f64> = (0..200).map(|k| grows(f64::from(k) / RATE_HZ)).collect();
         let found = growing_oscillation(&values, RATE_HZ, 8.0).unwrap();
         assert!((found.frequency_hz - 43.0).abs() < 2.0, "{found:?}");
-        let away: Vec<f64> = (0..200).map(|k| 1e-3 * (20.0 * k as f64 / RATE_HZ).exp()).collect();
+        let away: Vec<f64> = (0..200).map(|k| 1e-3 * (20.0 * f64::from(k) / RATE_HZ).exp()).collect();
         assert_eq!(growing_oscillation(&away, RATE_HZ, 8.0), None);
         for seed in 0..20 {
             let mut random = Random::new(seed);

@@ -248,7 +248,9 @@ impl JointFolds {
         let count = self.variable.len();
         let dense = |sparse: &[(usize, f64)]| {
             let mut dense = DVector::zeros(count);
-            sparse.iter().for_each(|&(place, factor)| dense[place] += factor);
+            for &(place, factor) in sparse {
+                dense[place] += factor;
+            }
             dense
         };
         let own = dense(combination);

@@ -85,7 +85,7 @@ fn first_run(gains: &DerivedControllers, is_watched: bool) -> (RobotRun, String)
         plant.set_state(0.0, &[motion.q[0], motion.q[motion.samples]], &[0.0, 0.0]);
         let mut late: VecDeque<Vec<f64>> = vec![vec![0.0, 0.0]; LATE_STEPS].into();
         let mut sample = 0.0;
-        while let Some(tau) = run.torque(sample / RATE_HZ, &plant.q().to_vec(), &plant.dq().to_vec()) {
+        while let Some(tau) = run.torque(sample / RATE_HZ, plant.q(), plant.dq()) {
             let tau = tau.to_vec();
             for _ in 0..STEPS {
                 late.push_back(tau.clone());
