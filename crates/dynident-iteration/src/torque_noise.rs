@@ -17,7 +17,7 @@ const PERIODS: usize = 4;
 const INDEPENDENT: f64 = 2.7;
 /// Fewest windows without a reversal that are used without the others.
 const FEWEST_WINDOWS: usize = 12;
-/// An octave with this many times the density of the next one shows the motion: noise of the first order falls by 4, and
+/// An octave with this many times the density of the next one shows the motion: noise of the first order falls by 4,
 /// the torque of a motion that fades by 16 and more.
 const STEEP: f64 = 8.0;
 /// A joint reverses where a quarter of a window brings it less far than this share of the others' mean.

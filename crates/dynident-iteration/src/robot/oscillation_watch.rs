@@ -37,8 +37,8 @@ impl RunOscillations {
         Self { limits, begin: (0.0, 0), newest: (0.0, Vec::new()), joints: Vec::new() }
     }
 
-    /// The next sample along a trajectory: its time, s, and positions, rad (m). The place of the joint that oscillates, if one does, with
-    /// frequency and amplitude.
+    /// The next sample along a trajectory: its time, s, and positions, rad (m). The place of the joint that oscillates,
+    /// if one does, with frequency and amplitude.
     pub(crate) fn look(&mut self, reference: &Reference, time_s: f64, q: &[f64]) -> Option<(usize, JointOscillation)> {
         let limits = self.limits?;
         let distance = |(joint, q): (usize, &f64)| q - target_at(reference, joint, time_s);

@@ -19,5 +19,6 @@ mod run_offsets;
 mod scara;
 mod simulated_arm;
 mod stops;
+mod torque_check;
 mod verdict;
 mod warm_up;

@@ -21,7 +21,7 @@ use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
     IterationSettings, OscillationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings,
-    Scheme, SettledSettings, StartWith,
+    Scheme, SettledSettings, StartWith, TorqueCheckSettings,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
@@ -158,6 +158,8 @@ pub struct IterationSection {
     pub max_runs: usize,
     /// When all has settled.
     pub settled: SettledSettings,
+    /// When a difference between logged and commanded torque counts.
+    pub torque_check: TorqueCheckSettings,
 }
 
 impl Default for IterationSection {
@@ -206,6 +208,7 @@ impl Default for IterationSection {
             most_model_free,
             max_runs,
             settled,
+            torque_check: TorqueCheckSettings::default(),
         }
     }
 }
@@ -279,6 +282,7 @@ impl IterationSection {
             most_model_free: self.most_model_free,
             max_runs: self.max_runs,
             settled: self.settled.clone(),
+            torque_check: Some(self.torque_check.clone()),
             safety: SafetySettings::default(),
         })
     }
