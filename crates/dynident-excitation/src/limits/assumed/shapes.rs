@@ -62,7 +62,7 @@ impl ShapesOfLinks {
                 found.stand_ins.push(first.name.clone());
             }
             if described {
-                let has_mass = |link: &Link| link.inertial.is_some_and(|inertial| inertial.mass > 0.0);
+                let has_mass = |link: &Link| link.inertial.is_some_and(|inertial| inertial.mass_kg() > 0.0);
                 let no_shape_at_all = |link: &Link| {
                     body.is_some() && found.shapes.len() == before && link.name == first.name
                 };
