@@ -53,7 +53,15 @@ pub(super) fn convex_pieces(triangles: Vec<Triangle>, most: usize) -> Vec<Vec<Ve
         pieces[place] = lower;
         pieces.push(upper);
     }
-    pieces.into_iter().map(|piece| piece.triangles.into_iter().flatten().collect()).collect()
+    pieces.into_iter().map(|piece| distinct(piece.triangles)).collect()
+}
+
+/// The corners of triangles, each once.
+fn distinct(triangles: Vec<Triangle>) -> Vec<Vec3> {
+    let mut corners: Vec<[u64; 3]> = triangles.into_iter().flatten().map(|corner| corner.0.map(f64::to_bits)).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners.into_iter().map(|bits| Vec3(bits.map(f64::from_bits))).collect()
 }
 
 /// Evenly spread directions (a spiral on the sphere).
