@@ -56,7 +56,7 @@ ROBOTS = {
     "two_dofs": DATA + "asr_twodof_description/urdf/TwoDofs.urdf",
     "iiwa14": ROOT / "robots/iiwa14.urdf",
     "planar2r": ROOT / "robots/planar2r.urdf",
-    "scara": ROOT / "benchmarks/scara.urdf",
+    "scara": ROOT / "benchmarks/robots/scara_shapes.urdf",
     # Legs and hands, held at the base.
     "finger": DATA + "finger_edu_description/robots/finger_edu.urdf",
     "bolt": DATA + "bolt_description/robots/bolt.urdf",
