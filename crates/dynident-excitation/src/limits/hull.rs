@@ -111,7 +111,8 @@ mod tests {
                 Vec3([0.05 * x, 0.08 * y, 0.3 * z + 0.1])
             })
             .collect();
-        let shape = LinkShape::holding("rod", &Solid { corners_m: corners_m.clone(), radius_m: 0.0, triangles: Vec::new() });
+        let shape =
+            LinkShape::holding("rod", &Solid { corners_m: corners_m.clone(), radius_m: 0.0, triangles: Vec::new() });
         assert!(shape.corners_m.len() <= DIRECTIONS && shape.radius_m < 0.02, "{}", shape.radius_m);
         let hull: Vec<Vec3> = shape.corners_m.iter().map(|corner| Vec3(*corner)).collect();
         assert!(farthest_from(&hull, &corners_m) <= shape.radius_m);

@@ -264,7 +264,8 @@ mod tests {
 
     /// The surface of a box as triangles.
     fn block(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
-        let corner = |k: usize| Vec3(core::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }));
+        let corner =
+            |k: usize| Vec3(core::array::from_fn(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }));
         let faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
         let split = |f: [usize; 4]| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]];
         faces.into_iter().flat_map(split).map(|triangle| triangle.map(corner)).collect()

@@ -176,8 +176,7 @@ mod tests {
             Vec3([f64::from(i), f64::from(j), random.uniform(0.0, 1.5)]).scale(1.0 / f64::from(steps))
         };
         let count = steps + 1;
-        let corners_m: Vec<Vec3> =
-            (0..count * count).map(|k| corner(random, k / count, k % count)).collect();
+        let corners_m: Vec<Vec3> = (0..count * count).map(|k| corner(random, k / count, k % count)).collect();
         let square = |k: u32| {
             let (i, j) = (k / steps, k % steps);
             let at = |i: u32, j: u32| i * count + j;
@@ -202,10 +201,7 @@ mod tests {
             let mut least = f64::INFINITY;
             for a in corners(&one) {
                 for b in corners(&two) {
-                    let placed = [
-                        Placed { corners: &a, at: &at },
-                        Placed { corners: &b, at: &Transform::IDENTITY },
-                    ];
+                    let placed = [Placed { corners: &a, at: &at }, Placed { corners: &b, at: &Transform::IDENTITY }];
                     let apart = hull_distance(placed[0], placed[1], f64::INFINITY, &mut Vec3::ZERO.clone());
                     least = least.min(apart.distance_m);
                 }

@@ -33,8 +33,8 @@ pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
         return Err(MeshFault::Collada("thousands of attributes in one element, or of nested namespaces"));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options)
-        .map_err(|error| MeshFault::Xml(shortened(&error.to_string())))?;
+    let document =
+        Document::parse_with_options(text, options).map_err(|error| MeshFault::Xml(shortened(&error.to_string())))?;
     let root = document.root_element();
     if !root.has_tag_name("COLLADA") {
         return Err(MeshFault::Format);
@@ -125,7 +125,8 @@ impl<'a, 'i> Reader<'a, 'i> {
                 continue;
             }
             let (offset, stride, places) = self.positions(mesh, form)?;
-            let mut counts = child(form, "vcount").map(|node| indices(node)).transpose()?.unwrap_or_default().into_iter();
+            let mut counts =
+                child(form, "vcount").map(|node| indices(node)).transpose()?.unwrap_or_default().into_iter();
             let lists = form.children().filter(|node| node.has_tag_name("p"));
             // A polygon with holes: its outer boundary.
             let outer = children(form, "ph").filter_map(|node| child(node, "p"));
@@ -348,7 +349,12 @@ mod tests {
         // A node that holds itself, and thirty levels that each hold the next twice.
         assert!(fault(&scene("<node id=\"loop\"><instance_node url=\"#loop\"/></node>")).contains("64 levels"));
         let levels: String = (0..30)
-            .map(|k| format!("<node id=\"l{k}\"><instance_node url=\"#l{n}\"/><instance_node url=\"#l{n}\"/></node>", n = k + 1))
+            .map(|k| {
+                format!(
+                    "<node id=\"l{k}\"><instance_node url=\"#l{n}\"/><instance_node url=\"#l{n}\"/></node>",
+                    n = k + 1
+                )
+            })
             .collect();
         let levels = format!("<node><instance_node url=\"#l0\"/><node>{levels}<node id=\"l30\"/></node></node>");
         assert!(fault(&scene(&levels)).contains("100,000 nodes"));

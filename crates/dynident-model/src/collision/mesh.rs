@@ -28,8 +28,7 @@ impl TriangleMesh {
 
     /// The mesh of separate triangles, three vertices each.
     pub(super) fn of_corners(corners: &[Vec3]) -> Self {
-        let triangles: Vec<[u32; 3]> =
-            (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         Self::merged(corners, &triangles)
     }
 }

@@ -45,9 +45,7 @@ fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, String> {
 fn geometry(form: Node<'_, '_>, name: &str) -> Result<Option<CollisionGeometry>, UrdfError> {
     let size = |attribute: &'static str| required_number(form, attribute).map(f64::abs);
     Ok(match name {
-        "box" => {
-            numbers::<3>(form, "size")?.map(|size_m| CollisionGeometry::Box { size_m: size_m.map(f64::abs) })
-        }
+        "box" => numbers::<3>(form, "size")?.map(|size_m| CollisionGeometry::Box { size_m: size_m.map(f64::abs) }),
         "cylinder" => Some(CollisionGeometry::Cylinder { radius_m: size("radius")?, length_m: size("length")? }),
         "sphere" => Some(CollisionGeometry::Sphere { radius_m: size("radius")? }),
         "capsule" => Some(CollisionGeometry::Capsule { radius_m: size("radius")?, length_m: size("length")? }),

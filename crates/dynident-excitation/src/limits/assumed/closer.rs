@@ -60,15 +60,13 @@ fn links_too_coarse(
     let surfaces = surfaces.collect::<Result<Vec<Surface>, LimitError>>()?;
     let mut workspace = Workspace::new(model);
     let postures = core::iter::once(neutral_posture(model)).chain(random_postures(model, POSTURES));
-    let postures: Vec<Vec<Transform>> =
-        postures.map(|q| body_placements(model, &mut workspace, &q).to_vec()).collect();
+    let postures: Vec<Vec<Transform>> = postures.map(|q| body_placements(model, &mut workspace, &q).to_vec()).collect();
     let is_too_coarse = |[a, b]: [usize; 2]| {
         let mut wrong = 0;
         let mut guesses = Vec::new();
         for (number, placements) in postures.iter().enumerate() {
-            let at = [a, b].map(|place| {
-                resolved.solids[place].body.map_or(Transform::IDENTITY, |body| placements[body])
-            });
+            let at =
+                [a, b].map(|place| resolved.solids[place].body.map_or(Transform::IDENTITY, |body| placements[body]));
             let (first, second) = ((&resolved.solids[a], &at[0]), (&resolved.solids[b], &at[1]));
             if solid_distance(first, second, clearance_m, &mut guesses).surface_m >= clearance_m
                 || surfaces[a].is_within(&at[0], &surfaces[b], &at[1], clearance_m)
@@ -97,12 +95,7 @@ fn links_too_coarse(
 }
 
 /// The surface of a link in the frame of its body; of what has no solid, such as a capsule that stands in, its shape.
-fn surface(
-    model: &Model,
-    link: &str,
-    solids: &[(String, Solid)],
-    hulls: &[LinkShape],
-) -> Result<Surface, LimitError> {
+fn surface(model: &Model, link: &str, solids: &[(String, Solid)], hulls: &[LinkShape]) -> Result<Surface, LimitError> {
     let (_, body_from_link) = link_place(model, link, "a collision shape")?;
     let own = solids.iter().filter(|(name, _)| name == link).map(|(_, solid)| solid.placed(&body_from_link));
     let mut own: Vec<Solid> = own.collect();

@@ -63,9 +63,8 @@ impl ShapesOfLinks {
             }
             if described {
                 let has_mass = |link: &Link| link.inertial.is_some_and(|inertial| inertial.mass_kg() > 0.0);
-                let no_shape_at_all = |link: &Link| {
-                    body.is_some() && found.shapes.len() == before && link.name == first.name
-                };
+                let no_shape_at_all =
+                    |link: &Link| body.is_some() && found.shapes.len() == before && link.name == first.name;
                 let without = links(body).iter().filter(|link| link.collision.is_empty());
                 let without = without.filter(|link| has_mass(link) || no_shape_at_all(link));
                 found.without.extend(without.map(|link| link.name.clone()));
