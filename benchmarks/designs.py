@@ -95,7 +95,7 @@ class Referee:
         self.shapes = pin.buildGeomFromUrdf(self.model, str(urdf), pin.GeometryType.COLLISION, None, folders)
         self.data, self.placed = self.model.createData(), pin.GeometryData(self.shapes)
         names = self.design["joints"]
-        # What each joint of the tree follows: (column of the file, factor, offset).
+        # Column of the file, factor and offset of each joint of the tree.
         self.follows = {name: (column, 1.0, 0.0) for column, name in enumerate(names)}
         for joint in ElementTree.parse(urdf).getroot().findall("joint"):
             mimic = joint.find("mimic")

@@ -359,7 +359,7 @@ mod tests {
         let levels = format!("<node><instance_node url=\"#l0\"/><node>{levels}<node id=\"l30\"/></node></node>");
         assert!(fault(&scene(&levels)).contains("100,000 nodes"));
         for text in ["<COLLADA", "<COLLADA/>", "<robot/>"] {
-            // Malformed, or nothing in it: no triangle comes of either.
+            // Malformed or empty: no triangles.
             assert!(read(text).map_or(true, |mesh| mesh.triangles.is_empty()), "{text}");
         }
         let negative = document("<unit meter=\"-1\"/>", "");

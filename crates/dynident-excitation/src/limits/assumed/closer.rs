@@ -94,7 +94,7 @@ fn links_too_coarse(
     Ok(coarse.map(|(solid, _)| solid.link.clone()).collect())
 }
 
-/// The surface of a link in the frame of its body; of what has no solid, such as a capsule that stands in, its shape.
+/// The surface of a link in the frame of its body: its solids, or its shapes if it has no solid (capsules).
 fn surface(model: &Model, link: &str, solids: &[(String, Solid)], hulls: &[LinkShape]) -> Result<Surface, LimitError> {
     let (_, body_from_link) = link_place(model, link, "a collision shape")?;
     let own = solids.iter().filter(|(name, _)| name == link).map(|(_, solid)| solid.placed(&body_from_link));

@@ -199,7 +199,10 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
     // Complete lists: what is not checked must be known.
     let pairs = |pairs: &[[String; 2]]| pairs.iter().map(|[a, b]| format!("{a} / {b}")).collect::<Vec<_>>().join(", ");
     if !resolved.left_out.is_empty() {
-        gaps.push(format!("pairs whose shapes stand in each other: {}", pairs(&resolved.left_out)));
+        gaps.push(format!(
+            "pairs whose shapes overlap in the neutral posture and in most others: {}",
+            pairs(&resolved.left_out)
+        ));
     }
     if !resolved.close.is_empty() {
         gaps.push(format!("pairs that run close by each other in every posture: {}", pairs(&resolved.close)));

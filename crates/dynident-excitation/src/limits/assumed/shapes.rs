@@ -17,22 +17,22 @@ const STAND_IN: f64 = 0.04;
 pub struct ShapesOfLinks {
     /// The shapes.
     pub shapes: Vec<LinkShape>,
-    /// Links for which a capsule from joint to joint stands in: all of a description without shapes, and those with a
-    /// shape that cannot be used.
+    /// Links with a capsule from joint to joint: all links of a description without shapes, and links with a shape that
+    /// cannot be used.
     pub stand_ins: Vec<String>,
     /// Links without any shape in a description that has shapes elsewhere: those with a mass, and all bodies.
     pub without: Vec<String>,
     /// Shapes that cannot be used, each with its link, its file and the reason.
     pub dropped: Vec<String>,
-    /// What the shapes of the description are, before they were simplified.
+    /// The shapes of the description in full detail, with their links.
     solids: Vec<(String, Solid)>,
     /// Whether the description has any shape.
     described: bool,
 }
 
 impl ShapesOfLinks {
-    /// The collision shapes of the description, which stands in `folder`: of meshes the convex hulls. For links with
-    /// shapes that cannot be used, and for a description without any, capsules along the links with a radius of 4 % of
+    /// The collision shapes of the description in `folder`, with convex hulls of meshes. Links with a shape that cannot
+    /// be used, and all links of a description without shapes, get capsules from joint to joint with a radius of 4 % of
     /// the arm's length.
     pub fn of(model: &Model, folder: &Path) -> Self {
         let radius_m = STAND_IN * arm_length_m(model);
