@@ -7,7 +7,7 @@ For each robot it writes a study that names the description only, runs `dynident
 
 * torque by `rnea` plus the description's damping and Coulomb friction, within `effort`;
 * positions and velocities within the description's limits;
-* no contact of links, with the real meshes. Left out are links on one joint or on neighbours, as everywhere, and what `design.json` lists under `not_checked`:
+* no contact of links, with the real meshes. Not checked are links on one joint or on neighbours, as everywhere, and what `design.json` lists under `not_checked`:
   pairs of links, links without a shape, links with a shape that could not be used;
 * no shape below the floor that `design.json` says was assumed, unless it is below it in every posture.
 

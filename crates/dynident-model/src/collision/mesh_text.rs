@@ -42,7 +42,8 @@ fn vertex<'t>(words: &mut impl Iterator<Item = &'t str>) -> Result<Vec3, MeshFau
     Ok(Vec3([number()?, number()?, number()?]))
 }
 
-/// Index of a face's corner `i`, `i/t`, `i//n` or `i/t/n`: counted from 1, or backwards from the last vertex if negative.
+/// Index of a face's corner `i`, `i/t`, `i//n` or `i/t/n`, which counts from 1, or backwards from the last vertex if
+/// negative.
 fn corner(word: &str, count: usize) -> Option<u32> {
     let index: i64 = word.split('/').next()?.parse().ok()?;
     let count = i64::try_from(count).ok()?;

@@ -10,7 +10,6 @@ mod consistent_parameters;
 mod coupled_joints;
 mod declared_torque;
 mod design_contact;
-mod design_meshes;
 mod design_messages;
 mod design_tasks;
 mod differentiators;

@@ -1,16 +1,18 @@
 //! Collision shapes in mesh files: concave links that only their convex hulls hold together, COLLADA, and files that
 //! cannot be used. The meshes are written here.
 
-use crate::common::Job;
 use core::fmt::Write;
 use core::ops::ControlFlow;
-use dynident::dynamics::{Workspace, body_placements};
-use dynident::model::{Transform, Vec3};
-use dynident::{DesignOutcome, Study, design_study};
+use dynident_dynamics::{ParametricModel, Workspace, body_placements};
+use dynident_excitation::check::{LimitReport, check_limits};
+use dynident_excitation::criteria::DOptimal;
+use dynident_excitation::families::{Fourier, FourierSettings};
+use dynident_excitation::limits::{AssumedLimits, LimitSet, Limits, LimitsInForce, ShapesOfLinks};
+use dynident_excitation::{DesignSettings, DesignTask, Family, Motion, design};
+use dynident_model::{Model, Transform, Vec3};
 use std::path::Path;
 
-const SMALL: &str =
-    "duration_s = 6.0\nsearch = { starts = 2, rounds = 0, evaluations_per_start = 80, polish_evaluations = 120 }";
+const DURATION_S: f64 = 6.0;
 
 /// The surface of a box as corners of triangles.
 fn block(low: [f64; 3], high: [f64; 3]) -> Vec<[f64; 3]> {
@@ -74,22 +76,48 @@ fn joint(name: &str, [parent, child]: [&str; 2], xyz: &str, axis: &str, range: f
     )
 }
 
-fn designed(folder: &Path, description: &str) -> DesignOutcome {
-    std::fs::write(folder.join("arm.urdf"), format!("<robot name=\"arm\">{description}</robot>")).unwrap();
-    let path = folder.join("study.toml");
-    let study = Study::parse(&format!("[robot]\nfile = \"arm.urdf\"\n[design]\n{SMALL}\n"), &path).unwrap();
-    design_study(&study, &path, &Job::options(1), |_| ControlFlow::Continue(())).unwrap()
+/// A robot and its limits as a study without any of its own has them.
+fn in_force(folder: &Path, description: &str, pieces: usize) -> (Model, LimitsInForce) {
+    let model = dynident_model::read_urdf(&format!("<robot name=\"arm\">{description}</robot>")).unwrap().model;
+    let shapes = ShapesOfLinks::of(&model, folder);
+    let settings = AssumedLimits { mesh_pieces: pieces, ..AssumedLimits::default() };
+    let limits = LimitsInForce::new(&model, &shapes, &settings, &Limits::default()).unwrap();
+    (model, limits)
 }
 
-/// Calls `look` with where all bodies are, at 50 Hz.
-fn along(outcome: &DesignOutcome, mut look: impl FnMut(&[Transform])) {
-    let model = outcome.robot.model();
-    let mut workspace = Workspace::new(model);
-    let (times, motion) = outcome.sampled(50.0);
+/// A small search; what the check finds, and where all bodies are at 50 Hz.
+fn designed(model: &Model, limits: &Limits, mut look: impl FnMut(&[Transform])) -> Vec<LimitReport> {
+    let robot = ParametricModel::new(model.clone(), Vec::new()).unwrap();
+    let family = Fourier::new(model.dof(), DURATION_S, &FourierSettings::default()).unwrap();
+    let task = DesignTask {
+        family: &family,
+        criteria: &[&DOptimal],
+        limits: &LimitSet::new(limits, model).unwrap(),
+        layout: robot.layout(),
+        torque_std_nm: &vec![1.0; model.dof()],
+        prior: None,
+    };
+    let settings = DesignSettings {
+        starts: Some(2),
+        rounds: Some(0),
+        evaluations_per_start: Some(80),
+        polish_evaluations: 120,
+        ..DesignSettings::default()
+    };
+    let best = design(&task, &settings, |_| ControlFlow::Continue(())).unwrap();
+    let motion_at = |times: &[f64], out: &mut Motion| family.motion(&best.parameters, times, out);
+    let times: Vec<f64> = (0..=300).map(|k| f64::from(k) / 50.0).collect();
+    let (mut motion, mut workspace) = (Motion::default(), Workspace::new(model));
+    motion_at(&times, &mut motion);
     for sample in 0..times.len() {
         let q: Vec<f64> = (0..model.dof()).map(|joint| motion.q[motion.of(joint)][sample]).collect();
         look(body_placements(model, &mut workspace, &q));
     }
+    check_limits(limits, model, DURATION_S, 1000.0, motion_at).unwrap()
+}
+
+fn broken(reports: &[LimitReport]) -> Vec<&LimitReport> {
+    reports.iter().filter(|report| report.violated).collect()
 }
 
 /// A bar that turns inside a channel: the channel's convex hull always holds it, its walls do not.
@@ -111,18 +139,19 @@ fn links_apart_by_their_meshes_only_are_kept_apart_and_move() {
         joint("j1", ["base", "post"], "0 0 0.3", "0 0 1", 0.5),
         joint("j2", ["post", "bar"], "0.02 0 0", "0 0 1", 0.5),
     ];
-    let outcome = designed(folder.path(), &description.concat());
-    let file = &outcome.file;
-    assert!(file.feasible, "{:?}", file.diagnosis);
-    // Until meshes were cut into pieces the pair was left out.
-    assert!(!file.not_checked.iter().any(|text| text.contains("base / bar")), "{:?}", file.not_checked);
-    assert!(file.limits.iter().any(|limit| limit.joint == "base / bar"), "{:?}", file.limits);
+    let lists = |limits: &LimitsInForce| limits.not_checked.iter().any(|text| text.contains("base / bar"));
+    let (model, hulls) = in_force(folder.path(), &description.concat(), 1);
+    assert!(lists(&hulls), "convex hulls overlap in every posture: {:?}", hulls.not_checked);
+    let (_, limits) = in_force(folder.path(), &description.concat(), 8);
+    assert!(!lists(&limits), "{:?}", limits.not_checked);
     let mut widest = 0.0_f64;
-    along(&outcome, |placements| {
+    let reports = designed(&model, &limits.limits, |placements| {
         for [x, y] in [[-0.17, -0.01], [-0.17, 0.01], [0.13, -0.01], [0.13, 0.01]] {
             widest = widest.max(placements[1].point(Vec3([x, y, -0.2]))[1].abs());
         }
     });
+    assert!(broken(&reports).is_empty(), "{:?}", broken(&reports));
+    assert!(reports.iter().any(|report| report.joint == "base / bar"), "{reports:?}");
     assert!(widest < 0.08, "the bar reaches {widest} m, the walls are at 0.08 m");
     // It does not stand still either.
     assert!(widest > 0.03, "{widest}");
@@ -144,18 +173,17 @@ fn a_rod_from_collada_stays_out_of_the_column() {
         joint("j2", ["column", "beam"], "0 0.1 0.45", "0 1 0", 2.7),
         joint("j3", ["beam", "rod"], "0 -0.1 0.4", "0 1 0", 2.7),
     ];
-    let outcome = designed(folder.path(), &description.concat());
-    let file = &outcome.file;
-    assert!(file.feasible, "{:?}", file.diagnosis);
-    assert!(!file.not_checked.iter().any(|text| text.contains("rod")), "{:?}", file.not_checked);
+    let (model, limits) = in_force(folder.path(), &description.concat(), 8);
+    assert!(!limits.not_checked.iter().any(|text| text.contains("rod")), "{:?}", limits.not_checked);
     let mut inside = 0;
-    along(&outcome, |placements| {
+    let reports = designed(&model, &limits.limits, |placements| {
         let column_from_rod = placements[0].inverse().then(&placements[2]);
         for step in 0..=50 {
             let Vec3([x, y, z]) = column_from_rod.point(Vec3([0.0, 0.0, 0.01 * f64::from(step)]));
             inside += usize::from(x.abs() <= 0.06 && y.abs() <= 0.06 && (0.0..=0.5).contains(&z));
         }
     });
+    assert!(broken(&reports).is_empty(), "{:?}", broken(&reports));
     assert_eq!(inside, 0, "points of the rod in the column");
 }
 
@@ -191,8 +219,8 @@ fn every_dropped_shape_is_listed_with_its_link_and_file() {
         description += &kind(joint(&format!("j{k}"), [&parent, &name], "0 0 0.2", "0 1 0", 1.0));
         description += &link(&name, shape);
     }
-    let outcome = designed(folder.path(), &description);
-    let listed = &outcome.file.not_checked;
+    let (_, limits) = in_force(folder.path(), &description, 8);
+    let listed = &limits.not_checked;
     for (link, what) in [
         ("arm0", "package://nowhere/missing.stl"),
         ("arm1", "pointer.stl: Git LFS pointer"),
