@@ -295,7 +295,9 @@ mod tests {
         let directions = spiral(DIRECTIONS);
         let volume = |points: &[Vec3]| {
             let mut outermost = Outermost::none();
-            points.iter().for_each(|point| outermost.add(*point, &directions));
+            for point in points {
+                outermost.add(*point, &directions);
+            }
             outermost.volume()
         };
         let sum: f64 = pieces.iter().map(|piece| volume(piece)).sum();

@@ -103,13 +103,14 @@ impl ShapesOfLinks {
         if !self.described {
             return format!("{CAPSULES}, since the description has no collision shapes");
         }
-        let mut words = "the description's collision shapes, convex hulls of meshes".to_owned();
-        if !in_pieces.is_empty() {
-            words += &format!(" (convex pieces for {})", listed(in_pieces));
-        }
-        if !self.stand_ins.is_empty() {
-            words += &format!("; for {} {CAPSULES}, since a shape cannot be used", listed(&self.stand_ins));
-        }
-        words
+        let pieces = match in_pieces {
+            [] => String::new(),
+            links => format!(" (convex pieces for {})", listed(links)),
+        };
+        let capsules = match self.stand_ins.as_slice() {
+            [] => String::new(),
+            links => format!("; for {} {CAPSULES}, since a shape cannot be used", listed(links)),
+        };
+        format!("the description's collision shapes, convex hulls of meshes{pieces}{capsules}")
     }
 }
