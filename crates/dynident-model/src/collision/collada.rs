@@ -348,14 +348,11 @@ mod tests {
         assert!(fault(&scene("<node><instance_controller url=\"#c\"/></node>")).contains("skinned"));
         // A node that holds itself, and thirty levels that each hold the next twice.
         assert!(fault(&scene("<node id=\"loop\"><instance_node url=\"#loop\"/></node>")).contains("64 levels"));
-        let levels: String = (0..30)
-            .map(|k| {
-                format!(
-                    "<node id=\"l{k}\"><instance_node url=\"#l{n}\"/><instance_node url=\"#l{n}\"/></node>",
-                    n = k + 1
-                )
-            })
-            .collect();
+        let level = |k: usize| {
+            let next = format!("<instance_node url=\"#l{}\"/>", k + 1);
+            format!("<node id=\"l{k}\">{next}{next}</node>")
+        };
+        let levels = (0..30).map(level).collect::<Vec<String>>().concat();
         let levels = format!("<node><instance_node url=\"#l0\"/><node>{levels}<node id=\"l30\"/></node></node>");
         assert!(fault(&scene(&levels)).contains("100,000 nodes"));
         for text in ["<COLLADA", "<COLLADA/>", "<robot/>"] {
