@@ -179,14 +179,13 @@ const LEAST_LISTED: f64 = 0.5;
 pub(super) fn causes(
     task: &IterationTask,
     check: &TorqueCheck,
-    explanations: &[Explanation],
+    (explanations, named): (&[Explanation], &[Option<Fitted>]),
     with: &CheckWith<'_>,
 ) -> Vec<TorqueCause> {
     let names = task.robot.joint_names();
-    let named: Vec<Option<Fitted>> = explanations.iter().map(Explanation::named).collect();
     let of = |candidate: TorqueCandidate| -> Vec<usize> {
         let is_it = |found: &Option<Fitted>| found.is_some_and(|found| found.candidate == candidate);
-        (0..named.len()).filter(|&joint| explanations[joint].matters && is_it(&named[joint])).collect()
+        (0..named.len()).filter(|&joint| is_it(&named[joint])).collect()
     };
     let listed = |joints: &[usize]| joints.iter().map(|&joint| names[joint].clone()).collect::<Vec<_>>();
     let mut found = Vec::new();

@@ -17,8 +17,10 @@
 //! | `separable_fit` | scales and timing by least squares |
 //! | `explanation` | what explains a difference: the candidates, and when one is named |
 //! | `row_scale` | what the parameters that several joints share show about each joint's torque |
+//! | `agreement` | one cause for all joints, where one explains them all |
 //! | `causes` | from single joints to one statement |
 
+mod agreement;
 mod causes;
 mod command;
 mod explanation;
@@ -31,6 +33,7 @@ pub(crate) use row_scale::{LeastDeviation, RowScale, row_scales};
 
 use crate::leg::{IterationTask, Leg};
 use crate::settings::RunIdentificationSettings;
+use agreement::agreement;
 use command::{CommandLaw, ObservedLeg, shared_parameters};
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Record, SimulationError, require};
@@ -44,6 +47,8 @@ const USUAL_CUTOFF_HZ: f64 = 8.0;
 const MOST_POINTS: usize = 150;
 /// Cycles of the cut-off that a run has at least.
 const CYCLES_PER_RUN: f64 = 12.0;
+/// Another timing is taken where it leaves less than this share of the squared differences.
+const BETTER: f64 = 0.5;
 /// Fewest rows per joint from which anything is concluded.
 const FEWEST_ROWS: usize = 20;
 
@@ -55,10 +60,8 @@ pub struct TorqueCheckSettings {
     /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
     /// have at most 1.5.
     pub scale_percent: f64,
-    /// Difference between logged and commanded torque from which a cause is looked for, root mean square as a percentage
-    /// of the joint's torque. Default 5: correct logs of the campaign's robots have at most 2.
-    pub cause_percent: f64,
-    /// Largest difference of a known control law that may have no named cause, in the same measure. Default 15.
+    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
+    /// Default 5: correct logs of the campaign's robots have at most 2.
     pub difference_percent: f64,
     /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
     /// share, percent. Default 5.
@@ -73,8 +76,7 @@ impl Default for TorqueCheckSettings {
     fn default() -> Self {
         Self {
             scale_percent: 3.0,
-            cause_percent: 5.0,
-            difference_percent: 15.0,
+            difference_percent: 5.0,
             row_scale_percent: 5.0,
             clock_percent: 0.1,
             sigmas: 4.0,
@@ -90,7 +92,6 @@ impl TorqueCheckSettings {
     pub fn validate(&self) -> Result<(), SimulationError> {
         let settings = [
             ("torque_check.scale_percent", self.scale_percent),
-            ("torque_check.cause_percent", self.cause_percent),
             ("torque_check.difference_percent", self.difference_percent),
             ("torque_check.row_scale_percent", self.row_scale_percent),
             ("torque_check.clock_percent", self.clock_percent),
@@ -246,8 +247,8 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         (0..dof).map(|joint| explain(&data, joint, with.settings)).collect()
     };
     let mut explanations = explained(&fit.columns);
-    let is_open = |own: &Explanation| own.matters && own.named().is_none();
-    if explanations.iter().any(is_open) {
+    let mut found = agreement(&explanations);
+    if explanations.iter().any(|own| own.matters) {
         // What is missing in the torque bends the timing: it is found again beside what may be missing.
         let data = JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1] };
         for extra in may_be_missing(&data) {
@@ -258,11 +259,10 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
             let own = other.columns.iter().zip(&fit.columns);
             let columns: Vec<Vec<Vec<f64>>> = own.map(|(all, base)| all[..base.len()].to_vec()).collect();
             let then = explained(&columns);
-            // It is only taken if it explains everything.
-            if then.iter().any(|own| own.matters) && !then.iter().any(is_open) {
-                explanations = then;
+            let agreed = agreement(&then);
+            if agreed.left < BETTER * found.left {
+                (explanations, found) = (then, agreed);
                 fit = SeparableFit { columns, ..other };
-                break;
             }
         }
     }
@@ -280,7 +280,7 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         let commanded = explanation.commanded.iter().step_by(step);
         shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
     }
-    check.causes = causes::causes(task, &check, &explanations, with);
+    check.causes = causes::causes(task, &check, (&explanations, &found.named), with);
     Some(check)
 }
 

@@ -8,8 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on real logs.
-const MOST_STEPS: usize = 6;
+/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on most logs; a clock that is off takes
+/// more.
+const MOST_STEPS: usize = 15;
 /// A step below this share of the finite difference ends the search.
 const SMALL_STEP: f64 = 1e-2;
 /// Smallest residual that a joint is weighted by, as a share of its torque: exact logs would have infinite weights.
