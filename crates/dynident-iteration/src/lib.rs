@@ -156,4 +156,5 @@ pub use settings::{IterationSettings, RunIdentificationSettings, RunOffsets, Sch
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use supervision::{NextMotion, NextWays, Supervisor};
+pub use typical_drives::with_typical_drives;
 pub use warm_up::WarmUp;

@@ -4,9 +4,11 @@
 
 mod floor;
 mod shapes;
+mod turns;
 mod words;
 
 pub use shapes::ShapesOfLinks;
+pub use turns::StartPositions;
 
 use super::description::{JointLimit, Limits};
 use super::error::LimitError;
@@ -31,18 +33,28 @@ pub struct AssumedLimits {
     /// What is kept free before each of the description's position stops, percent of the way from the middle of the
     /// range to the stop. Default 5.
     pub stop_margin_percent: f64,
+    /// Turns that a turning joint without position limits may be away from where the motion starts. With a
+    /// `start_posture` so many to either side of it; without one half as many to either side of home, or of zero, so
+    /// that no two positions are further apart. 0: not limited. Default 1.
+    pub continuous_turns: f64,
 }
 
 impl Default for AssumedLimits {
     fn default() -> Self {
-        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0 }
+        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0, continuous_turns: 1.0 }
     }
 }
 
 impl AssumedLimits {
     /// Nothing is assumed.
     pub fn none() -> Self {
-        Self { floor: false, self_collision: false, acceleration: false, stop_margin_percent: 0.0 }
+        Self {
+            floor: false,
+            self_collision: false,
+            acceleration: false,
+            stop_margin_percent: 0.0,
+            continuous_turns: 0.0,
+        }
     }
 }
 
@@ -67,7 +79,8 @@ const RUN_UP_RAD: f64 = 0.2;
 const RUN_UP: f64 = 0.1;
 
 impl LimitsInForce {
-    /// The description's limits, the assumptions that `settings` asks for, and `given`, whose values win.
+    /// The description's limits, the assumptions that `settings` asks for, and `given`, whose values win. `starts` are
+    /// the positions about which joints without position limits turn.
     ///
     /// # Errors
     /// As [`Limits::validate`] of the shapes and `given`.
@@ -76,6 +89,7 @@ impl LimitsInForce {
         shapes: &ShapesOfLinks,
         settings: &AssumedLimits,
         given: &Limits,
+        starts: &StartPositions,
     ) -> Result<Self, LimitError> {
         let mut under = Limits::from_model(model);
         let (mut assumed, mut not_checked) = (Vec::new(), Vec::new());
@@ -86,6 +100,7 @@ impl LimitsInForce {
                 settings.stop_margin_percent
             ));
         }
+        assumed.extend(turns::bound_turns(&mut under, given, model, (settings.continuous_turns, starts)));
         if settings.acceleration && bound_accelerations(&mut under, given, model) {
             assumed.push(
                 "acceleration: full speed after 0.2 rad from rest, a tenth of the stroke where a joint slides (defaults.acceleration)"
@@ -129,6 +144,7 @@ impl LimitsInForce {
         }
         not_checked.extend(self_collision_gaps(model, shapes, &limits)?);
         not_checked.extend(joint_gaps(model, &limits));
+        not_checked.extend(follower_gaps(model));
         not_checked.push(
             "what the description does not hold: surroundings, cables, a tool or payload, deviation of the controller"
                 .to_owned(),
@@ -198,6 +214,19 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
         gaps.push(format!("links without a collision shape: {}", listed(&shapes.without)));
     }
     Ok(gaps)
+}
+
+/// Joints that follow more joints than a torque term can act on, whose friction, inertia or spring is left out.
+fn follower_gaps(model: &Model) -> Option<String> {
+    let left_out = |(place, joint): &(usize, &Joint)| {
+        let drivers = model.drivers(*place).filter(|(_, share)| *share != 0.0).count();
+        let drive =
+            [joint.damping, joint.friction, joint.drive_inertia].into_iter().flatten().any(|value| value != 0.0);
+        (drivers > 1 && joint.spring.is_some()) || (drivers > 2 && drive)
+    };
+    let joints: Vec<String> = model.followers().filter(left_out).map(|(_, joint)| joint.name.clone()).collect();
+    (!joints.is_empty())
+        .then(|| format!("torque of springs and friction at {}, each of which follows several joints", listed(&joints)))
 }
 
 /// Joints that something is not limited of.
