@@ -179,3 +179,16 @@ fn the_check_has_the_torque_of_the_description() {
     assert!((found.worst_ratio - largest[1] / 20.0).abs() < 1e-12, "{found:?} {largest:?}");
     assert!(largest[1] > 2.0 * largest[0], "friction is the larger part: {largest:?}");
 }
+
+/// Friction, armature and spring of an MJCF hinge.
+#[test]
+fn the_description_of_another_format_counts_as_well() {
+    let text = r#"<mujoco><compiler angle="radian"/><worldbody><body name="rod"><inertial pos="0 0 -0.5" mass="2" diaginertia="0.2 0.2 0.01"/>
+      <joint name="hinge" axis="0 1 0" armature="0.3" damping="2" frictionloss="1.5" stiffness="5" springref="0.4"/></body></worldbody></mujoco>"#;
+    let model = dynident_model::read_robot(text.to_owned(), std::path::Path::new("rod.xml")).unwrap().model;
+    let known = KnownTorque::of_description(&model);
+    let (mut low, mut high) = ([0.0], [0.0]);
+    known.range(&[7.0], [&[1.0], &[-0.5], &[2.0]], &mut low, &mut high);
+    let expected = 7.0 + 0.3 * 2.0 + 2.0 * -0.5 - 1.5 + 5.0 * (1.0 - 0.4);
+    assert!((low[0] - expected).abs() < 1e-12 && low == high, "{low:?} {high:?} {expected}");
+}

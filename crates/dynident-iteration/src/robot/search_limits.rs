@@ -108,3 +108,55 @@ impl WatchedPoint {
         square.sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::robot::{EnvelopeSettings, WorkspaceSettings};
+    use dynident_excitation::limits::{JointLimit, Limits};
+    use dynident_model::sample::{Random, planar_2r};
+
+    #[test]
+    fn the_tighter_of_both_limits_with_room() {
+        let mut random = Random::new(1);
+        let model = planar_2r(1.0, random.body(), random.body());
+        let own = JointLimit {
+            joint: "joint1".to_owned(),
+            position: Some([-0.5, 4.0]),
+            speed: Some(1.0),
+            torque: Some(10.0),
+            torque_margin: 0.5,
+            ..JointLimit::default()
+        };
+        let limits = Limits { joints: vec![own], ..Limits::default() };
+        let mut bounds = WorkspaceSettings::default();
+        (bounds.lower[2], bounds.tool) = (-0.3, Some([0.2, 0.0, 0.0]));
+        let envelope = EnvelopeSettings {
+            lower: Some((-1.0).into()),
+            upper: Some(2.0.into()),
+            speed: Some(2.0.into()),
+            torque: Some(8.0.into()),
+            tracking_error: Some(0.2.into()),
+            workspace: Some(bounds),
+            ..EnvelopeSettings::default()
+        };
+        let found = envelope.narrow(limits.clone(), &model, 0.1).unwrap();
+        let [first, second] = [&found.joints[0], &found.joints[1]];
+        // 0.1 · 0.2 rad of room at the upper end; the study's lower end is tighter, and so are its speed and torque.
+        assert_eq!(first.position, Some([-0.5, 2.0 - 0.1 * 0.2]));
+        assert_eq!((first.speed, first.torque, first.torque_margin), (Some(1.0), Some(10.0), 0.5));
+        assert_eq!(second.position, Some([-1.0 + 0.1 * 0.2, 2.0 - 0.1 * 0.2]));
+        assert_eq!((second.speed, second.torque), (Some(2.0 * 0.9), Some(8.0 * 0.9)));
+        let boxed = &found.boxes[0];
+        assert!(boxed.x_m.is_none() && boxed.y_m.is_none() && boxed.z_m.unwrap()[0] == -0.3);
+        // The tool turns about both joints: 0.2 m from the second, 1.2 m from the first.
+        let tool = boxed.points.last().unwrap();
+        assert!((tool.radius_m - 0.02 * (0.2_f64.powi(2) + 1.2_f64.powi(2)).sqrt()).abs() < 1e-12, "{tool:?}");
+        assert!(found.validate(&model).is_ok());
+        // Without a margin the envelope itself.
+        let exact = envelope.narrow(limits, &model, 0.0).unwrap();
+        assert_eq!(exact.joints[1].position, Some([-1.0, 2.0]));
+        assert!(exact.boxes[0].points.iter().all(|point| point.radius_m == 0.0));
+        let percent = EnvelopeSettings { search_margin_percent: Some(95.0), ..envelope };
+        assert!(percent.narrow(Limits::default(), &model, 0.1).is_err());
+    }
+}

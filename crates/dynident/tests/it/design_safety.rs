@@ -107,7 +107,8 @@ fn declared_torques_are_part_of_the_torque_limit() {
     let folder = tempfile::tempdir().unwrap();
     let robot = two_joints("revolute", r#"lower="-2.5" upper="2.5" velocity="2" effort="34""#, "");
     std::fs::write(folder.path().join("robot.urdf"), robot).unwrap();
-    std::fs::write(folder.path().join("still.csv"), "t_s,q1,q2\n0,1.0,0\n0.01,1.0,0\n0.02,1.0,0\n0.03,1.0,0\n").unwrap();
+    std::fs::write(folder.path().join("still.csv"), "t_s,q1,q2\n0,1.0,0\n0.01,1.0,0\n0.02,1.0,0\n0.03,1.0,0\n")
+        .unwrap();
     let used = |torque: &str| {
         let text = format!(
             "[robot]\nfile = \"robot.urdf\"\n[design.defaults]\nfloor = false\nself_collision = false\n[[torque]]\nname = \"k\"\njoint = \"first\"\nexpression = \"q - 0.5\"\n{torque}\n"
@@ -123,6 +124,35 @@ fn declared_torques_are_part_of_the_torque_limit() {
     // Gravity pulls the arm down, which is towards positive angles: the spring of -20 (q - 0.5) = -10 Nm adds to it.
     assert!((with - without - 10.0).abs() < 1e-6, "{with} {without}");
     assert!(is_named && !is_named_still);
+}
+
+/// A known load that the motion carries is part of the torque limit.
+#[test]
+fn a_payload_is_part_of_the_torque_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = two_joints("revolute", r#"lower="-2.5" upper="2.5" velocity="2" effort="34""#, "");
+    std::fs::write(folder.path().join("robot.urdf"), robot).unwrap();
+    std::fs::write(folder.path().join("still.csv"), "t_s,q1,q2\n0,0,0\n0.01,0,0\n0.02,0,0\n0.03,0,0\n").unwrap();
+    let path = folder.path().join("study.toml");
+    let checked = |design: &str, load: &str| {
+        let text = format!(
+            "[robot]\nfile = \"robot.urdf\"\n[design]\n{design}\ndefaults = {{ floor = false, self_collision = false }}\n[[payload]]\nname = \"weight\"\nlink = \"fore\"\n{load}\n"
+        );
+        let study = Study::parse(&text, &path).unwrap();
+        check_trajectory(&study, &path, &folder.path().join("still.csv"), &Job::options(1))
+    };
+    let known = "mass_kg = 1.2\ncom_m = [0.3, 0.0, 0.0]";
+    let used = |design: &str| {
+        let file = checked(design, known).unwrap().file;
+        file.limits.iter().find(|own| own.kind == LimitKind::Torque && own.joint == "first").unwrap().worst_ratio * 34.0
+    };
+    // 1.2 kg on an arm of 0.4 + 0.3 m, stretched out level.
+    let more = used("payload = \"weight\"") - used("");
+    assert!((more - 1.2 * 9.81 * 0.7).abs() < 1e-9, "{more}");
+    let error = checked("payload = \"other\"", known).unwrap_err().to_string();
+    assert!(error.contains("other") && error.contains("weight"), "{error}");
+    let error = checked("payload = \"weight\"", "mass_kg = 1.2").unwrap_err().to_string();
+    assert!(error.contains("com_m"), "{error}");
 }
 
 /// With 3 rad/s in 30 s a joint without stops could go round and round.

@@ -39,7 +39,7 @@ impl LimitCheck {
         motion_at: &dyn Fn(&[f64], &mut Motion),
         (single, stop): (&dyn Fn() -> Result<Vec<Relaxation>, Error>, &dyn Fn() -> bool),
     ) -> Result<Self, Error> {
-        let model = setup.robot.model();
+        let model = &setup.loaded;
         let in_limits = |error| Error::section(study_path, "design.limits")(error);
         let rates = (duration_s, rate_hz);
         let whole = check_limits_until(&setup.limits, model, rates, motion_at, stop).map_err(in_limits)?;

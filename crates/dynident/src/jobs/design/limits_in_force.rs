@@ -2,7 +2,7 @@
 //! iteration; and the torque beyond the rigid bodies' that they include.
 
 use super::prior;
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::study::{DesignSection, Folders, IterationSection, Study, StudyRobot};
 use dynident_excitation::check::LimitReport;
 use dynident_excitation::limits::{
@@ -80,6 +80,37 @@ pub(super) fn in_force(
     Ok(in_force)
 }
 
+/// The robot with the payload that the motion carries.
+///
+/// # Errors
+/// A payload that the study does not have, or of which mass or centre of mass is not known.
+pub(super) fn loaded((study, study_path): (&Study, &Path), robot: &StudyRobot) -> Result<Model, Error> {
+    let model = robot.model();
+    let Some(name) = study.design.as_ref().and_then(|design| design.payload.as_ref()) else { return Ok(model.clone()) };
+    let wrong = Error::section::<StudyError>(study_path, "design");
+    let Some(section) = study.payload.iter().find(|payload| payload.name == *name) else {
+        let known = study.payload.iter().map(|payload| payload.name.clone()).collect();
+        return Err(wrong(StudyError::Unknown { key: "payload", what: "payload", name: name.clone(), known }));
+    };
+    let Some(known) = section.known() else {
+        let fix = "torque limits need what it weighs: give its mass_kg and com_m";
+        return Err(wrong(StudyError::conflict(format!("payload = \"{name}\""), fix)));
+    };
+    let links = model.bodies().iter().enumerate();
+    let mut links = links.flat_map(|(body, own)| own.links.iter().map(move |link| (body, link)));
+    let Some((body, link)) = links.find(|(_, link)| link.name == section.link) else {
+        let known = model.bodies().iter().flat_map(|body| &body.links).map(|link| link.name.clone()).collect();
+        let (key, name) = ("payload.link", section.link.clone());
+        return Err(wrong(StudyError::Unknown { key, what: "moving link", name, known }));
+    };
+    if !model.bodies_without_prior().is_empty() {
+        return Ok(model.clone());
+    }
+    let mut inertials = model.inertials().to_vec();
+    inertials[body] = inertials[body].plus(&known.expressed_in(&link.placement));
+    model.with_inertials(&inertials).map_err(Error::study(study_path))
+}
+
 /// What a study's robot keeps wherever it moves.
 ///
 /// # Errors
@@ -94,7 +125,7 @@ fn starts(
     iteration: Option<&IterationSection>,
     model: &Model,
     purpose: LimitsFor<'_>,
-) -> Result<StartPositions, crate::error::StudyError> {
+) -> Result<StartPositions, StudyError> {
     let start = match (purpose, &section.start_posture) {
         (LimitsFor::Motion(start), _) => start.iter().copied().map(Some).collect(),
         (LimitsFor::Search | LimitsFor::Ways | LimitsFor::Log, Some(start)) => start.named("start_posture", model)?,

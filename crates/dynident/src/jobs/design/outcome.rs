@@ -18,6 +18,7 @@ use dynident_excitation::families::Given;
 use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
+use dynident_model::Model;
 use nalgebra::DMatrix;
 use std::path::Path;
 use std::time::Instant;
@@ -123,6 +124,8 @@ pub struct DesignOutcome {
     pub limits: Limits,
     /// The search by generations, for optimisers that have them; empty for gradients.
     pub history: Vec<Generation>,
+    /// The robot with the payload that the motion carries.
+    loaded: Model,
     family: Box<dyn Family>,
 }
 
@@ -172,8 +175,8 @@ impl DesignOutcome {
             not_checked: setup.not_checked,
             notes: setup.notes,
         };
-        let (robot, limits) = (setup.robot, setup.limits);
-        Self { file, robot, limits, history: origin.history, family: origin.motion }
+        let (robot, loaded, limits) = (setup.robot, setup.loaded, setup.limits);
+        Self { file, robot, loaded, limits, history: origin.history, family: origin.motion }
     }
 
     /// The outcome with what it comes from: of the study, and of what else was read.
@@ -211,7 +214,7 @@ impl DesignOutcome {
     /// middle of what friction may hold), joint-major as the motion, Nm (N); `None` while a body's
     /// inertial is unknown.
     pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
-        let model = self.robot.model();
+        let model = &self.loaded;
         if !model.bodies_without_prior().is_empty() {
             return None;
         }

@@ -1,6 +1,6 @@
 //! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
 
-use super::limits_in_force::{LimitsFor, in_force, included};
+use super::limits_in_force::{LimitsFor, in_force, included, loaded};
 use super::outcome::Stopwatch;
 use super::{prior, table};
 use crate::error::{Error, StudyError};
@@ -9,6 +9,7 @@ use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
 use dynident_excitation::limits::{LimitSet, Limits, LimitsInForce};
 use dynident_excitation::{Family, Information, Motion};
+use dynident_model::Model;
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -28,6 +29,8 @@ pub(super) struct DesignSetup {
     pub(super) name: String,
     pub(super) section: DesignSection,
     pub(super) robot: StudyRobot,
+    /// The robot with the payload that the motion carries.
+    pub(super) loaded: Model,
     pub(super) limits: Limits,
     pub(super) set: LimitSet,
     pub(super) criteria: Vec<Box<dyn Criterion>>,
@@ -79,7 +82,8 @@ impl DesignSetup {
         let robot = StudyRobot::new(study, study_path, &folders)?;
         let LimitsInForce { limits, assumed, not_checked } = in_force((study, study_path, &folders), &robot, purpose)?;
         notes.extend(included(&limits, robot.model()));
-        let set = LimitSet::new(&limits, robot.model()).map_err(Error::section(study_path, "design.limits"))?;
+        let loaded = loaded((study, study_path), &robot)?;
+        let set = LimitSet::new(&limits, &loaded).map_err(Error::section(study_path, "design.limits"))?;
         let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study_path, "design"))?;
         let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
@@ -102,6 +106,7 @@ impl DesignSetup {
             ones: vec![1.0; robot.model().dof()],
             section,
             robot,
+            loaded,
             limits,
             set,
             criteria,

@@ -82,6 +82,9 @@ pub struct DesignSection {
     pub parameters: Vec<GivenStroke>,
     /// Where the motion starts, and where a family that returns ends; free by default.
     pub start_posture: Option<StartPosture>,
+    /// Name of a known `[[payload]]` that the arm carries in the motion: torque limits include it. None by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub payload: Option<String>,
     /// What is known before the motion; nothing by default.
     pub prior: PriorSection,
     /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default
@@ -104,6 +107,7 @@ impl Default for DesignSection {
             optimiser: OptimiserChoice::default(),
             parameters: Vec::new(),
             start_posture: None,
+            payload: None,
             prior: PriorSection::default(),
             torque_std_nm: None,
             search: DesignSettings::default(),
