@@ -48,8 +48,8 @@ fn designed(folder: &Path, robot: &str, design: &str) -> DesignOutcome {
     design_study(&study, &path, &Job::options(2), |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// The first joint's friction may take 28 of its 34 Nm. The torque of the design, computed here by Newton and Euler with
-/// the friction of the description beside them, stays below.
+/// The first joint's friction may take 28 of its 34 Nm. The torque of the design stays below. It is computed here by
+/// Newton and Euler, with the friction of the description added.
 #[test]
 fn friction_of_the_description_is_part_of_the_torque_limit() {
     let folder = tempfile::tempdir().unwrap();
@@ -334,7 +334,7 @@ postures = 50
             }
         }
     }
-    // A tenth of the tracking error, 0.02 rad, on an arm of 0.9 m: some millimetres to centimetres are free, and the box
-    // is made use of.
+    // A tenth of the tracking error, 0.02 rad, on an arm of 0.9 m: some millimetres to centimetres are free, and the
+    // motion uses the box.
     assert!(nearest > 2e-3 && nearest < 0.1, "{nearest}");
 }
