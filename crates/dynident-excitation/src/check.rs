@@ -3,7 +3,8 @@
 //!
 //! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics and the
 //! exact known torque of friction and drives (the worst case at rest), distances of links from another algorithm than
-//! the search's. Only the choice of shapes and their pairs, which is part of what the limit *is*, comes from [`SelfCollision`](crate::limits::SelfCollision).
+//! the search's. Only the choice of shapes and their pairs, which is part of what the limit *is*, comes from
+//! [`SelfCollision`](crate::limits::SelfCollision).
 
 mod apart;
 

@@ -160,7 +160,7 @@ pub struct DesignProgress {
 }
 
 /// Searches. `watch` is asked after every evaluation, from any thread, and may end the search: the best so far is then
-/// still led inside the limits, for 0.3 s at most.
+/// still led inside the limits, for 0.5 s at most.
 ///
 /// # Errors
 /// If settings are out of range or no start can be evaluated at all.
@@ -319,8 +319,8 @@ fn timed(
         }
     }
     // What still breaks a limit is taken back inside: made smaller, or a hair towards a motion that the search saw keep
-    // all, else by a search for the limits alone. The first two are also done where the search was ended, as far as time
-    // allows.
+    // all, else by a search for the limits alone. The first two are also done where the search was ended, as far as
+    // time allows.
     let broken = (kept.violation > 0.0).then(|| (kept.clone(), values));
     for (outside, worst) in outside.iter().chain(&broken) {
         if let Some(smaller) = shrunk(task, criterion, (outside, worst), [&fine, &logged], &overdue)

@@ -36,8 +36,8 @@ pub(crate) enum Came {
 }
 
 impl Iteration {
-    /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded. `stop` ends
-    /// it.
+    /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded. `stop`
+    /// ends it.
     pub(crate) fn prepared(
         &self,
         task: &IterationTask,

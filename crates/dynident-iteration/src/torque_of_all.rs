@@ -26,8 +26,8 @@ pub(crate) struct LargestTorque {
     pub(crate) beyond_search: Vec<f64>,
 }
 
-/// The largest torques along a trajectory. `searched` gives the torque that the model of a search has, joint-major along
-/// a motion.
+/// The largest torques along a trajectory. `searched` gives the torque that the model of a search has, joint-major
+/// along a motion.
 pub(crate) fn largest_torque(
     robot: &ParametricModel,
     known: &RunEstimate,

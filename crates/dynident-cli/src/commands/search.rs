@@ -6,7 +6,7 @@ use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// What Ctrl-C does to a search.
+/// Effect of Ctrl-C on a search.
 #[derive(Clone, Copy)]
 pub(crate) enum OnInterrupt {
     /// The best motion so far is the result.

@@ -37,7 +37,7 @@ impl<'a> Starts<'a> {
         Self { task, times, positions, speeds, workspace, motion: Motion::default(), values: Vec::new() }
     }
 
-    /// So many starts; fewer, one at least, once `stop` says so.
+    /// Draws `count` starts; after `stop` is true it draws no more, and returns at least one.
     pub(super) fn several(
         &mut self,
         count: usize,

@@ -5,7 +5,7 @@ use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 /// Seconds that a search has after it was ended, to bring its best motion inside the limits.
-const GRACE_S: f64 = 0.3;
+const GRACE_S: f64 = 0.5;
 
 /// Asks the watcher of a search, from any thread, and remembers when it ended the search.
 pub(super) struct Interruption<'a> {

@@ -66,8 +66,8 @@ pub struct Diagnosis {
     /// Broken limits, worst first; empty for a feasible motion.
     pub broken: Vec<BrokenLimit>,
     /// Single changes that would do, the smallest first (by relative change). Where limits of several kinds are broken
-    /// that no slower run fixes, the smallest combination instead; empty only where the motion is not finite, or the search for changes was
-    /// stopped.
+    /// that no slower run fixes, the smallest combination instead; empty only where the motion is not finite, or the
+    /// search for changes was stopped.
     pub relaxations: Vec<Relaxation>,
 }
 

@@ -10,10 +10,10 @@ use dynident_model::terms::{
 /// Torque terms with their values. Together with the rigid bodies they give the torque that torque and power limits
 /// are compared with.
 ///
-/// Coulomb friction is a sign of the velocity here, whatever step a study estimates it with: at rest it may have either
-/// sign, so the torque of a joint at a sample is a range `[low, high]`, whose ends differ at rest only. Friction with
-/// hysteresis (Maxwell slip) may have any value up to its yield torque at every sample. A change with the temperature
-/// is not included.
+/// Coulomb friction is a sign of the velocity here, also where a study estimates it with a smooth step. At rest it may
+/// have either sign, so the torque of a joint at a sample is a range `[low, high]`, whose ends differ at rest only.
+/// Friction with hysteresis (Maxwell slip) may have any value up to its yield torque at every sample. A change with the
+/// temperature is not included.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KnownTorque {
     terms: Vec<(TorqueTerm, f64)>,
@@ -27,8 +27,8 @@ impl KnownTorque {
         known
     }
 
-    /// What the robot description states: viscous and Coulomb friction, drive inertia and springs of its joints. The
-    /// friction and inertia of a joint that follows one or two others act on these.
+    /// Known torque of the robot description: viscous and Coulomb friction, drive inertia and springs of its joints.
+    /// The friction and inertia of a joint that follows one or two others act on these.
     pub fn of_description(model: &Model) -> Self {
         let mut known = Self::default();
         for (place, joint) in model.tree_joints().iter().enumerate() {
@@ -142,7 +142,7 @@ impl KnownTorque {
 
 const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
-/// What a unit of a term gives to one joint at one sample.
+/// Torque of one unit of a term on one joint at one sample.
 fn column(term: &TorqueTerm, joint: usize, motion: &JointMotion<'_>) -> f64 {
     let mut out = [0.0];
     let mut input = TermInput { load: None, temperature_c: None, memory: &mut HysteresisState::default() };
@@ -150,7 +150,7 @@ fn column(term: &TorqueTerm, joint: usize, motion: &JointMotion<'_>) -> f64 {
     out[0]
 }
 
-/// What a unit of friction that follows the sign of a velocity gives to one joint: both signs at rest.
+/// Torque of one unit of friction by the sign of a velocity on one joint: lowest and highest, both signs at rest.
 fn step(term: &TorqueTerm, friction: &VelocityFriction<'_>, joint: usize, dq: &[f64], rigid: &[f64]) -> [f64; 2] {
     let joints = term.joints();
     let velocity: f64 = joints.iter().zip(friction.ratios).map(|(&of, ratio)| ratio * dq[of]).sum();

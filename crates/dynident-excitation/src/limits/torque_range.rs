@@ -205,7 +205,7 @@ impl Step {
         [ramp(0.0), ramp(-self.width)]
     }
 
-    /// What the step is multiplied by in the torque of the joint at `place`, and its derivative by the velocity.
+    /// Factor of the step in the torque of the joint at `place`, and the factor's derivative by the velocity.
     fn size(&self, place: usize, value: f64, velocity: f64, rigid: f64) -> (f64, f64) {
         let size = value * self.ratios[place] * if self.by_load { rigid.abs() } else { 1.0 };
         let Some([speed, exponent]) = self.fading else { return (size, 0.0) };

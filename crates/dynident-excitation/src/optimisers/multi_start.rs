@@ -56,7 +56,7 @@ pub(crate) fn multi_start<P: ConstrainedProblem>(
     let runs: Vec<_> = starts
         .par_iter()
         .map(|start| {
-            // Whoever stopped the search was asked after an evaluation: there is a best.
+            // The search can only be stopped after an evaluation: a best point exists.
             if stopped.load(Ordering::Relaxed) {
                 return Err(OptimiserError::Start);
             }

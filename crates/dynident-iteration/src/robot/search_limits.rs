@@ -6,8 +6,7 @@ use dynident_excitation::limits::{BoxLimit, JointLimit, Limits, LinkPoint};
 use dynident_model::Model;
 use dynident_simulation::SimulationError;
 
-/// Where an envelope bounds a position on one side only, the other side of the range is so far away, rad (m of a usual
-/// arm): nothing comes there.
+/// Distance of the other end of a range that an envelope bounds on one side only, rad (m of a usual arm): out of reach.
 const FAR: f64 = 40.0;
 
 impl EnvelopeSettings {
@@ -24,7 +23,7 @@ impl EnvelopeSettings {
         let errors: Vec<f64> = envelope.tracking_error.iter().map(|error| margin * error.unwrap_or(0.0)).collect();
         let own = model.own_scale();
         let known = model.bodies_without_prior().is_empty();
-        // What the description says already has room; see `ROOM` of the envelope.
+        // Defaults from the description already have room: `ROOM` of the envelope.
         let kept = |stated: bool| if stated { 1.0 - margin } else { 1.0 };
         for (place, joint) in model.joints().iter().enumerate() {
             let at = limits.joints.iter().position(|limit| limit.joint == joint.name).unwrap_or_else(|| {

@@ -33,9 +33,9 @@ pub struct AssumedLimits {
     /// What is kept free before each of the description's position stops, percent of the way from the middle of the
     /// range to the stop. Default 5.
     pub stop_margin_percent: f64,
-    /// Turns that a turning joint without position limits may be away from where the motion starts. With a
-    /// `start_posture` so many to either side of it; without one half as many to either side of home, or of zero, so
-    /// that no two positions are further apart. 0: not limited. Default 1.
+    /// Most turns between the start of the motion and any position of a turning joint without position limits. With a
+    /// `start_posture` the range has this many turns to either side of it. Without one it has half of them to either
+    /// side of home, or of zero. 0 means no limit. Default 1.
     pub continuous_turns: f64,
 }
 

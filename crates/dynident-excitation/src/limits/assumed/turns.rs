@@ -14,7 +14,8 @@ pub struct StartPositions {
     pub home: Vec<Option<f64>>,
 }
 
-/// Limits the positions of turning joints for which neither the description nor `given` does; what it says of them.
+/// Limits the positions of turning joints that neither the description nor `given` limits. Returns a sentence about
+/// them.
 pub(super) fn bound_turns(
     under: &mut Limits,
     given: &Limits,

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Rate of the diagnosis, Hz of a usual arm.
 const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
 
-/// What both rates are divided by once somebody asks for a stop.
+/// Divisor of both rates after a stop was requested.
 const COARSER: f64 = 10.0;
 
 /// Every limit as a motion uses it.

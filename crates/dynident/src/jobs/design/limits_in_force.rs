@@ -14,7 +14,7 @@ use dynident_model::terms::{JointProperty, TorqueTerm};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What the limits are for.
+/// Purpose of the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LimitsFor<'a> {
     /// A search for a motion, which keeps room inside the iteration's envelope.
@@ -23,7 +23,7 @@ pub(super) enum LimitsFor<'a> {
     Motion(&'a [f64]),
     /// Ways to a motion and back.
     Ways,
-    /// What a robot has done: nothing is assumed of what it may do.
+    /// A log of a finished run: nothing is assumed.
     Log,
 }
 
@@ -111,7 +111,7 @@ pub(super) fn loaded((study, study_path): (&Study, &Path), robot: &StudyRobot) -
     model.with_inertials(&inertials).map_err(Error::study(study_path))
 }
 
-/// What a study's robot keeps wherever it moves.
+/// Limits of a study's robot for ways to a motion and back.
 ///
 /// # Errors
 /// As [`in_force`].
@@ -174,7 +174,7 @@ fn is_known(known: &KnownTorque, joint: usize, property: Option<JointProperty>) 
     })
 }
 
-/// What torque limits include beside the rigid bodies, in a sentence; none where nothing is known.
+/// A sentence about the torque that limits include in addition to the rigid bodies; `None` without known torque.
 pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
     let mut by_kind: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (term, _) in limits.known_torque.terms() {
@@ -189,7 +189,7 @@ pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
         by_kind.into_iter().map(|(kind, joints)| format!("{kind} of {}", listed(&joints))).collect();
     let is_limited = limits.joints.iter().any(|limit| limit.torque.or(limit.power_w).is_some());
     (is_limited && !parts.is_empty())
-        .then(|| format!("torque limits include, beside the rigid bodies: {}", parts.join("; ")))
+        .then(|| format!("torque limits include, in addition to the rigid bodies: {}", parts.join("; ")))
 }
 
 /// What torque limits do not include because nothing states it, and how much of each limit the motion leaves for it.
@@ -217,7 +217,7 @@ pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[Limit
     for (what, joints) in [("friction", without(&has_friction)), ("drive inertia", without(&has_inertia))] {
         if !joints.is_empty() {
             lines.push(format!(
-                "torque of {what}, which nothing states; of the torque limit is left for it at the peak: {}",
+                "torque of {what} (not stated anywhere); part of each torque limit that is free at the peak: {}",
                 listed(&joints)
             ));
         }

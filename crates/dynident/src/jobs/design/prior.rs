@@ -62,8 +62,8 @@ pub(super) fn information(
     Ok(total)
 }
 
-/// The known torque with what an earlier result found of friction and drives: every term whose base parameter is its own
-/// alone. Friction of a joint by the description makes way for it.
+/// The known torque with the friction and drive inertia of an earlier result: every term whose base parameter sums
+/// nothing else. It replaces the friction of the joint by the description.
 pub(super) fn with_earlier_torque(
     section: &PriorSection,
     robot: &StudyRobot,
