@@ -1,9 +1,10 @@
 //! The last word on limits: every limit looked at again, sample by sample, by code that shares nothing with the
 //! optimiser's.
 //!
-//! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics,
-//! distances of links from another algorithm than the search's. Only the choice of shapes and their pairs, which is
-//! part of what the limit *is*, comes from [`SelfCollision`](crate::limits::SelfCollision).
+//! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics and the
+//! exact known torque of friction and drives (the worst case at rest), distances of links from another algorithm than
+//! the search's. Only the choice of shapes and their pairs, which is part of what the limit *is*, comes from
+//! [`SelfCollision`](crate::limits::SelfCollision).
 
 mod apart;
 
@@ -90,8 +91,23 @@ pub fn check_limits(
     model: &Model,
     duration_s: f64,
     rate_hz: f64,
-    mut motion: impl FnMut(&[f64], &mut Motion),
+    motion: impl FnMut(&[f64], &mut Motion),
 ) -> Result<Vec<LimitReport>, LimitError> {
+    Ok(check_limits_until(limits, model, (duration_s, rate_hz), motion, &|| false)?.unwrap_or_default())
+}
+
+/// [`check_limits()`] at duration (s) and rate (Hz), which ends without a report once `stop` says so. It is asked every
+/// 1000 samples.
+///
+/// # Errors
+/// As [`check_limits()`].
+pub fn check_limits_until(
+    limits: &Limits,
+    model: &Model,
+    (duration_s, rate_hz): (f64, f64),
+    mut motion: impl FnMut(&[f64], &mut Motion),
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Vec<LimitReport>>, LimitError> {
     limits.validate(model)?;
     for (what, value) in [("duration", duration_s), ("rate", rate_hz)] {
         if !value.is_finite() || value <= 0.0 {
@@ -109,8 +125,12 @@ pub fn check_limits(
     let (mut block, mut times) = (Motion::default(), Vec::with_capacity(BLOCK));
     let dof = model.dof();
     let mut state = vec![vec![0.0; dof]; 4];
+    let mut torque = [vec![0.0; dof], vec![0.0; dof]];
     let mut start = 0;
     while start <= steps {
+        if stop() {
+            return Ok(None);
+        }
         times.clear();
         times.extend((start..(start + BLOCK).min(steps + 1)).map(|step| (step as f64 / rate_hz).min(duration_s)));
         motion(&times, &mut block);
@@ -120,10 +140,12 @@ pub fn check_limits(
                     *to = from[joint * times.len() + sample];
                 }
             }
-            let tau = inverse_dynamics(model, &mut workspace, &state[0], &state[1], &state[2]);
+            let rigid = inverse_dynamics(model, &mut workspace, &state[0], &state[1], &state[2]);
+            let [low, high] = &mut torque;
+            limits.known_torque.range(rigid, [&state[0], &state[1], &state[2]], low, high);
             let placements = body_placements(model, &mut kinematics, &state[0]);
             for (probe, report) in &mut probes {
-                let ratio = probe.ratio(&state, tau, placements, report.worst_ratio);
+                let ratio = probe.ratio(&state, &torque, placements, report.worst_ratio);
                 let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
                 if ratio > report.worst_ratio {
                     (report.worst_ratio, report.at_s) = (ratio, at_s);
@@ -136,7 +158,7 @@ pub fn check_limits(
         report.violated = report.worst_ratio > 1.0 + VIOLATION;
         report
     };
-    Ok(probes.into_iter().map(finish).collect())
+    Ok(Some(probes.into_iter().map(finish).collect()))
 }
 
 fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, LimitError> {
@@ -306,9 +328,14 @@ fn band(x: f64, lower: f64, upper: f64) -> f64 {
     ((x - lower) / half - 1.0).max((upper - x) / half - 1.0)
 }
 
+/// The larger magnitude of the lowest and the highest torque of a joint.
+fn most([low, high]: &[Vec<f64>; 2], joint: usize) -> f64 {
+    low[joint].abs().max(high[joint].abs())
+}
+
 impl Probe {
     /// The ratio at one sample. A pair that cannot reach the `worst` ratio so far gives that one.
-    fn ratio(&mut self, state: &[Vec<f64>], tau: &[f64], placements: &[Transform], worst: f64) -> f64 {
+    fn ratio(&mut self, state: &[Vec<f64>], torque: &[Vec<f64>; 2], placements: &[Transform], worst: f64) -> f64 {
         let at = |point: &Point| place(placements, point.body, point.at);
         match self {
             Self::Band { array, joint, lower, upper } => band(state[*array][*joint], *lower, *upper),
@@ -316,8 +343,8 @@ impl Probe {
                 let followed = sources.iter().map(|&(joint, share)| share * state[*array][joint]);
                 band(*offset + followed.sum::<f64>(), *lower, *upper)
             }
-            Self::Torque { joint, limit } => tau[*joint].abs() / *limit,
-            Self::Power { joint, limit } => (tau[*joint] * state[1][*joint]).abs() / *limit,
+            Self::Torque { joint, limit } => most(torque, *joint) / *limit,
+            Self::Power { joint, limit } => most(torque, *joint) * state[1][*joint].abs() / *limit,
             Self::Axis { point, axis, lower, upper } => {
                 band(at(point)[*axis], *lower + point.radius_m, *upper - point.radius_m)
             }

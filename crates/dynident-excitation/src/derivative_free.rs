@@ -11,6 +11,7 @@ use crate::optimisers::{
     BinaryGeneticSettings, CmaEsSettings, Generation, OptimiserError, Progress, binary_genetic, cma_es,
 };
 use core::ops::ControlFlow;
+use core::sync::atomic::{AtomicBool, Ordering};
 use dynident_model::sample::Random;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -32,6 +33,9 @@ const MARGIN: f64 = 0.005;
 
 /// Searches at most: again with wider margins while something is broken between samples.
 const SEARCHES: usize = 3;
+
+/// Name of the search's rounds.
+const ROUND: &str = "generations";
 
 /// Random starts that tell how large parameters are, and by how much the box around them is wider.
 const SIZED_BY: usize = 100;
@@ -69,19 +73,32 @@ pub fn design_without_gradients(
     // Searches with tighter limits while something is broken between the samples.
     for search in 0..SEARCHES {
         let objective = Objective { task, criterion, times: &times, weight, margins: &margins, idle: Mutex::default() };
-        let fitness = |parameters: &[f64]| objective.fitness(parameters);
-        let mut stopped = false;
+        // The rest of a generation is not evaluated once the search was ended.
+        let stopped = AtomicBool::new(false);
+        let best_so_far = Mutex::new(f64::INFINITY);
+        let ended = |progress: &DesignProgress| {
+            if !stopped.load(Ordering::Relaxed) && (watch(progress).is_break() || late()) {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            stopped.load(Ordering::Relaxed)
+        };
+        let before = evaluations as u64;
+        let fitness = |parameters: &[f64]| {
+            let value = *best_so_far.lock().unwrap_or_else(PoisonError::into_inner);
+            let so_far = DesignProgress { round: ROUND, value, violation: 0.0, evaluations: before };
+            if ended(&so_far) { f64::INFINITY } else { objective.fitness(parameters) }
+        };
         let mut curve = Vec::new();
         let mut hear = |progress: &Progress<'_>| {
             curve.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
             let so_far = DesignProgress {
-                round: "generations",
+                round: ROUND,
                 value: progress.value,
                 violation: 0.0,
                 evaluations: (evaluations + progress.evaluations) as u64,
             };
-            stopped = watch(&so_far).is_break() || late();
-            if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            *best_so_far.lock().unwrap_or_else(PoisonError::into_inner) = progress.value;
+            if ended(&so_far) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let seed = settings.seed.wrapping_add(search as u64);
         let (best, used) = match optimiser {
@@ -108,7 +125,7 @@ pub fn design_without_gradients(
         if kept.as_ref().is_none_or(|kept| found.better_than(kept)) {
             kept = Some(found);
         }
-        if whole || stopped || late() {
+        if whole || stopped.load(Ordering::Relaxed) || late() {
             break;
         }
         for (margin, c) in margins.iter_mut().zip(&worst) {

@@ -10,6 +10,7 @@ mod clear_starts;
 mod column_units;
 mod effort;
 mod envelope;
+mod interruption;
 mod metric;
 mod problem;
 mod restarts;
@@ -30,6 +31,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
 use effort::{Effort, most_of_polishes};
+use interruption::Interruption;
 use nalgebra::DMatrix;
 use restarts::Neighbourhood;
 use restoration::restored;
@@ -149,7 +151,7 @@ pub struct Design {
 pub struct DesignProgress {
     /// Name of the round.
     pub round: &'static str,
-    /// Best value of the round's criterion in its smooth form.
+    /// Best value of the round's criterion in its smooth form; infinite before the first evaluation.
     pub value: f64,
     /// Largest violation there.
     pub violation: f64,
@@ -157,8 +159,8 @@ pub struct DesignProgress {
     pub evaluations: u64,
 }
 
-/// Searches. `watch` hears of every better point, from any thread, and may end the search; the best so far is then
-/// still led inside the limits.
+/// Searches. `watch` is asked after every evaluation, from any thread, and may end the search: the best so far is then
+/// still led inside the limits, for 0.5 s at most.
 ///
 /// # Errors
 /// If settings are out of range or no start can be evaluated at all.
@@ -200,18 +202,14 @@ fn timed(
     let coarse = grid(task.family.duration_s(), settings.search_grid(task));
     let effort = Effort::of(task, settings, coarse.len());
     let rounds = Rounds::new(task, &coarse, logged.len(), true);
-    let watch_all = watch;
-    let stopped = AtomicBool::new(false);
-    let over = || stopped.load(Ordering::Relaxed) || late();
+    let interruption = Interruption::new(&watch, elapsed_s, &evaluations);
+    let over = || interruption.is_ended() || late();
     let watch = |round: &'static str| {
-        let (watch, evaluations, stopped) = (&watch_all, &evaluations, &stopped);
-        move |value: f64, violation: f64| {
-            let evaluations = evaluations.load(Ordering::Relaxed);
-            let ended = watch(&DesignProgress { round, value, violation, evaluations }).is_break();
-            stopped.fetch_or(ended, Ordering::Relaxed);
-            stopped.load(Ordering::Relaxed)
-        }
+        let interruption = &interruption;
+        move |value: f64, violation: f64| interruption.reported(round, value, violation)
     };
+    let overdue = || interruption.is_overdue();
+    let no_more_starts = || interruption.reported(STARTS, f64::INFINITY, 0.0) || late();
     // Rounds of searches from random starts, then around the best.
     let mut random = Random::new(settings.seed);
     let mut random_starts = Starts::new(task, &coarse);
@@ -227,8 +225,7 @@ fn timed(
         let stop = |value, violation| watch(value, violation) || late();
         let race_is_over = || later(RACE_SHARE * search_share());
         let each = if around.is_some() { effort.evaluations_per_restart } else { effort.evaluations_per_start };
-        let starts =
-            around.unwrap_or_else(|| (0..effort.starts).map(|_| random_starts.next(&mut random).into()).collect());
+        let starts = around.unwrap_or_else(|| random_starts.several(effort.starts, &mut random, &no_more_starts));
         let worth = match neighbourhood.score() {
             // Restarts around the best find a better one sooner than it comes to its own end.
             _ if round < UNFOLLOWED_ROUNDS && effort.rounds >= MANY_ROUNDS => Worth::Never,
@@ -258,16 +255,35 @@ fn timed(
     let best = best.ok_or(OptimiserError::Start)?;
     let mut state = best.state.on_twice_the_samples(coarse.len());
     let (mut kept, mut values) = assess(task, criterion, state.x.clone(), &fine, &logged);
+    if interruption.is_ended() {
+        let (seen, of_seen) = assess(task, criterion, best.feasible.clone(), &fine, &logged);
+        if seen.better_than(&kept) {
+            (kept, values) = (seen, of_seen);
+        }
+    }
+    // One more, short, after the watcher has ended the search, where its best is outside the limits.
+    let mut last_ways = 1;
     // What the last polish left, where it is outside.
     let mut outside = None;
     let mut left = most_of_polishes(task, settings, fine.len());
     for _ in 0..POLISHES {
+        if interruption.is_ended() {
+            if kept.violation <= 0.0 || last_ways == 0 {
+                break;
+            }
+            last_ways -= 1;
+        }
         // A search that was ended still comes back inside the limits: some tenths of a second.
         let ended = over();
         // Half of what is left, so that something is left for what is broken between samples.
-        let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations }.min(left.div_ceil(2).max(1));
+        let most = match (interruption.is_ended(), ended) {
+            (true, _) => EVALUATIONS_AFTER_END,
+            (false, true) => LAST_EVALUATIONS,
+            (false, false) => settings.polish_evaluations,
+        };
+        let budget = most.min(left.div_ceil(2).max(1));
         let report = watch("polish");
-        let stop = |value, violation| (report(value, violation) && !ended) || later(POLISH_SHARE);
+        let stop = |value, violation| (report(value, violation) && !ended) || later(POLISH_SHARE) || overdue();
         let found = rounds.polish(criterion, &margins, state, budget, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         left = left.saturating_sub(found.evaluations);
@@ -288,7 +304,7 @@ fn timed(
         }
         // A hair outside is made smaller by as much, if that costs next to nothing.
         if let Some((ended, worst)) = outside.as_ref().filter(|(ended, _)| ended.violation < HAIR_OUTSIDE)
-            && let Some(smaller) = shrunk(task, criterion, (ended, worst), [&fine, &logged])
+            && let Some(smaller) = shrunk(task, criterion, (ended, worst), [&fine, &logged], &overdue)
             && loss(criterion, ended, &smaller) < LEAST_LOSS * criterion.scale(task.layout.columns().len())
         {
             outside = None;
@@ -303,24 +319,24 @@ fn timed(
         }
     }
     // What still breaks a limit is taken back inside: made smaller, or a hair towards a motion that the search saw keep
-    // all, else by a search for the limits alone. The first two take some milliseconds and are done however the search
-    // ended.
+    // all, else by a search for the limits alone. The first two are also done where the search was ended, as far as
+    // time allows.
     let broken = (kept.violation > 0.0).then(|| (kept.clone(), values));
     for (outside, worst) in outside.iter().chain(&broken) {
-        if let Some(smaller) = shrunk(task, criterion, (outside, worst), [&fine, &logged])
+        if let Some(smaller) = shrunk(task, criterion, (outside, worst), [&fine, &logged], &overdue)
             && smaller.better_than(&kept)
         {
             kept = smaller;
         }
     }
-    if kept.violation > 0.0 {
+    if kept.violation > 0.0 && !overdue() {
         let (inside, _) = assess(task, criterion, best.feasible, &fine, &logged);
-        if let Some(between) = way_inside(task, criterion, &kept, &inside, [&fine, &logged]) {
+        if let Some(between) = way_inside(task, criterion, &kept, &inside, [&fine, &logged], &overdue) {
             kept = between;
         }
     }
-    if kept.violation > 0.0 && !stopped.load(Ordering::Relaxed) && !later(RESTORATION_SHARE) {
-        let stop = |progress: &DesignProgress| watch_all(progress).is_break() || later(RESTORATION_SHARE);
+    if kept.violation > 0.0 && !interruption.is_ended() && !later(RESTORATION_SHARE) {
+        let stop = |value, violation| watch("restoration")(value, violation) || later(RESTORATION_SHARE);
         let used;
         (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
         evaluations.fetch_add(used as u64, Ordering::Relaxed);
@@ -357,11 +373,16 @@ const MANY_ROUNDS: usize = 8;
 const HAIR_OUTSIDE: f64 = 3e-4;
 const LEAST_LOSS: f64 = 1e-3;
 
+/// Name of the round that draws random starts.
+const STARTS: &str = "starts";
+
 /// Polishes at most.
 const POLISHES: usize = 6;
 
 /// Evaluations of a polish once the time is up: enough to come back inside the limits.
 const LAST_EVALUATIONS: usize = 300;
+/// The same once the watcher has ended the search; they also end after [`interruption`]'s time.
+const EVALUATIONS_AFTER_END: usize = 60;
 
 /// What the smooth criterion of `smaller` is above that of `larger`; infinite where either has none.
 fn loss(criterion: &dyn Criterion, larger: &Assessment, smaller: &Assessment) -> f64 {

@@ -70,11 +70,15 @@ pub(crate) fn motions<'a>(
 ///
 /// # Errors
 /// Why there is no way to one of them.
-pub(crate) fn ways_of(task: &IterationTask, settings: &IterationSettings) -> Result<Vec<Option<FoundWays>>, HomeError> {
+pub(crate) fn ways_of(
+    task: &IterationTask,
+    settings: &IterationSettings,
+    stop: &dyn Fn() -> bool,
+) -> Result<Vec<Option<FoundWays>>, HomeError> {
     let envelope = settings.safety.envelope.as_ref();
     let of_leg = |leg: &Leg| {
         let home = settings.safety.home.as_ref();
-        home.map(|home| home.ways(task.robot.model(), leg.reference(), envelope)).transpose()
+        home.map(|home| home.ways_until(task.robot.model(), leg.reference(), envelope, stop)).transpose()
     };
     task.legs.iter().map(of_leg).collect()
 }
@@ -85,7 +89,7 @@ pub(crate) fn rehearsed<'a>(
     settings: &IterationSettings,
     robot: &ParametricModel,
     (plan, controller, model): (&RunPlan, &ControllerSettings, Option<&ControllerModel>),
-    ways: &[Option<FoundWays>],
+    (ways, stop): (&[Option<FoundWays>], &dyn Fn() -> bool),
     before: &[RunRecord],
 ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, SimulationError> {
     let Some(rehearsal) = &settings.safety.rehearsal else { return Ok(Ok(None)) };
@@ -117,7 +121,7 @@ pub(crate) fn rehearsed<'a>(
         oscillation: settings.safety.oscillation.limits(robot.model()),
         envelope: settings.safety.envelope.as_ref(),
     };
-    Ok(rehearsed.run(rehearsal)?.map(Some))
+    Ok(rehearsed.run(rehearsal, stop)?.map(Some))
 }
 
 /// What somebody who is asked hears of a motion.

@@ -8,7 +8,7 @@ use crate::iteration::Iteration;
 use crate::leg::IterationTask;
 use crate::policy::RunPlan;
 use crate::record::RunRecord;
-use crate::rehearsal::Rehearsal;
+use crate::rehearsal::{Rehearsal, RehearsalFailure};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::status::IterationStatus;
 use crate::supervision::Supervisor;
@@ -36,12 +36,14 @@ pub(crate) enum Came {
 }
 
 impl Iteration {
-    /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded.
+    /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded. `stop`
+    /// ends it.
     pub(crate) fn prepared(
         &self,
         task: &IterationTask,
         plan: &RunPlan,
         before: &[RunRecord],
+        stop: Option<&StopSignal>,
     ) -> Result<Result<Prepared, IterationStatus>, IterationError> {
         let settings = self.settings();
         let controller = plan.controller(settings);
@@ -51,14 +53,21 @@ impl Iteration {
             let reason = format!("run {} is not commanded: {why}", plan.run);
             Ok(Err(IterationStatus::Refused { reason }))
         };
-        let ways = match ways_of(task, settings) {
+        let interrupted = || {
+            let reason = format!("while run {} was prepared", plan.run);
+            Ok(Err(IterationStatus::Interrupted { reason }))
+        };
+        let stopped = || stop.is_some_and(StopSignal::is_requested);
+        let ways = match ways_of(task, settings, &stopped) {
             Ok(ways) => ways,
             Err(HomeError::Numbers(error)) => return Err(error.into()),
+            Err(HomeError::Interrupted) => return interrupted(),
             Err(none) => return refused(&none),
         };
         let with = (plan, &controller, model.as_ref());
-        match rehearsed(task, settings, &robot, with, &ways, before)? {
+        match rehearsed(task, settings, &robot, with, (&ways, &stopped), before)? {
             Ok(rehearsal) => Ok(Ok(Prepared { controller, model, ways, rehearsal })),
+            Err(RehearsalFailure::Interrupted) => interrupted(),
             Err(failure) => refused(&failure),
         }
     }

@@ -106,7 +106,7 @@ impl Iteration {
         let legs = legs_along(&self.task, next.motion.as_ref())?;
         let task = &IterationTask { legs: legs.into_owned(), ..self.task.clone() };
         let legs = &task.legs;
-        let prepared = match self.prepared(task, plan, before)? {
+        let prepared = match self.prepared(task, plan, before, supervisor.stop())? {
             Ok(prepared) => prepared,
             Err(status) => return Ok(PlannedRun::Stopped(status)),
         };

@@ -78,7 +78,7 @@ impl Iteration {
         let (run, model) = (last.run, known.for_controller());
         let plan = RunPlan { run, model, damping: 1.0, stiffness: 1.0 };
         let task = IterationTask { legs: vec![held_out.leg.clone()], ..self.task().clone() };
-        let prepared = match self.prepared(&task, &plan, records)? {
+        let prepared = match self.prepared(&task, &plan, records, supervisor.stop())? {
             Ok(prepared) => prepared,
             Err(status) => return Ok(HeldOutCame::Stopped(status)),
         };

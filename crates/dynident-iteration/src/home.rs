@@ -98,6 +98,9 @@ pub enum HomeError {
         /// Random postures that were tried.
         tried: usize,
     },
+    /// Somebody asked for a stop.
+    #[error("the search for the ways from and to home was interrupted")]
+    Interrupted,
     /// Limits that cannot be.
     #[error(transparent)]
     Limits(#[from] LimitError),
@@ -140,9 +143,23 @@ impl HomeSettings {
     /// # Errors
     /// Why there is no way; nothing has moved then.
     pub fn ways(&self, model: &Model, motion: &Reference, envelope: Option<&Envelope>) -> Result<FoundWays, HomeError> {
+        self.ways_until(model, motion, envelope, &|| false)
+    }
+
+    /// The same; the search ends with [`HomeError::Interrupted`] once `stop` says so.
+    ///
+    /// # Errors
+    /// As [`ways`](Self::ways).
+    pub fn ways_until(
+        &self,
+        model: &Model,
+        motion: &Reference,
+        envelope: Option<&Envelope>,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<FoundWays, HomeError> {
         self.validate(model.dof())?;
         require_length("joints of the motion", model.dof(), motion.joints())?;
-        let planner = Planner::new(self, model, motion, envelope)?;
+        let planner = Planner::new(self, model, motion, (envelope, stop))?;
         let samples = motion.samples();
         let posture = |sample: usize| -> Vec<f64> {
             (0..motion.joints()).map(|joint| motion.motion().q[joint * samples + sample]).collect()
@@ -195,6 +212,7 @@ struct Planner<'a> {
     /// With what the nominal model does not know taken off the torque.
     limits: Limits,
     set: LimitSet,
+    stop: &'a dyn Fn() -> bool,
 }
 
 impl<'a> Planner<'a> {
@@ -202,7 +220,7 @@ impl<'a> Planner<'a> {
         home: &'a HomeSettings,
         model: &'a Model,
         motion: &Reference,
-        envelope: Option<&Envelope>,
+        (envelope, stop): (Option<&Envelope>, &'a dyn Fn() -> bool),
     ) -> Result<Self, HomeError> {
         let mut limits = home.limits.clone();
         for limit in &mut limits.joints {
@@ -226,7 +244,7 @@ impl<'a> Planner<'a> {
         });
         let fastest = fastest.collect();
         let set = LimitSet::new(&limits, model)?;
-        Ok(Self { home, model, rate_hz: motion.rate_hz(), fastest, limits, set })
+        Ok(Self { home, model, rate_hz: motion.rate_hz(), fastest, limits, set, stop })
     }
 
     /// That the motion stands still at a sample.
@@ -240,6 +258,11 @@ impl<'a> Planner<'a> {
             }
         }
         Ok(())
+    }
+
+    /// That nobody asks for a stop.
+    fn asked(&self) -> Result<(), HomeError> {
+        if (self.stop)() { Err(HomeError::Interrupted) } else { Ok(()) }
     }
 
     fn clear_posture(&self, q: &[f64], posture: &'static str, fix: &'static str) -> Result<(), HomeError> {
@@ -308,6 +331,7 @@ impl<'a> Planner<'a> {
 
     /// Whether the straight way between two postures looks clear.
     fn sees(&self, from: &[f64], to: &[f64]) -> Result<bool, HomeError> {
+        self.asked()?;
         Ok(self.looks_clear(&self.piece(from, to)?))
     }
 
@@ -384,6 +408,7 @@ impl<'a> Planner<'a> {
     /// The limit that a way breaks worst, if it breaks one. It is looked at as often as a motion is by the rate of such
     /// checks: so much more rarely as it is slower, never more rarely than its own samples.
     fn broken(&self, way: &Motion) -> Result<Option<LimitReport>, HomeError> {
+        self.asked()?;
         let check_hz = self.home.speed * self.model.own_scale().round_hertz(CHECK_RATE_HZ);
         let rate_hz = check_hz.max(self.rate_hz);
         // A posture is looked at once.

@@ -164,4 +164,5 @@ pub use supervision::{NextMotion, NextWays, Supervisor};
 pub use torque_check::{
     CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck, TorqueCheckSettings,
 };
+pub use typical_drives::with_typical_drives;
 pub use warm_up::WarmUp;

@@ -10,11 +10,11 @@ use crate::run_information::{RunNoise, run_information};
 use crate::run_motion::RunMotion;
 use crate::torque_of_all::{LargestTorque, largest_torque};
 use core::ops::ControlFlow;
-use dynident_dynamics::{BatchWorkspace, ParametricModel, inverse_dynamics_batch};
+use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
 use dynident_excitation::check::{CHECK_RATE_HZ, check_limits};
 use dynident_excitation::criteria::{Criterion, WorstDirections};
 use dynident_excitation::families::{FamilyError, StartingAt};
-use dynident_excitation::limits::{JointLimit, LimitError, LimitSet, Limits};
+use dynident_excitation::limits::{JointLimit, KnownTorque, LimitError, LimitSet, Limits};
 use dynident_excitation::optimisers::OptimiserError;
 use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Information, Motion, design};
 use dynident_model::sample::Random;
@@ -95,6 +95,9 @@ enum NotRedesigned {
     /// The motion ends elsewhere than it begins.
     #[error("the family does not return joint {joint} to where it began")]
     Ends { joint: String },
+    /// Somebody asked for a stop.
+    #[error("the search was interrupted")]
+    Interrupted,
     /// Once more brings as much.
     #[error("the best other motion is to bring {percent:.0} %, no more")]
     NoBetter { percent: f64 },
@@ -107,9 +110,9 @@ enum NotRedesigned {
 /// noise that their estimates found, and it is the best by [`WorstDirections`] of the sum. What a controller needs of a
 /// model is torque, wherever the arm may be asked to move: directions are measured by the torque error that they make
 /// over random states within the limits of position, velocity and acceleration, in units of the joints' noise. Its
-/// limits hold for every model in the uncertainty (the 95 % ellipsoid of the parameters): the torque that friction and
-/// uncertainty may add to the bodies' is taken off the limits of the search, and what the search finds is looked at
-/// with all of them, again with less where one is beyond. It begins where the first motion began.
+/// limits hold for every model in the uncertainty (the 95 % ellipsoid of the parameters): the search has the torque of
+/// the estimated bodies, friction and drives, what the uncertainty may add is taken off its limits, and what it finds
+/// is looked at with all of them, again with less where one is beyond. It begins where the first motion began.
 #[derive(Debug)]
 pub struct Redesign {
     family: StartingAt,
@@ -152,16 +155,22 @@ impl Redesign {
         let model = found_bodies(before.robot, before.known)?;
         let names = before.robot.joint_names();
         let torque_limits = self.torque_limits(before, &names);
-        // Friction and uncertainty are about what they were along the motion before.
-        let mut taken_off = repeated.beyond_bodies.clone();
+        let known = self.known_torque(before);
+        let stopped = || before.stop.is_some_and(StopSignal::is_requested);
+        // What the uncertainty adds is about what it was along the motion before.
+        let mut taken_off = repeated.beyond_search.clone();
         let mut last = None;
         for _ in 0..SEARCHES {
-            let limits = self.with_torque(&names, &torque_limits, &taken_off);
+            let limits = self.with_torque(&names, (&torque_limits, &known), &taken_off);
             let set = LimitSet::new(&limits, &model)?;
             let found = self.designed(before, (information, noise), &set)?;
+            if stopped() {
+                return Err(NotRedesigned::Interrupted);
+            }
             let reference = Reference::of_family(&self.family, &found.parameters, self.rate_hz, None)?;
             self.check(&limits, &model, &found, &reference, &names)?;
-            let torque = largest_torque(before.robot, before.known, &reference, &|motion| bodies(&model, motion));
+            let searched = |motion: &Motion| searched_torque(&model, &known, motion);
+            let torque = largest_torque(before.robot, before.known, &reference, &searched);
             let beyond = |joint: usize| torque.of_all[joint] - torque_limits[joint];
             let worst = (0..names.len()).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
             let Some(worst) = worst.filter(|&joint| beyond(joint) > 0.0) else { return Ok((reference, torque)) };
@@ -170,9 +179,6 @@ impl Redesign {
             }
             let (joint, torque, limit) = (names[worst].clone(), torque.of_all[worst], torque_limits[worst]);
             last = Some(NotRedesigned::Torque { joint, torque, limit });
-            if before.stop.is_some_and(StopSignal::is_requested) {
-                break;
-            }
         }
         Err(last.unwrap_or(NotRedesigned::Search(OptimiserError::Start)))
     }
@@ -187,9 +193,21 @@ impl Redesign {
         names.iter().enumerate().map(|(joint, name)| of_design(name).min(of_drive(joint))).collect()
     }
 
-    /// The limits with what is left of each joint's torque for its bodies.
-    fn with_torque(&self, names: &[String], torque_limits: &[f64], taken_off: &[f64]) -> Limits {
-        let mut limits = self.limits.clone();
+    /// The torque of friction and drives that the search has: by the estimate, or as before any run.
+    fn known_torque(&self, before: &BeforeRun<'_>) -> KnownTorque {
+        let Some(all) = &before.known.possible else { return self.limits.known_torque.clone() };
+        let values = &all[before.robot.model().inertial_count()..];
+        KnownTorque::new(before.robot.terms().iter().cloned().zip(values.iter().copied()))
+    }
+
+    /// The limits with what is left of each joint's torque for the model that the search has.
+    fn with_torque(
+        &self,
+        names: &[String],
+        (torque_limits, known): (&[f64], &KnownTorque),
+        taken_off: &[f64],
+    ) -> Limits {
+        let mut limits = Limits { known_torque: known.clone(), ..self.limits.clone() };
         for ((name, limit), taken_off) in names.iter().zip(torque_limits).zip(taken_off) {
             if limit.is_finite() && limits.of(name).is_none() {
                 limits.joints.push(JointLimit { joint: name.clone(), ..JointLimit::default() });
@@ -314,7 +332,8 @@ impl MotionPlanner for Redesign {
         let again = expected(repeated);
         let repeat_gain_percent = again.gain_percent();
         let model = found_bodies(before.robot, before.known)?;
-        let torque = largest_torque(before.robot, before.known, repeated, &|motion| bodies(&model, motion));
+        let searched = |motion: &Motion| searched_torque(&model, &self.known_torque(before), motion);
+        let torque = largest_torque(before.robot, before.known, repeated, &searched);
         let found = self.search(before, (&information, &noise), &torque).and_then(|(reference, torque)| {
             let other = expected(&reference);
             let percent = other.gain_percent();
@@ -355,10 +374,22 @@ fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, S
     Ok(robot.model().with_inertials(&bodies)?)
 }
 
-/// The torque of rigid bodies along a motion, joint-major.
-fn bodies(model: &Model, motion: &Motion) -> Vec<f64> {
-    let mut workspace = BatchWorkspace::new(model);
-    let mut tau = vec![0.0; motion.joints * motion.samples];
-    inverse_dynamics_batch(model, &mut workspace, &motion.view(), &mut tau);
+/// The largest magnitude that the model of a search has for each torque along a motion, joint-major.
+fn searched_torque(model: &Model, known: &KnownTorque, motion: &Motion) -> Vec<f64> {
+    let dof = motion.joints;
+    let mut workspace = Workspace::new(model);
+    let mut tau = vec![0.0; dof * motion.samples];
+    let [mut q, mut dq, mut ddq, mut low, mut high] = [(); 5].map(|()| vec![0.0; dof]);
+    for sample in 0..motion.samples {
+        for joint in 0..dof {
+            let at = joint * motion.samples + sample;
+            (q[joint], dq[joint], ddq[joint]) = (motion.q[at], motion.dq[at], motion.ddq[at]);
+        }
+        let rigid = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
+        known.range(rigid, [&q, &dq, &ddq], &mut low, &mut high);
+        for joint in 0..dof {
+            tau[joint * motion.samples + sample] = high[joint].max(-low[joint]);
+        }
+    }
     tau
 }

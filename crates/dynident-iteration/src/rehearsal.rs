@@ -120,6 +120,9 @@ pub enum RehearsalFailure {
     /// The motion asks for more than there is.
     #[error("the model's torque along the motion leaves the envelope: {0}; give a slower motion")]
     Torque(Breach),
+    /// Somebody asked for a stop.
+    #[error("the rehearsal was interrupted")]
+    Interrupted,
     /// A robot that may be the true one is not held.
     #[error(
         "in simulation {robot} is not held: {verdict}; {}give other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or state rehearsal.uncertainty_percent and [iteration.envelope]",
@@ -218,13 +221,14 @@ pub(crate) struct Rehearsed<'a> {
 }
 
 impl Rehearsed<'_> {
-    /// Rehearses.
+    /// Rehearses, until `stop` says so.
     ///
     /// # Errors
     /// Numbers that do not fit; that the rehearsal fails is inside.
     pub(crate) fn run(
         &self,
         settings: &RehearsalSettings,
+        stop: &dyn Fn() -> bool,
     ) -> Result<Result<Rehearsal, RehearsalFailure>, SimulationError> {
         let dof = self.robot.dof();
         let names = self.robot.joint_names();
@@ -243,6 +247,9 @@ impl Rehearsed<'_> {
         // The mass matrix, where the robot may come to stand and where it moves.
         let mut random = Random::new(settings.seed);
         for q in self.postures(settings.postures, &mut random) {
+            if stop() {
+                return Ok(Err(RehearsalFailure::Interrupted));
+            }
             let eigenvalues = inertia_matrix(&mut known, &q).symmetric_eigenvalues();
             let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
             if smallest.is_nan() || smallest <= SINGULAR * largest.abs() {
@@ -270,6 +277,9 @@ impl Rehearsed<'_> {
             let late = (0..=settings.robots).map(|number| Rehearsing { number, delay_s, is_light: false });
             let itself = Rehearsing { number: 0, delay_s: 0.0, is_light: false };
             for one in core::iter::once(itself).chain(late.skip(usize::from(delay_s == 0.0))) {
+                if stop() {
+                    return Ok(Err(RehearsalFailure::Interrupted));
+                }
                 if let Err(failure) = self.simulate(believed, (one, settings), &mut random, &mut shown)? {
                     return Ok(Err(failure));
                 }

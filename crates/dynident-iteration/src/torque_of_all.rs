@@ -22,17 +22,17 @@ pub(crate) struct LargestTorque {
     /// Of any model in the 95 % ellipsoid of all parameters: `|wᵀθ| + √χ² √(wᵀ C w)`, which is the largest `|wᵀϑ|` over
     /// `(ϑ - θ)ᵀ C⁻¹ (ϑ - θ) ≤ χ²`; also of `θ` in place of the estimate, the robot that controllers get.
     pub(crate) of_all: Vec<f64>,
-    /// By how much that is beyond the torque of the rigid bodies that a search has, at most.
-    pub(crate) beyond_bodies: Vec<f64>,
+    /// By how much that is beyond the torque that the model of a search has, at most.
+    pub(crate) beyond_search: Vec<f64>,
 }
 
-/// The largest torques along a trajectory. `bodies` gives the torque of the rigid bodies that a search has, joint-major
+/// The largest torques along a trajectory. `searched` gives the torque that the model of a search has, joint-major
 /// along a motion.
 pub(crate) fn largest_torque(
     robot: &ParametricModel,
     known: &RunEstimate,
     reference: &Reference,
-    bodies: &dyn Fn(&Motion) -> Vec<f64>,
+    searched: &dyn Fn(&Motion) -> Vec<f64>,
 ) -> LargestTorque {
     let dof = robot.dof();
     let spread = covariance(known);
@@ -50,14 +50,14 @@ pub(crate) fn largest_torque(
         })
         .collect();
     let (mut workspace, mut panels) = (BatchWorkspace::new(robot.model()), Panels::default());
-    let mut largest = LargestTorque { of_all: vec![0.0; dof], beyond_bodies: vec![0.0; dof] };
+    let mut largest = LargestTorque { of_all: vec![0.0; dof], beyond_search: vec![0.0; dof] };
     let whole = reference.motion();
     let step = ((reference.rate_hz() / robot.model().own_scale().round_hertz(RATE_HZ)) as usize).max(1);
     let samples: Vec<usize> = (0..whole.samples).step_by(step).collect();
     for some in samples.chunks(SAMPLES_AT_ONCE) {
         let part = samples_of(whole, some);
         regressor_panels(robot.model(), &mut workspace, robot.layout(), &part.view(), &mut panels);
-        let rigid = bodies(&part);
+        let of_search = searched(&part);
         for joint in 0..dof {
             let columns = robot.layout().joint_columns(joint);
             let rows =
@@ -67,9 +67,9 @@ pub(crate) fn largest_torque(
             for sample in 0..some.len() {
                 let middle = torques.iter().fold(0.0_f64, |most, tau| most.max(tau[sample].abs()));
                 let all = middle + width * spreads.row(sample).norm();
-                let beyond = all - rigid[joint * some.len() + sample].abs();
+                let beyond = all - of_search[joint * some.len() + sample].abs();
                 largest.of_all[joint] = largest.of_all[joint].max(all);
-                largest.beyond_bodies[joint] = largest.beyond_bodies[joint].max(beyond);
+                largest.beyond_search[joint] = largest.beyond_search[joint].max(beyond);
             }
         }
     }

@@ -17,7 +17,7 @@ const SPEED: f64 = 2.0;
 /// UR10's wrist is 0.2 kg m² at 56 Nm; of other machines it is as much in their own seconds), dry friction of 5 % of
 /// it, and as much viscous friction at the velocity limit.
 /// None if nothing was to be filled in.
-pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
+pub fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     filled_in(robot, |_| true, 1.0)
 }
 

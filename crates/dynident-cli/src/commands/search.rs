@@ -6,28 +6,41 @@ use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A line that says how far a search is.
-pub(crate) struct Search {
-    line: Option<ProgressBar>,
-    /// The effect of Ctrl-C, for the line.
-    interruption: &'static str,
+/// Effect of Ctrl-C on a search.
+#[derive(Clone, Copy)]
+pub(crate) enum OnInterrupt {
+    /// The best motion so far is the result.
+    KeepsBest,
+    /// The command ends, and nothing of the search is kept.
+    EndsCommand,
 }
 
-/// Ctrl-C ends the search, and the command goes on with the best motion so far.
-pub(crate) const KEEPS_THE_BEST: &str = "Ctrl-C keeps the best";
-/// Ctrl-C ends the command; the motion so far is discarded.
-pub(crate) const ENDS_THE_COMMAND: &str = "Ctrl-C ends the command";
+impl OnInterrupt {
+    fn words(self) -> &'static str {
+        match self {
+            Self::KeepsBest => "Ctrl-C keeps the best",
+            Self::EndsCommand => "Ctrl-C ends the command, without this motion",
+        }
+    }
+}
+
+/// A line that shows how far a search is.
+pub(crate) struct Search {
+    line: Option<ProgressBar>,
+    on_interrupt: OnInterrupt,
+}
+
 
 impl Search {
-    /// Shows a line to people who watch. Once Ctrl-C was pressed the search ends with its best.
-    pub(crate) fn new(context: &Context, interruption: &'static str) -> Self {
-        Self { line: (!context.quiet && terminal::watched()).then(line), interruption }
+    /// Shows a line to people who watch. Once Ctrl-C was pressed the search ends.
+    pub(crate) fn new(context: &Context, on_interrupt: OnInterrupt) -> Self {
+        Self { line: (!context.quiet && terminal::watched()).then(line), on_interrupt }
     }
 
     /// Hears of the search, and ends it if that was asked for.
     pub(crate) fn hear(&self, at: &DesignProgress) -> ControlFlow<()> {
         if let Some(line) = &self.line {
-            line.set_message(state(at, self.interruption));
+            line.set_message(state(at, self.on_interrupt));
             line.tick();
         }
         if interruption::pressed() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -50,11 +63,29 @@ fn line() -> ProgressBar {
     line
 }
 
-fn state(at: &DesignProgress, interruption: &str) -> String {
+fn state(at: &DesignProgress, on_interrupt: OnInterrupt) -> String {
+    let words = on_interrupt.words();
+    if !at.value.is_finite() {
+        return format!("{}; {words}", at.round);
+    }
     let limits = if at.violation <= 1e-6 {
         "inside all limits".to_owned()
     } else {
         format!("{:.2} % over a limit", 100.0 * at.violation)
     };
-    format!("{}: criterion {:.4}, {limits}; {interruption}", at.round, at.value)
+    format!("{}: criterion {:.4}, {limits}; {words}", at.round, at.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DesignProgress, OnInterrupt, state};
+
+    #[test]
+    fn only_a_search_that_keeps_its_best_promises_it() {
+        let at = DesignProgress { round: "search", value: 1.5, violation: 0.02, evaluations: 7 };
+        let line = state(&at, OnInterrupt::KeepsBest);
+        assert_eq!(line, "search: criterion 1.5000, 2.00 % over a limit; Ctrl-C keeps the best");
+        let first = DesignProgress { round: "starts", value: f64::INFINITY, ..at };
+        assert_eq!(state(&first, OnInterrupt::EndsCommand), "starts; Ctrl-C ends the command, without this motion");
+    }
 }

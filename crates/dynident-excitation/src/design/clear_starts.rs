@@ -7,6 +7,7 @@
 use super::{DesignTask, ranges};
 use crate::limits::LimitWorkspace;
 use crate::motion::Motion;
+use crate::optimisers::AugmentedLagrangianState;
 use dynident_model::sample::Random;
 
 /// Postures tried, and narrowings of the ranges about each.
@@ -36,16 +37,30 @@ impl<'a> Starts<'a> {
         Self { task, times, positions, speeds, workspace, motion: Motion::default(), values: Vec::new() }
     }
 
+    /// Draws `count` starts; after `stop` is true it draws no more, and returns at least one.
+    pub(super) fn several(
+        &mut self,
+        count: usize,
+        random: &mut Random,
+        stop: &dyn Fn() -> bool,
+    ) -> Vec<AugmentedLagrangianState> {
+        let mut starts = Vec::with_capacity(count);
+        while starts.len() < count && (starts.is_empty() || !stop()) {
+            starts.push(self.next(random, stop).into());
+        }
+        starts
+    }
+
     /// The next start: the family's own where no places are limited, else the clearest of those tried, the first that
     /// is clear enough.
-    pub(super) fn next(&mut self, random: &mut Random) -> Vec<f64> {
+    fn next(&mut self, random: &mut Random, stop: &dyn Fn() -> bool) -> Vec<f64> {
         let mut best = self.task.family.random(&self.positions, &self.speeds, random);
         if !self.task.limits.has_places() {
             return best;
         }
         let mut least = self.broken_places(&best);
         for _ in 0..POSTURES {
-            if least <= NEARLY {
+            if least <= NEARLY || stop() {
                 break;
             }
             let posture: Vec<f64> = self.positions.iter().map(|[low, high]| random.uniform(*low, *high)).collect();
@@ -60,7 +75,7 @@ impl<'a> Starts<'a> {
                 if broken < least {
                     (best, least) = (start, broken);
                 }
-                if least <= NEARLY {
+                if least <= NEARLY || stop() {
                     break;
                 }
                 // Not all joints alike: which of them lead into the obstacle is not known.

@@ -5,9 +5,10 @@ use super::effort::most_of_restoration;
 use super::rounds::Rounds;
 use super::shrunk::shrunk;
 use super::way_inside::way_inside;
-use super::{DesignProgress, DesignSettings, DesignTask, ranges};
+use super::{DesignSettings, DesignTask, ranges};
 use crate::criteria::{Criterion, ValueAndGradient};
 use crate::optimisers::OptimiserError;
+use core::sync::atomic::{AtomicBool, Ordering};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
@@ -64,15 +65,19 @@ pub(crate) fn restored(
     settings: &DesignSettings,
     kept: Assessment,
     [fine, logged]: [&[f64]; 2],
-    stop: &(dyn Fn(&DesignProgress) -> bool + Sync),
+    stop: &(dyn Fn(f64, f64) -> bool + Sync),
 ) -> Result<(Assessment, usize), OptimiserError> {
     let criterion = task.criteria[task.criteria.len() - 1];
     let mut random = Random::new(settings.seed ^ 0x5e57);
     let (positions, speeds) = ranges(task.limits);
     let (mut best, mut evaluations) = (kept, 0);
-    let report = |value: f64, violation: f64, evaluations: usize| {
-        stop(&DesignProgress { round: "restoration", value, violation, evaluations: evaluations as u64 })
+    // Asked where nothing else is to be reported.
+    let (least, ended) = (best.violation, AtomicBool::new(false));
+    let report = |value: f64, violation: f64| {
+        ended.fetch_or(stop(value, violation), Ordering::Relaxed);
+        ended.load(Ordering::Relaxed)
     };
+    let over = || report(0.0, least);
     // Without a criterion nothing says how long a step may be where no limit pushes.
     let [plain, rounds] = [false, true].map(|shaped| Rounds::new(task, fine, logged.len(), shaped));
     let most = most_of_restoration(task, settings, fine.len());
@@ -85,17 +90,17 @@ pub(crate) fn restored(
             let left = most.saturating_sub(evaluations);
             let budget = settings.polish_evaluations.max(EVALUATIONS).min(left.div_ceil(3).max(1));
             let found = plain.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
-                violation <= 0.0 || report(value, violation, evaluations)
+                violation <= 0.0 || report(value, violation)
             })?;
             evaluations += found.evaluations;
             parameters = found.best.feasible;
             let (assessed, worst) = assess(task, criterion, parameters.clone(), fine, logged);
             let (mut whole, on_samples) = (assessed.violation <= 0.0, found.best.violation <= MARGIN);
             // Most of what the criterion had found is still there a hair away from it.
-            if let Some(between) = way_inside(task, criterion, &best, &assessed, [fine, logged]) {
+            if let Some(between) = way_inside(task, criterion, &best, &assessed, [fine, logged], &over) {
                 parameters.clone_from(&between.parameters);
                 best = between;
-            } else if let Some(smaller) = shrunk(task, criterion, (&assessed, &worst), [fine, logged])
+            } else if let Some(smaller) = shrunk(task, criterion, (&assessed, &worst), [fine, logged], &over)
                 && smaller.better_than(&best)
             {
                 parameters.clone_from(&smaller.parameters);
@@ -103,11 +108,9 @@ pub(crate) fn restored(
             } else if assessed.better_than(&best) {
                 best = assessed;
             }
-            if whole {
+            if whole && !over() {
                 let budget = settings.polish_evaluations.min(most.saturating_sub(evaluations).max(1));
-                let found = rounds.polish(criterion, &margins, parameters.into(), budget, |value, violation| {
-                    report(value, violation, evaluations)
-                })?;
+                let found = rounds.polish(criterion, &margins, parameters.into(), budget, report)?;
                 evaluations += found.evaluations;
                 let (assessed, _) = assess(task, criterion, found.best.feasible, fine, logged);
                 if assessed.better_than(&best) {
@@ -115,14 +118,14 @@ pub(crate) fn restored(
                 }
                 return Ok((best, evaluations));
             }
-            if !on_samples || evaluations >= most || report(0.0, best.violation, evaluations) {
+            if whole || !on_samples || evaluations >= most || over() {
                 break;
             }
             for (margin, c) in margins.iter_mut().zip(&worst) {
                 *margin += if *c > 0.0 { c.min(WIDEST) + 1e-6 } else { 0.0 };
             }
         }
-        if evaluations >= most || report(0.0, best.violation, evaluations) {
+        if evaluations >= most || over() {
             break;
         }
     }

@@ -28,7 +28,7 @@ const STILL: f64 = 1e-6;
 
 /// `outside`, whose rows are at most `worst`, between it and standing still in the middle of each joint's own way,
 /// with the smallest of the shares tried that keeps all limits between samples. None if it keeps them already, or if
-/// a tenth of the motion is not small enough.
+/// a tenth of the motion is not small enough, or once `stop` says so.
 ///
 /// A family whose motions are linear in its parameters needs no trial where single joints break their own limits: on
 /// the way to a motion inside a value `v > 0` that ends at `-d` is zero at the share `v / (v + d)` at the latest,
@@ -39,6 +39,7 @@ pub(super) fn shrunk(
     criterion: &dyn Criterion,
     (outside, worst): (&Assessment, &[f64]),
     [fine, logged]: [&[f64]; 2],
+    stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
     if outside.violation <= 0.0 || !outside.violation.is_finite() {
         return None;
@@ -60,7 +61,7 @@ pub(super) fn shrunk(
     }
     let of_all = shares.iter().copied().fold(FIRST_SHARE, f64::max);
     for doubling in 0..=DOUBLINGS {
-        if shares.iter().any(|share| *share > MOST) {
+        if shares.iter().any(|share| *share > MOST) || stop() {
             return None;
         }
         let ways = outside.parameters.iter().zip(&still).enumerate();
@@ -184,7 +185,7 @@ mod tests {
             let (positions, speeds) = ranges(task.limits);
             let start = family.random(&positions, &speeds, &mut Random::new(3));
             let (first, worst) = judged(start.clone());
-            let inside = shrunk(task, &condition, (&first, &worst), [&fine, &logged]).unwrap_or(first);
+            let inside = shrunk(task, &condition, (&first, &worst), [&fine, &logged], &|| false).unwrap_or(first);
             assert!(inside.violation <= 0.0);
             // As much larger about its posture as breaks a limit by some hundredths.
             let still = standing_still(task, &inside.parameters, &fine);
@@ -198,13 +199,14 @@ mod tests {
             }
             let (outside, worst) = larger(below);
             assert!(outside.violation > 0.009, "{}", outside.violation);
-            let smaller = shrunk(task, &condition, (&outside, &worst), [&fine, &logged]).expect("a hundredth does");
+            let smaller =
+                shrunk(task, &condition, (&outside, &worst), [&fine, &logged], &|| false).expect("a hundredth does");
             assert!(smaller.violation <= 0.0);
             // The regressor goes with the motion, and its smallest singular value with the acceleration's square at
             // most: two hundredths of the figure, and as much for what position takes of a range that is not centred.
             let lost = smaller.figure.unwrap() / outside.figure.unwrap() - 1.0;
             assert!(lost < 0.04, "{lost}");
-            assert!(shrunk(task, &condition, (&smaller, &worst), [&fine, &logged]).is_none());
+            assert!(shrunk(task, &condition, (&smaller, &worst), [&fine, &logged], &|| false).is_none());
         });
     }
 }

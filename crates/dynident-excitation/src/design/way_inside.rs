@@ -13,7 +13,7 @@ const DOUBLINGS: i32 = 9;
 
 /// `(1 - s) outside + s inside`, for the smallest of the shares s = 1/512, 1/256, .., 1/2 that keeps all limits between
 /// samples; none if `outside` is inside already or far outside, `inside` breaks a limit, the family is not linear
-/// in its parameters, or the result is worse than `inside`.
+/// in its parameters, the result is worse than `inside`, or `stop` says so.
 ///
 /// For a family that is linear in its parameters positions, velocities and accelerations, and with them all limits that
 /// are convex in them, change by no more than a straight line: what is broken by a share ε is kept after about ε of the
@@ -24,6 +24,7 @@ pub(super) fn way_inside(
     outside: &Assessment,
     inside: &Assessment,
     [fine, logged]: [&[f64]; 2],
+    stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
     let near = outside.violation > 0.0 && outside.violation <= SMALL;
     if !near || inside.violation > 0.0 || !task.family.is_linear() {
@@ -33,6 +34,7 @@ pub(super) fn way_inside(
         outside.parameters.iter().zip(&inside.parameters).map(|(from, to)| from + share * (to - from)).collect()
     };
     (0..DOUBLINGS)
+        .take_while(|_| !stop())
         .map(|doubling| assess(task, criterion, between(FIRST_SHARE * f64::from(1 << doubling)), fine, logged).0)
         .find(|assessed| assessed.violation <= 0.0)
         .filter(|assessed| assessed.better_than(inside))
@@ -68,7 +70,7 @@ mod tests {
         };
         let (fine, logged) = (grid(10.0, 127), grid(10.0, 1001));
         let judged = |parameters: Vec<f64>| assess(&task, &DOptimal, parameters, &fine, &logged).0;
-        let way = |outside, inside| way_inside(&task, &DOptimal, outside, inside, [&fine, &logged]);
+        let way = |outside, inside| way_inside(&task, &DOptimal, outside, inside, [&fine, &logged], &|| false);
         let (positions, speeds) = ranges(&limits);
         let start = family.random(&positions, &speeds, &mut Random::new(3));
         let scaled = |by: f64| judged(start.iter().map(|p| by * p).collect());

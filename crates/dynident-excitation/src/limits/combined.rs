@@ -18,13 +18,21 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// `c` is the constraint's value: the share of the limit that is missing, for the floor metres. A slower run fixes
 /// velocity, acceleration, jerk and the part of torque that gravity does not ask for, so the sum falls before it rises;
 /// it is looked at on a grid up to where s - 1 alone costs more than limits alone, then by golden section. `None` if a
-/// motion is not finite.
-pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Option<Relaxation> {
+/// motion is not finite, or `stop` says so.
+pub(super) fn smallest_combination(
+    set: &LimitSet,
+    times_s: &[f64],
+    motion: &Motion,
+    stop: &dyn Fn() -> bool,
+) -> Option<Relaxation> {
     let mut workspace = set.workspace();
     let mut at = |factor: f64| {
         let broken = broken_limits(set, &mut workspace, times_s, &stretched(motion, factor));
         (factor - 1.0 + broken.iter().map(|broken| broken.value).sum::<f64>(), factor, broken)
     };
+    if stop() {
+        return None;
+    }
     let mut best: (f64, f64, Vec<BrokenLimit>) = at(1.0);
     if !best.0.is_finite() {
         return None;
@@ -35,6 +43,9 @@ pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Mot
         let place = |k: usize| 1.0 + (most - 1.0) * (k as f64 / PLACES as f64).powi(2);
         let mut lowest = 0;
         for k in 1..=PLACES {
+            if stop() {
+                return None;
+            }
             let found = at(place(k));
             if found.0 < best.0 {
                 (best, lowest) = (found, k);
@@ -42,6 +53,9 @@ pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Mot
         }
         let (mut from, mut to) = (place(lowest.saturating_sub(1)), place((lowest + 1).min(PLACES)));
         for _ in 0..STEPS {
+            if stop() {
+                return None;
+            }
             let (left, right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
             let (left, right) = (at(left), at(right));
             if left.0 <= right.0 {

@@ -1,5 +1,6 @@
 //! What a user says about limits: plain numbers by joint and link name.
 
+use super::known_torque::KnownTorque;
 use super::self_collision_shapes::{LinkShape, SelfCollision};
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
@@ -36,6 +37,10 @@ pub struct Limits {
     pub column: Option<ColumnLimit>,
     /// Distances between the arm's own links.
     pub self_collision: Option<SelfCollision>,
+    /// Torque beyond the rigid bodies' that torque and power limits include. Not in files: it comes from the robot
+    /// description and from what else is known of the drives.
+    #[serde(skip)]
+    pub known_torque: KnownTorque,
 }
 
 /// Limits of one joint; rad (m), seconds, Nm (N), W. Rates and torques are largest magnitudes.
@@ -57,7 +62,8 @@ pub struct JointLimit {
     /// Highest jerk, rad/s³ or m/s³.
     #[serde(default)]
     pub jerk: Option<f64>,
-    /// Highest torque by the model's prior inertial parameters, Nm or N.
+    /// Highest torque by the model's prior inertial parameters and the known torque of friction, drives and springs, Nm
+    /// or N.
     #[serde(default)]
     pub torque: Option<f64>,
     /// Part of the torque limit kept free for what the prior does not know, 0 (nothing) to below 1.
@@ -139,8 +145,8 @@ pub struct ColumnLimit {
 }
 
 impl Limits {
-    /// The description's own limits: position where both ends are given, velocity, torque from `effort`. Acceleration,
-    /// jerk, power and space stay free.
+    /// The description's own limits: position where both ends are given, velocity, torque from `effort`, which includes
+    /// the description's friction, drive inertia and springs. Acceleration, jerk, power and space stay free.
     pub fn from_model(model: &Model) -> Self {
         let joints = model.joints().iter().map(|joint| JointLimit {
             joint: joint.name.clone(),
@@ -149,11 +155,12 @@ impl Limits {
             torque: joint.limits.effort,
             ..JointLimit::default()
         });
-        Self { joints: joints.collect(), ..Self::default() }
+        let known_torque = KnownTorque::of_description(model);
+        Self { joints: joints.collect(), known_torque, ..Self::default() }
     }
 
     /// These limits with `other` laid over them: what `other` says wins, joint by joint and value by value; its boxes
-    /// are added.
+    /// are added. Its known torque wins where it has any.
     pub fn overlaid(mut self, other: &Self) -> Self {
         for over in &other.joints {
             let Some(under) = self.joints.iter_mut().find(|under| under.joint == over.joint) else {
@@ -174,6 +181,9 @@ impl Limits {
         self.floor = other.floor.clone().or(self.floor);
         self.column = other.column.clone().or(self.column);
         self.self_collision = other.self_collision.clone().or(self.self_collision);
+        if !other.known_torque.is_empty() {
+            self.known_torque = other.known_torque.clone();
+        }
         self
     }
 

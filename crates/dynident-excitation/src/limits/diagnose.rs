@@ -66,7 +66,8 @@ pub struct Diagnosis {
     /// Broken limits, worst first; empty for a feasible motion.
     pub broken: Vec<BrokenLimit>,
     /// Single changes that would do, the smallest first (by relative change). Where limits of several kinds are broken
-    /// that no slower run fixes, the smallest combination instead; empty only where the motion is not finite.
+    /// that no slower run fixes, the smallest combination instead; empty only where the motion is not finite, or the
+    /// search for changes was stopped.
     pub relaxations: Vec<Relaxation>,
 }
 
@@ -98,6 +99,15 @@ pub(crate) fn relaxation(set: &LimitSet, widened: &[Widened]) -> Option<Relaxati
 /// # Panics
 /// If there is not one time per sample.
 pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
+    diagnose_until(set, times_s, motion, &|| false)
+}
+
+/// [`diagnose()`] that looks for no further change once `stop` says so: the broken limits are named, and the changes
+/// found until then.
+///
+/// # Panics
+/// If there is not one time per sample.
+pub fn diagnose_until(set: &LimitSet, times_s: &[f64], motion: &Motion, stop: &dyn Fn() -> bool) -> Diagnosis {
     assert_eq!(times_s.len(), motion.samples, "one time per sample");
     let broken = broken_limits(set, &mut set.workspace(), times_s, motion);
     let mut sized = Vec::new();
@@ -107,14 +117,14 @@ pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
             sized.push((broken[0].value, Relaxation::Limits { kind: first, changes }));
         }
         let duration_s = times_s.last().zip(times_s.first()).map_or(0.0, |(last, first)| last - first);
-        if let Some(factor) = smallest_stretch(set, motion) {
+        if let Some(factor) = smallest_stretch(set, motion, stop) {
             sized.push((factor - 1.0, Relaxation::Stretch { factor, duration_s: duration_s * factor }));
         }
     }
     sized.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut relaxations: Vec<Relaxation> = sized.into_iter().map(|(_, relaxation)| relaxation).collect();
     if relaxations.is_empty() && !broken.is_empty() {
-        relaxations.extend(smallest_combination(set, times_s, motion));
+        relaxations.extend(smallest_combination(set, times_s, motion, stop));
     }
     Diagnosis { broken, relaxations }
 }
@@ -162,19 +172,22 @@ pub(super) fn stretched(motion: &Motion, factor: f64) -> Motion {
 }
 
 /// The smallest factor at which the stretched motion keeps every limit, rounded up in its ninth digit; `None` if none
-/// up to 1000 does.
-fn smallest_stretch(set: &LimitSet, motion: &Motion) -> Option<f64> {
+/// up to 1000 does, or `stop` says so.
+fn smallest_stretch(set: &LimitSet, motion: &Motion, stop: &dyn Fn() -> bool) -> Option<f64> {
     let mut workspace = set.workspace();
     let mut values = Vec::new();
     let mut holds = |factor: f64| {
         set.values(&mut workspace, &stretched(motion, factor), &mut values);
         values.iter().all(|c| *c <= TOLERANCE)
     };
-    if !holds(LARGEST_STRETCH) {
+    if stop() || !holds(LARGEST_STRETCH) {
         return None;
     }
     let (mut broken, mut kept) = (1.0, LARGEST_STRETCH);
     while kept - broken > 1e-9 * kept {
+        if stop() {
+            return None;
+        }
         // Geometric steps: factors near 1 are the common case.
         let middle = f64::sqrt(broken * kept);
         if holds(middle) { kept = middle } else { broken = middle }
@@ -252,7 +265,8 @@ impl Diagnosis {
                 }
             });
         }
-        if !self.broken.is_empty() && self.relaxations.is_empty() {
+        let is_finite = self.broken.iter().all(|broken| broken.value.is_finite());
+        if !is_finite && self.relaxations.is_empty() {
             sentences.push("No change would do: the motion is not finite.".to_owned());
         }
         sentences

@@ -15,6 +15,14 @@ pub enum LimitError {
         /// The names that exist.
         known: Vec<String>,
     },
+    /// Known torque of a joint that the robot does not have.
+    #[error("known torque {term} acts on a joint that the robot of {joints} joints does not have")]
+    TorqueOfNoJoint {
+        /// The term's symbol.
+        term: String,
+        /// Joints of the robot.
+        joints: usize,
+    },
     /// Two entries for one joint.
     #[error("limits name joint `{joint}` twice: join the entries into one")]
     DuplicateJoint {

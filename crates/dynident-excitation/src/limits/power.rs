@@ -1,11 +1,11 @@
-//! Mechanical power of a joint.
+//! Mechanical power of a joint, known torque of friction and drives included.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
 use super::term::{Inputs, Pull, Term};
 use dynident_model::Model;
 
-/// `|τ q̇| / limit - 1`.
+/// `max(|τ_low q̇|, |τ_high q̇|) / limit - 1`.
 #[derive(Clone, Debug)]
 pub(crate) struct PowerLimits(Vec<(usize, Constraint)>);
 
@@ -29,8 +29,9 @@ impl Term for PowerLimits {
         let motion = inputs.motion;
         for ((joint, constraint), row) in self.0.iter().zip(out.chunks_exact_mut(motion.samples)) {
             let (scale, range) = (1.0 / constraint.size, motion.of(*joint));
-            for ((c, tau), dq) in row.iter_mut().zip(&inputs.tau[range.clone()]).zip(&motion.dq[range]) {
-                *c = (tau * dq).abs() * scale - 1.0;
+            let torques = inputs.torque.low[range.clone()].iter().zip(&inputs.torque.high[range.clone()]);
+            for ((c, (low, high)), dq) in row.iter_mut().zip(torques).zip(&motion.dq[range]) {
+                *c = (low * dq).abs().max((high * dq).abs()) * scale - 1.0;
             }
         }
     }
@@ -40,9 +41,12 @@ impl Term for PowerLimits {
         for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let scale = 1.0 / constraint.size;
             for (at, weight) in motion.of(*joint).zip(row) {
-                let (tau, dq) = (inputs.tau[at], motion.dq[at]);
+                let (low, high, dq) = (inputs.torque.low[at], inputs.torque.high[at], motion.dq[at]);
+                let is_high = high.abs() >= low.abs();
+                let (tau, to) =
+                    if is_high { (high, &mut pull.torque.high[at]) } else { (low, &mut pull.torque.low[at]) };
                 let signed = weight * scale * (tau * dq).signum();
-                pull.tau[at] += signed * dq;
+                *to += signed * dq;
                 pull.motion.dq[at] += signed * tau;
             }
         }

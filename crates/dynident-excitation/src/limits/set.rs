@@ -11,6 +11,7 @@ use super::power::PowerLimits;
 use super::self_collision::SelfCollisionLimits;
 use super::term::{Inputs, Pull, Term};
 use super::torque::{TorqueLimits, torque_adjoint};
+use super::torque_range::{SmoothTorque, TorqueRange};
 use super::wrench::{Wrench, pull_wrenches};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{BatchWorkspace, Workspace, body_placements, inverse_dynamics_batch};
@@ -25,6 +26,7 @@ pub struct LimitSet {
     rows_of: Vec<usize>,
     constraints: Vec<Constraint>,
     bands: Vec<JointBand>,
+    known: SmoothTorque,
     torque: bool,
     placements: bool,
 }
@@ -37,9 +39,12 @@ pub struct LimitWorkspace {
     single: Workspace,
     /// The motion that torques and placements belong to.
     motion: Motion,
+    /// Torque of the rigid bodies.
     tau: Vec<f64>,
+    torque: TorqueRange,
     placements: Vec<Transform>,
     by_torque: Vec<f64>,
+    by_range: TorqueRange,
     wrenches: Vec<Wrench>,
     q: Vec<f64>,
     by_position: Vec<f64>,
@@ -88,6 +93,7 @@ impl LimitSet {
         let constraints: Vec<Constraint> = terms.iter().flat_map(|term| term.constraints()).collect();
         Ok(Self {
             model: model.clone(),
+            known: SmoothTorque::new(&limits.known_torque, model),
             torque: terms.iter().any(|term| term.needs_torque()),
             placements: terms.iter().any(|term| term.needs_placements()),
             bands,
@@ -124,8 +130,10 @@ impl LimitSet {
             single: Workspace::new(&self.model),
             motion: Motion::default(),
             tau: Vec::new(),
+            torque: TorqueRange::default(),
             placements: Vec::new(),
             by_torque: Vec::new(),
+            by_range: TorqueRange::default(),
             wrenches: Vec::new(),
             q: vec![0.0; self.model.dof()],
             by_position: Vec::new(),
@@ -145,8 +153,8 @@ impl LimitSet {
         if samples == 0 {
             return;
         }
-        let LimitWorkspace { tau, placements, swept, .. } = workspace;
-        let inputs = Inputs { motion, tau, placements, bodies: self.model.body_count(), swept: *swept };
+        let LimitWorkspace { torque, placements, swept, .. } = workspace;
+        let inputs = Inputs { motion, torque, placements, bodies: self.model.body_count(), swept: *swept };
         let mut rest = out.as_mut_slice();
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at_mut(rows * samples);
@@ -175,21 +183,25 @@ impl LimitSet {
             return;
         }
         self.prepare(workspace, motion);
-        let LimitWorkspace { single, tau, placements, by_torque, wrenches, by_position, swept, .. } = workspace;
-        by_torque.clear();
-        by_torque.resize(if self.torque { dof * samples } else { 0 }, 0.0);
+        let LimitWorkspace {
+            single, tau, torque, placements, by_torque, by_range, wrenches, by_position, swept, ..
+        } = workspace;
+        by_range.reset(if self.torque { dof * samples } else { 0 });
         wrenches.clear();
         let bodies = self.model.body_count();
         wrenches.resize(if self.placements { bodies * samples } else { 0 }, Wrench::ZERO);
-        let inputs = Inputs { motion, tau, placements, bodies, swept: *swept };
+        let inputs = Inputs { motion, torque, placements, bodies, swept: *swept };
         let mut rest = weights;
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at(rows * samples);
-            let mut pull = Pull { motion: &mut *adjoint, tau: by_torque, wrenches };
+            let mut pull = Pull { motion: &mut *adjoint, torque: &mut *by_range, wrenches };
             term.apply_adjoint(&inputs, own, &mut pull);
             rest = others;
         }
         if self.torque {
+            by_torque.clear();
+            by_torque.extend(by_range.low.iter().zip(&by_range.high).map(|(low, high)| low + high));
+            self.known.apply_adjoint(motion, tau, by_range, by_torque, adjoint);
             torque_adjoint(&self.model, single, motion, by_torque, adjoint);
         }
         if self.placements {
@@ -219,6 +231,10 @@ impl LimitSet {
         if self.torque {
             workspace.tau.resize(dof * samples, 0.0);
             inverse_dynamics_batch(&self.model, &mut workspace.batch, &motion.view(), &mut workspace.tau);
+            workspace.torque.of_bodies(&workspace.tau);
+            if !self.known.is_empty() {
+                self.known.add(motion, &workspace.tau, &mut workspace.torque);
+            }
         }
         if self.placements {
             let bodies = self.model.body_count();

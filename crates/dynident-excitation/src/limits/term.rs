@@ -1,6 +1,7 @@
 //! What each kind of limit offers to the set: values over a block of samples, and the way back.
 
 use super::kind::Constraint;
+use super::torque_range::TorqueRange;
 use super::wrench::Wrench;
 use crate::motion::{Motion, MotionAdjoint};
 use core::fmt::Debug;
@@ -11,7 +12,7 @@ use dynident_model::{Transform, Vec3};
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
-    pub(crate) tau: &'a [f64],
+    pub(crate) torque: &'a TorqueRange,
     pub(crate) placements: &'a [Transform],
     /// Placements of one sample.
     pub(crate) bodies: usize,
@@ -30,7 +31,7 @@ impl Inputs<'_> {
 /// bodies.
 pub(crate) struct Pull<'a> {
     pub(crate) motion: &'a mut MotionAdjoint,
-    pub(crate) tau: &'a mut [f64],
+    pub(crate) torque: &'a mut TorqueRange,
     /// Sample by sample, one per body.
     pub(crate) wrenches: &'a mut [Wrench],
 }

@@ -1,4 +1,5 @@
-//! Joint torque by the prior model, less the margin kept free for what the prior does not know.
+//! Joint torque by the prior model and the known torque of friction and drives, less the margin kept free for what
+//! neither knows.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
@@ -7,7 +8,7 @@ use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{Workspace, inverse_dynamics_derivatives};
 use dynident_model::Model;
 
-/// `|τ| / ((1 - margin) limit) - 1`.
+/// `max(τ_high, -τ_low) / ((1 - margin) limit) - 1`.
 #[derive(Clone, Debug)]
 pub(crate) struct TorqueLimits(Vec<(usize, Constraint)>);
 
@@ -38,17 +39,23 @@ impl Term for TorqueLimits {
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
         for ((joint, constraint), row) in self.0.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
             let scale = 1.0 / constraint.size;
-            for (c, tau) in row.iter_mut().zip(&inputs.tau[inputs.motion.of(*joint)]) {
-                *c = tau.abs() * scale - 1.0;
+            let range = inputs.motion.of(*joint);
+            let torques = inputs.torque.low[range.clone()].iter().zip(&inputs.torque.high[range]);
+            for (c, (low, high)) in row.iter_mut().zip(torques) {
+                *c = high.max(-low) * scale - 1.0;
             }
         }
     }
 
     fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
         for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
-            let (scale, range) = (1.0 / constraint.size, inputs.motion.of(*joint));
-            for ((to, weight), tau) in pull.tau[range.clone()].iter_mut().zip(row).zip(&inputs.tau[range]) {
-                *to += weight * scale * tau.signum();
+            let scale = 1.0 / constraint.size;
+            for (at, weight) in inputs.motion.of(*joint).zip(row) {
+                if inputs.torque.high[at] >= -inputs.torque.low[at] {
+                    pull.torque.high[at] += weight * scale;
+                } else {
+                    pull.torque.low[at] -= weight * scale;
+                }
             }
         }
     }

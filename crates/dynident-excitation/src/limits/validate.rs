@@ -5,6 +5,7 @@ use super::error::LimitError;
 use super::kind::LimitKind;
 use super::link_points::link_place;
 use dynident_model::Model;
+use dynident_model::terms::TorqueTerm;
 
 impl Limits {
     /// Checks every number and name against the robot.
@@ -53,6 +54,13 @@ impl Limits {
                 return Err(LimitError::NoPoints { what: "the column".to_owned() });
             }
             validate_points(&column.points, "the column", model)?;
+        }
+        let beyond = |(term, _): &&(TorqueTerm, f64)| term.joints().iter().any(|&joint| joint >= model.dof());
+        if let Some((term, _)) = self.known_torque.terms().iter().find(beyond) {
+            return Err(LimitError::TorqueOfNoJoint { term: term.symbol(), joints: model.dof() });
+        }
+        if let Some((term, value)) = self.known_torque.terms().iter().find(|(_, value)| !value.is_finite()) {
+            return Err(LimitError::NotFinite { what: format!("known torque {}", term.symbol()), value: *value });
         }
         self.self_collision.as_ref().map_or(Ok(()), |limit| limit.validate(model))
     }

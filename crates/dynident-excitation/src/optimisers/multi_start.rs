@@ -5,6 +5,7 @@ use super::{
     OptimiserError, Progress, augmented_lagrangian,
 };
 use core::ops::ControlFlow;
+use core::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
@@ -33,7 +34,8 @@ impl MultiStartResult {
 ///
 /// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on;
 /// `iteration` and `evaluations` are those of the start that speaks. Unless it stops the search, the result does not
-/// depend on the number of threads: among equals the first start is best.
+/// depend on the number of threads: among equals the first start is best. Starts that have not begun when it is stopped
+/// are left out, as if the problem were not defined there.
 ///
 /// # Errors
 /// No start; settings or bounds out of range.
@@ -50,15 +52,22 @@ pub(crate) fn multi_start<P: ConstrainedProblem>(
     super::check_bounds(&problem().bounds(), false)?;
     let best: Mutex<(Vec<f64>, f64, f64)> = Mutex::new((Vec::new(), f64::INFINITY, f64::INFINITY));
     let tolerance = settings.feasibility_tolerance;
+    let stopped = AtomicBool::new(false);
     let runs: Vec<_> = starts
         .par_iter()
         .map(|start| {
+            // The search can only be stopped after an evaluation: a best point exists.
+            if stopped.load(Ordering::Relaxed) {
+                return Err(OptimiserError::Start);
+            }
             let mut hear = |progress: &Progress<'_>| {
                 let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
                 if before((progress.value, progress.violation), (best.1, best.2), tolerance) {
                     *best = (progress.best.to_vec(), progress.value, progress.violation);
                 }
-                watch(&Progress { best: &best.0, value: best.1, violation: best.2, ..*progress })
+                let flow = watch(&Progress { best: &best.0, value: best.1, violation: best.2, ..*progress });
+                stopped.fetch_or(flow.is_break(), Ordering::Relaxed);
+                flow
             };
             augmented_lagrangian(&mut problem(), start, settings, &mut hear)
         })

@@ -5,6 +5,8 @@ mod common;
 mod design;
 mod feasibility;
 mod information;
+mod interruption;
+mod known_torque;
 mod limit_messages;
 mod limits;
 mod meshes;

@@ -5,7 +5,7 @@ use super::ways::RunPart;
 use super::workspace::{WorkspaceBox, WorkspaceSettings};
 use dynident_dynamics::Workspace as Arrays;
 use dynident_model::Model;
-use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError};
+use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError, require};
 use serde::{Deserialize, Serialize};
 
 /// Speeds that no robot measures come from positions at least this far apart, seconds of a usual arm: quantised
@@ -16,6 +16,8 @@ const SPEED_SPAN_S: f64 = 0.01;
 pub(crate) const TRACKING_RAD: f64 = 0.3;
 /// The same of a joint that slides, m of a usual arm.
 pub(crate) const TRACKING_M: f64 = 0.1;
+/// Room that searches keep inside the envelope, percent.
+const SEARCH_MARGIN_PERCENT: f64 = 10.0;
 /// Room above the description's velocity and effort: controllers overshoot, and sensors are noisy.
 const ROOM: f64 = 1.1;
 
@@ -44,14 +46,25 @@ pub struct EnvelopeSettings {
     /// A box in the base frame that no link's origin may leave; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace: Option<WorkspaceSettings>,
+    /// Room that a search for a motion keeps inside the envelope, percent: of the allowed tracking error for positions
+    /// and the workspace (times the length of the arm), of the limit for a stated velocity or torque. Default 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search_margin_percent: Option<f64>,
 }
 
 impl EnvelopeSettings {
+    /// Room that a search keeps inside the envelope, a share.
+    pub fn search_margin(&self) -> f64 {
+        0.01 * self.search_margin_percent.unwrap_or(SEARCH_MARGIN_PERCENT)
+    }
+
     /// The envelope of a robot: what is stated, else what its description says, else the defaults.
     ///
     /// # Errors
     /// Lists of another length; limits that are not positive, positions that are not numbers.
     pub fn envelope(&self, model: &Model) -> Result<Envelope, SimulationError> {
+        let percent = self.search_margin_percent.unwrap_or(SEARCH_MARGIN_PERCENT);
+        require((0.0..=90.0).contains(&percent), "envelope.search_margin_percent", percent, "give 0 to 90")?;
         let joints = model.joints();
         let each = |what: &str, stated: &Option<PerJoint>, positive: bool, own: &dyn Fn(usize) -> Option<f64>| {
             let Some(stated) = stated else { return Ok((0..joints.len()).map(own).collect()) };

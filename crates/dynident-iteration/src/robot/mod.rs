@@ -15,6 +15,7 @@ mod process_group;
 mod process_settings;
 mod protocol;
 mod recorder;
+mod search_limits;
 mod simulated;
 mod stop_reason;
 mod stop_signal;

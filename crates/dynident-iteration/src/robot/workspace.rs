@@ -88,7 +88,7 @@ pub struct WatchedPoint {
     /// Where it is in that joint's frame, m.
     pub offset_m: [f64; 3],
     #[serde(skip)]
-    body: usize,
+    pub(super) body: usize,
 }
 
 /// A box of the base frame with the points that may not leave it.

@@ -435,3 +435,18 @@ fn a_way_is_rehearsed() {
     let reason = refused(settings);
     assert!(reason.contains("run 1 is not commanded: home itself breaks the limit of position of joint1"), "{reason}");
 }
+
+/// Whoever asks for a stop while ways are looked for is not asked again.
+#[test]
+fn a_search_for_ways_ends() {
+    for at in 1..=5 {
+        let asked = core::cell::Cell::new(0);
+        let stop = || {
+            asked.set(asked.get() + 1);
+            asked.get() >= at
+        };
+        let ended = home([0.2, -0.1]).ways_until(&model(), &motion(START, END), None, &stop);
+        assert!(matches!(ended, Err(HomeError::Interrupted)), "{at}: {ended:?}");
+        assert_eq!(asked.get(), at);
+    }
+}

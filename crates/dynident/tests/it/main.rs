@@ -11,6 +11,7 @@ mod coupled_joints;
 mod declared_torque;
 mod design_contact;
 mod design_messages;
+mod design_safety;
 mod design_tasks;
 mod differentiators;
 mod drive_gains;

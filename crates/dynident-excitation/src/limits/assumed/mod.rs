@@ -5,9 +5,11 @@
 mod closer;
 mod floor;
 mod shapes;
+mod turns;
 mod words;
 
 pub use shapes::ShapesOfLinks;
+pub use turns::StartPositions;
 
 use super::description::{JointLimit, Limits};
 use super::error::LimitError;
@@ -35,18 +37,29 @@ pub struct AssumedLimits {
     /// Most convex pieces that the mesh of a collision shape is cut into, where its convex hull is too coarse. Default
     /// 8; 1 keeps the hulls.
     pub mesh_pieces: usize,
+    /// Most turns between the start of the motion and any position of a turning joint without position limits. With a
+    /// `start_posture` the range has this many turns to either side of it. Without one it has half of them to either
+    /// side of home, or of zero. 0 means no limit. Default 1.
+    pub continuous_turns: f64,
 }
 
 impl Default for AssumedLimits {
     fn default() -> Self {
-        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0, mesh_pieces: 8 }
+        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0, continuous_turns: 1.0, mesh_pieces: 8 }
     }
 }
 
 impl AssumedLimits {
     /// Nothing is assumed.
     pub fn none() -> Self {
-        Self { floor: false, self_collision: false, acceleration: false, stop_margin_percent: 0.0, mesh_pieces: 1 }
+        Self {
+            floor: false,
+            self_collision: false,
+            acceleration: false,
+            stop_margin_percent: 0.0,
+            continuous_turns: 0.0,
+            mesh_pieces: 1,
+        }
     }
 }
 
@@ -71,7 +84,8 @@ const RUN_UP_RAD: f64 = 0.2;
 const RUN_UP: f64 = 0.1;
 
 impl LimitsInForce {
-    /// The description's limits, the assumptions that `settings` asks for, and `given`, whose values win.
+    /// The description's limits, the assumptions that `settings` asks for, and `given`, whose values win. `starts` are
+    /// the positions about which joints without position limits turn.
     ///
     /// # Errors
     /// As [`Limits::validate`] of the shapes and `given`.
@@ -80,6 +94,7 @@ impl LimitsInForce {
         shapes: &ShapesOfLinks,
         settings: &AssumedLimits,
         given: &Limits,
+        starts: &StartPositions,
     ) -> Result<Self, LimitError> {
         let mut under = Limits::from_model(model);
         let (mut assumed, mut not_checked) = (Vec::new(), Vec::new());
@@ -90,6 +105,7 @@ impl LimitsInForce {
                 settings.stop_margin_percent
             ));
         }
+        assumed.extend(turns::bound_turns(&mut under, given, model, (settings.continuous_turns, starts)));
         if settings.acceleration && bound_accelerations(&mut under, given, model) {
             assumed.push(
                 "acceleration: full speed after 0.2 rad from rest, a tenth of the stroke where a joint slides (defaults.acceleration)"
@@ -139,6 +155,7 @@ impl LimitsInForce {
         not_checked.extend(self_collision_gaps(model, shapes, &limits)?);
         not_checked.extend(shapes.dropped.iter().cloned());
         not_checked.extend(joint_gaps(model, &limits));
+        not_checked.extend(follower_gaps(model));
         not_checked.push(
             "what the description does not hold: surroundings, cables, a tool or payload, deviation of the controller"
                 .to_owned(),
@@ -211,6 +228,19 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
         gaps.push(format!("links without a collision shape: {}", shapes.without.join(", ")));
     }
     Ok(gaps)
+}
+
+/// Joints that follow more joints than a torque term can act on, whose friction, inertia or spring is left out.
+fn follower_gaps(model: &Model) -> Option<String> {
+    let left_out = |(place, joint): &(usize, &Joint)| {
+        let drivers = model.drivers(*place).filter(|(_, share)| *share != 0.0).count();
+        let drive =
+            [joint.damping, joint.friction, joint.drive_inertia].into_iter().flatten().any(|value| value != 0.0);
+        (drivers > 1 && joint.spring.is_some()) || (drivers > 2 && drive)
+    };
+    let joints: Vec<String> = model.followers().filter(left_out).map(|(_, joint)| joint.name.clone()).collect();
+    (!joints.is_empty())
+        .then(|| format!("torque of springs and friction at {}, each of which follows several joints", listed(&joints)))
 }
 
 /// Joints that something is not limited of.

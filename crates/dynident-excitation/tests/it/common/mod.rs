@@ -56,6 +56,7 @@ pub(crate) fn all_limits(model: &Model) -> Limits {
         floor: Some(FloorLimit { height_m: 0.1, ..Default::default() }),
         column: Some(ColumnLimit { radius_m: 0.2, axis_xy_m: [0.02, -0.03], points, height_m: Some(0.6) }),
         self_collision: Some(SelfCollision::default()),
+        ..Limits::default()
     }
 }
 

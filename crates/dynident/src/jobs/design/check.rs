@@ -11,6 +11,7 @@ use crate::jobs::provenance::seen_from;
 use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
+use dynident_excitation::limits::Relaxation;
 use dynident_excitation::{Family, Motion, grid};
 use dynident_identification::{Execution, IdentificationSettings, Logs};
 use dynident_recording::MotionBlock;
@@ -20,6 +21,9 @@ use std::path::Path;
 /// What is checked of a table, and of a log.
 const SPLINE: &str = "the quintic spline through the samples of the table";
 const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
+
+/// Nothing is searched for, and nobody asks for a stop.
+const NO_SEARCH: (&dyn Fn() -> Result<Vec<Relaxation>, Error>, &dyn Fn() -> bool) = (&|| Ok(Vec::new()), &|| false);
 
 /// Most samples of a log.
 const MAX_SAMPLES: usize = 2_000_000;
@@ -39,10 +43,13 @@ pub fn check_trajectory(
     trajectory: &Path,
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
-    let mut setup = DesignSetup::for_check(study, study_path, options)?;
-    let joints = setup.robot.parametric.joint_names();
+    let folders = Folders::new(study, study_path, options.data.as_deref());
+    let joints = StudyRobot::new(study, study_path, &folders)?.parametric.joint_names();
     let table = table::trajectory(trajectory, &joints, &study.motion)?;
     let given = table.given;
+    let samples = given.samples();
+    let start: Vec<f64> = (0..joints.len()).map(|joint| samples.q[samples.of(joint).start]).collect();
+    let mut setup = DesignSetup::for_check(study, study_path, options, &start)?;
     let duration_s = given.duration_s();
     let longest_s = DesignSection::longest_s(setup.robot.model());
     if duration_s > longest_s {
@@ -53,7 +60,7 @@ pub fn check_trajectory(
     setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
     let check_rate_hz = setup.robot.model().own_scale().round_hertz(CHECK_RATE_HZ);
-    let check = LimitCheck::of(&setup, study_path, duration_s, check_rate_hz, SPLINE, &motion_at, &|| Ok(Vec::new()))?;
+    let check = LimitCheck::of(&setup, study_path, (duration_s, check_rate_hz), SPLINE, &motion_at, NO_SEARCH)?;
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);
@@ -101,7 +108,7 @@ pub fn check_log(
     for piece in &pieces {
         let motion_at = |times: &[f64], out: &mut Motion| piece.motion(&[], times, out);
         check.append(
-            LimitCheck::of(&setup, study_path, piece.duration_s(), rate_hz, SAMPLES, &motion_at, &|| Ok(Vec::new()))?,
+            LimitCheck::of(&setup, study_path, (piece.duration_s(), rate_hz), SAMPLES, &motion_at, NO_SEARCH)?,
             duration_s,
         );
         let part = setup.information(piece.times_s(), &motion_at);

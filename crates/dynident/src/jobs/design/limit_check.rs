@@ -2,13 +2,16 @@
 
 use super::setup::DesignSetup;
 use crate::error::Error;
-use dynident_excitation::check::{LimitReport, VIOLATION, check_limits};
-use dynident_excitation::limits::{LimitSet, Relaxation, diagnose};
+use dynident_excitation::check::{LimitReport, VIOLATION, check_limits, check_limits_until};
+use dynident_excitation::limits::{LimitSet, Relaxation, diagnose_until};
 use dynident_excitation::{Motion, grid};
 use std::path::Path;
 
 /// Rate of the diagnosis, Hz of a usual arm.
 const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
+
+/// Divisor of both rates after a stop was requested.
+const COARSER: f64 = 10.0;
 
 /// Every limit as a motion uses it.
 pub(super) struct LimitCheck {
@@ -23,25 +26,34 @@ pub(super) struct LimitCheck {
 }
 
 impl LimitCheck {
-    /// Looks at the motion `rate_hz` times a second. If it breaks a limit, `single` looks for changes of one limit that
-    /// would make another motion possible.
+    /// Looks at the motion `rate_hz` times a second, ten times more rarely once `stop` says so. If it breaks a limit,
+    /// `single` looks for changes of one limit that would make another motion possible.
     ///
     /// # Errors
     /// Limits that make no sense for the robot.
     pub(super) fn of(
         setup: &DesignSetup,
         study_path: &Path,
-        duration_s: f64,
-        rate_hz: f64,
+        (duration_s, rate_hz): (f64, f64),
         of: &'static str,
         motion_at: &dyn Fn(&[f64], &mut Motion),
-        single: &dyn Fn() -> Result<Vec<Relaxation>, Error>,
+        (single, stop): (&dyn Fn() -> Result<Vec<Relaxation>, Error>, &dyn Fn() -> bool),
     ) -> Result<Self, Error> {
-        let reports = check_limits(&setup.limits, setup.robot.model(), duration_s, rate_hz, motion_at)
-            .map_err(Error::section(study_path, "design.limits"))?;
+        let model = &setup.loaded;
+        let in_limits = |error| Error::section(study_path, "design.limits")(error);
+        let rates = (duration_s, rate_hz);
+        let whole = check_limits_until(&setup.limits, model, rates, motion_at, stop).map_err(in_limits)?;
+        let (reports, rate_hz) = match whole {
+            Some(reports) => (reports, rate_hz),
+            None => {
+                let rate_hz = rate_hz / COARSER;
+                let reports = check_limits(&setup.limits, model, duration_s, rate_hz, motion_at);
+                (reports.map_err(in_limits)?, rate_hz)
+            }
+        };
         let broken = reports.iter().any(|report| report.violated);
         let diagnosis =
-            if broken { sentences(&setup.set, duration_s, &reports, motion_at, single()?) } else { Vec::new() };
+            if broken { sentences(&setup.set, duration_s, &reports, motion_at, (single()?, stop)) } else { Vec::new() };
         Ok(Self { reports, rate_hz, of, diagnosis })
     }
 
@@ -72,13 +84,13 @@ fn sentences(
     duration_s: f64,
     reports: &[LimitReport],
     motion_at: &dyn Fn(&[f64], &mut Motion),
-    single: Vec<Relaxation>,
+    (single, stop): (Vec<Relaxation>, &dyn Fn() -> bool),
 ) -> Vec<String> {
-    let rate_hz = set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ);
+    let rate_hz = set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ) / if stop() { COARSER } else { 1.0 };
     let times = grid(duration_s, (duration_s * rate_hz).ceil() as usize + 1);
     let mut motion = Motion::default();
     motion_at(&times, &mut motion);
-    let mut diagnosis = diagnose(set, &times, &motion);
+    let mut diagnosis = diagnose_until(set, &times, &motion, stop);
     diagnosis.take_single(single);
     let sentences = diagnosis.sentences();
     if !sentences.is_empty() {

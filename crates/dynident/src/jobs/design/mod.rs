@@ -5,6 +5,7 @@ mod check;
 mod family;
 mod forecast;
 mod limit_check;
+mod limits_in_force;
 mod outcome;
 mod prior;
 mod search;
@@ -14,8 +15,8 @@ mod table;
 
 pub use check::{check_log, check_trajectory};
 pub(super) use family::{MotionFamily, motion_family};
+pub(super) use limits_in_force::limits_of;
 pub use outcome::DesignOutcome;
-pub(super) use setup::limits_of;
 pub(super) use table::trajectory as trajectory_table;
 
 use crate::error::{Error, Expected};
@@ -33,7 +34,7 @@ use std::path::Path;
 use step_wise::step_wise;
 
 /// Designs the motion that a study's `[design]` asks for (its defaults where the section is absent). `watch` hears how
-/// far the search is and may end it: the best so far is the result.
+/// far the search is and may end it: the best so far is the result, its limits checked at a tenth of the rate.
 ///
 /// The terms are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a
 /// motion that breaks one is a result, with `feasible` false and a diagnosis.
@@ -54,12 +55,12 @@ pub fn design_study(
     // The best motion of the family.
     let found = match &setup.section.criterion {
         CriterionChoice::WindowedCondition(windowed) => {
-            let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, watch)
+            let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, &watch)
                 .map_err(Error::section(study_path, "design"))?;
             setup.notes.push(WINDOWED.to_owned());
             found
         }
-        _ => search(&setup, study_path, watch)?,
+        _ => search(&setup, study_path, &watch)?,
     };
 
     // Its limits, by a check that shares nothing with the search, and what it says about the parameters.
@@ -68,10 +69,11 @@ pub fn design_study(
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let single = || match found.windowed {
         Some(_) => Ok(Vec::new()),
-        None => changes(&setup, study_path, &found),
+        None => changes(&setup, study_path, &found, &watch),
     };
-    let mut check =
-        LimitCheck::of(&setup, study_path, duration_s, check_rate_hz, "the motion itself", &motion_at, &single)?;
+    let rates = (duration_s, check_rate_hz);
+    let stop = || watch(&found.progress("check")).is_break();
+    let mut check = LimitCheck::of(&setup, study_path, rates, "the motion itself", &motion_at, (&single, &stop))?;
     check.diagnosis.extend(found.windowed.iter().flat_map(WindowedFile::sentences));
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);

@@ -2,6 +2,7 @@
 
 use super::forecast::named_forecast;
 use super::limit_check::LimitCheck;
+use super::limits_in_force::not_included;
 use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::cpu_time::cpu_seconds;
@@ -17,6 +18,7 @@ use dynident_excitation::families::Given;
 use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
+use dynident_model::Model;
 use nalgebra::DMatrix;
 use std::path::Path;
 use std::time::Instant;
@@ -122,12 +124,15 @@ pub struct DesignOutcome {
     pub limits: Limits,
     /// The search by generations, for optimisers that have them; empty for gradients.
     pub history: Vec<Generation>,
+    /// The robot with the payload that the motion carries.
+    loaded: Model,
     family: Box<dyn Family>,
 }
 
 impl DesignOutcome {
     /// All of it together.
-    pub(super) fn new(setup: DesignSetup, origin: MotionOrigin, review: MotionReview) -> Self {
+    pub(super) fn new(mut setup: DesignSetup, origin: MotionOrigin, review: MotionReview) -> Self {
+        setup.not_checked.extend(not_included(&setup.limits, &setup.robot, &review.check.reports));
         let MotionInformation { plain, weighted } = &review.information;
         let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
         let condition = |scaled| ConditionNumber { scaled, ..ConditionNumber::default() }.figure(plain);
@@ -170,8 +175,8 @@ impl DesignOutcome {
             not_checked: setup.not_checked,
             notes: setup.notes,
         };
-        let (robot, limits) = (setup.robot, setup.limits);
-        Self { file, robot, limits, history: origin.history, family: origin.motion }
+        let (robot, loaded, limits) = (setup.robot, setup.loaded, setup.limits);
+        Self { file, robot, loaded, limits, history: origin.history, family: origin.motion }
     }
 
     /// The outcome with what it comes from: of the study, and of what else was read.
@@ -205,23 +210,26 @@ impl DesignOutcome {
         (times, motion)
     }
 
-    /// Torque along a motion by the prior inertial parameters, joint-major as the motion, Nm (N); `None` while a body's
+    /// Torque along a motion by the prior inertial parameters and the known torque of friction and drives (at rest the
+    /// middle of what friction may hold), joint-major as the motion, Nm (N); `None` while a body's
     /// inertial is unknown.
     pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
-        let model = self.robot.model();
+        let model = &self.loaded;
         if !model.bodies_without_prior().is_empty() {
             return None;
         }
         let mut workspace = Workspace::new(model);
         let mut torque = vec![0.0; motion.joints * motion.samples];
+        let [mut low, mut high] = [(); 2].map(|()| vec![0.0; motion.joints]);
         for sample in 0..motion.samples {
             let state = |values: &[f64]| -> Vec<f64> {
                 (0..motion.joints).map(|joint| values[joint * motion.samples + sample]).collect()
             };
-            let tau =
-                inverse_dynamics(model, &mut workspace, &state(&motion.q), &state(&motion.dq), &state(&motion.ddq));
-            for (joint, tau) in tau.iter().enumerate() {
-                torque[joint * motion.samples + sample] = *tau;
+            let (q, dq, ddq) = (state(&motion.q), state(&motion.dq), state(&motion.ddq));
+            let rigid = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
+            self.limits.known_torque.range(rigid, [&q, &dq, &ddq], &mut low, &mut high);
+            for joint in 0..motion.joints {
+                torque[joint * motion.samples + sample] = f64::midpoint(low[joint], high[joint]);
             }
         }
         Some(torque)

@@ -5,6 +5,8 @@ use crate::result::BaseParameterResult;
 use crate::result::stored::read_part;
 use crate::study::{Folders, PriorSection, StudyRobot};
 use dynident_dynamics::Column;
+use dynident_excitation::limits::KnownTorque;
+use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 use serde::Deserialize;
 use std::path::Path;
@@ -58,6 +60,31 @@ pub(super) fn information(
         notes.push(format!("prior: the description's inertial parameters, good to {percent} % each"));
     }
     Ok(total)
+}
+
+/// The known torque with the friction and drive inertia of an earlier result: every term whose base parameter sums
+/// nothing else. It replaces the friction of the joint by the description.
+pub(super) fn with_earlier_torque(
+    section: &PriorSection,
+    robot: &StudyRobot,
+    folders: &Folders,
+    known: KnownTorque,
+) -> Result<KnownTorque, Error> {
+    let Some(result) = &section.result else { return Ok(known) };
+    let path = folders.find(result, None)?;
+    let found: EarlierEstimate = read_part(&path)?;
+    let of = |symbol: &str| {
+        found.base_parameters.iter().find(|own| own.symbol == symbol && own.expression == symbol).map(|own| own.value)
+    };
+    let found: Vec<(&TorqueTerm, f64)> = robot
+        .terms()
+        .iter()
+        .filter_map(|term| Some((term, of(&term.symbol())?)))
+        .filter(|(_, value)| value.is_finite())
+        .collect();
+    let joints = found.iter().filter(|(term, _)| term.is_joint_friction()).filter_map(|(term, _)| term.own_joint());
+    let known = joints.fold(known, KnownTorque::without_friction_of);
+    Ok(found.into_iter().fold(known, |known, (term, value)| known.with(term.clone(), value)))
 }
 
 /// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into

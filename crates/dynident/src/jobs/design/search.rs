@@ -24,6 +24,8 @@ pub(super) struct SearchResult {
     pub(super) start_posture: Vec<Option<f64>>,
     /// The criterion's figure; none where a parameter is not excited.
     pub(super) figure: Option<f64>,
+    /// Largest violation of a limit by the search; zero of a windowed design.
+    pub(super) violation: f64,
     /// The strokes of a windowed design.
     pub(super) windowed: Option<WindowedFile>,
     /// The search by generations, for optimisers that have them.
@@ -32,6 +34,18 @@ pub(super) struct SearchResult {
     pub(super) evaluations: usize,
     /// Seconds by the clock.
     pub(super) seconds: f64,
+}
+
+impl SearchResult {
+    /// What is reported after the search.
+    pub(super) fn progress(&self, round: &'static str) -> DesignProgress {
+        DesignProgress {
+            round,
+            value: self.figure.unwrap_or(f64::INFINITY),
+            violation: self.violation,
+            evaluations: self.evaluations as u64,
+        }
+    }
 }
 
 /// The search for the ordinary problem: all joints at once, by gradients or without.
@@ -70,6 +84,7 @@ pub(super) fn search(
         parameters: best.parameters,
         start_posture,
         figure: best.figure,
+        violation: best.violation,
         windowed: None,
         history,
         evaluations: best.evaluations,
@@ -90,11 +105,18 @@ fn task<'a>(setup: &'a DesignSetup, family: &'a dyn Family, criteria: &'a [&'a d
 }
 
 /// Changes of a single limit with which another motion than the one found would be possible; within the time limit's
-/// own length where there is one.
-pub(super) fn changes(setup: &DesignSetup, study_path: &Path, found: &SearchResult) -> Result<Vec<Relaxation>, Error> {
+/// own length where there is one. `watch` may end the search for them.
+pub(super) fn changes(
+    setup: &DesignSetup,
+    study_path: &Path,
+    found: &SearchResult,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+) -> Result<Vec<Relaxation>, Error> {
     let criteria: Vec<&dyn Criterion> = setup.criteria.iter().map(|criterion| &**criterion).collect();
     let settings = &setup.section.search;
-    let over = || settings.time_limit_s.is_some_and(|limit| setup.stopwatch.started.elapsed().as_secs_f64() > limit);
+    let progress = found.progress("changes of limits");
+    let late = || settings.time_limit_s.is_some_and(|limit| setup.stopwatch.started.elapsed().as_secs_f64() > limit);
+    let over = || watch(&progress).is_break() || late();
     single_changes(&task(setup, &*found.family, &criteria), settings, &found.parameters, &over)
         .map_err(Error::section(study_path, "design"))
 }

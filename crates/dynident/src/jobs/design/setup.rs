@@ -1,13 +1,15 @@
 //! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
 
+use super::limits_in_force::{LimitsFor, in_force, included, loaded};
 use super::outcome::Stopwatch;
 use super::{prior, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
-use dynident_excitation::limits::{AssumedLimits, LimitError, LimitSet, Limits, LimitsInForce, ShapesOfLinks};
+use dynident_excitation::limits::{LimitSet, Limits, LimitsInForce};
 use dynident_excitation::{Family, Information, Motion};
+use dynident_model::Model;
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -27,6 +29,8 @@ pub(super) struct DesignSetup {
     pub(super) name: String,
     pub(super) section: DesignSection,
     pub(super) robot: StudyRobot,
+    /// The robot with the payload that the motion carries.
+    pub(super) loaded: Model,
     pub(super) limits: Limits,
     pub(super) set: LimitSet,
     pub(super) criteria: Vec<Box<dyn Criterion>>,
@@ -44,19 +48,24 @@ impl DesignSetup {
     /// For a search: terms are smooth, and something bounds how fast each joint moves.
     pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
-        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes, true)?;
+        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes, LimitsFor::Search)?;
         bounded(&setup.robot, &setup.limits).map_err(Error::section(study_path, "design.limits"))?;
         Ok(setup)
     }
 
-    /// For a motion that is there already: terms as the study has them.
-    pub(super) fn for_check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
-        Self::new(study, study_path, options, Vec::new(), true)
+    /// For a motion that is there already and starts at these positions: terms as the study has them.
+    pub(super) fn for_check(
+        study: &Study,
+        study_path: &Path,
+        options: &RunOptions<'_>,
+        start: &[f64],
+    ) -> Result<Self, Error> {
+        Self::new(study, study_path, options, Vec::new(), LimitsFor::Motion(start))
     }
 
     /// For a log: what the robot did needs no assumption of what it may do.
     pub(super) fn for_log(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
-        Self::new(study, study_path, options, Vec::new(), false)
+        Self::new(study, study_path, options, Vec::new(), LimitsFor::Log)
     }
 
     fn new(
@@ -64,19 +73,17 @@ impl DesignSetup {
         study_path: &Path,
         options: &RunOptions<'_>,
         mut notes: Vec<String>,
-        assume: bool,
+        purpose: LimitsFor<'_>,
     ) -> Result<Self, Error> {
         let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
         section.validate().map_err(Error::section(study_path, "design"))?;
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let robot = StudyRobot::new(study, study_path, &folders)?;
-        let in_limits = |error| Error::section(study_path, "design.limits")(error);
-        section.limits.validate(robot.model()).map_err(in_limits)?;
-        let settings = if assume { section.defaults.clone() } else { AssumedLimits::none() };
-        let LimitsInForce { limits, assumed, not_checked } =
-            in_force(&robot, &settings, &section.limits).map_err(in_limits)?;
-        let set = LimitSet::new(&limits, robot.model()).map_err(Error::section(study_path, "design.limits"))?;
+        let LimitsInForce { limits, assumed, not_checked } = in_force((study, study_path, &folders), &robot, purpose)?;
+        notes.extend(included(&limits, robot.model()));
+        let loaded = loaded((study, study_path), &robot)?;
+        let set = LimitSet::new(&limits, &loaded).map_err(Error::section(study_path, "design.limits"))?;
         let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study_path, "design"))?;
         let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
@@ -99,6 +106,7 @@ impl DesignSetup {
             ones: vec![1.0; robot.model().dof()],
             section,
             robot,
+            loaded,
             limits,
             set,
             criteria,
@@ -137,25 +145,6 @@ impl DesignSetup {
             None => criterion.figure(weighted),
         }
     }
-}
-
-/// What a study's robot keeps wherever it moves: the description's limits, those assumed, and those of `[design]`,
-/// where there is one.
-///
-/// # Errors
-/// Limits that cannot be.
-pub(in crate::jobs) fn limits_of(study: &Study, robot: &StudyRobot) -> Result<Limits, LimitError> {
-    let section = study.design.clone().unwrap_or_default();
-    section.limits.validate(robot.model())?;
-    Ok(in_force(robot, &section.defaults, &section.limits)?.limits)
-}
-
-/// The limits of a robot: the description's, those assumed, and the study's.
-fn in_force(robot: &StudyRobot, settings: &AssumedLimits, given: &Limits) -> Result<LimitsInForce, LimitError> {
-    let with_shapes = settings.floor || (settings.self_collision && given.self_collision.is_none());
-    let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
-    let shapes = if with_shapes { ShapesOfLinks::of(robot.model(), folder) } else { ShapesOfLinks::default() };
-    LimitsInForce::new(robot.model(), &shapes, settings, given)
 }
 
 /// Information of a motion at `times`, a block at a time.

@@ -128,6 +128,7 @@ pub(crate) fn step_wise(
         parameters,
         start_posture: Vec::new(),
         figure: Some(condition_sum),
+        violation: 0.0,
         windowed: Some(file),
         history,
         evaluations,

@@ -16,7 +16,7 @@ use std::path::Path;
 /// Spreads the seeds of legs that have an iteration each.
 const SEED_OF_LEG: u64 = 0xd1b5_4a32_d192_ed03;
 
-/// The trajectory of each leg; the study's own is looked for once.
+/// The trajectory of each leg; the study's own is looked for once, and again with each known load.
 pub(super) fn trajectories(
     study: &Study,
     study_path: &Path,
@@ -33,11 +33,19 @@ pub(super) fn trajectories(
     let mut whole: Option<Trajectory> = None;
     let mut all = Vec::new();
     for leg in &section.leg {
-        if leg.trajectory.is_some() || leg.design.is_some() {
+        // A load that is known is part of the torque limits, and its motion is looked for with it.
+        let is_known = |name: &String| study.payload.iter().any(|one| one.name == *name && one.known().is_some());
+        let load = leg.payload.as_ref().filter(|name| is_known(name));
+        if leg.trajectory.is_some() || leg.design.is_some() || load.is_some() {
             let mut own = study.clone();
-            own.iteration.get_or_insert_default().trajectory.clone_from(&leg.trajectory);
+            if leg.trajectory.is_some() || leg.design.is_some() {
+                own.iteration.get_or_insert_default().trajectory.clone_from(&leg.trajectory);
+            }
             if leg.design.is_some() {
                 own.design.clone_from(&leg.design);
+            }
+            if let (Some(design), Some(load)) = (&mut own.design, load) {
+                design.payload = Some(load.clone());
             }
             all.push(of(&own)?);
             continue;

@@ -208,7 +208,7 @@ fn iterated(
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
     let references: Vec<_> = legs.iter().map(Leg::reference).collect();
     let limits = match section.home {
-        Some(_) => limits_of(study, &robot).map_err(Error::section(study_path, "design.limits"))?,
+        Some(_) => limits_of((study, study_path, &folders), &robot)?,
         None => Limits::default(),
     };
     let (settings, lowered) = section.guarded(settings, (study, limits), &robot, &references).map_err(in_section)?;

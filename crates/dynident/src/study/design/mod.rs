@@ -39,6 +39,9 @@ const MAX_SAMPLES: f64 = 1e6;
 /// Largest margin to stops, percent.
 const MOST_STOP_MARGIN: f64 = 90.0;
 
+/// Most turns of a joint without position limits.
+const MOST_TURNS: f64 = 1e4;
+
 /// Most starts, rounds and evaluations of one start.
 const MAX_COUNT: usize = 1_000_000;
 
@@ -79,6 +82,9 @@ pub struct DesignSection {
     pub parameters: Vec<GivenStroke>,
     /// Where the motion starts, and where a family that returns ends; free by default.
     pub start_posture: Option<StartPosture>,
+    /// Name of a known `[[payload]]` that the arm carries in the motion: torque limits include it. None by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub payload: Option<String>,
     /// What is known before the motion; nothing by default.
     pub prior: PriorSection,
     /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default
@@ -101,6 +107,7 @@ impl Default for DesignSection {
             optimiser: OptimiserChoice::default(),
             parameters: Vec::new(),
             start_posture: None,
+            payload: None,
             prior: PriorSection::default(),
             torque_std_nm: None,
             search: DesignSettings::default(),
@@ -256,6 +263,23 @@ impl DesignSection {
         model.own_scale().seconds(MAX_DURATION_S)
     }
 
+    /// Where the family's own settings let the motion start, rad (m), joint by joint; empty where they do not say.
+    pub(crate) fn start_of_family(&self) -> Vec<Option<f64>> {
+        let own = match &self.family {
+            FamilyChoice::SplicedLogistic(own) => own.offsets.as_ref(),
+            FamilyChoice::Joined(own) => own.start.as_ref(),
+            FamilyChoice::Fourier(_)
+            | FamilyChoice::BSpline(_)
+            | FamilyChoice::Quintic(_)
+            | FamilyChoice::Multisine(_)
+            | FamilyChoice::LogisticStrokes(_)
+            | FamilyChoice::FrictionLadder(_)
+            | FamilyChoice::StaticPostures(_)
+            | FamilyChoice::Function(_) => None,
+        };
+        own.map_or_else(Vec::new, |start| start.iter().copied().map(Some).collect())
+    }
+
     /// Checks everything that needs no robot.
     ///
     /// # Errors
@@ -290,6 +314,7 @@ impl DesignSection {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
         }
         within("defaults.stop_margin_percent", self.defaults.stop_margin_percent, 0.0, MOST_STOP_MARGIN)?;
+        within("defaults.continuous_turns", self.defaults.continuous_turns, 0.0, MOST_TURNS)?;
         self.prior.validate()?;
         if !self.prior.is_empty() && self.criterion.of_regressor() {
             let fix = "a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction";

@@ -23,7 +23,7 @@ impl StartPosture {
     ///
     /// # Errors
     /// A joint that the model does not have, another number of positions than joints.
-    pub(in crate::study) fn named(&self, key: &'static str, model: &Model) -> Result<Vec<Option<f64>>, StudyError> {
+    pub(crate) fn named(&self, key: &'static str, model: &Model) -> Result<Vec<Option<f64>>, StudyError> {
         let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
         match self {
             Self::List(list) if list.len() != names.len() => {

@@ -21,6 +21,11 @@ impl IterationSection {
         }
     }
 
+    /// The envelope, where there is one: of a robot outside, or stated.
+    pub(crate) fn envelope_in_force(&self) -> Option<&EnvelopeSettings> {
+        (self.is_outside() || self.envelope != EnvelopeSettings::default()).then_some(&self.envelope)
+    }
+
     /// That a robot outside has gains that somebody stands for: stated, or by a stated bandwidth from a description
     /// with bodies.
     ///
@@ -135,10 +140,9 @@ impl IterationSection {
                 settings.controller = derived.model_based;
             }
         }
-        let stated = self.envelope != EnvelopeSettings::default();
         settings.safety = SafetySettings {
             outside,
-            envelope: (outside || stated).then(|| self.envelope.envelope(model)).transpose()?,
+            envelope: self.envelope_in_force().map(|own| own.envelope(model)).transpose()?,
             oscillation: self.oscillation.clone(),
             rehearsal: outside.then(|| RehearsalSettings {
                 delay_s: Some(self.delay_s(study, robot)),
