@@ -6,6 +6,7 @@ use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
+use crate::inputs::InputFiles;
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::pages::design as pictures;
@@ -123,6 +124,7 @@ pub struct DesignOutcome {
     /// The search by generations, for optimisers that have them; empty for gradients.
     pub history: Vec<Generation>,
     family: Box<dyn Family>,
+    inputs: InputFiles,
 }
 
 impl DesignOutcome {
@@ -170,11 +172,14 @@ impl DesignOutcome {
             not_checked: setup.not_checked,
             notes: setup.notes,
         };
-        let (robot, limits) = (setup.robot, setup.limits);
-        Self { file, robot, limits, history: origin.history, family: origin.motion }
+        let (robot, limits, inputs) = (setup.robot, setup.limits, setup.inputs);
+        Self { inputs, file, robot, limits, history: origin.history, family: origin.motion }
     }
 
     /// The outcome with what it comes from: of the study, and of what else was read.
+    ///
+    /// # Errors
+    /// A file that cannot be read again, or that changed since the design began.
     pub(super) fn with_provenance(
         mut self,
         (study, study_path): (&Study, &Path),
@@ -182,6 +187,7 @@ impl DesignOutcome {
         further: &[(&'static str, StudyInput)],
     ) -> Result<Self, Error> {
         self.file.provenance = Some(motion_provenance(study, study_path, options.data.as_deref(), further)?);
+        self.inputs.unchanged()?;
         Ok(self)
     }
 

@@ -3,6 +3,7 @@
 use super::outcome::Stopwatch;
 use super::{prior, table};
 use crate::error::{Error, StudyError};
+use crate::inputs::InputFiles;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
@@ -38,6 +39,8 @@ pub(super) struct DesignSetup {
     pub(super) assumed: Vec<String>,
     pub(super) not_checked: Vec<String>,
     pub(super) stopwatch: Stopwatch,
+    /// The study's files as they were before anything was read.
+    pub(super) inputs: InputFiles,
 }
 
 impl DesignSetup {
@@ -69,6 +72,7 @@ impl DesignSetup {
         let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
         section.validate().map_err(Error::section(study_path, "design"))?;
+        let inputs = InputFiles::of(study, study_path, options.data.as_deref());
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let robot = StudyRobot::new(study, study_path, &folders)?;
         let in_limits = |error| Error::section(study_path, "design.limits")(error);
@@ -108,6 +112,7 @@ impl DesignSetup {
             assumed,
             not_checked,
             stopwatch,
+            inputs,
         })
     }
 
