@@ -79,11 +79,19 @@ impl fmt::Display for LogMistake {
                 joints.join(", ")
             ),
             Self::PositionSign { joints } => {
-                write!(f, "the positions of {} have the opposite sign: reverse it, and check the torque's", joints.join(", "))
+                write!(
+                    f,
+                    "the positions of {} have the opposite sign: reverse it, and check the torque's",
+                    joints.join(", ")
+                )
             }
             Self::ExchangedPositions { columns } => {
                 let each = columns.iter().map(|(name, holds)| format!("that of {name} holds the motion of {holds}"));
-                write!(f, "columns of positions are exchanged ({}): name them in the robot's order, q and tau alike", each.collect::<Vec<_>>().join(", "))
+                write!(
+                    f,
+                    "columns of positions are exchanged ({}): name them in the robot's order, q and tau alike",
+                    each.collect::<Vec<_>>().join(", ")
+                )
             }
             Self::TorqueUnit { ratio, unit } => {
                 write!(f, "the torques are {ratio:.3e} times those that the model predicts ({unit}): write Nm (N)")
@@ -253,8 +261,7 @@ impl<'a> Comparison<'a> {
         // What is plausible by itself comes first: the robot lags, and stamps that are right stay as they are.
         let covers = |start: f64| start >= earliest && start <= latest;
         let alike = |start: f64| {
-            covers(start)
-                && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - ALIKE)
+            covers(start) && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - ALIKE)
         };
         let (start_s, early) = if alike(0.0) {
             (0.0, false)
@@ -286,9 +293,8 @@ impl<'a> Comparison<'a> {
                 reversed.push(name(joint));
             }
             let ratio = range(&own) / range(&self.targets[holds]);
-            let unit = POSITION_UNITS.iter().position(|(_, factor)| {
-                (ratio / factor - 1.0).abs() <= settings.ratio_tolerance
-            });
+            let unit =
+                POSITION_UNITS.iter().position(|(_, factor)| (ratio / factor - 1.0).abs() <= settings.ratio_tolerance);
             if let Some(unit) = unit {
                 match in_unit.iter_mut().find(|(known, ..)| *known == unit) {
                     Some((_, _, joints)) => joints.push(name(joint)),
@@ -299,8 +305,10 @@ impl<'a> Comparison<'a> {
         if !exchanged.is_empty() {
             mistakes.push(LogMistake::ExchangedPositions { columns: exchanged });
         }
-        mistakes.extend(in_unit.into_iter().map(|(unit, ratio, joints)| {
-            LogMistake::PositionUnit { joints, ratio, unit: POSITION_UNITS[unit].0 }
+        mistakes.extend(in_unit.into_iter().map(|(unit, ratio, joints)| LogMistake::PositionUnit {
+            joints,
+            ratio,
+            unit: POSITION_UNITS[unit].0,
         }));
         if !reversed.is_empty() {
             mistakes.push(LogMistake::PositionSign { joints: reversed });

@@ -5,9 +5,11 @@ mod client;
 mod conversation;
 mod envelope;
 mod folder;
+mod folder_forms;
 mod function;
 mod handover;
 mod held_torque;
+mod log_mistakes;
 mod log_table;
 mod process;
 mod process_group;
@@ -23,8 +25,10 @@ mod workspace;
 
 pub use envelope::{Envelope, EnvelopeSettings};
 pub use folder::{FolderRobot, FolderSettings};
+pub use folder_forms::FolderForm;
 pub use function::{ControlledRun, FunctionRobot};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
+pub use log_mistakes::{ExaminedLog, LogMistake, LogMistakeSettings, examine_log};
 pub use log_table::{LogTableError, read_log_table};
 pub use process::ProcessRobot;
 pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
@@ -154,19 +158,22 @@ pub struct RobotRun {
     pub truth: Option<Run>,
     /// What was recorded along the ways, where the request had some and they are known.
     pub ways: Option<WayRecords>,
+    /// What was changed in the record to bring it onto the motion's clock; `None` where nothing was.
+    pub note: Option<String>,
 }
 
 impl RobotRun {
     /// A run of which nothing was recorded.
     pub fn without_samples(status: RobotStatus, joints: &[String], rate_hz: f64) -> Self {
-        Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None }
+        Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None, note: None }
     }
 
     /// How it ended, in words, and what its record shows of why it left its envelope.
     pub fn ending(&self, reference: &Reference) -> String {
         let of_joint = |at| held_torque::held_torque(reference, &self.record, at);
         let held = self.status.too_far().and_then(of_joint);
-        held.map_or_else(|| self.status.to_string(), |held| format!("{}; {held}", self.status))
+        let parts = [Some(self.status.to_string()), held.map(|held| held.to_string()), self.note.clone()];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 
     /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
@@ -413,6 +420,13 @@ pub trait Robot: core::fmt::Debug {
 
     /// Names of its joints, in the model's order.
     fn joints(&self) -> &[String];
+
+    /// Whether a person has corrected the log of a run since it was read: `folder_name` is that of its request
+    /// ([`RunRequest::folder_name`]), `kept` what was recorded along `reference`. Only a robot whose logs a person brings
+    /// may answer true: then the run is judged anew from the corrected log.
+    fn has_corrected_log(&self, _folder_name: &str, _reference: &Reference, _kept: &Record) -> bool {
+        false
+    }
 
     /// Runs a trajectory. What the robot does wrong is the run's [`RobotStatus`], with the records so far.
     ///
