@@ -1,5 +1,5 @@
-//! **May this input file be read, and is it still the same?** Opens regular files only, reads at most a stated number of
-//! bytes, detects files that change while they are read, and shortens what messages quote of them.
+//! **May this input file be read, and is it still the same?** Opens regular files only, reads at most a stated number
+//! of bytes, detects files that change while they are read, and shortens what messages quote of them.
 //!
 //! ```
 //! use dynident_files::{SeenFiles, read};
@@ -121,9 +121,9 @@ pub fn shortened(message: &str) -> String {
     cut(&parts.join("`"), MOST_IN_MESSAGE)
 }
 
-/// What distinguishes a file from the one that takes its place: length, time of the last change and, on Unix, device and
-/// inode. Content that is replaced within the resolution of the file system's clock, in place and at the same length, is
-/// not detected.
+/// What distinguishes a file from the one that takes its place: length, time of the last change and, on Unix, device
+/// and inode. Content that is replaced within the resolution of the file system's clock, in place and at the same
+/// length, is not detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileIdentity {
     bytes: u64,

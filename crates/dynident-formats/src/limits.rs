@@ -3,9 +3,9 @@
 /// Bound on the memory that the numbers of one file take, for the formats that are held in memory as a whole (NumPy,
 /// MATLAB, HDF5, DIAdem) and for one batch of Arrow. Text, JSON lines, Parquet and bags are read in pieces.
 ///
-/// A file of `n` bytes may take `min(memory_bytes, max(always_bytes, expansion · n))`. Measured joint logs shrink to 1/2
-/// to 1/10 when they are packed, and columns of one repeated value to 1/1000: packed numbers that expand more than
-/// `expansion` times beyond `always_bytes` are no recording of a robot.
+/// A file of `n` bytes may take `min(memory_bytes, max(always_bytes, expansion · n))`. Measured on 13 logs of four arms
+/// as doubles: packing by zlib shrinks a log 1.1 to 2.9 times, and a column of one repeated value 680 times. Packed
+/// numbers that expand more than `expansion` times beyond `always_bytes` are no recording of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadLimits {
     /// Largest memory, bytes. Default 2 GiB.

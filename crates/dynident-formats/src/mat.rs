@@ -60,7 +60,7 @@ mod reading {
         }
     }
 
-    /// What has been found so far.
+    /// Reader state: byte order, memory left, and the arrays of all variables.
     struct Found {
         big_endian: bool,
         budget: Budget,
@@ -109,7 +109,7 @@ mod reading {
     struct Tag {
         kind: u32,
         size: usize,
-        /// The bytes of an element of up to four, which stand in the tag.
+        /// The content of an element of at most four bytes, which is inside the tag.
         short: Option<[u8; 4]>,
     }
 
@@ -213,8 +213,8 @@ mod reading {
             Ok(values)
         }
 
-        /// Adds the arrays in a matrix element of `size` bytes: its own, or those of a struct's fields. `name` is what a
-        /// struct calls it.
+        /// Adds the arrays in a matrix element of `size` bytes: its own, or those of a struct's fields. `name` is what
+        /// a struct calls it.
         fn matrix(
             &mut self,
             reader: &mut dyn Read,

@@ -6,7 +6,8 @@ use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::schema::types::ColumnDescriptor;
 
-/// Values of one page at most. Writers make pages of about 20,000; a page of repeated levels may claim 2^31 in a few bytes.
+/// Values of one page at most. Writers make pages of about 20,000; a page of repeated levels may claim 2^31 in a few
+/// bytes.
 const MOST_VALUES: u32 = 1 << 26;
 
 /// The pages of `inner`, each looked at before it is handed on.

@@ -106,7 +106,7 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
     Some(Member { name, method, crc, packed, header })
 }
 
-/// The unpacked bytes of a member, and their checksum so far.
+/// Unpacked bytes of a member, with a running checksum.
 pub(crate) struct Contents<'a> {
     reader: Box<dyn Read + 'a>,
     hasher: crc32fast::Hasher,

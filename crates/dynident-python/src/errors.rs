@@ -56,7 +56,9 @@ pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
         Job::Result { path, .. } | Job::Export { path, .. } | Job::Factors { path, .. } => {
             (ResultError::new_err(message), Some(path), None, None)
         }
-        Job::File { path, .. } | Job::Output { path, .. } | Job::Changed { path } => (Error::new_err(message), Some(path), None, None),
+        Job::File { path, .. } | Job::Output { path, .. } | Job::Changed { path } => {
+            (Error::new_err(message), Some(path), None, None)
+        }
         _ => (Error::new_err(message), None, None, None),
     };
     let value = exception.value(py);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Largest file of a result, a design, runs or factors that is read, bytes.
 pub const MAX_RESULT_BYTES: u64 = 1 << 32;
-/// Largest robot description in which meshes and included files are looked for, bytes.
+/// Largest robot description that is searched for meshes and included files, bytes.
 const MAX_ROBOT_BYTES: u64 = 64 << 20;
 
 /// Reads a file that a command has written: a result, a design, runs, factors.
@@ -25,8 +25,8 @@ pub fn read_result(path: &Path) -> Result<Vec<u8>, Error> {
 pub(crate) struct InputFiles(SeenFiles);
 
 impl InputFiles {
-    /// Takes note of the study's file, every file that the study names, and the meshes and included files that its robot
-    /// names, as far as they exist.
+    /// Takes note of the study's file, every file that the study names, and the meshes and included files that its
+    /// robot names, as far as they exist.
     pub(crate) fn of(study: &Study, study_path: &Path, data: Option<&Path>) -> Self {
         let mut files = named_files(study, study_path, data, |_| true);
         if let Ok(robot) = Folders::new(study, study_path, data).find(&study.robot.file, None) {
@@ -34,7 +34,7 @@ impl InputFiles {
         }
         let seen = SeenFiles::default();
         for file in files {
-            // A recording may be several files. What cannot be read is reported where it is read.
+            // A recording may be several files. Errors are reported by the reader.
             for part in dynident_recording::log::files(&file).unwrap_or_default() {
                 let _ = seen.is_unchanged(&part);
             }
@@ -50,7 +50,7 @@ impl InputFiles {
         self.0.first_changed().map_or(Ok(()), |path| Err(Error::Changed { path }))
     }
 
-    /// Does a job that reads the files. A file that changes during the job is an error, whatever the job's outcome is:
+    /// Does a job that reads the files. A file that changes during the job is an error, also if the job failed:
     /// its numbers and the hashes in its provenance may belong to different contents.
     ///
     /// # Errors

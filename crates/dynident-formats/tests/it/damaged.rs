@@ -159,7 +159,7 @@ fn mat(element: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A matrix element of `count` doubles in one column, of which `data` is there.
+/// A matrix element that claims `count` doubles in one column and contains `data`.
 #[cfg(feature = "gzip")]
 fn matrix(count: u32, data: &[u8]) -> Vec<u8> {
     let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();

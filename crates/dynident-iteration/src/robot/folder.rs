@@ -35,8 +35,8 @@ pub struct FolderSettings {
     /// Rate of the URScript program, Hz: 125 for CB-series, 500 for e-series. Default 125.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub urscript_rate_hz: Option<f64>,
-    /// Torque at the joint for one ampere, Nm/A (N/A), gear included: one number or one for each joint. `current.csv` is
-    /// made with it, and a log may have currents `i1..` in A instead of `tau1..`. Default none.
+    /// Torque at the joint for one ampere, Nm/A (N/A), gear included: one number or one for each joint. `current.csv`
+    /// is made with it, and a log may have currents `i1..` in A instead of `tau1..`. Default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_constants: Option<PerJoint>,
 }
@@ -47,7 +47,7 @@ impl FolderSettings {
         Self { folder: folder.into(), wait_s: 0.0, forms: Vec::new(), urscript_rate_hz: None, torque_constants: None }
     }
 
-    /// What the forms need, for so many joints.
+    /// Settings of the forms for a robot with this number of joints.
     fn form_settings(&self, joints: usize) -> Result<FormSettings, SimulationError> {
         let constants = self.torque_constants.as_ref().map(|constants| {
             let holds = |value: f64| value.is_finite() && value != 0.0;
@@ -105,7 +105,8 @@ impl FolderRobot {
         Ok(Self { settings, forms, prior: None, joints, name })
     }
 
-    /// With the model by which the unit of recorded torques is judged as long as the controller has none.
+    /// Sets the model that predicts torques while the controller has none: the unit of recorded torques is judged by
+    /// it.
     #[must_use]
     pub fn with_prior(mut self, prior: Option<ControllerModel>) -> Self {
         self.prior = prior;
@@ -117,7 +118,7 @@ impl FolderRobot {
         read_log_with_currents(path, &self.joints, rate_hz, self.forms.torque_constants.as_deref())
     }
 
-    /// What a log along a reference shows.
+    /// Compares a log with the reference and the predicted torque.
     fn examined(&self, record: Record, reference: &Reference, model: Option<&ControllerModel>) -> ExaminedLog {
         let torque = model.or(self.prior.as_ref()).map(|model| {
             let rows: Vec<Vec<f64>> = model_torques(reference, model).collect();

@@ -40,7 +40,7 @@ pub(super) struct FormSettings {
 }
 
 /// Writes the forms of a run's motion, and of the ways to it and back, into its folder. Torques need a model: without
-/// one there are none yet.
+/// one their files are left out.
 ///
 /// # Errors
 /// A motion that a form cannot hold, a file that cannot be written.

@@ -10,8 +10,8 @@ use dynident_simulation::{Record, Reference};
 /// When a recording is taken for a mistake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogMistakeSettings {
-    /// Correlation of recorded with commanded positions from which a comparison is certain. Default 0.95: a simulated arm
-    /// with soft loops reaches 0.97, the motions of two joints of a designed trajectory stay below 0.6.
+    /// Correlation of recorded with commanded positions from which a comparison is certain. Default 0.95: apart from a
+    /// delay and a scale, the tracking error is then a third of the motion's standard deviation (`1/√(1 + 0.33²)`).
     pub min_correlation: f64,
     /// A delay that may be the robot's own, s: up to this much, time stamps are left as they are. Default 0.25.
     pub max_lag_s: f64,
@@ -62,7 +62,7 @@ pub enum LogMistake {
     TorqueUnit {
         /// Recorded over predicted torque, the middle one of the joints.
         ratio: f64,
-        /// What it may be.
+        /// The likely unit, in words.
         unit: &'static str,
     },
 }
@@ -100,14 +100,14 @@ impl fmt::Display for LogMistake {
     }
 }
 
-/// What a recording shows.
+/// A recording after the comparison with its motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExaminedLog {
     /// The recording, on the motion's clock.
     pub record: Record,
-    /// What was changed to bring it there; `None` where its time stamps are used as they are.
+    /// Change of the time stamps in words; `None` if they are used as they are.
     pub note: Option<String>,
-    /// What has to be corrected in the file.
+    /// Mistakes that have to be corrected in the file.
     pub mistakes: Vec<LogMistake>,
 }
 
@@ -229,7 +229,7 @@ impl<'a> Comparison<'a> {
         self.times_s.iter().map(|time| interpolated(&record.times_s, own, (time + start_s) / seconds)).collect()
     }
 
-    /// Mean over the joints that move of the best correlation of each with any commanded motion, whatever its sign.
+    /// Mean over the moving joints of the largest absolute correlation with the commanded motion of any joint.
     fn correlation(&self, record: &Record, seconds: f64, start_s: f64) -> f64 {
         let best = |&joint: &usize| {
             let own = self.recorded(record, joint, seconds, start_s);
@@ -239,8 +239,8 @@ impl<'a> Comparison<'a> {
         self.moving.iter().map(best).sum::<f64>() / self.moving.len() as f64
     }
 
-    /// The clock on which the recording resembles the motion most, with stamps in a unit of so many seconds; `None` if
-    /// the recording is shorter than the motion then.
+    /// Finds the clock with the largest correlation, for time stamps in a unit of `seconds`; `None` if the recording is
+    /// then shorter than the motion.
     fn clock(&self, record: &Record, seconds: f64, settings: &LogMistakeSettings) -> Option<Clock> {
         let duration_s = self.reference.duration_s();
         let (first, last) = (record.times_s[0] * seconds, record.times_s[record.samples - 1] * seconds);
@@ -258,7 +258,7 @@ impl<'a> Comparison<'a> {
         let best = coarse.map(|start| (at(start), start)).max_by(|a, b| a.0.total_cmp(&b.0))?;
         let fine = (-10..=10).map(|k| best.1 + step * f64::from(k) / 10.0);
         let (correlation, start_s) = fine.map(|start| (at(start), start)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        // What is plausible by itself comes first: the robot lags, and stamps that are right stay as they are.
+        // Stamps as they are come first, then those of a recording that begins with the motion: the robot may lag.
         let covers = |start: f64| start >= earliest && start <= latest;
         let alike = |start: f64| {
             covers(start) && ((start_s - start).abs() <= settings.max_lag_s || at(start) >= correlation - ALIKE)
@@ -429,7 +429,7 @@ mod tests {
         let record = recorded(0.0, DURATION_S);
         let found = examined(record.clone());
         assert_eq!(found, ExaminedLog { record, note: None, mistakes: Vec::new() });
-        // Another motion is no mistake of units.
+        // Another motion is not explained by units.
         let mut other = recorded(0.0, DURATION_S);
         other.q.iter_mut().enumerate().for_each(|(k, q)| *q = (k as f64 * 0.37).sin());
         assert_eq!(examined(other.clone()), ExaminedLog { record: other, note: None, mistakes: Vec::new() });

@@ -72,8 +72,8 @@ pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -
     read_log_with_currents(path, joints, rate_hz, None)
 }
 
-/// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, where there
-/// is no column `tau1`.
+/// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, where
+/// there is no column `tau1`.
 ///
 /// # Errors
 /// As [`read_log_table`].

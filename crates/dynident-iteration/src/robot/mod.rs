@@ -158,7 +158,7 @@ pub struct RobotRun {
     pub truth: Option<Run>,
     /// What was recorded along the ways, where the request had some and they are known.
     pub ways: Option<WayRecords>,
-    /// What was changed in the record to bring it onto the motion's clock; `None` where nothing was.
+    /// Change of the record's time stamps in words; `None` if they are used as they are.
     pub note: Option<String>,
 }
 
@@ -422,8 +422,8 @@ pub trait Robot: core::fmt::Debug {
     fn joints(&self) -> &[String];
 
     /// Whether a person has corrected the log of a run since it was read: `folder_name` is that of its request
-    /// ([`RunRequest::folder_name`]), `kept` what was recorded along `reference`. Only a robot whose logs a person brings
-    /// may answer true: then the run is judged anew from the corrected log.
+    /// ([`RunRequest::folder_name`]), `kept` what was recorded along `reference`. Only a robot whose logs a person
+    /// brings may answer true: then the run is judged anew from the corrected log.
     fn has_corrected_log(&self, _folder_name: &str, _reference: &Reference, _kept: &Record) -> bool {
         false
     }

@@ -1,5 +1,5 @@
-//! Logs that a person brings: mistakes are named before the robot is blamed, a corrected file is read again, and the
-//! motion is there in every form that was asked for.
+//! Logs that a person brings: mistakes are named before the robot is blamed, a corrected file is read again, and every
+//! form of the motion is written.
 
 use super::simulated_arm::{Simulated, described, reference, settings, task};
 use dynident_iteration::robot::{Envelope, FolderForm, FolderRobot, FolderSettings};
@@ -19,7 +19,7 @@ fn prior() -> ControllerModel {
     ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).unwrap()
 }
 
-/// What a robot without any mistake records.
+/// A log without any mistake.
 fn recorded() -> Record {
     Simulated::default().robot().run(&RunRequest::new(1, &reference(), &pd())).unwrap().record
 }
@@ -175,7 +175,7 @@ fn every_form_of_a_motion_is_in_its_folder() {
     std::fs::write(robot.run_folder(1).join("log.csv"), currents.csv().replace("tau", "i")).unwrap();
     let run = robot.run(&request).unwrap();
     assert!(run.status.is_done() && run.record.tau.iter().zip(&right.tau).all(|(a, b)| (a - b).abs() < 1e-9));
-    // What a form needs is asked for before anything is written.
+    // A form without its settings is refused before anything is written.
     let refused = |settings: FolderSettings| FolderRobot::new(settings, joints.clone()).unwrap_err().to_string();
     let message = refused(FolderSettings { torque_constants: None, ..settings.clone() });
     assert!(message.contains("torque_constants"), "{message}");

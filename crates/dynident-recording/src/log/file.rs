@@ -37,9 +37,9 @@ impl FileLog {
     /// What the file is, and a pass over its rows.
     ///
     /// # Errors
-    /// If it cannot be read, is no table, or changed since the first pass.
+    /// If it cannot be read, does not hold a table, or changed since the first pass.
     pub fn open_with_format(&self) -> Result<(FileFormat, Box<dyn LogTable>), RecordingError> {
-        // What cannot be listed or found cannot be opened either, and is reported there.
+        // Errors of listing and finding a file are reported when it is opened.
         for file in dynident_formats::files(&self.path).unwrap_or_default() {
             if self.seen.is_unchanged(&file).is_ok_and(|unchanged| !unchanged) {
                 return Err(RecordingError::Changed { file });

@@ -21,7 +21,7 @@ impl Progress for Once<'_> {
     fn end(&self) {}
 }
 
-/// A study of two logs, whose robot lies beside it.
+/// A study of two logs, with its robot in the same folder.
 fn job(folder: &Path) -> Job {
     std::fs::copy(repository("robots/planar2r.urdf"), folder.join("arm.urdf")).unwrap();
     let truth = Truth::near(&folder.join("arm.urdf"), 0.1, true);
