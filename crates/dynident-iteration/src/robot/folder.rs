@@ -182,7 +182,11 @@ impl FolderRobot {
         };
         let ways = self.way_records(request, folder)?;
         let stopped = dynident_files::read_text(&folder.join("stopped.txt"), MOST_STOPPED_BYTES).ok();
-        let ExaminedLog { record, note, mistakes } = self.examined(record, request.reference, request.model);
+        // A run that was stopped follows the motion only so far; its log is taken as it is.
+        let ExaminedLog { record, note, mistakes } = match &stopped {
+            Some(_) => ExaminedLog { record, note: None, mistakes: Vec::new() },
+            None => self.examined(record, request.reference, request.model),
+        };
         if !mistakes.is_empty() {
             let each = mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
             return Ok(waiting(format!(

@@ -7,11 +7,10 @@ use super::setup::{DesignSetup, MotionInformation};
 use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
 use crate::inputs::InputFiles;
-use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::pages::design as pictures;
-use crate::result::{DESIGN_SCHEMA, DesignFile, WindowedFile};
-use crate::study::{FamilyChoice, Study, StudyInput, StudyRobot};
+use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
+use crate::study::{FamilyChoice, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::families::Given;
@@ -19,7 +18,6 @@ use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
 use nalgebra::DMatrix;
-use std::path::Path;
 use std::time::Instant;
 
 /// Rate of the pictures, Hz of a usual arm.
@@ -124,7 +122,6 @@ pub struct DesignOutcome {
     /// The search by generations, for optimisers that have them; empty for gradients.
     pub history: Vec<Generation>,
     family: Box<dyn Family>,
-    inputs: InputFiles,
 }
 
 impl DesignOutcome {
@@ -172,23 +169,14 @@ impl DesignOutcome {
             not_checked: setup.not_checked,
             notes: setup.notes,
         };
-        let (robot, limits, inputs) = (setup.robot, setup.limits, setup.inputs);
-        Self { inputs, file, robot, limits, history: origin.history, family: origin.motion }
+        let (robot, limits) = (setup.robot, setup.limits);
+        Self { file, robot, limits, history: origin.history, family: origin.motion }
     }
 
-    /// The outcome with what it comes from: of the study, and of what else was read.
-    ///
-    /// # Errors
-    /// A file that cannot be read again, or that changed since the design began.
-    pub(super) fn with_provenance(
-        mut self,
-        (study, study_path): (&Study, &Path),
-        options: &RunOptions<'_>,
-        further: &[(&'static str, StudyInput)],
-    ) -> Result<Self, Error> {
-        self.file.provenance = Some(motion_provenance(study, study_path, options.data.as_deref(), further)?);
-        self.inputs.unchanged()?;
-        Ok(self)
+    /// The outcome with what it comes from.
+    pub(super) fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.file.provenance = Some(provenance);
+        self
     }
 
     /// The family of the motion; its parameters are the file's.
