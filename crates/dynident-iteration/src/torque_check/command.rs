@@ -172,11 +172,7 @@ impl<'a> ObservedLeg<'a> {
     }
 
     /// Calls `then` with each sample, its time, and what the controller followed and saw.
-    fn each_instant(
-        &self,
-        timing: &[f64; SHARED],
-        then: &mut dyn FnMut(usize, f64, Target<'_>, Measured<'_>),
-    ) {
+    fn each_instant(&self, timing: &[f64; SHARED], then: &mut dyn FnMut(usize, f64, Target<'_>, Measured<'_>)) {
         let [position_delay_s, velocity_delay_s, torque_lag_s, clock_rate] = *timing;
         let commanded = self.leg.commanded();
         let [mut q, mut dq, mut ddq, mut seen_q, mut seen_dq] = [(); 5].map(|()| vec![0.0; self.joints]);

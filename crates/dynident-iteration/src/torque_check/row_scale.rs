@@ -88,9 +88,7 @@ pub(crate) fn row_scales(
 
 /// Scales `1 + κ` relative to that of the joint with which the others agree best.
 fn relative(kappa: &[Option<f64>], covariance: &DMatrix<f64>) -> Vec<Option<RowScale>> {
-    let std = |a: usize, b: usize| {
-        (covariance[(a, a)] + covariance[(b, b)] - 2.0 * covariance[(a, b)]).max(0.0).sqrt()
-    };
+    let std = |a: usize, b: usize| (covariance[(a, a)] + covariance[(b, b)] - 2.0 * covariance[(a, b)]).max(0.0).sqrt();
     let disagreement = |a: usize| -> Option<f64> {
         let own = kappa[a]?;
         // Beyond some deviations a joint is wrong, however far.
@@ -117,7 +115,15 @@ mod tests {
     /// Three joints agree with each other, one does not: whichever was held is not the reference by that alone.
     #[test]
     fn scales_are_relative_to_the_joints_that_agree() {
-        let covariance = DMatrix::from_fn(4, 4, |a, b| if a == 0 || b == 0 { 0.0 } else if a == b { 2e-4 } else { 1e-4 });
+        let covariance = DMatrix::from_fn(4, 4, |a, b| {
+            if a == 0 || b == 0 {
+                0.0
+            } else if a == b {
+                2e-4
+            } else {
+                1e-4
+            }
+        });
         let found = relative(&[Some(0.0), Some(0.25), Some(0.251), Some(0.249)], &covariance);
         let wrong = found[0].unwrap();
         assert!((wrong.value - 0.8).abs() < 2e-3 && wrong.std < 0.02, "{wrong:?}");

@@ -19,9 +19,11 @@ fn prior() -> ControllerModel {
     ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).unwrap()
 }
 
-/// A log without any mistake.
+/// A log without any mistake, of a run under the first controller.
 fn recorded() -> Record {
-    Simulated::default().robot().run(&RunRequest::new(1, &reference(), &pd())).unwrap().record
+    let (controller, model, reference) = (settings().first.unwrap(), prior(), reference());
+    let request = RunRequest { model: Some(&model), ..RunRequest::new(1, &reference, &controller) };
+    Simulated::default().robot().run(&request).unwrap().record
 }
 
 fn envelope() -> Envelope {
@@ -103,7 +105,7 @@ fn a_corrected_log_is_read_again() {
     let mut own = settings();
     own.safety = SafetySettings { outside: true, envelope: Some(envelope()), ..SafetySettings::default() };
     let iteration = Iteration::new(task(), own).unwrap();
-    let mut calls = |out: &Path| {
+    let calls = |out: &Path| {
         let store = IterationStore::open(out, "test", true).unwrap();
         let mut robot = FolderRobot::new(FolderSettings::new(&exchange), task().robot.joint_names()).unwrap();
         let outcome = iterate(&iteration, &mut [&mut robot], Some(&store), &mut |_, _| {}).unwrap();

@@ -4,7 +4,8 @@
 use super::simulated_arm::{self, Simulated, arm};
 use dynident_dynamics::{Workspace, gravity_torque};
 use dynident_iteration::{
-    Iteration, IterationOutcome, IterationSettings, Next, Robot, RobotRun, RunRequest, Shortfall, SimulatedRobot, TorqueCause, iterate,
+    Iteration, IterationOutcome, IterationSettings, Next, Robot, RobotRun, RunRequest, Shortfall, SimulatedRobot,
+    TorqueCause, iterate,
 };
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Record, SensorSettings, SimulationError};
@@ -124,13 +125,19 @@ fn correct_logs_pass() {
 fn a_wrong_torque_is_named_and_never_loaded() {
     let named = |fault: &dyn Fn(&mut Record)| -> Vec<TorqueCause> {
         let outcome = iterated(&Simulated::default(), simulated_arm::settings(), fault);
-        assert!(!outcome.status.is_converged() && outcome.runs.len() == 1, "{}: {:?}", outcome.status, outcome.shortfalls);
+        assert!(
+            !outcome.status.is_converged() && outcome.runs.len() == 1,
+            "{}: {:?}",
+            outcome.status,
+            outcome.shortfalls
+        );
         causes(&outcome)
     };
     let joint = |k: usize| format!("joint{k}");
     let both = || vec![joint(1), joint(2)];
     for factor in [0.85, 0.95, 1.06] {
-        let [TorqueCause::Scale { joint: name, factor: found, half_width_95 }] = &named(&|log| scaled(log, [1.0, factor]))[..]
+        let [TorqueCause::Scale { joint: name, factor: found, half_width_95 }] =
+            &named(&|log| scaled(log, [1.0, factor]))[..]
         else {
             panic!("{factor}")
         };
@@ -179,7 +186,11 @@ fn a_difference_without_a_known_cause_has_none() {
 fn a_drive_that_delivers_less_is_found_by_the_other_joint() {
     let mut settings = simulated_arm::settings();
     settings.first = None;
-    let own = PositionLoopSettings { kp: Some(4000.0.into()), kd: Some(300.0.into()), ..PositionLoopSettings::of_robot(true) };
+    let own = PositionLoopSettings {
+        kp: Some(4000.0.into()),
+        kd: Some(300.0.into()),
+        ..PositionLoopSettings::of_robot(true)
+    };
     settings.controller = ControllerSettings::PositionLoop(own);
     let outcome = iterated(&Simulated::default(), settings.clone(), &|_| {});
     assert!(causes(&outcome).is_empty(), "{:?}", outcome.shortfalls);

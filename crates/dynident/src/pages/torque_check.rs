@@ -16,7 +16,8 @@ pub(crate) fn torque_section(page: &mut Report, file: &IterationsFile) {
     page.add(Heading::new("Logged and commanded torque"));
     page.add(statement(run, check));
     page.add(scales(file, check));
-    for (name, joint) in file.joints.iter().zip(&check.joints).filter(|(_, joint)| !joint.points.is_empty()).take(MOST_PICTURES)
+    for (name, joint) in
+        file.joints.iter().zip(&check.joints).filter(|(_, joint)| !joint.points.is_empty()).take(MOST_PICTURES)
     {
         page.add(points(name, joint));
     }
@@ -43,13 +44,11 @@ fn statement(run: &IterationRun, check: &TorqueCheck) -> Text {
         1e3 * check.torque_lag_s,
         check.clock_percent
     );
-    let causes = check.causes.iter().map(|cause| (Tone::Warning, format!("{cause}. To correct it: {}.", cause.remedy())));
+    let causes =
+        check.causes.iter().map(|cause| (Tone::Warning, format!("{cause}. To correct it: {}.", cause.remedy())));
     let points: Vec<(Tone, String)> = causes.collect();
-    let points = if points.is_empty() {
-        vec![(Tone::Good, "No difference that counts was found.".to_owned())]
-    } else {
-        points
-    };
+    let points =
+        if points.is_empty() { vec![(Tone::Good, "No difference that counts was found.".to_owned())] } else { points };
     let paragraphs = match check.source {
         CommandSource::Unknown => vec![source.to_owned()],
         CommandSource::Controller | CommandSource::FeedForward => vec![source.to_owned(), timing],
@@ -61,9 +60,12 @@ fn statement(run: &IterationRun, check: &TorqueCheck) -> Text {
 fn scales(file: &IterationsFile, check: &TorqueCheck) -> BarPlot {
     let mut plot = BarPlot::new("Scale of the logged torque", "logged per commanded torque");
     plot.reference_label = "correct scale".to_owned();
-    plot.note = "With 95 % error bars. \"By the other joints\": from the parameters that the torques of several joints share.".to_owned();
+    plot.note =
+        "With 95 % error bars. \"By the other joints\": from the parameters that the torques of several joints share."
+            .to_owned();
     for (name, joint) in file.joints.iter().zip(&check.joints) {
-        let rows = [(joint.scale, joint.scale_std, ""), (joint.row_scale, joint.row_scale_std, ", by the other joints")];
+        let rows =
+            [(joint.scale, joint.scale_std, ""), (joint.row_scale, joint.row_scale_std, ", by the other joints")];
         for (value, std, which) in rows {
             let Some(value) = value else { continue };
             plot.bars.push(Bar {
@@ -81,7 +83,8 @@ fn scales(file: &IterationsFile, check: &TorqueCheck) -> BarPlot {
 fn points(name: &str, joint: &JointTorqueCheck) -> LinePlot {
     let mut points = joint.points.clone();
     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let (commanded, logged): (Vec<f64>, Vec<f64>) = points.iter().map(|[commanded, logged]| (*commanded, *logged)).unzip();
+    let (commanded, logged): (Vec<f64>, Vec<f64>) =
+        points.iter().map(|[commanded, logged]| (*commanded, *logged)).unzip();
     let mut plot = LinePlot::new(
         format!("{name}: logged against commanded torque"),
         "commanded torque, Nm (N)",
