@@ -6,8 +6,6 @@ use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
-use crate::inputs::InputFiles;
-use crate::jobs::provenance::motion_provenance;
 use crate::pages::design as pictures;
 use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
 use crate::study::{FamilyChoice, StudyRobot};
