@@ -37,17 +37,19 @@ fn flipped_bytes_never_give_other_numbers() {
         std::fs::write(&path, &whole).unwrap();
         let (expected, _) = all(&path).unwrap();
         let mut refused = 0;
-        let steps = 150.min(whole.len());
+        // The list at an archive's end has no checksum: a member with another ending of its name is no array.
+        let end = whole.windows(4).position(|word| word == b"PK\x01\x02").unwrap_or(whole.len());
+        let steps = 150.min(end);
         // Without its first bytes a file is one of another format.
-        for k in (0..steps).filter(|k| whole.len() * k / steps >= 8) {
+        for k in (0..steps).filter(|k| end * k / steps >= 8) {
             let mut bytes = whole.clone();
-            bytes[whole.len() * k / steps] ^= 0x40;
+            bytes[end * k / steps] ^= 0x40;
             std::fs::write(&path, &bytes).unwrap();
             match all(&path) {
                 Err(_) => refused += 1,
                 // A broken length ends a bag early, and that is reported.
                 Ok((_, true)) => {}
-                Ok((found, false)) => assert!(found == expected, "{file}, byte {}", whole.len() * k / steps),
+                Ok((found, false)) => assert!(found == expected, "{file}, byte {}", end * k / steps),
             }
         }
         assert!(refused > 0, "{file}");
@@ -78,7 +80,7 @@ fn packed_numbers_do_not_fill_the_memory() {
     let path = scratch.path().join("bomb");
     let zeros = vec![0; 1 << 20];
     let started = std::time::Instant::now();
-    let mut refused = |bytes: &[u8], words: &str| {
+    let refused = |bytes: &[u8], words: &str| {
         std::fs::write(&path, bytes).unwrap();
         let message = open(&path).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
