@@ -11,12 +11,20 @@ struct Once<'a> {
     what: &'a (dyn Fn() + Sync),
 }
 
-impl Progress for Once<'_> {
-    fn begin(&self, _: &str, _: Option<u64>) {}
-    fn advance(&self, _: u64) {
+impl Once<'_> {
+    fn now(&self) {
         if !self.done.swap(true, Ordering::SeqCst) {
             (self.what)();
         }
+    }
+}
+
+impl Progress for Once<'_> {
+    fn begin(&self, _: &str, _: Option<u64>) {
+        self.now();
+    }
+    fn advance(&self, _: u64) {
+        self.now();
     }
     fn end(&self) {}
 }
