@@ -37,13 +37,13 @@ pub(crate) fn written(outcome: io::Result<()>) -> Result<(), String> {
 /// An error, on standard error, as clap words its own.
 pub(crate) fn complain(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "error: {}", visible(message));
+    let _ = writeln!(out, "error: {}", visible(&dynident::shortened(message)));
 }
 
 /// A remark, on standard error.
 pub(crate) fn remark(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "note: {}", visible(message));
+    let _ = writeln!(out, "note: {}", visible(&dynident::shortened(message)));
 }
 
 /// A question, on standard error; the answer comes on the same line.

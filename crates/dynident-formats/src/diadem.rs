@@ -8,6 +8,7 @@ use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
+use crate::limits::{Budget, ReadLimits, SPLIT};
 use crate::table::Table;
 use std::collections::HashMap;
 use std::io::Read;
@@ -17,8 +18,6 @@ use std::path::{Path, PathBuf};
 pub(crate) const BEGIN: &[u8] = b"DIAEXTENDED";
 /// A header of thousands of channels is shorter.
 const LONGEST_HEADER: u64 = 1 << 24;
-/// Values of one recording at most.
-const MOST_VALUES: usize = 1 << 28;
 const COPY: &str = "copy the whole trace again, all files with its name";
 
 /// One header.
@@ -84,7 +83,7 @@ fn broken(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> 
 impl Header {
     fn read(path: &Path) -> Result<Self, FileError> {
         let mut bytes = Vec::new();
-        std::fs::File::open(path)
+        dynident_files::open(path)
             .and_then(|file| file.take(LONGEST_HEADER).read_to_end(&mut bytes))
             .map_err(|source| FileError::Io { file: path.to_owned(), source })?;
         // Controllers write Latin-1, in which every byte is a letter.
@@ -153,7 +152,7 @@ fn headers(path: &Path) -> Vec<PathBuf> {
 /// Whether `path` is a header.
 pub(crate) fn is_header(path: &Path) -> bool {
     let mut begin = [0; BEGIN.len()];
-    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut begin));
+    let read = dynident_files::open(path).and_then(|mut file| file.read_exact(&mut begin));
     read.is_ok() && begin == BEGIN
 }
 
@@ -173,10 +172,13 @@ pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, FileError> {
     Ok(files)
 }
 
-pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
+pub(crate) fn open(path: &Path, limits: &ReadLimits) -> Result<Box<dyn Table>, FileError> {
     let paths = headers(path);
+    let length = |path: &PathBuf| std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    let mut budget =
+        Budget::new(limits, files(path).unwrap_or_default().iter().map(length).fold(0, u64::saturating_add));
     let several = paths.len() > 1;
-    let (mut arrays, mut notes, mut values) = (Vec::new(), Vec::new(), 0);
+    let (mut arrays, mut notes) = (Vec::new(), Vec::new());
     let mut clock = None;
     for own in &paths {
         let header = Header::read(own)?;
@@ -195,12 +197,15 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
             }
             let name =
                 if several && !is_time { format!("{}[A{number}]", channel.name()) } else { channel.name().to_owned() };
-            let count = channel.whole(220).filter(|count| *count <= MOST_VALUES);
+            let count = channel.whole(220);
             let count = count.ok_or_else(|| broken(own, format!("channel `{name}`"), "it has no length (220)"))?;
-            values += count;
-            if values > MOST_VALUES || arrays.len() >= MOST_COLUMNS {
-                return Err(broken(own, format!("channel `{name}`"), "the channels together would fill 2 GiB"));
+            let place = || format!("channel `{name}`");
+            if arrays.len() >= MOST_COLUMNS {
+                return Err(broken(own, place(), format!("there are more than {MOST_COLUMNS} channels")));
             }
+            budget
+                .take((count as u64).checked_mul(8))
+                .map_err(|problem| FileError::broken(own, FileFormat::Diadem, place(), problem, SPLIT))?;
             if !is_time && channel.kind().is_none() {
                 notes.push(format!("{name}: numbers of the type `{}` are not read", channel.text(214)));
                 continue;
@@ -249,7 +254,7 @@ fn numbers(header: &Header, channel: &Channel, count: usize) -> Result<Vec<f64>,
             format!("{count} values are told, and `{}` ends before", path.file_name().unwrap_or_default().display());
         return Err(broken(problem));
     }
-    let data = std::fs::read(&path).map_err(|source| FileError::Io { file: path.clone(), source })?;
+    let data = dynident_files::read(&path, size).map_err(|source| FileError::Io { file: path.clone(), source })?;
     let [offset, factor] = channel.scale();
     let value = |row: usize| {
         let at = (first + row * stride) * kind.size();

@@ -5,7 +5,7 @@ use crate::table::Table;
 use std::path::Path;
 
 #[cfg(not(feature = "hdf5"))]
-pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
+pub(crate) fn open(path: &Path, _: crate::limits::Budget) -> Result<Box<dyn Table>, FileError> {
     Err(FileError::NotBuilt { file: path.to_owned(), format: "an HDF5 file", feature: "hdf5" })
 }
 
@@ -18,22 +18,26 @@ mod reading {
     use crate::arrays::{Array, ArrayTable};
     use crate::error::visible;
     use crate::kind::FileFormat;
+    use crate::limits::{Budget, SPLIT};
     use hdf5_pure::{DType, Dataset, File, Group};
 
     /// Groups in groups.
     const DEEPEST: usize = 8;
     /// Data sets at most.
     const MOST_SETS: usize = 10_000;
-    /// Numbers of all data sets together, at most: 2 GiB.
-    const MOST_NUMBERS: u64 = 1 << 28;
 
-    pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
+    pub(crate) fn open(path: &Path, budget: Budget) -> Result<Box<dyn Table>, FileError> {
         let error = |error: hdf5_pure::Error| {
             FileError::broken(path, FileFormat::Hdf5, "the file", error.to_string(), "write or copy it again")
         };
+        dynident_files::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
         let file = File::open_streaming(path).map_err(error)?;
-        let mut found = Found { path, arrays: Vec::new(), others: Vec::new(), sets: 0, left: MOST_NUMBERS };
+        let mut found = Found { path, arrays: Vec::new(), others: Vec::new(), sets: 0, budget, too_large: false };
         found.group(&file.root(), "", 0)?;
+        // A table without its largest columns would be taken for the recording.
+        if let (true, Some(problem)) = (found.too_large, found.others.last()) {
+            return Err(FileError::broken(path, FileFormat::Hdf5, "its data sets", problem.as_str(), SPLIT));
+        }
         let others = if found.others.is_empty() { "no data sets".to_owned() } else { found.others.join(", ") };
         let table = ArrayTable::new(found.arrays).ok_or_else(|| {
             let fix = "save vectors or matrices of real numbers";
@@ -47,7 +51,9 @@ mod reading {
         arrays: Vec<Array>,
         others: Vec<String>,
         sets: usize,
-        left: u64,
+        budget: Budget,
+        /// Whether a data set was larger than the memory allows; it is the last of `others`.
+        too_large: bool,
     }
 
     impl Found<'_> {
@@ -67,12 +73,15 @@ mod reading {
                 let place = name(&own);
                 // One that cannot be read leaves the others readable.
                 let read = group.dataset(&own).map_err(|error| error.to_string());
-                match read.and_then(|set| array(&set, &place, self.left)) {
-                    Ok(array) => {
-                        self.left -= array.values.len() as u64;
-                        self.arrays.push(array);
+                match read.and_then(|set| array(&set, &place, &mut self.budget)) {
+                    Ok(array) => self.arrays.push(array),
+                    Err(problem) => {
+                        self.too_large = problem == self.budget.problem();
+                        self.others.push(visible(&format!("{place}: {problem}")));
+                        if self.too_large {
+                            return Ok(());
+                        }
                     }
-                    Err(problem) => self.others.push(visible(&format!("{place}: {problem}"))),
                 }
             }
             if depth < DEEPEST {
@@ -83,6 +92,9 @@ mod reading {
                     let place = name(&own);
                     let inner = group.group(&own).map_err(|error| self.broken(&place, &error))?;
                     self.group(&inner, &place, depth + 1)?;
+                    if self.too_large {
+                        return Ok(());
+                    }
                 }
             }
             Ok(())
@@ -90,7 +102,7 @@ mod reading {
     }
 
     /// The numbers of a data set.
-    fn array(set: &Dataset, place: &str, most: u64) -> Result<Array, String> {
+    fn array(set: &Dataset, place: &str, budget: &mut Budget) -> Result<Array, String> {
         let text = |error: hdf5_pure::Error| error.to_string();
         let kind = set.dtype().map_err(text)?;
         if !matches!(
@@ -112,9 +124,7 @@ mod reading {
         let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();
         let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two sides")?;
         let numbers = shape.iter().try_fold(1_u64, |all, side| all.checked_mul(*side));
-        if numbers.is_none_or(|numbers| numbers > most) {
-            return Err("more than 2 GiB of numbers".to_owned());
-        }
+        budget.take(numbers.and_then(|numbers| numbers.checked_mul(8)))?;
         let values = set.read_f64().map_err(text)?;
         if values.len() != sides[0] * sides[1] {
             return Err("another count of numbers than its sides say".to_owned());

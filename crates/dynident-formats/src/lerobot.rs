@@ -150,7 +150,7 @@ mod reading {
     fn read_info(folder: &Path) -> Result<Value, FileError> {
         let path = folder.join(INFO);
         let mut text = Vec::new();
-        std::fs::File::open(&path)
+        dynident_files::open(&path)
             .and_then(|file| file.take(LONGEST_INFO).read_to_end(&mut text))
             .map_err(|source| FileError::Io { file: path.clone(), source })?;
         let info: Result<Value, _> = serde_json::from_slice(&text);
@@ -164,7 +164,7 @@ mod reading {
 
     fn open_part(folder: &Path, path: &Path) -> Result<Box<dyn Table>, FileError> {
         let io = |source| FileError::Io { file: path.to_owned(), source };
-        let head = recognition::head(&mut BufReader::new(std::fs::File::open(path).map_err(io)?)).map_err(io)?;
+        let head = recognition::head(&mut BufReader::new(dynident_files::open(path).map_err(io)?)).map_err(io)?;
         // What stands for a file that was not fetched is text.
         if !head.starts_with(b"PAR1") {
             let place = path.strip_prefix(folder).unwrap_or(path).display().to_string();

@@ -14,7 +14,8 @@
 //! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices either way up | `gzip`, `hdf5` |
 //!
 //! Columns that were recorded on different clocks (topics of a bag) are joined on that of the first one selected: see
-//! [`Table::select`]. Indices in names count from 0. What is allocated is bounded by what the file holds.
+//! [`Table::select`]. Indices in names count from 0. What is allocated is bounded by what the file holds, and by
+//! [`ReadLimits`]. Checksums in a file are verified. Only regular files are read.
 //!
 //! ```
 //! use dynident_formats::{Contents, open};
@@ -54,6 +55,7 @@ mod hdf5;
 mod json_lines;
 mod kind;
 mod lerobot;
+mod limits;
 mod mat;
 mod npy;
 mod packed;
@@ -66,11 +68,13 @@ mod ros;
 mod table;
 mod zip;
 
+pub use dynident_files::SeenFiles;
 pub use error::FileError;
 pub use kind::FileFormat;
+pub use limits::ReadLimits;
 pub use table::{ColumnGroup, Table};
 
-use std::fs::File;
+use limits::Budget;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -104,8 +108,17 @@ impl core::fmt::Debug for Contents {
 /// holds.
 ///
 /// # Errors
-/// If it cannot be read, is of a format that is not read, or is broken where its columns are named.
+/// If it cannot be read, is no regular file, is of a format that is not read, is broken where its columns are named, or
+/// takes more memory than the default of [`ReadLimits`].
 pub fn open(path: &Path) -> Result<Opened, FileError> {
+    open_within(path, &ReadLimits::default())
+}
+
+/// As [`open`], with other limits of memory.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_within(path: &Path, limits: &ReadLimits) -> Result<Opened, FileError> {
     let refused = |source| FileError::Io { file: path.to_owned(), source };
     let folder = std::fs::metadata(path).map_err(refused)?.is_dir();
     if let Some(folder) = lerobot::folder(path) {
@@ -117,7 +130,8 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
         }
         return Err(refused(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
     }
-    let file = File::open(path).map_err(refused)?;
+    let file = dynident_files::open(path).map_err(refused)?;
+    let budget = Budget::new(limits, file.metadata().map_err(refused)?.len());
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let head = recognition::head(&mut reader).map_err(refused)?;
     let format = recognition::recognised(path, &head)?;
@@ -137,16 +151,17 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
             }
         }
         FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
-        FileFormat::Npy => Contents::Table(npy::open(path, reader)?),
-        FileFormat::Npz => Contents::Table(npy::open_archive(path)?),
+        // Not packed: an array cannot be longer than its file.
+        FileFormat::Npy => Contents::Table(npy::open(path, reader, Budget::new(limits, u64::MAX))?),
+        FileFormat::Npz => Contents::Table(npy::open_archive(path, budget)?),
         FileFormat::Mcap => bags::open_mcap(path)?,
         FileFormat::Rosbag2 => bags::open_database(path)?,
         FileFormat::Parquet => Contents::Table(parquet::open(path)?),
         FileFormat::LeRobot => Contents::Table(lerobot::open(path)?),
-        FileFormat::Arrow => Contents::Table(arrow::open(path)?),
-        FileFormat::Diadem => Contents::Table(diadem::open(path)?),
-        FileFormat::Mat5 => Contents::Table(mat::open(path, reader)?),
-        FileFormat::Hdf5 => Contents::Table(hdf5::open(path)?),
+        FileFormat::Arrow => Contents::Table(arrow::open(path, budget)?),
+        FileFormat::Diadem => Contents::Table(diadem::open(path, limits)?),
+        FileFormat::Mat5 => Contents::Table(mat::open(path, reader, budget)?),
+        FileFormat::Hdf5 => Contents::Table(hdf5::open(path, budget)?),
     };
     Ok(Opened { format, contents })
 }
@@ -161,7 +176,7 @@ pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, FileError> {
         return lerobot::files(folder);
     }
     if !path.is_dir() {
-        if diadem::is_header(path) {
+        if path.is_file() && diadem::is_header(path) {
             return diadem::files(path);
         }
         return Ok(vec![path.to_owned()]);

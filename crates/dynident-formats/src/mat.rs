@@ -7,7 +7,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 #[cfg(not(feature = "gzip"))]
-pub(crate) fn open(path: &Path, _: impl BufRead) -> Result<Box<dyn Table>, FileError> {
+pub(crate) fn open(path: &Path, _: impl BufRead, _: crate::limits::Budget) -> Result<Box<dyn Table>, FileError> {
     Err(FileError::NotBuilt { file: path.to_owned(), format: "a MATLAB 5 file", feature: "gzip" })
 }
 
@@ -20,92 +20,73 @@ mod reading {
     use crate::arrays::{Array, ArrayTable};
     use crate::bytes::{Bytes, Number};
     use crate::kind::FileFormat;
+    use crate::limits::{Budget, SPLIT};
     use std::io::Read;
 
-    /// Unpacked bytes of all variables together, at most.
-    const MOST_UNPACKED: u64 = 1 << 31;
     /// Structs in structs.
     const DEEPEST: usize = 8;
+    /// Bytes of a name, of the sides of an array, or of the list of a struct's fields, at most.
+    const LONGEST_HEAD: usize = 1 << 20;
+    /// Bytes of numbers that are converted at once.
+    const BLOCK: usize = 1 << 16;
 
     const MATRIX: u32 = 14;
     const PACKED: u32 = 15;
 
-    pub(crate) fn open(path: &Path, mut reader: impl BufRead) -> Result<Box<dyn Table>, FileError> {
-        let broken = |place: String, problem: &str| {
-            FileError::broken(path, FileFormat::Mat5, place, problem, "save or copy it again")
-        };
-        let mut header = [0; 128];
-        reader.read_exact(&mut header).map_err(|_| broken("its header".to_owned(), "it is cut off"))?;
-        let big_endian = &header[126..] == b"MI";
-        let (mut arrays, mut others, mut left, mut variable) = (Vec::new(), Vec::new(), MOST_UNPACKED, 0);
-        loop {
-            let place = || format!("variable {variable}");
-            let mut tag = Vec::new();
-            let io = |source| FileError::Io { file: path.to_owned(), source };
-            reader.by_ref().take(8).read_to_end(&mut tag).map_err(io)?;
-            if tag.is_empty() {
-                break;
-            }
-            let mut words = Bytes::new(&tag, big_endian);
-            let (Some(kind), Some(size)) = (words.u32(), words.u32()) else {
-                return Err(broken(place(), "it is cut off"));
-            };
-            let mut body = Vec::new();
-            let read = reader.by_ref().take(u64::from(size).min(left + 1)).read_to_end(&mut body).map_err(io)?;
-            if read as u64 > left {
-                return Err(broken(place(), "more than 2 GiB of numbers"));
-            }
-            if read < size as usize {
-                return Err(broken(place(), "it is cut off"));
-            }
-            if kind == PACKED {
-                let mut unpacked = Vec::new();
-                let mut decoder = flate2::read::ZlibDecoder::new(&body[..]).take(left + 1);
-                let read = decoder.read_to_end(&mut unpacked);
-                read.map_err(|error| broken(place(), &format!("it cannot be unpacked ({error})")))?;
-                if unpacked.len() as u64 > left {
-                    return Err(broken(place(), "more than 2 GiB of numbers"));
-                }
-                left -= unpacked.len() as u64;
-                let mut element = Bytes::new(&unpacked, big_endian);
-                match element.u32().zip(element.u32()) {
-                    Some((MATRIX, size)) => {
-                        let inside = element.take(size as usize).ok_or_else(|| broken(place(), "it is cut off"))?;
-                        matrix(Bytes::new(inside, big_endian), big_endian, None, 0, &mut arrays, &mut others)
-                            .ok_or_else(|| broken(place(), "its parts do not fit together"))?;
-                    }
-                    Some(_) => {}
-                    None => return Err(broken(place(), "it is cut off")),
-                }
-            } else if kind == MATRIX {
-                left -= body.len() as u64;
-                matrix(Bytes::new(&body, big_endian), big_endian, None, 0, &mut arrays, &mut others)
-                    .ok_or_else(|| broken(place(), "its parts do not fit together"))?;
-            }
-            variable += 1;
-        }
-        let found = if others.is_empty() { "no variables".to_owned() } else { others.join(", ") };
-        let table = ArrayTable::new(arrays).ok_or_else(|| {
-            let fix = "save vectors or matrices of real numbers (timetable: `save` its table2array)";
-            FileError::no_columns(path, FileFormat::Mat5, found, fix)
-        })?;
-        Ok(Box::new(table.with_notes(others.into_iter().map(|name| format!("{name}: no real numbers")).collect())))
+    /// Why a variable cannot be read.
+    enum Problem {
+        Cut,
+        Misfit,
+        TooLarge(String),
+        Unreadable(std::io::Error),
     }
 
-    /// Kind and bytes of the next element, which begins at a multiple of eight.
-    fn element<'a>(bytes: &mut Bytes<'a>) -> Option<(u32, &'a [u8])> {
-        let word = bytes.u32()?;
-        // The short form keeps up to four bytes in the tag.
-        let (kind, body) = if word >> 16 != 0 {
-            let body = bytes.take(4)?;
-            (word & 0xFFFF, body.get(..(word >> 16) as usize)?)
-        } else {
-            let size = bytes.u32()? as usize;
-            (word, bytes.take(size)?)
-        };
-        // The last element may lack its padding.
-        let _ = bytes.align(8);
-        Some((kind, body))
+    impl From<std::io::Error> for Problem {
+        fn from(error: std::io::Error) -> Self {
+            if error.kind() == std::io::ErrorKind::UnexpectedEof { Self::Cut } else { Self::Unreadable(error) }
+        }
+    }
+
+    impl Problem {
+        fn at(self, path: &Path, variable: usize) -> FileError {
+            let copy = "save or copy it again";
+            let (problem, fix) = match self {
+                Self::Cut => ("it is cut off".to_owned(), copy),
+                Self::Misfit => ("its parts do not fit together".to_owned(), copy),
+                Self::TooLarge(problem) => (problem, SPLIT),
+                Self::Unreadable(error) => (format!("it cannot be unpacked ({error})"), copy),
+            };
+            FileError::broken(path, FileFormat::Mat5, format!("variable {variable}"), problem, fix)
+        }
+    }
+
+    /// Reader state: byte order, memory left, and the arrays of all variables.
+    struct Found {
+        big_endian: bool,
+        budget: Budget,
+        arrays: Vec<Array>,
+        others: Vec<String>,
+    }
+
+    pub(crate) fn open(path: &Path, mut reader: impl BufRead, budget: Budget) -> Result<Box<dyn Table>, FileError> {
+        let mut header = [0; 128];
+        let cut = "it is cut off";
+        reader
+            .read_exact(&mut header)
+            .map_err(|_| FileError::broken(path, FileFormat::Mat5, "its header", cut, "save or copy it again"))?;
+        let big_endian = &header[126..] == b"MI";
+        let mut found = Found { big_endian, budget, arrays: Vec::new(), others: Vec::new() };
+        let mut variable = 0;
+        while found.variable(&mut reader).map_err(|problem| problem.at(path, variable))? {
+            variable += 1;
+        }
+        let Found { arrays, others, .. } = found;
+        let names = if others.is_empty() { "no variables".to_owned() } else { others.join(", ") };
+        let table = ArrayTable::new(arrays).ok_or_else(|| {
+            let fix = "save vectors or matrices of real numbers (timetable: `save` its table2array)";
+            FileError::no_columns(path, FileFormat::Mat5, names, fix)
+        })?;
+        Ok(Box::new(table.with_notes(others.into_iter().map(|name| format!("{name}: no real numbers")).collect())))
     }
 
     fn number(kind: u32) -> Option<Number> {
@@ -124,63 +105,171 @@ mod reading {
         })
     }
 
-    /// Adds the arrays in a matrix element: its own, or those of a struct's fields. `name` is what a struct calls it.
-    fn matrix(
-        mut bytes: Bytes,
-        big_endian: bool,
-        name: Option<String>,
-        depth: usize,
-        arrays: &mut Vec<Array>,
-        others: &mut Vec<String>,
-    ) -> Option<()> {
-        // An empty field of a struct has no parts at all.
-        if bytes.left() == 0 {
-            return Some(());
-        }
-        let (_, flags) = element(&mut bytes)?;
-        let flags = Bytes::new(flags, big_endian).u32()?;
-        let (class, complex) = (flags & 0xFF, flags & 0x800 != 0);
-        let (_, sides) = element(&mut bytes)?;
-        let mut words = Bytes::new(sides, big_endian);
-        let mut sides = Vec::new();
-        while let Some(side) = words.u32() {
-            sides.push(side as usize);
-        }
-        let (_, own) = element(&mut bytes)?;
-        let name = name.unwrap_or_else(|| String::from_utf8_lossy(own).into_owned());
-        match class {
-            // double, single, and integers of any width
-            6..=15 if !complex => {
-                let (kind, body) = element(&mut bytes)?;
-                let number = number(kind)?;
-                let count = sides.iter().try_fold(1_usize, |all, side| all.checked_mul(*side))?;
-                if body.len() != count.checked_mul(number.size())? {
-                    return None;
-                }
-                let mut entries = Bytes::new(body, big_endian);
-                let values: Vec<f64> = (0..count).map_while(|_| entries.number(number)).collect();
-                match Array::two_sides(&sides) {
-                    Some(shape) => arrays.push(Array::column_major(name, shape, values)),
-                    None => others.push(name),
-                }
+    /// The beginning of an element.
+    struct Tag {
+        kind: u32,
+        size: usize,
+        /// The content of an element of at most four bytes, which is inside the tag.
+        short: Option<[u8; 4]>,
+    }
+
+    /// Reads over the rest of `reader`; so a packed variable's checksum is compared.
+    fn pass_over(reader: &mut dyn Read) -> Result<(), Problem> {
+        std::io::copy(reader, &mut std::io::sink())?;
+        Ok(())
+    }
+
+    impl Found {
+        /// Reads the next variable of the file; false at the end.
+        fn variable(&mut self, reader: &mut impl BufRead) -> Result<bool, Problem> {
+            if reader.fill_buf()?.is_empty() {
+                return Ok(false);
             }
-            // struct
-            2 if depth < DEEPEST && sides.iter().all(|side| *side == 1) => {
-                let (_, length) = element(&mut bytes)?;
-                let length = Bytes::new(length, big_endian).u32()? as usize;
-                let (_, names) = element(&mut bytes)?;
-                if length == 0 || names.len() % length != 0 {
-                    return None;
+            let mut tag = [0; 8];
+            reader.read_exact(&mut tag)?;
+            let mut words = Bytes::new(&tag, self.big_endian);
+            let (kind, size) = words.u32().zip(words.u32()).ok_or(Problem::Cut)?;
+            let mut body = reader.take(u64::from(size));
+            match kind {
+                PACKED => {
+                    let mut unpacked = flate2::bufread::ZlibDecoder::new(&mut body);
+                    let tag = self.tag(&mut unpacked)?;
+                    if tag.kind == MATRIX {
+                        self.matrix(&mut unpacked, tag.size, None, 0)?;
+                    }
+                    // The checksum stands behind what is unpacked.
+                    pass_over(&mut (&mut unpacked).take(8))?;
                 }
-                for field in names.chunks_exact(length) {
-                    let field = field.split(|byte| *byte == 0).next().unwrap_or_default();
-                    let (_, body) = element(&mut bytes)?;
-                    let path = format!("{name}.{}", String::from_utf8_lossy(field));
-                    matrix(Bytes::new(body, big_endian), big_endian, Some(path), depth + 1, arrays, others)?;
-                }
+                MATRIX => self.matrix(&mut body, size as usize, None, 0)?,
+                _ => {}
             }
-            _ => others.push(name),
+            pass_over(&mut body)?;
+            if body.limit() > 0 { Err(Problem::Cut) } else { Ok(true) }
         }
-        Some(())
+
+        fn tag(&self, reader: &mut dyn Read) -> Result<Tag, Problem> {
+            let mut tag = [0; 8];
+            reader.read_exact(&mut tag)?;
+            let mut words = Bytes::new(&tag, self.big_endian);
+            let (word, size) = words.u32().zip(words.u32()).ok_or(Problem::Cut)?;
+            // The short form keeps up to four bytes in the tag.
+            if word >> 16 == 0 {
+                return Ok(Tag { kind: word, size: size as usize, short: None });
+            }
+            let short = [tag[4], tag[5], tag[6], tag[7]];
+            let size = (word >> 16) as usize;
+            if size > short.len() {
+                return Err(Problem::Misfit);
+            }
+            Ok(Tag { kind: word & 0xFFFF, size, short: Some(short) })
+        }
+
+        /// Reads the fill bytes up to a multiple of eight; the last element may lack them.
+        fn padding(reader: &mut dyn Read, size: usize) -> Result<(), Problem> {
+            pass_over(&mut reader.take((size.wrapping_neg() & 7) as u64))
+        }
+
+        /// The bytes of a short element: flags, sides, a name.
+        fn head(&self, reader: &mut dyn Read) -> Result<Vec<u8>, Problem> {
+            let tag = self.tag(reader)?;
+            if let Some(short) = tag.short {
+                return Ok(short[..tag.size].to_vec());
+            }
+            if tag.size > LONGEST_HEAD {
+                return Err(Problem::Misfit);
+            }
+            let mut bytes = vec![0; tag.size];
+            reader.read_exact(&mut bytes)?;
+            Self::padding(reader, tag.size)?;
+            Ok(bytes)
+        }
+
+        /// Reads the numbers of an array with `count` entries.
+        fn numbers(&mut self, reader: &mut dyn Read, count: Option<usize>) -> Result<Vec<f64>, Problem> {
+            let tag = self.tag(reader)?;
+            let number = number(tag.kind).ok_or(Problem::Misfit)?;
+            let count = count.filter(|count| count.checked_mul(number.size()) == Some(tag.size));
+            let count = count.ok_or(Problem::Misfit)?;
+            // Every number takes eight bytes, however it is written.
+            self.budget.take((count as u64).checked_mul(8)).map_err(Problem::TooLarge)?;
+            let mut values = Vec::new();
+            let mut convert = |bytes: &[u8]| {
+                let mut entries = Bytes::new(bytes, self.big_endian);
+                values.extend((0..bytes.len() / number.size()).map_while(|_| entries.number(number)));
+            };
+            if let Some(short) = tag.short {
+                convert(&short[..tag.size]);
+                return Ok(values);
+            }
+            // Grows with what is really there, not with what the tag claims.
+            let (mut block, mut left) = (vec![0; BLOCK.min(tag.size)], tag.size);
+            while left > 0 {
+                let part = &mut block[..left.min(BLOCK)];
+                reader.read_exact(part)?;
+                convert(part);
+                left -= part.len();
+            }
+            Self::padding(reader, tag.size)?;
+            Ok(values)
+        }
+
+        /// Adds the arrays in a matrix element of `size` bytes: its own, or those of a struct's fields. `name` is what
+        /// a struct calls it.
+        fn matrix(
+            &mut self,
+            reader: &mut dyn Read,
+            size: usize,
+            name: Option<String>,
+            depth: usize,
+        ) -> Result<(), Problem> {
+            // An empty field of a struct has no parts at all.
+            if size == 0 {
+                return Ok(());
+            }
+            let reader = &mut reader.take(size as u64);
+            let flags = self.head(reader)?;
+            let flags = Bytes::new(&flags, self.big_endian).u32().ok_or(Problem::Misfit)?;
+            let (class, complex) = (flags & 0xFF, flags & 0x800 != 0);
+            let sides = self.head(reader)?;
+            let mut words = Bytes::new(&sides, self.big_endian);
+            let mut sides = Vec::new();
+            while let Some(side) = words.u32() {
+                sides.push(side as usize);
+            }
+            let own = self.head(reader)?;
+            let name = name.unwrap_or_else(|| String::from_utf8_lossy(&own).into_owned());
+            match class {
+                // double, single, and integers of any width
+                6..=15 if !complex => {
+                    let count = sides.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
+                    let values = self.numbers(reader, count)?;
+                    match Array::two_sides(&sides) {
+                        Some(shape) => self.arrays.push(Array::column_major(name, shape, values)),
+                        None => self.others.push(name),
+                    }
+                }
+                // struct
+                2 if depth < DEEPEST && sides.iter().all(|side| *side == 1) => {
+                    let length = self.head(reader)?;
+                    let length = Bytes::new(&length, self.big_endian).u32().ok_or(Problem::Misfit)? as usize;
+                    let names = self.head(reader)?;
+                    if length == 0 || names.len() % length != 0 {
+                        return Err(Problem::Misfit);
+                    }
+                    for field in names.chunks_exact(length) {
+                        let field = field.split(|byte| *byte == 0).next().unwrap_or_default();
+                        let path = format!("{name}.{}", String::from_utf8_lossy(field));
+                        let tag = self.tag(reader)?;
+                        if tag.short.is_some() {
+                            return Err(Problem::Misfit);
+                        }
+                        self.matrix(reader, tag.size, Some(path), depth + 1)?;
+                        Self::padding(reader, tag.size)?;
+                    }
+                }
+                _ => self.others.push(name),
+            }
+            pass_over(reader)
+        }
     }
 }

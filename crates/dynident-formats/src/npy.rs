@@ -4,13 +4,12 @@ use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
 use crate::bytes::{Bytes, Number};
 use crate::error::FileError;
 use crate::kind::FileFormat;
+use crate::limits::{Budget, SPLIT};
 use crate::table::Table;
 use crate::zip;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// Unpacked arrays of one archive at most, bytes: what is packed may claim to be anything.
-const MOST_UNPACKED: u64 = 1 << 31;
 /// A header is a line or two; that of a structured array a few thousand bytes.
 const LONGEST_HEADER: usize = 1 << 20;
 
@@ -32,26 +31,32 @@ struct Field {
 }
 
 /// The array in `reader`.
-pub(crate) fn open(path: &Path, mut reader: impl Read) -> Result<Box<dyn Table>, FileError> {
-    let arrays = arrays(path, FileFormat::Npy, "", &mut reader, MOST_UNPACKED)?;
+pub(crate) fn open(path: &Path, mut reader: impl Read, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
+    let arrays = arrays(path, FileFormat::Npy, "", &mut reader, &mut budget)?;
     let named = arrays.iter().all(|array| !array.name.is_empty());
     let table = ArrayTable::new(arrays).ok_or_else(|| nothing(path, FileFormat::Npy))?;
     Ok(Box::new(if named { table } else { table.nameless() }))
 }
 
 /// The arrays of an archive, by their names there.
-pub(crate) fn open_archive(path: &Path) -> Result<Box<dyn Table>, FileError> {
+pub(crate) fn open_archive(path: &Path, mut budget: Budget) -> Result<Box<dyn Table>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
-    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut file = dynident_files::open(path).map_err(io)?;
     let members = zip::members(path, &mut file)?;
-    let (mut all, mut left, mut found) = (Vec::new(), MOST_UNPACKED, 0);
+    let (mut all, mut found) = (Vec::new(), 0);
     for member in &members {
         let Some(name) = member.name.strip_suffix(".npy") else { continue };
         found += 1;
-        let contents = zip::contents(path, &mut file, member)?;
-        let arrays = arrays(path, FileFormat::Npz, name, &mut BufReader::new(contents), left)?;
-        left = left.saturating_sub(arrays.iter().map(|array| array.values.len() as u64 * 8).sum());
-        all.extend(arrays);
+        let mut contents = BufReader::new(zip::contents(path, &mut file, member)?);
+        let arrays = arrays(path, FileFormat::Npz, name, &mut contents, &mut budget);
+        // Damaged bytes explain any other fault; an array that is too large is not unpacked to its end.
+        match arrays {
+            Err(error @ FileError::Broken { fix: SPLIT, .. }) => return Err(error),
+            arrays => {
+                contents.into_inner().verify(path)?;
+                all.extend(arrays?);
+            }
+        }
     }
     if found == 0 {
         return Err(FileError::OtherFormat {
@@ -73,17 +78,25 @@ fn arrays(
     format: FileFormat,
     name: &str,
     reader: &mut impl Read,
-    most: u64,
+    budget: &mut Budget,
 ) -> Result<Vec<Array>, FileError> {
     let place = if name.is_empty() { "the array".to_owned() } else { format!("array `{name}`") };
     let broken =
         |problem: String| FileError::broken(path, format, place.clone(), problem, "write it again with numpy.save");
     let header = header(reader).map_err(&broken)?;
     let items = header.shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
-    let bytes = items.and_then(|items| items.checked_mul(header.item)).filter(|bytes| *bytes as u64 <= most);
-    let (Some(items), Some(bytes)) = (items, bytes) else {
-        return Err(broken(format!("its shape {:?} is larger than 2 GiB", header.shape)));
+    let bytes = items.and_then(|items| items.checked_mul(header.item));
+    let too_large = || FileError::broken(path, format, place.clone(), budget.problem(), SPLIT);
+    let (Some(items), Some(bytes)) = (items, bytes.filter(|bytes| budget.allows(Some(*bytes as u64)))) else {
+        return Err(too_large());
     };
+    // Every number takes eight bytes, however it is written.
+    let numbers = header.fields.iter().filter(|field| field.number.is_some()).map(|field| field.count);
+    let numbers = numbers.sum::<usize>().checked_mul(items).and_then(|count| (count as u64).checked_mul(8));
+    if !budget.allows(numbers) {
+        return Err(too_large());
+    }
+    budget.take(numbers).map_err(&broken)?;
     if header.fields.iter().map(|field| field.count).sum::<usize>() > MOST_COLUMNS {
         return Err(broken(format!("it has more than {MOST_COLUMNS} columns")));
     }

@@ -81,7 +81,7 @@ mod reading {
     }
 
     pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
-        let file = File::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
+        let file = dynident_files::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
         let file = guarded(|| SerializedFileReader::new(file)).map_err(|error| broken(path, "its footer", &error))?;
         let mut table = ParquetTable {
             path: path.to_owned(),

@@ -6,6 +6,10 @@ use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::schema::types::ColumnDescriptor;
 
+/// Values of one page at most. Writers make pages of about 20,000; a page of repeated levels may claim 2^31 in a few
+/// bytes.
+const MOST_VALUES: u32 = 1 << 26;
+
 /// The pages of `inner`, each looked at before it is handed on.
 pub(crate) struct CheckedPages {
     inner: Box<dyn PageReader>,
@@ -35,6 +39,9 @@ impl CheckedPages {
                 return Ok(());
             }
         };
+        if page.num_values() > MOST_VALUES {
+            return Err(ParquetError::General(format!("a page has more than {MOST_VALUES} values")));
+        }
         let needs_dictionary = matches!(encoding, Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
         if !fits {
             Err(ParquetError::EOF("a page ends within its levels".into()))

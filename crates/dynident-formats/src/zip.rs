@@ -12,6 +12,8 @@ use std::path::Path;
 pub(crate) struct Member {
     pub(crate) name: String,
     method: u16,
+    /// CRC-32 of the unpacked bytes.
+    crc: u32,
     packed: u64,
     header: u64,
 }
@@ -76,7 +78,8 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
     }
     bytes.take(6)?;
     let method = bytes.u16()?;
-    bytes.take(8)?;
+    bytes.take(4)?;
+    let crc = bytes.u32()?;
     let (mut packed, unpacked) = (u64::from(bytes.u32()?), bytes.u32()?);
     let [name, extra, comment] = [bytes.u16()?, bytes.u16()?, bytes.u16()?].map(usize::from);
     bytes.take(8)?;
@@ -100,36 +103,84 @@ fn member(bytes: &mut Bytes) -> Option<Member> {
             }
         }
     }
-    Some(Member { name, method, packed, header })
+    Some(Member { name, method, crc, packed, header })
+}
+
+/// Unpacked bytes of a member, with a running checksum.
+pub(crate) struct Contents<'a> {
+    reader: Box<dyn Read + 'a>,
+    hasher: crc32fast::Hasher,
+    place: String,
+    crc: u32,
+}
+
+impl Read for Contents<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.reader.read(buffer)?;
+        self.hasher.update(&buffer[..read]);
+        Ok(read)
+    }
+}
+
+impl Contents<'_> {
+    /// Reads to the end and compares the checksum with the one in the archive's list.
+    ///
+    /// # Errors
+    /// If they differ: bytes were changed after the archive was written.
+    pub(crate) fn verify(mut self, path: &Path) -> Result<(), FileError> {
+        let mut block = [0; 1 << 12];
+        loop {
+            match self.read(&mut block) {
+                Ok(0) => break,
+                Ok(_) => {}
+                Err(error) => return Err(broken(path, &self.place, &format!("it cannot be unpacked ({error})"))),
+            }
+        }
+        if self.hasher.finalize() == self.crc {
+            return Ok(());
+        }
+        Err(broken(path, &self.place, "its bytes do not match their checksum (CRC-32): the file is damaged"))
+    }
 }
 
 /// The contents of a member as a stream.
-pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> Result<Box<dyn Read + 'a>, FileError> {
+pub(crate) fn contents<'a>(path: &Path, file: &'a mut File, member: &Member) -> Result<Contents<'a>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
     let place = format!("member `{}`", member.name);
     file.seek(SeekFrom::Start(member.header)).map_err(io)?;
     let mut header = Vec::new();
     file.by_ref().take(30).read_to_end(&mut header).map_err(io)?;
     let mut bytes = Bytes::new(&header, false);
-    let skip = (bytes.take(4) == Some(b"PK\x03\x04"))
+    let [name, extra] = (bytes.take(4) == Some(b"PK\x03\x04"))
         .then(|| bytes.take(22))
         .flatten()
-        .and_then(|_| Some(i64::from(bytes.u16()?) + i64::from(bytes.u16()?)))
+        .and_then(|_| Some([bytes.u16()?, bytes.u16()?]))
         .ok_or_else(|| broken(path, &place, "its header is broken"))?;
-    file.seek(SeekFrom::Current(skip)).map_err(io)?;
-    let packed = file.take(member.packed);
-    match member.method {
-        0 => Ok(Box::new(packed)),
-        #[cfg(feature = "gzip")]
-        8 => Ok(Box::new(flate2::bufread::DeflateDecoder::new(std::io::BufReader::new(packed)))),
-        #[cfg(not(feature = "gzip"))]
-        8 => Err(FileError::NotBuilt { file: path.to_owned(), format: "a packed NumPy archive", feature: "gzip" }),
-        _ => Err(FileError::broken(
-            path,
-            FileFormat::Npz,
-            place,
-            "it is packed in another way than deflate",
-            "write it with numpy.savez or numpy.savez_compressed",
-        )),
+    let mut own_name = Vec::new();
+    file.by_ref().take(u64::from(name)).read_to_end(&mut own_name).map_err(io)?;
+    if String::from_utf8_lossy(&own_name) != member.name {
+        return Err(broken(path, &place, "its header has another name: the file is damaged"));
     }
+    file.seek(SeekFrom::Current(i64::from(extra))).map_err(io)?;
+    let packed = file.take(member.packed);
+    let reader: Box<dyn Read + 'a> = match member.method {
+        0 => Box::new(packed),
+        #[cfg(feature = "gzip")]
+        8 => Box::new(flate2::bufread::DeflateDecoder::new(std::io::BufReader::new(packed))),
+        #[cfg(not(feature = "gzip"))]
+        8 => {
+            let format = "a packed NumPy archive";
+            return Err(FileError::NotBuilt { file: path.to_owned(), format, feature: "gzip" });
+        }
+        _ => {
+            return Err(FileError::broken(
+                path,
+                FileFormat::Npz,
+                place,
+                "it is packed in another way than deflate",
+                "write it with numpy.savez or numpy.savez_compressed",
+            ));
+        }
+    };
+    Ok(Contents { reader, hasher: crc32fast::Hasher::new(), place, crc: member.crc })
 }

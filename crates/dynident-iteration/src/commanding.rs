@@ -35,6 +35,11 @@ pub(crate) enum Came {
     CutShort(Option<RobotRun>, CutShort),
 }
 
+/// Number of a run's leg: it differs from leg to leg, since noise and folders depend on it.
+pub(crate) fn folder_number(run: usize, place: usize, legs: usize) -> usize {
+    (run - 1) * legs + place + 1
+}
+
 impl Iteration {
     /// Controller, model, ways and rehearsal of a plan along the legs of `task`; or why it is not commanded. `stop`
     /// ends it.
@@ -83,8 +88,7 @@ impl Iteration {
     ) -> Result<Came, IterationError> {
         let Commanded { place, speed, purpose, .. } = *motion;
         let Prepared { controller, model, ways, rehearsal } = prepared;
-        // Numbers of runs differ from leg to leg: noise and folders go by them.
-        let run = (plan.run - 1) * task.legs.len() + place + 1;
+        let run = folder_number(plan.run, place, task.legs.len());
         let reference = &*motion.reference()?;
         let found = ways[place].as_ref();
         let own = found.map(|found| if speed < 1.0 { found.ways.slowed(speed) } else { Ok(found.ways.clone()) });

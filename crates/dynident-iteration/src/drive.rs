@@ -1,7 +1,7 @@
 //! Robots, records and the policy together.
 
 use crate::before_motion::motions;
-use crate::commanding::{Came, Prepared};
+use crate::commanding::{Came, Prepared, folder_number};
 use crate::convergence::Shortfall;
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
@@ -17,7 +17,7 @@ use crate::planner::PlannedMotion;
 use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::robot::{Robot, RobotRun, RunPurpose, StopSignal};
+use crate::robot::{Robot, RobotRun, RunPurpose, RunRequest, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::run_logs::RunLog;
 use crate::run_motion::{RunMotion, legs_along};
@@ -27,6 +27,7 @@ use crate::supervision::{Supervisor, Watching};
 use crate::warm_up::{WarmUpWatch, passes};
 use dynident_simulation::{Record, require_length};
 use std::borrow::Cow;
+use std::path::Path;
 use std::time::Instant;
 
 /// How an iteration went.
@@ -55,6 +56,13 @@ enum PlannedRun {
     Stopped(IterationStatus),
     /// It does not count: what was recorded of the run, and why.
     CutShort(Vec<RobotRun>, CutShort),
+}
+
+/// A log that was corrected after it had been read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum CorrectedLog {
+    Run,
+    HeldOut,
 }
 
 impl Iteration {
@@ -285,6 +293,36 @@ impl Iteration {
         }
     }
 
+    /// Which log of the newest run a person has corrected since it was read, if any.
+    fn corrected_log(
+        &self,
+        robots: &[&mut dyn Robot],
+        last: &RunRecord,
+        store: &IterationStore,
+    ) -> Result<Option<CorrectedLog>, IterationError> {
+        let joints = self.task.robot.joint_names();
+        let is_corrected = |robot: &dyn Robot, purpose: RunPurpose, number: usize, leg: &Leg, path: &Path| {
+            let (reference, controller) = (leg.reference(), &self.settings().model_free);
+            let name = RunRequest { purpose, ..RunRequest::new(number, reference, controller) }.folder_name();
+            let kept = store.kept_log(path, &joints, reference.rate_hz());
+            kept.is_some_and(|kept| robot.has_corrected_log(&name, reference, &kept))
+        };
+        let legs = self.legs_of(last)?;
+        for (place, leg) in legs.iter().enumerate() {
+            let robot = if robots.len() == 1 { &robots[0] } else { &robots[place] };
+            let number = folder_number(last.run, place, legs.len());
+            if is_corrected(&**robot, RunPurpose::Run, number, leg, &store.log_path(last.run, place)) {
+                return Ok(Some(CorrectedLog::Run));
+            }
+        }
+        let held_out = self.held_out.as_ref().filter(|_| last.held_out.is_some());
+        Ok(held_out.and_then(|held_out| {
+            let path = store.held_out_log_path(last.run);
+            is_corrected(&*robots[0], RunPurpose::HeldOut, last.run, &held_out.leg, &path)
+                .then_some(CorrectedLog::HeldOut)
+        }))
+    }
+
     /// The logs of the good runs among `records`, from the store: what further runs are identified together with.
     fn good_logs(&self, records: &[RunRecord], store: Option<&IterationStore>) -> Result<Vec<GoodLog>, IterationError> {
         let Some(store) = store.filter(|_| self.settings.pool) else { return Ok(Vec::new()) };
@@ -349,6 +387,15 @@ pub fn iterate_supervised(
         require_length("robots", legs, robots.len())?;
     }
     let mut records = store.map_or_else(|| Ok(Vec::new()), IterationStore::records)?;
+    if let (Some(store), Some(last)) = (store, records.last())
+        && let Some(corrected) = iteration.corrected_log(robots, last, store)?
+    {
+        match corrected {
+            CorrectedLog::Run => store.forget_run(last.run)?,
+            CorrectedLog::HeldOut => store.forget_held_out(last.run)?,
+        }
+        records = store.records()?;
+    }
     if let Some(store) = store {
         let robot = iteration.robot(&records)?;
         for record in &records {

@@ -69,10 +69,13 @@ fn table_name(leg: usize) -> String {
     if leg == 0 { "motion.csv".to_owned() } else { format!("motion_{}.csv", leg + 1) }
 }
 
+/// Largest table that is read, bytes.
+const MOST_BYTES: u64 = 1 << 30;
+
 fn read_table(path: &Path, joints: usize, rate_hz: f64) -> Result<Reference, IterationError> {
     let wrong = |problem: String| IterationError::State { path: PathBuf::from(path), problem };
     let fix = "the run was made along it: put it back, or remove this folder and those after it";
-    let text = std::fs::read_to_string(path).map_err(|error| wrong(format!("{error}; {fix}")))?;
+    let text = dynident_files::read_text(path, MOST_BYTES).map_err(|error| wrong(format!("{error}; {fix}")))?;
     let columns = 1 + 3 * joints;
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (line, row) in text.lines().enumerate().skip(1) {

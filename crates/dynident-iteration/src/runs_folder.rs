@@ -84,6 +84,15 @@ impl RunsFolder {
         self.removable().try_for_each(|folder| remove(folder))
     }
 
+    /// Removes one run, if nothing but an iteration's files is in its folder.
+    ///
+    /// # Errors
+    /// As [`remove_runs`](Self::remove_runs).
+    pub(crate) fn remove_run(&self, folder: &Path) -> Result<(), IterationError> {
+        self.may_remove_runs()?;
+        if self.kept.iter().any(|kept| kept == folder) { remove(folder) } else { Ok(()) }
+    }
+
     /// The folders of runs, and of what was planned for them.
     fn removable(&self) -> impl Iterator<Item = &PathBuf> {
         self.kept.iter().chain(self.planned.iter().chain(&self.held_out).map(|(_, folder)| folder))

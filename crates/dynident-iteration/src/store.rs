@@ -21,6 +21,9 @@ use std::path::{Path, PathBuf};
 /// Schema of `runs/interrupted_k/interrupted.json`.
 const INTERRUPTED_SCHEMA: &str = "dynident/interrupted/1";
 
+/// Largest file of a run that is read, bytes.
+const MOST_BYTES: u64 = 1 << 30;
+
 /// Schema of `runs/run_k/run.json`.
 pub const RUN_SCHEMA: &str = "dynident/run/1";
 
@@ -112,7 +115,7 @@ impl IterationStore {
         let mut records = Vec::new();
         loop {
             let path = self.run_folder(records.len() + 1).join(RUN_FILE);
-            let text = match fs::read_to_string(&path) {
+            let text = match dynident_files::read_text(&path, MOST_BYTES) {
                 Ok(text) => text,
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(records),
                 Err(error) => return Err(IterationError::file(&path)(error)),
@@ -155,7 +158,7 @@ impl IterationStore {
     /// The held-out run after a run, if it is there.
     fn held_out(&self, run: usize) -> Result<Option<HeldOutRun>, IterationError> {
         let path = self.held_out_folder(run).join(HELD_OUT_FILE);
-        let text = match fs::read_to_string(&path) {
+        let text = match dynident_files::read_text(&path, MOST_BYTES) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(IterationError::file(&path)(error)),
@@ -229,7 +232,7 @@ impl IterationStore {
     pub fn planned(&self, run: usize, joints: usize) -> Result<Option<PlannedMotion>, IterationError> {
         let folder = self.plan_folder(run);
         let path = folder.join(PLAN_FILE);
-        let text = match fs::read_to_string(&path) {
+        let text = match dynident_files::read_text(&path, MOST_BYTES) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(IterationError::file(&path)(error)),
@@ -304,6 +307,28 @@ impl IterationStore {
         // It has another name now: there is nothing left to remove.
         let _ = fresh.keep();
         sync_folder(&self.runs)
+    }
+
+    /// Forgets the newest run, whose log was corrected, with everything that was made after it.
+    ///
+    /// # Errors
+    /// A folder that holds files of somebody else, or that cannot be removed.
+    pub(crate) fn forget_run(&self, run: usize) -> Result<(), IterationError> {
+        RunsFolder::look(&self.runs)?.remove_run(&self.run_folder(run))?;
+        self.forget_held_out(run)
+    }
+
+    /// Forgets the held-out run after the newest run, with what was planned after it.
+    ///
+    /// # Errors
+    /// A folder that cannot be removed.
+    pub(crate) fn forget_held_out(&self, run: usize) -> Result<(), IterationError> {
+        RunsFolder::look(&self.runs)?.remove_plans_but(run)
+    }
+
+    /// The log of a run's leg as it was kept, or that of the held-out run after it; `None` where nothing was recorded.
+    pub(crate) fn kept_log(&self, path: &Path, joints: &[String], rate_hz: f64) -> Option<Record> {
+        read_log_table(path, joints, rate_hz).ok()
     }
 
     /// The records of a run, leg after leg, at these rates: bit for bit as they were when it was made.

@@ -7,7 +7,6 @@ use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
 use crate::xacro::{XacroFailure, has_macros, written_out};
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -218,8 +217,8 @@ pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
 /// The bytes of a file.
 fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
-    // Bounded reading: the length that the system reports may be wrong (pipes, devices).
-    File::open(path)
+    // Bounded reading: the length that the system reports may be wrong (files of the kernel).
+    dynident_files::open(path)
         .and_then(|file| file.take(MAX_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
     if bytes.len() as u64 > MAX_DESCRIPTION_BYTES {

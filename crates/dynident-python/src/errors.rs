@@ -41,7 +41,7 @@ pub(crate) fn factors(error: impl core::fmt::Display) -> PyErr {
 /// The exception that a job's error is, with its place.
 pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
     use dynident::Error as Job;
-    let message = error.to_string();
+    let message = dynident::shortened(&error.to_string());
     let (exception, path, line, column): (PyErr, Option<&Path>, Option<u64>, Option<u32>) = match error {
         Job::StudyAt { path, line, column, .. } => {
             (StudyError::new_err(message), Some(path), Some(u64::from(*line)), Some(*column))
@@ -56,7 +56,9 @@ pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
         Job::Result { path, .. } | Job::Export { path, .. } | Job::Factors { path, .. } => {
             (ResultError::new_err(message), Some(path), None, None)
         }
-        Job::File { path, .. } | Job::Output { path, .. } => (Error::new_err(message), Some(path), None, None),
+        Job::File { path, .. } | Job::Output { path, .. } | Job::Changed { path } => {
+            (Error::new_err(message), Some(path), None, None)
+        }
         _ => (Error::new_err(message), None, None, None),
     };
     let value = exception.value(py);

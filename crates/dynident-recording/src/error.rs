@@ -36,6 +36,12 @@ pub enum RecordingError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// A file that is not the one that was first read.
+    #[error("{}: the file changed while it was read; wait until nothing writes to it, then run the command again", file.display())]
+    Changed {
+        /// The file.
+        file: PathBuf,
+    },
     /// No row of numbers in the file.
     #[error("{}; the log needs at least one row of numbers", no_rows(place))]
     NoRows {

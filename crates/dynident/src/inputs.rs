@@ -1,9 +1,82 @@
-//! No output takes the place of an input.
+//! The files that a job reads: none is overwritten, and none changes while the job reads it.
 
 use crate::error::Error;
 use crate::study::{Folders, Study};
+use dynident_files::SeenFiles;
+use dynident_model::collision::find_mesh;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// Largest file of a result, a design, runs or factors that is read, bytes.
+pub const MAX_RESULT_BYTES: u64 = 1 << 32;
+/// Largest robot description that is searched for meshes and included files, bytes.
+const MAX_ROBOT_BYTES: u64 = 64 << 20;
+
+/// Reads a file that a command has written: a result, a design, runs, factors.
+///
+/// # Errors
+/// [`Error::File`] if it cannot be read, is no regular file or is larger than [`MAX_RESULT_BYTES`].
+pub fn read_result(path: &Path) -> Result<Vec<u8>, Error> {
+    dynident_files::read(path, MAX_RESULT_BYTES).map_err(|source| Error::File { path: path.to_owned(), source })
+}
+
+/// The files of a study as they were when a job began to read them.
+#[derive(Debug)]
+pub(crate) struct InputFiles(SeenFiles);
+
+impl InputFiles {
+    /// Takes note of the study's file, every file that the study names, and the meshes and included files that its
+    /// robot names, as far as they exist.
+    pub(crate) fn of(study: &Study, study_path: &Path, data: Option<&Path>) -> Self {
+        let mut files = named_files(study, study_path, data, |_| true);
+        if let Ok(robot) = Folders::new(study, study_path, data).find(&study.robot.file, None) {
+            files.extend(files_of_robot(&robot));
+        }
+        let seen = SeenFiles::default();
+        for file in files {
+            // A recording may be several files. Errors are reported by the reader.
+            for part in dynident_recording::log::files(&file).unwrap_or_default() {
+                let _ = seen.is_unchanged(&part);
+            }
+        }
+        Self(seen)
+    }
+
+    /// That no file has changed since.
+    ///
+    /// # Errors
+    /// [`Error::Changed`] with the first one that has.
+    pub(crate) fn unchanged(&self) -> Result<(), Error> {
+        self.0.first_changed().map_or(Ok(()), |path| Err(Error::Changed { path }))
+    }
+
+    /// Does a job that reads the files. A file that changes during the job is an error, also if the job failed:
+    /// its numbers and the hashes in its provenance may belong to different contents.
+    ///
+    /// # Errors
+    /// [`Error::Changed`], and those of the job.
+    pub(crate) fn while_unchanged<R>(&self, job: impl FnOnce() -> Result<R, Error>) -> Result<R, Error> {
+        let done = job();
+        self.unchanged()?;
+        done
+    }
+}
+
+/// The meshes and included files that a robot description names in attributes `file` and `filename`.
+fn files_of_robot(robot: &Path) -> Vec<PathBuf> {
+    let folder = robot.parent().unwrap_or(Path::new(""));
+    let Ok(text) = dynident_files::read_text(robot, MAX_ROBOT_BYTES) else { return Vec::new() };
+    let named = |attribute: &'static str| {
+        text.split(attribute).skip(1).filter_map(|rest| {
+            let quote = rest.chars().next().filter(|quote| matches!(quote, '"' | '\''))?;
+            rest[1..].split_once(quote).map(|(name, _)| name)
+        })
+    };
+    let mut names: Vec<&str> = named("file=").chain(named("filename=")).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.into_iter().filter_map(|name| find_mesh(folder, name)).collect()
+}
 
 /// That none of `outputs` (files or folders, which need not exist yet) is one of `inputs` or holds one, also under
 /// another path or through a link.
@@ -27,12 +100,15 @@ pub fn refuse_overwriting(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<(),
 /// names a file is found by looking: every text of these sections that is a file in one of the study's folders, or
 /// beside one that is (as the `file` keys of a log's channels are), so that no key can be forgotten.
 pub fn study_inputs(study: &Study, study_path: &Path, data: Option<&Path>, sections: &[&str]) -> Vec<PathBuf> {
+    named_files(study, study_path, data, |section| sections.contains(&section))
+}
+
+/// The study file and the files that its sections name, of those sections that are `chosen`.
+fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let folders = Folders::new(study, study_path, data);
     let mut texts = Vec::new();
     if let Ok(Value::Object(all)) = serde_json::to_value(study) {
-        for section in sections {
-            gather(all.get(*section).unwrap_or(&Value::Null), &mut texts);
-        }
+        all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| gather(value, &mut texts));
     }
     let mut files: Vec<PathBuf> = texts.iter().filter_map(|text| folders.find(Path::new(text), None).ok()).collect();
     let beside: Vec<PathBuf> = files

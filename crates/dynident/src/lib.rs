@@ -67,10 +67,11 @@ pub use dynident_online as online;
 pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 
+pub use dynident_files::shortened;
 pub use dynident_identification::{Progress, Role, Silent};
 pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError};
 pub use factors::{FactorLog, Factors, seconds_of};
-pub use inputs::{refuse_overwriting, study_inputs};
+pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Reads factors; the message of what is wrong names the file.
 pub(super) fn read(path: &Path) -> Result<Factors, String> {
-    let bytes = std::fs::read(path).map_err(|error| format!("{}: cannot be read ({error})", path.display()))?;
+    let bytes = dynident::read_result(path).map_err(super::message_of)?;
     Factors::from_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()))
 }
 

@@ -4,7 +4,7 @@ use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use dynident::excitation::DesignProgress;
-use dynident::iteration::{NextMotion, StopSignal};
+use dynident::iteration::{NextMotion, RobotRun, RunRecord, StopSignal};
 use dynident::result::INTERRUPTED;
 use dynident::study::LegOrder;
 use dynident::{
@@ -81,7 +81,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
     let most = section.max_runs * iterations;
     progress.begin("runs", Some(most as u64));
-    let mut hear = |_: &_, _: &[_]| progress.advance(1);
+    let mut notes = Vec::new();
+    let mut hear = |record: &RunRecord, runs: &[RobotRun]| {
+        progress.advance(1);
+        notes.extend(runs.iter().filter_map(|run| Some(format!("run {}: {}", record.run, run.note.as_ref()?))));
+    };
     let mut allow = |motion: &NextMotion| permission::for_motion(motion);
     let design = |at: &DesignProgress| search.hear(at);
     let mut watch = IterationWatch { stop, ..IterationWatch::new(&design, &mut hear) };
@@ -91,6 +95,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let file = iterate_study(&study, &options.study, &options.out, !options.fresh, &run, &mut watch);
     progress.end();
     search.end();
+    notes.iter().for_each(|note| terminal::remark(note));
     let file = match file {
         Err(error @ Error::Interrupted { .. }) => {
             terminal::remark(&error.to_string());

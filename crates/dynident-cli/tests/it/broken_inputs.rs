@@ -47,6 +47,39 @@ fn every_broken_study_is_refused_with_its_place() {
     assert!(!out.exists(), "a refused study left something behind");
 }
 
+/// A name, an expression or a key of 200,000 characters is shortened where a message quotes it.
+#[test]
+fn messages_quote_no_long_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = std::fs::read_to_string(broken().join("good.toml")).unwrap();
+    for file in ["arm.urdf", "log.csv"] {
+        if broken().join(file).exists() {
+            std::fs::copy(broken().join(file), folder.path().join(file)).unwrap();
+        }
+    }
+    let (long, deep) = ("x".repeat(200_000), "(".repeat(200_000));
+    let torque = |name: &str, joint: &str, expression: &str| {
+        format!("{good}\n[[torque]]\nname = \"{name}\"\njoint = \"{joint}\"\nexpression = \"{expression}\"\n")
+    };
+    let studies = [
+        torque("g", "j1", &format!("{deep}q{}", deep.replace('(', ")"))),
+        torque("g", "j1", &deep),
+        torque("g", "j1", &long),
+        torque(&long, "j1", "q"),
+        torque("g", &long, "q"),
+        format!("{long} = 1\n{good}"),
+        format!("name = \"{long}\" b\n{good}"),
+        format!("name = \"{long}\"\nname = \"a\"\n{good}"),
+    ];
+    let path = folder.path().join("long.toml");
+    for (number, study) in studies.iter().enumerate() {
+        std::fs::write(&path, study).unwrap();
+        let ran = run_in(folder.path(), &["identify", "long.toml", "--out", "result"]);
+        assert_eq!(ran.status, 2, "{number}");
+        assert!(ran.stderr.len() < 2000, "{number}: {} bytes, {}", ran.stderr.len(), &ran.stderr[..300]);
+    }
+}
+
 #[test]
 fn the_study_that_they_were_made_from_is_good() {
     let out = tempfile::tempdir().unwrap();

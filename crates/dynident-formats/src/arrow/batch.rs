@@ -3,11 +3,12 @@
 use super::flat::Flat;
 use super::schema::{Cell, Leaf, List, Place};
 use crate::bytes::Bytes;
+use crate::limits::Budget;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 
-/// Unpacked buffers of one batch at most, bytes: what is packed may claim to be anything.
-const MOST_UNPACKED: usize = 1 << 31;
+/// Fill bytes behind a buffer at most, which the format aligns to 64.
+const MOST_FILL: u64 = 128;
 
 /// How buffers are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,8 +89,8 @@ impl Batch {
         Ok(Self { rows, entries, buffers: batch.numbers(2), views: batch.numbers(4), packing, begin, bytes })
     }
 
-    /// Reads a column; or says what is wrong with it. `left`: bytes that may still be unpacked.
-    fn load(&self, leaf: &Leaf, reader: &mut BufReader<File>, left: &mut usize) -> Result<Loaded, String> {
+    /// Reads a column; or says what is wrong with it. `left`: memory that may still be taken.
+    fn load(&self, leaf: &Leaf, reader: &mut BufReader<File>, left: &mut Budget) -> Result<Loaded, String> {
         // What stands in groups, and lists, have one entry a row; entries of lists are as many as their field says.
         let mut around = Vec::new();
         for place in &leaf.around {
@@ -120,8 +121,8 @@ impl Batch {
         leaves: &[Leaf],
         asked_for: impl Fn(usize) -> bool,
         reader: &mut BufReader<File>,
+        mut left: Budget,
     ) -> Result<Vec<Option<Loaded>>, (usize, String)> {
-        let mut left = MOST_UNPACKED;
         let mut loaded = Vec::with_capacity(leaves.len());
         for (index, leaf) in leaves.iter().enumerate() {
             let column = asked_for(index).then(|| self.load(leaf, reader, &mut left)).transpose();
@@ -142,7 +143,7 @@ impl Batch {
         place: Place,
         entries: usize,
         reader: &mut BufReader<File>,
-        left: &mut usize,
+        left: &mut Budget,
     ) -> Result<Flags, String> {
         // Where all are there, the buffer may be empty.
         if self.buffers.get(self.number(place, 0)).is_some_and(|[_, length]| *length == 0) {
@@ -157,7 +158,7 @@ impl Batch {
         wide: bool,
         entries: usize,
         reader: &mut BufReader<File>,
-        left: &mut usize,
+        left: &mut Budget,
     ) -> Result<Offsets, String> {
         if self.rows == 0 {
             return Ok(Offsets::Each(vec![0]));
@@ -183,10 +184,10 @@ impl Batch {
         which: usize,
         wanted: Option<usize>,
         reader: &mut BufReader<File>,
-        left: &mut usize,
+        left: &mut Budget,
     ) -> Result<Vec<u8>, String> {
-        let wanted = wanted.filter(|wanted| wanted <= left).ok_or("it would be larger than 2 GiB")?;
-        *left -= wanted;
+        left.take(wanted.map(|wanted| wanted as u64))?;
+        let wanted = wanted.unwrap_or_default();
         let [offset, length] = *self.buffers.get(self.number(place, which)).ok_or("it lacks a buffer")?;
         let (offset, length) = u64::try_from(offset).ok().zip(u64::try_from(length).ok()).ok_or("a negative place")?;
         if offset.checked_add(length).is_none_or(|end| end > self.bytes) {
@@ -213,6 +214,10 @@ impl Batch {
             }
         };
         unpacked.by_ref().take(wanted as u64).read_to_end(&mut data).map_err(problem)?;
+        // The checksum of what is packed stands behind its last byte; before that there may be fill bytes.
+        if self.packing != Packing::Plain {
+            std::io::copy(&mut unpacked.by_ref().take(MOST_FILL), &mut std::io::sink()).map_err(problem)?;
+        }
         drop(unpacked);
         if data.len() < wanted {
             return Err(format!("its buffer has {} bytes of {wanted}", data.len()));

@@ -26,6 +26,9 @@ pub(crate) fn begins_stream(head: &[u8]) -> bool {
 }
 
 #[cfg(not(feature = "arrow"))]
-pub(crate) fn open(path: &std::path::Path) -> Result<Box<dyn crate::table::Table>, crate::error::FileError> {
+pub(crate) fn open(
+    path: &std::path::Path,
+    _: crate::limits::Budget,
+) -> Result<Box<dyn crate::table::Table>, crate::error::FileError> {
     Err(crate::error::FileError::NotBuilt { file: path.to_owned(), format: "an Arrow table", feature: "arrow" })
 }

@@ -7,6 +7,7 @@ use super::schema::{Cell, Leaf, List, Schema};
 use crate::arrays::{LONGEST_LIST, MOST_COLUMNS};
 use crate::error::FileError;
 use crate::kind::FileFormat;
+use crate::limits::Budget;
 use crate::table::Table;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -28,6 +29,8 @@ struct Message {
 struct ArrowTable {
     path: PathBuf,
     reader: BufReader<File>,
+    /// Memory for the columns of one batch.
+    budget: Budget,
     /// Where the next message begins, and where the last one ends.
     next_message: u64,
     end: u64,
@@ -49,9 +52,9 @@ struct ArrowTable {
     estimated_rows: Option<u64>,
 }
 
-pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
+pub(crate) fn open(path: &Path, budget: Budget) -> Result<Box<dyn Table>, FileError> {
     let io = |source| FileError::Io { file: path.to_owned(), source };
-    let file = File::open(path).map_err(io)?;
+    let file = dynident_files::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut magic = [0; MAGIC.len()];
@@ -61,6 +64,7 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
     let mut table = ArrowTable {
         path: path.to_owned(),
         reader,
+        budget,
         next_message: if stream { 0 } else { 8 },
         end,
         stream,
@@ -234,7 +238,7 @@ impl ArrowTable {
             if batch.rows == 0 {
                 continue;
             }
-            let loaded = batch.loaded(&self.leaves, &asked_for, &mut self.reader);
+            let loaded = batch.loaded(&self.leaves, &asked_for, &mut self.reader, self.budget);
             self.loaded = loaded.map_err(|(leaf, problem)| {
                 broken(&self.path, format!("{place}, column {}", self.leaves[leaf].name), problem)
             })?;

@@ -107,8 +107,11 @@ impl Part for Database {
         if message.starts_with(b"\x28\xB5\x2F\xFD") {
             let mut unpacked = Vec::new();
             let read = zstd::stream::read::Decoder::new(&message[..])
-                .and_then(|decoder| decoder.take(LONGEST_MESSAGE).read_to_end(&mut unpacked));
+                .and_then(|decoder| decoder.take(LONGEST_MESSAGE + 1).read_to_end(&mut unpacked));
             read.map_err(|error| self.file.broken(place(), format!("it cannot be unpacked ({error})")))?;
+            if unpacked.len() as u64 > LONGEST_MESSAGE {
+                return Err(self.file.broken(place(), "it is larger than 256 MiB"));
+            }
             *message = unpacked;
         }
         Ok(Some((topic, time)))

@@ -39,9 +39,12 @@ impl core::fmt::Debug for McapFile {
 
 impl McapFile {
     pub(super) fn open(path: &Path) -> Result<Self, FileError> {
-        let file = File::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
+        let file = dynident_files::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
         // Chunks are unpacked here: lengths inside of them may lie.
-        let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_emit_chunks(true);
+        let options = LinearReaderOptions::default()
+            .with_record_length_limit(LONGEST_RECORD)
+            .with_emit_chunks(true)
+            .with_validate_data_section_crc(true);
         Ok(Self {
             path: path.to_owned(),
             file,

@@ -32,7 +32,7 @@ pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     use std::io::Read;
     let path = folder.join(METADATA);
     let mut text = String::new();
-    std::fs::File::open(&path)
+    dynident_files::open(&path)
         .and_then(|file| file.take(LONGEST_METADATA).read_to_string(&mut text))
         .map_err(|source| FileError::Io { file: path.clone(), source })?;
     let broken = |problem: String| {

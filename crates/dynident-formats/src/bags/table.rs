@@ -10,7 +10,6 @@ use crate::kind::FileFormat;
 use crate::recognition;
 use crate::table::{ColumnGroup, Table};
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +33,7 @@ pub(crate) fn open_database(path: &Path) -> Result<Contents, FileError> {
 pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
     let mut found = Vec::new();
     for part in parts(path)? {
-        let file = File::open(&part).map_err(|source| FileError::Io { file: part.clone(), source })?;
+        let file = dynident_files::open(&part).map_err(|source| FileError::Io { file: part.clone(), source })?;
         let head = recognition::head(&mut BufReader::new(file));
         let head = head.map_err(|source| FileError::Io { file: part.clone(), source })?;
         match recognition::recognised(&part, &head)? {

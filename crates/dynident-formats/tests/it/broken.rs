@@ -138,7 +138,8 @@ fn claims_that_the_file_cannot_fill_take_no_memory() {
     drop(file);
     let message = drain(&path).unwrap_err().to_string();
     assert!(message.contains("80 bytes of 1600000000 are there"), "{message}");
-    for (shape, words) in [("(9999999999999, 9999999999)", "larger than 2 GiB"), ("(-1,)", "not understood")] {
+    for (shape, words) in [("(9999999999999, 9999999999)", "more than 2048 MiB of memory"), ("(-1,)", "not understood")]
+    {
         let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend_from_slice(&(header.len() as u16).to_le_bytes());

@@ -1,16 +1,24 @@
 //! A robot that a person runs: files out, a log in.
 
 use super::envelope::EnvelopeWatch;
-use super::log_table::{LogTableError, read_log_table};
+use super::folder_forms::{FolderForm, FormSettings, write_forms};
+use super::handover::model_torques;
+use super::log_mistakes::{ExaminedLog, LogMistakeSettings, examine_log};
+use super::log_table::{LogTableError, read_log_with_currents};
 use super::stop_reason::Stopping;
 use super::ways::{RunPart, WayRecords};
 use super::{Breach, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, handover};
-use dynident_simulation::{SimulationError, require};
+use dynident_excitation::export::UrScriptSettings;
+use dynident_simulation::controllers::ControllerModel;
+use dynident_simulation::{PerJoint, Record, Reference, SimulationError, require};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Where, and for how long to look.
+/// Longest reason in stopped.txt that is read, bytes.
+const MOST_STOPPED_BYTES: u64 = 1 << 20;
+
+/// Where, for how long to look, and in which forms motions are written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -20,6 +28,48 @@ pub struct FolderSettings {
     /// How long to wait for a log, s. Default 0: look once.
     #[serde(default)]
     pub wait_s: f64,
+    /// Further forms of each motion: `"ros2"`, `"urscript"`, `"waypoints"`, `"torque"`, `"current"`. Default none:
+    /// `trajectory.csv` and `controller.json` are always there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forms: Vec<FolderForm>,
+    /// Rate of the URScript program, Hz: 125 for CB-series, 500 for e-series. Default 125.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub urscript_rate_hz: Option<f64>,
+    /// Torque at the joint for one ampere, Nm/A (N/A), gear included: one number or one for each joint. `current.csv`
+    /// is made with it, and a log may have currents `i1..` in A instead of `tau1..`. Default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_constants: Option<PerJoint>,
+}
+
+impl FolderSettings {
+    /// A folder with the default settings.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), wait_s: 0.0, forms: Vec::new(), urscript_rate_hz: None, torque_constants: None }
+    }
+
+    /// Settings of the forms for a robot with this number of joints.
+    fn form_settings(&self, joints: usize) -> Result<FormSettings, SimulationError> {
+        let constants = self.torque_constants.as_ref().map(|constants| {
+            let holds = |value: f64| value.is_finite() && value != 0.0;
+            constants.values("torque_constants", joints, "give Nm (N) at the joint for one ampere", holds)
+        });
+        let torque_constants = constants.transpose()?;
+        let lacks = self.forms.contains(&FolderForm::Current) && torque_constants.is_none();
+        require(
+            !lacks,
+            "torque_constants",
+            f64::NAN,
+            "forms = [\"current\"] needs Nm (N) at the joint for one ampere",
+        )?;
+        let urscript = self.forms.contains(&FolderForm::Urscript);
+        let fix =
+            "URScript is for the six joints of a UR arm: take \"urscript\" out of forms, or lock the other joints";
+        require(!urscript || joints == 6, "joints of a robot with forms = [\"urscript\"]", joints as f64, fix)?;
+        let urscript_rate_hz = self.urscript_rate_hz.unwrap_or(UrScriptSettings::default().rate_hz);
+        let fix = "give 1 to 500 Hz (125 for CB-series, 500 for e-series)";
+        require((1.0..=500.0).contains(&urscript_rate_hz), "urscript_rate_hz", urscript_rate_hz, fix)?;
+        Ok(FormSettings { forms: self.forms.clone(), urscript_rate_hz, torque_constants })
+    }
 }
 
 /// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and drops `run_k/log.csv`
@@ -29,9 +79,15 @@ pub struct FolderSettings {
 /// are not written again unless they differ, so that a second pass disturbs nobody; where they differ and a log is
 /// there, that log belongs to another run, and is refused. Ways to the motion and back are in `approach.csv` and
 /// `return.csv`; logs of them, `approach_log.csv` and `return_log.csv`, are looked at where they are.
+///
+/// Before a log is judged it is compared with the motion ([`examine_log`]): a wrong unit, sign, column or time stamp is
+/// named, and the run waits for the corrected file. A log that is corrected later is read again by the next call.
 #[derive(Debug)]
 pub struct FolderRobot {
     settings: FolderSettings,
+    forms: FormSettings,
+    /// The model by which torques are judged before a run has given one.
+    prior: Option<ControllerModel>,
     joints: Vec<String>,
     name: String,
 }
@@ -40,12 +96,35 @@ impl FolderRobot {
     /// The robot behind a folder, with the model's joints.
     ///
     /// # Errors
-    /// A time to wait that is negative or not finite.
+    /// A time to wait that is negative or not finite, forms that lack a setting or do not fit the robot.
     pub fn new(settings: FolderSettings, joints: Vec<String>) -> Result<Self, SimulationError> {
         let wait = settings.wait_s;
         require((0.0..=1e7).contains(&wait), "wait_s", wait, "give 0 to 1e7 s")?;
         let name = settings.folder.display().to_string();
-        Ok(Self { settings, joints, name })
+        let forms = settings.form_settings(joints.len())?;
+        Ok(Self { settings, forms, prior: None, joints, name })
+    }
+
+    /// Sets the model that predicts torques while the controller has none: the unit of recorded torques is judged by
+    /// it.
+    #[must_use]
+    pub fn with_prior(mut self, prior: Option<ControllerModel>) -> Self {
+        self.prior = prior;
+        self
+    }
+
+    /// The log at a path.
+    fn read(&self, path: &Path, rate_hz: f64) -> Result<Record, LogTableError> {
+        read_log_with_currents(path, &self.joints, rate_hz, self.forms.torque_constants.as_deref())
+    }
+
+    /// Compares a log with the reference and the predicted torque.
+    fn examined(&self, record: Record, reference: &Reference, model: Option<&ControllerModel>) -> ExaminedLog {
+        let torque = model.or(self.prior.as_ref()).map(|model| {
+            let rows: Vec<Vec<f64>> = model_torques(reference, model).collect();
+            (0..self.joints.len()).flat_map(|joint| rows.iter().map(move |row| row[joint])).collect::<Vec<_>>()
+        });
+        examine_log(record, reference, torque.as_deref(), &LogMistakeSettings::default())
     }
 
     /// The folder of a run.
@@ -68,6 +147,7 @@ impl FolderRobot {
         }
         handover::write(request, &self.joints, folder)?;
         handover::write_ways(request, folder)?;
+        write_forms(request, &self.joints, &self.forms, folder)?;
         let ends = Instant::now() + Duration::from_secs_f64(self.settings.wait_s);
         loop {
             let run = self.look(request, folder)?;
@@ -95,13 +175,24 @@ impl FolderRobot {
             };
             return Ok(waiting(what.to_owned()));
         }
-        let record = match read_log_table(&log, &self.joints, request.reference.rate_hz()) {
+        let record = match self.read(&log, request.reference.rate_hz()) {
             Ok(record) => record,
             Err(error @ LogTableError::Incomplete { .. }) => return Ok(waiting(format!("log.csv: {error}"))),
             Err(error) => return Err(RobotFault::File { path: log, reason: error.to_string() }),
         };
         let ways = self.way_records(request, folder)?;
-        let stopped = std::fs::read_to_string(folder.join("stopped.txt")).ok();
+        let stopped = dynident_files::read_text(&folder.join("stopped.txt"), MOST_STOPPED_BYTES).ok();
+        // A run that was stopped follows the motion only so far; its log is taken as it is.
+        let ExaminedLog { record, note, mistakes } = match &stopped {
+            Some(_) => ExaminedLog { record, note: None, mistakes: Vec::new() },
+            None => self.examined(record, request.reference, request.model),
+        };
+        if !mistakes.is_empty() {
+            let each = mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+            return Ok(waiting(format!(
+                "log.csv: {each}. Correct the file and run the same command again: the robot need not move again"
+            )));
+        }
         let (first, last) = (record.times_s[0], record.times_s[record.samples - 1]);
         let duration_s = request.reference.duration_s();
         let status = match stopped {
@@ -121,7 +212,7 @@ impl FolderRobot {
                 }
             }
         };
-        Ok(RobotRun { status, record, truth: None, ways })
+        Ok(RobotRun { status, record, truth: None, ways, note })
     }
 
     /// What somebody logged of the ways, where both logs are there.
@@ -131,7 +222,7 @@ impl FolderRobot {
             return Ok(None);
         }
         let read = |path: &PathBuf| {
-            let read = read_log_table(path, &self.joints, request.reference.rate_hz());
+            let read = self.read(path, request.reference.rate_hz());
             read.map_err(|error| RobotFault::File { path: path.clone(), reason: error.to_string() })
         };
         Ok(Some(WayRecords { approach: read(&paths[0])?, back: read(&paths[1])? }))
@@ -155,6 +246,15 @@ impl Robot for FolderRobot {
 
     fn joints(&self) -> &[String] {
         &self.joints
+    }
+
+    fn has_corrected_log(&self, folder_name: &str, reference: &Reference, kept: &Record) -> bool {
+        let path = self.settings.folder.join(folder_name).join("log.csv");
+        // A file that is gone, or that is being written, is no correction.
+        let Ok(record) = self.read(&path, reference.rate_hz()) else { return false };
+        let same = |found: &Record| (&found.times_s, &found.q, &found.tau) == (&kept.times_s, &kept.q, &kept.tau);
+        // Only the clock may have been changed before the record was kept.
+        !same(&record) && !same(&self.examined(record, reference, None).record)
     }
 
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {

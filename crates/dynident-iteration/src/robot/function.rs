@@ -198,7 +198,7 @@ impl ControlledRun {
                 RobotStatus::Failed { fault: RobotFault::Short { end_s, duration_s, part }, stopping: None }
             }
         };
-        RobotRun { status, record, truth: None, ways }
+        RobotRun { status, record, truth: None, ways, note: None }
     }
 }
 

@@ -18,7 +18,6 @@ pub const CONTROLLER_SCHEMA: &str = "dynident/controller/1";
 /// there is one: a feed-forward for controllers that have no model of their own.
 pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) -> String {
     let joints = reference.joints();
-    let mut model = model.cloned();
     let mut text = String::from("t_s");
     let prefixes: &[&str] = if model.is_some() { &["q", "dq", "ddq", "tau"] } else { &["q", "dq", "ddq"] };
     for prefix in prefixes {
@@ -28,25 +27,34 @@ pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) ->
         }
     }
     text.push('\n');
+    let mut torques = model.map(|model| model_torques(reference, model));
     let mut sample = ReferenceSample::new(joints);
-    let mut tau = vec![0.0; joints];
     for k in 0..reference.samples() {
         sample.take(reference, k);
         let Target { q, dq, ddq } = sample.target();
         let _ = write!(text, "{}", k as f64 / reference.rate_hz());
-        for value in [q, dq, ddq].into_iter().flatten() {
+        let tau = torques.as_mut().and_then(Iterator::next).unwrap_or_default();
+        for value in [q, dq, ddq].into_iter().flatten().chain(&tau) {
             let _ = write!(text, ",{value}");
-        }
-        if let Some(model) = &mut model {
-            let friction = FrictionCompensation::Reference;
-            model.torque(Measured { q, dq }, sample.target(), ddq, friction, &mut tau);
-            for value in &tau {
-                let _ = write!(text, ",{value}");
-            }
         }
         text.push('\n');
     }
     text
+}
+
+/// The torques that a model expects along a reference, sample after sample, Nm (N).
+pub(super) fn model_torques<'a>(
+    reference: &'a Reference,
+    model: &ControllerModel,
+) -> impl Iterator<Item = Vec<f64>> + use<'a> {
+    let (mut model, mut sample) = (model.clone(), ReferenceSample::new(reference.joints()));
+    (0..reference.samples()).map(move |k| {
+        sample.take(reference, k);
+        let Target { q, dq, ddq } = sample.target();
+        let mut tau = vec![0.0; reference.joints()];
+        model.torque(Measured { q, dq }, sample.target(), ddq, FrictionCompensation::Reference, &mut tau);
+        tau
+    })
 }
 
 /// The controller's settings, the joints' order, the envelope that no sample may leave, and the model in numbers:
@@ -146,7 +154,7 @@ pub(super) fn write_ways(request: &RunRequest<'_>, folder: &Path) -> Result<Opti
 pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
     let same = |there: &str, text: &str| there == text || of_the_run(there) == of_the_run(text);
     let differs = |(path, text): &(PathBuf, String)| {
-        path.exists() && !std::fs::read_to_string(path).is_ok_and(|there| same(&there, text))
+        path.exists() && !dynident_files::read_text(path, MOST_BYTES).is_ok_and(|there| same(&there, text))
     };
     Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
 }
@@ -159,14 +167,25 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
     Ok(Value::Object(file))
 }
 
-/// Writes under another name in the same folder, then renames; what is there already with the same text stays.
-fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
-    if std::fs::read_to_string(path).is_ok_and(|there| there == text) {
+/// Largest file that is compared with what is to be written, bytes.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Writes under another name in the same folder, then renames; what is there already with the same text stays. The file
+/// has the permissions of any new file: it is for people and other programs.
+pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
+    if dynident_files::read_text(path, MOST_BYTES).is_ok_and(|there| there == text) {
         return Ok(());
     }
     let fault = |error: std::io::Error| RobotFault::File { path: path.to_owned(), reason: error.to_string() };
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fault)?;
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Less what the user's mask takes away.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(fault)?;
     file.write_all(text.as_bytes()).and_then(|()| file.as_file().sync_all()).map_err(fault)?;
     file.persist(path).map_err(|error| fault(error.error))?;
     Ok(())

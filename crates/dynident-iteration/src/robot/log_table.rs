@@ -1,5 +1,6 @@
 //! The log that a person drops: a table `t_s, q1.., tau1..`.
 
+use dynident_files::quoted;
 use dynident_simulation::Record;
 use thiserror::Error;
 
@@ -17,12 +18,14 @@ pub enum LogTableError {
         reason: String,
     },
     /// Its first line does not name a column.
-    #[error("line 1 has no column {column}: give {}", expected.join(","))]
+    #[error("line 1 has no column {column}: give {}, separated by commas; it is `{found}`", expected.join(","))]
     NoColumn {
         /// The column.
         column: String,
         /// All that are needed.
         expected: Vec<String>,
+        /// The line.
+        found: String,
     },
     /// A row of another length, or the last row without its end.
     #[error("line {line}: {found} fields where the header has {expected}")]
@@ -66,32 +69,45 @@ pub enum LogTableError {
 /// # Errors
 /// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line does not end.
 pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -> Result<Record, LogTableError> {
-    let unreadable = |error: std::io::Error| LogTableError::Unreadable { reason: error.to_string() };
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > LARGEST {
-        return Err(LogTableError::Unreadable { reason: "larger than a gigabyte".to_owned() });
-    }
-    parse(&std::fs::read_to_string(path).map_err(unreadable)?, joints, rate_hz)
+    read_log_with_currents(path, joints, rate_hz, None)
 }
 
-fn parse(text: &str, joints: &[String], rate_hz: f64) -> Result<Record, LogTableError> {
+/// Reads a log as [`read_log_table`] does. With torque constants, Nm/A (N/A), it may have currents `i1..`, A, where
+/// there is no column `tau1`.
+///
+/// # Errors
+/// As [`read_log_table`].
+pub(super) fn read_log_with_currents(
+    path: &std::path::Path,
+    joints: &[String],
+    rate_hz: f64,
+    constants: Option<&[f64]>,
+) -> Result<Record, LogTableError> {
+    let unreadable = |error: std::io::Error| LogTableError::Unreadable { reason: error.to_string() };
+    parse(&dynident_files::read_text(path, LARGEST).map_err(unreadable)?, joints, rate_hz, constants)
+}
+
+fn parse(text: &str, joints: &[String], rate_hz: f64, constants: Option<&[f64]>) -> Result<Record, LogTableError> {
     let incomplete = |reason: &str| LogTableError::Incomplete { reason: reason.to_owned() };
     if !text.ends_with('\n') {
         return Err(incomplete("its last line has no end"));
     }
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    let (_, header) = lines.next().ok_or_else(|| incomplete("it is empty"))?;
-    let header: Vec<&str> = header.trim_start_matches('\u{feff}').split(',').map(str::trim).collect();
+    let (_, first_line) = lines.next().ok_or_else(|| incomplete("it is empty"))?;
+    let header: Vec<&str> = first_line.trim_start_matches('\u{feff}').split(',').map(str::trim).collect();
     let numbered = |prefix: &'static str| (1..=joints.len()).map(move |joint| format!("{prefix}{joint}"));
+    let constants = constants.filter(|_| !header.contains(&"tau1") && header.contains(&"i1"));
+    let torque = if constants.is_some() { "i" } else { "tau" };
     let expected: Vec<String> =
-        core::iter::once("t_s".to_owned()).chain(numbered("q")).chain(numbered("tau")).collect();
+        core::iter::once("t_s".to_owned()).chain(numbered("q")).chain(numbered(torque)).collect();
     let places: Vec<usize> = expected
         .iter()
         .map(|column| {
-            header
-                .iter()
-                .position(|name| name == column)
-                .ok_or_else(|| LogTableError::NoColumn { column: column.clone(), expected: expected.clone() })
+            header.iter().position(|name| name == column).ok_or_else(|| LogTableError::NoColumn {
+                column: column.clone(),
+                expected: expected.clone(),
+                found: quoted(first_line),
+            })
         })
         .collect::<Result<_, _>>()?;
     // One row after the other, by columns.
@@ -107,7 +123,7 @@ fn parse(text: &str, joints: &[String], rate_hz: f64) -> Result<Record, LogTable
             let value = value.ok_or_else(|| LogTableError::NotANumber {
                 line,
                 column: expected[column].clone(),
-                field: fields[place].chars().take(40).collect(),
+                field: quoted(fields[place]),
             })?;
             if column == 0 && columns[0].last().is_some_and(|&before| value <= before) {
                 return Err(LogTableError::Time { line, time_s: value });
@@ -122,7 +138,11 @@ fn parse(text: &str, joints: &[String], rate_hz: f64) -> Result<Record, LogTable
     let mut columns = columns.into_iter();
     let times_s = columns.next().unwrap_or_default();
     let q = columns.by_ref().take(joints.len()).flatten().collect();
-    Ok(Record { joints: joints.to_vec(), rate_hz, samples, times_s, q, tau: columns.flatten().collect() })
+    let mut tau: Vec<f64> = columns.flatten().collect();
+    for (own, constant) in tau.chunks_exact_mut(samples).zip(constants.unwrap_or_default()) {
+        own.iter_mut().for_each(|value| *value *= constant);
+    }
+    Ok(Record { joints: joints.to_vec(), rate_hz, samples, times_s, q, tau })
 }
 
 #[cfg(test)]
@@ -132,7 +152,7 @@ mod tests {
     #[test]
     fn logs_are_read_by_name_and_refused_by_line() {
         let joints = ["a".to_owned(), "b".to_owned()];
-        let read = |text: &str| parse(text, &joints, 100.0);
+        let read = |text: &str| parse(text, &joints, 100.0, None);
         let good = "tau2,t_s,q1,q2,tau1,spare\n4,0,1,2,3,x\n8,0.01,5,6,7,x\n";
         let record = read(good).unwrap();
         assert_eq!((record.samples, &record.q, &record.tau), (2, &vec![1.0, 5.0, 2.0, 6.0], &vec![3.0, 7.0, 4.0, 8.0]));
@@ -144,5 +164,9 @@ mod tests {
         assert!(message(&good.replace(",7,", ",nan,")).contains("column tau1"));
         assert!(message(&good.replace(",7,", ",")).contains("line 3: 5 fields"));
         assert!(message("t_s,q1,q2,tau1,tau2\n").contains("no rows"));
+        assert!(message("t_s;q1;q2;tau1;tau2\n0;1;2;3;4\n").contains("separated by commas; it is `t_s;q1"));
+        let currents = "t_s,q1,q2,i1,i2\n0,1,2,3,4\n";
+        assert!(message(currents).contains("no column tau1"));
+        assert_eq!(parse(currents, &joints, 100.0, Some(&[10.0, -2.0])).unwrap().tau, [30.0, -8.0]);
     }
 }

@@ -5,9 +5,11 @@ mod client;
 mod conversation;
 mod envelope;
 mod folder;
+mod folder_forms;
 mod function;
 mod handover;
 mod held_torque;
+mod log_mistakes;
 mod log_table;
 mod oscillation_watch;
 mod process;
@@ -27,8 +29,10 @@ mod workspace;
 pub use envelope::{Envelope, EnvelopeSettings};
 pub(crate) use envelope::{TRACKING_M, TRACKING_RAD};
 pub use folder::{FolderRobot, FolderSettings};
+pub use folder_forms::FolderForm;
 pub use function::{ControlledRun, FunctionRobot};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
+pub use log_mistakes::{ExaminedLog, LogMistake, LogMistakeSettings, examine_log};
 pub use log_table::{LogTableError, read_log_table};
 pub(crate) use oscillation_watch::RunOscillations;
 pub use process::ProcessRobot;
@@ -163,12 +167,14 @@ pub struct RobotRun {
     pub truth: Option<Run>,
     /// What was recorded along the ways, where the request had some and they are known.
     pub ways: Option<WayRecords>,
+    /// Change of the record's time stamps in words; `None` if they are used as they are.
+    pub note: Option<String>,
 }
 
 impl RobotRun {
     /// A run of which nothing was recorded.
     pub fn without_samples(status: RobotStatus, joints: &[String], rate_hz: f64) -> Self {
-        Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None }
+        Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None, note: None }
     }
 
     /// How it ended, in words, and what its record shows of why it was stopped: a torque that no longer answered, or an
@@ -178,7 +184,8 @@ impl RobotRun {
         let held = self.status.too_far().and_then(of_joint).map(|held| held.to_string());
         let oscillation = || oscillation_watch::oscillation_at_end(reference, &self.record, lowest_hz);
         let shown = held.or_else(|| self.status.is_stopped_by_a_limit().then(oscillation)?.map(|own| own.to_string()));
-        shown.map_or_else(|| self.status.to_string(), |shown| format!("{}; {shown}", self.status))
+        let parts = [Some(self.status.to_string()), shown, self.note.clone()];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 
     /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
@@ -454,6 +461,13 @@ pub trait Robot: core::fmt::Debug {
 
     /// Names of its joints, in the model's order.
     fn joints(&self) -> &[String];
+
+    /// Whether a person has corrected the log of a run since it was read: `folder_name` is that of its request
+    /// ([`RunRequest::folder_name`]), `kept` what was recorded along `reference`. Only a robot whose logs a person
+    /// brings may answer true: then the run is judged anew from the corrected log.
+    fn has_corrected_log(&self, _folder_name: &str, _reference: &Reference, _kept: &Record) -> bool {
+        false
+    }
 
     /// Runs a trajectory. What the robot does wrong is the run's [`RobotStatus`], with the records so far.
     ///

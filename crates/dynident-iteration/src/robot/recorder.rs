@@ -174,6 +174,7 @@ impl<'a> Recorder<'a> {
             record: motion.unwrap_or_else(|| empty_record(&self.joints, 0.0)),
             truth: None,
             ways: approach.zip(back).map(|(approach, back)| WayRecords { approach, back }),
+            note: None,
         }
     }
 }

@@ -74,7 +74,9 @@ impl Robot for SimulatedRobot {
                 None => RobotStatus::Simulated { verdict: verdict.clone() },
             },
         };
-        let Some(ways) = request.ways else { return Ok(RobotRun { status, record, truth: Some(run), ways: None }) };
+        let Some(ways) = request.ways else {
+            return Ok(RobotRun { status, record, truth: Some(run), ways: None, note: None });
+        };
         // Half a sample of room for times that are no whole numbers of periods in the last digit.
         let half_s = 0.5 / request.reference.rate_hz();
         let begin_s = ways.approach.duration_s();
@@ -87,6 +89,6 @@ impl Robot for SimulatedRobot {
         };
         let record = cut(&record, [from_s, to_s], begin_s);
         let truth = run.of_samples(first..first + request.reference.samples());
-        Ok(RobotRun { status, record, truth: Some(truth), ways: Some(ways) })
+        Ok(RobotRun { status, record, truth: Some(truth), ways: Some(ways), note: None })
     }
 }

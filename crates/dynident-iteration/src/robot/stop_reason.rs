@@ -129,7 +129,10 @@ impl core::fmt::Display for Stopping {
             Self::Unknown => {
                 write!(f, "nobody knows whether the robot stands: look at the robot before anything else")
             }
-            Self::SeenAfterwards => write!(f, "seen in the log when the run was over"),
+            Self::SeenAfterwards => write!(
+                f,
+                "seen in the log when the run was over; if the log is wrong, correct the file: the same command reads it again"
+            ),
         }
     }
 }

@@ -310,7 +310,7 @@ fn a_way_that_is_not_run_to_its_end() {
 #[test]
 fn a_folder_holds_the_ways() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 };
+    let settings = FolderSettings::new(folder.path());
     let mut robot = FolderRobot::new(settings, joints()).unwrap();
     let ways = ways();
     let waiting = run(&mut robot, Some(&ways), None).status.to_string();

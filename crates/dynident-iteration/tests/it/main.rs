@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod differentiators;
+mod folder_logs;
 mod function_robots;
 mod held_out;
 mod home;

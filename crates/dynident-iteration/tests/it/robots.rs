@@ -159,7 +159,7 @@ fn programs_that_are_not_there_are_named() {
 #[test]
 fn a_folder_waits_for_its_log() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 };
+    let settings = FolderSettings::new(folder.path());
     let mut robot = FolderRobot::new(settings, joints()).unwrap();
     let waiting = |run: &RobotRun, what: &str| {
         assert!(matches!(&run.status, RobotStatus::Waiting { reason, .. } if reason.contains(what)), "{}", run.status);
@@ -291,7 +291,7 @@ fn a_loop_without_feed_forward_gets_no_torques() {
     let reference = reference();
     for feed_forward in [true, false] {
         let folder = tempfile::tempdir().unwrap();
-        let settings = FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 };
+        let settings = FolderSettings::new(folder.path());
         let mut robot = FolderRobot::new(settings, joints()).unwrap();
         let controller = ControllerSettings::PositionLoop(PositionLoopSettings::of_robot(feed_forward));
         let request = RunRequest { model: Some(&believed), ..RunRequest::new(1, &reference, &controller) };

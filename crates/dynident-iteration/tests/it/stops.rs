@@ -336,8 +336,7 @@ fn a_link_that_leaves_the_workspace_stops_the_run() {
 #[test]
 fn a_folders_log_is_watched_afterwards() {
     let folder = tempfile::tempdir().unwrap();
-    let mut robot =
-        FolderRobot::new(FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 }, joints()).unwrap();
+    let mut robot = FolderRobot::new(FolderSettings::new(folder.path()), joints()).unwrap();
     let (reference, controller) = (reference(), pd());
     let tight = Envelope { tracking_error: vec![Some(0.01); 2], ..envelope() };
     let request = RunRequest { envelope: Some(&tight), ..RunRequest::new(1, &reference, &controller) };

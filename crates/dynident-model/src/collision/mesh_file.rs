@@ -3,7 +3,6 @@
 use super::mesh::TriangleMesh;
 use super::{collada, mesh_text, stl};
 use crate::spatial::Vec3;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -113,7 +112,7 @@ pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     let missing = || MeshError::Missing { name: name.to_owned(), folder: folder.to_owned() };
     let path = find_mesh(folder, name).ok_or_else(missing)?;
     let mut bytes = Vec::new();
-    File::open(&path)
+    dynident_files::open(&path)
         .and_then(|file| file.take(MAX_MESH_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|source| MeshError::File { path: path.clone(), source })?;
     let parsed = if bytes.len() as u64 > MAX_MESH_BYTES { Err(MeshFault::TooLarge) } else { parse(&bytes) };

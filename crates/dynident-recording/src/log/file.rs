@@ -5,34 +5,46 @@ use super::source::{LogGroup, LogSource, LogTable};
 use super::text::TextTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
+use dynident_files::SeenFiles;
 use dynident_formats::{Contents, FileError, FileFormat, Table};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A file that holds rows of numbers, of any format that is read (`docs/src/logs.md`), found out from its content. The
-/// folder of a rosbag2 recording counts as a file.
+/// folder of a rosbag2 recording is treated as a file.
+///
+/// A log is read several times. Every pass and every clone compares the files' length, time of change and inode with
+/// those of the first pass: a file that was replaced in between is an error.
 #[derive(Clone, Debug)]
 pub struct FileLog {
     path: PathBuf,
     header: Header,
     delimiter: Option<char>,
+    seen: Arc<SeenFiles>,
 }
 
 impl FileLog {
     /// The file at `path`; `header` and `delimiter` of `format` hold for text. Nothing is read yet.
     pub fn new(path: &Path, format: &LogFormat) -> Self {
-        Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter }
+        Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter, seen: Arc::default() }
     }
 
     /// The file at `path`, whose header and delimiter are found out if it is text.
     pub fn described_by_itself(path: &Path) -> Self {
-        Self { path: path.to_owned(), header: Header::Auto, delimiter: None }
+        Self { path: path.to_owned(), header: Header::Auto, delimiter: None, seen: Arc::default() }
     }
 
     /// What the file is, and a pass over its rows.
     ///
     /// # Errors
-    /// If it cannot be read, or is no table.
+    /// If it cannot be read, does not hold a table, or changed since the first pass.
     pub fn open_with_format(&self) -> Result<(FileFormat, Box<dyn LogTable>), RecordingError> {
+        // Errors of listing and finding a file are reported when it is opened.
+        for file in dynident_formats::files(&self.path).unwrap_or_default() {
+            if self.seen.is_unchanged(&file).is_ok_and(|unchanged| !unchanged) {
+                return Err(RecordingError::Changed { file });
+            }
+        }
         let opened = dynident_formats::open(&self.path)?;
         let table: Box<dyn LogTable> = match opened.contents {
             Contents::Text(text) => Box::new(TextTable::open(&self.path, text, self.header, self.delimiter)?),

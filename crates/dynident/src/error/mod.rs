@@ -27,6 +27,12 @@ pub enum Error {
         /// What the system says.
         source: std::io::Error,
     },
+    /// A file that is not the one that was first read: what is known of it does not belong to its hash.
+    #[error("{}: the file changed while it was read; wait until nothing writes to it, then run the command again", path.display())]
+    Changed {
+        /// The file.
+        path: PathBuf,
+    },
     /// A study that is wrong at a place of its text.
     #[error("{}:{line}:{column}: {source}", path.display())]
     StudyAt {

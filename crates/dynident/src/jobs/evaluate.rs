@@ -80,8 +80,7 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
-        .from_path(states)
-        .map_err(|error| table_error(states, &error))?;
+        .from_reader(dynident_files::open(states).map_err(|source| Error::File { path: states.to_owned(), source })?);
     let header = reader.headers().map_err(|error| table_error(states, &error))?.clone();
     let mut places = Vec::new();
     for group in quantity.groups() {

@@ -7,7 +7,6 @@ use crate::result::{InputFile, Provenance};
 use crate::study::{Folders, Study, StudyInput};
 use dynident_recording::LogSource;
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path};
 use std::time::SystemTime;
@@ -37,6 +36,23 @@ pub(crate) fn provenance(
     // A study may have been put together in memory, where the path is a name only.
     let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
     Ok(identified_by(study, own, inputs))
+}
+
+/// The provenance of a result that is made long after the study and the robot were read, from what was `begun` then and
+/// the files that were `read` since: the study and the robot may be other ones by now.
+///
+/// # Errors
+/// [`Error::File`] for one that cannot be read again.
+pub(crate) fn later_provenance(
+    study: &Study,
+    study_path: &Path,
+    begun: &Provenance,
+    read: &[(&'static str, StudyInput)],
+) -> Result<Provenance, Error> {
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    let robot = begun.inputs.iter().filter(|input| input.what == "robot").cloned().map(Ok);
+    let since = read.iter().map(|(what, source)| read_input(what, source, folder));
+    Ok(identified_by(study, begun.study.clone(), robot.chain(since).collect::<Result<_, _>>()?))
 }
 
 /// The provenance of a result of reduced logs.
@@ -135,7 +151,7 @@ fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
     // The folder of a recording is its parts, one after the other.
     let parts = dynident_recording::log::files(path).map_err(|error| cannot(path, std::io::Error::other(error)))?;
     for part in parts {
-        let mut file = File::open(&part).map_err(|error| cannot(&part, error))?;
+        let mut file = dynident_files::open(&part).map_err(|error| cannot(&part, error))?;
         loop {
             let length = file.read(&mut block).map_err(|error| cannot(&part, error))?;
             if length == 0 {

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, FactorsError};
 use crate::factors::{FactorLog, Factors, name_alone};
+use crate::inputs::InputFiles;
 use crate::jobs::identify::{IdentificationOutcome, Made, written};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::{factors_provenance, now};
@@ -46,6 +47,7 @@ pub fn reduce(
     options: &RunOptions<'_>,
 ) -> Result<Factors, Error> {
     study.require_training_log(study_path)?;
+    let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let factors = |source| Error::Factors { path: study_path.to_owned(), source };
     if let Some(file) = study.torque.iter().find_map(|torque| torque.table_file.as_ref()) {
@@ -63,7 +65,8 @@ pub fn reduce(
     let robot = StudyRobot::new(&study, study_path, &folders)?;
     let in_study = Error::identification::<IdentificationError>(study_path);
     let task = study.task_with(study.settings(study_path, &robot)?, &robot, &folders)?;
-    let reduced = reduce_task(&task, settings.segments, options.execution()).map_err(&in_study)?;
+    let reduced =
+        files.while_unchanged(|| reduce_task(&task, settings.segments, options.execution()).map_err(&in_study))?;
     let log = |log| FactorLog::new(settings.arm.clone(), settings.recorded_at_s, log);
     let kind = without_logs(&study, &robot);
     Ok(Factors::new(kind, name_alone(study_path), reduced.into_iter().map(log).collect()))

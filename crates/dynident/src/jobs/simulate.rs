@@ -1,6 +1,7 @@
 //! A simulated robot runs a study's trajectory under a controller.
 
 use crate::error::Error;
+use crate::inputs::InputFiles;
 use crate::jobs::iterate::Trajectory;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::jobs::provenance::motion_provenance;
@@ -35,6 +36,7 @@ pub fn simulate_study(
 ) -> Result<Simulation, Error> {
     // The robot, its controller, and the run.
     let simulation = study.simulation.clone().unwrap_or_default();
+    let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let mut truth = simulation.truth(&study.coupling, &robot).map_err(Error::section(study_path, "simulation"))?;
@@ -87,5 +89,6 @@ pub fn simulate_study(
             robot.layout().columns().iter().map(|column| column.unit().to_owned()).collect(),
         ),
     };
+    files.unchanged()?;
     Ok(Simulation { file, log: run.record.csv() })
 }

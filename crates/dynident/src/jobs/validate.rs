@@ -1,6 +1,7 @@
 //! A finished model against logs that were not used for its fit.
 
 use crate::error::Error;
+use crate::inputs::InputFiles;
 use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::jobs::provenance::{read_input, seen_from};
@@ -35,6 +36,7 @@ pub fn validate_result(
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
     study.require_log(study_path)?;
+    let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let study = &stored.as_fitted(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
@@ -62,7 +64,7 @@ pub fn validate_result(
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
     });
-    let tested = tested.map_err(Error::identification(study_path))?;
+    let tested = files.while_unchanged(|| tested.map_err(Error::identification(study_path)))?;
     let joints = model.joint_names();
     let folder = study_path.parent().unwrap_or(Path::new(""));
     let summary = |log: &HeldOutExamination| {
@@ -82,6 +84,7 @@ pub fn validate_result(
         }
     }
     problems.extend(logs.iter().flat_map(LogSummary::problems));
+    files.unchanged()?;
     Ok(ValidationFile {
         schema: VALIDATION_SCHEMA.to_owned(),
         name: study_name(study, study_path),

@@ -3,6 +3,7 @@
 use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
+use crate::inputs::read_result;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{
     DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset, Shortfall, TorqueCheck,
@@ -77,7 +78,7 @@ impl IterationsFile {
     /// # Errors
     /// A file that cannot be read or is none of this version.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let bytes = read_result(path)?;
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
         let file: Self =
             serde_json::from_slice(&bytes).map_err(|error| wrong(format!("not what `iterate` writes: {error}")))?;

@@ -2,6 +2,7 @@
 
 use super::identification::{RESULT_SCHEMA, ResultFile};
 use crate::error::Error;
+use crate::inputs::read_result;
 use crate::study::{FrictionTerm, JointDrive, Study};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
@@ -16,7 +17,7 @@ use std::path::Path;
 /// # Errors
 /// A file that cannot be read, is no result, or is one of another version.
 pub(crate) fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+    let bytes = read_result(path)?;
     part_of(&bytes, path)
 }
 
@@ -44,7 +45,7 @@ impl ResultFile {
     /// # Errors
     /// A file that cannot be read, is no result, or is one of another version.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let bytes = read_result(path)?;
         Self::parse(&bytes, path)
     }
 

@@ -33,11 +33,11 @@ impl Folders {
             return Err(Error::File { path: folder.clone(), source });
         }
         let tried: Vec<PathBuf> = self.candidates.iter().map(|folder| folder.join(file)).collect();
-        tried.iter().find(|path| path.is_file() || is_recording(path)).cloned().ok_or_else(|| Error::Missing {
-            file: file.to_owned(),
-            tried,
-            source_of_data: source.map(str::to_owned),
-        })
+        tried
+            .iter()
+            .find(|path| path.exists() && !path.is_dir() || is_recording(path))
+            .cloned()
+            .ok_or_else(|| Error::Missing { file: file.to_owned(), tried, source_of_data: source.map(str::to_owned) })
     }
 }
 

@@ -2,7 +2,6 @@
 
 use dynident_recording::{Log, LogFormat, LogSource, MemoryLog};
 use fnv::FnvHasher;
-use std::fs::File;
 use std::hash::Hasher;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -59,7 +58,7 @@ fn same_file_content(a: &Path, b: &Path) -> bool {
 
 /// FNV-1a of a file's bytes, 64 bits; none if it cannot be read.
 fn hash(path: &Path) -> Option<u64> {
-    let mut file = BufReader::with_capacity(1 << 16, File::open(path).ok()?);
+    let mut file = BufReader::with_capacity(1 << 16, dynident_files::open(path).ok()?);
     let mut hasher = FnvHasher::default();
     loop {
         let block = file.fill_buf().ok()?;

@@ -161,11 +161,12 @@ impl Study {
     /// If the file cannot be read, or as [`parse`](Study::parse).
     pub fn load(path: &Path) -> Result<Self, Error> {
         let cannot = |source| Error::File { path: path.to_owned(), source };
-        let size = std::fs::metadata(path).map_err(cannot)?.len();
-        if size > MAX_STUDY_BYTES {
-            return Err(Error::study(path)(StudyError::TooLarge { most_bytes: MAX_STUDY_BYTES }));
-        }
-        let bytes = std::fs::read(path).map_err(cannot)?;
+        let bytes = dynident_files::read(path, MAX_STUDY_BYTES).map_err(|source| match source.kind() {
+            std::io::ErrorKind::FileTooLarge => {
+                Error::study(path)(StudyError::TooLarge { most_bytes: MAX_STUDY_BYTES })
+            }
+            _ => cannot(source),
+        })?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let good = error.utf8_error().valid_up_to();
             let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();

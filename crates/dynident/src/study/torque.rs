@@ -2,11 +2,13 @@
 
 use super::{Code, Folders, Study};
 use crate::error::{Error, StudyError};
+use dynident_files::quoted;
 use dynident_model::terms::{
     Declared, DeclaredLaw, Expression, JointNames, TorqueFunction, TorqueLaw, TorqueTable, TorqueTerm,
 };
 use dynident_model::{Model, ModelError};
 use serde::{Deserialize, Serialize};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -150,7 +152,8 @@ pub(super) fn declared_terms(
 fn read_table(path: &Path) -> Result<TorqueTable, Error> {
     let cannot = |source| Error::File { path: path.to_owned(), source };
     let at = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
-    if std::fs::metadata(path).map_err(cannot)?.len() > MOST_TABLE_BYTES {
+    let file = dynident_files::open(path).map_err(cannot)?;
+    if file.metadata().map_err(cannot)?.len() > MOST_TABLE_BYTES {
         return Err(at(1, "larger than 1 MiB: a table of torque has at most 200 points".to_owned()));
     }
     let mut reader = csv::ReaderBuilder::new()
@@ -158,8 +161,7 @@ fn read_table(path: &Path) -> Result<TorqueTable, Error> {
         .trim(csv::Trim::All)
         .flexible(true)
         .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| at(1, error.to_string()))?;
+        .from_reader(file.take(MOST_TABLE_BYTES));
     let mut points = Vec::new();
     for (place, record) in reader.records().enumerate() {
         let record = record.map_err(|error| at(error.position().map_or(1, csv::Position::line), error.to_string()))?;
@@ -170,7 +172,7 @@ fn read_table(path: &Path) -> Result<TorqueTable, Error> {
             None if place == 0 && record.iter().all(|field| field.parse::<f64>().is_err()) => {}
             Some(_) | None => {
                 let found = record.iter().collect::<Vec<_>>().join(",");
-                return Err(at(line, format!("`{found}`: give two numbers, position and torque")));
+                return Err(at(line, format!("`{}`: give two numbers, position and torque", quoted(&found))));
             }
         }
     }

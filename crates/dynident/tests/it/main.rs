@@ -23,6 +23,7 @@ mod factors;
 mod friction_choice;
 mod friction_cutoff;
 mod in_memory;
+mod input_files;
 mod instruments;
 mod iteration_home;
 mod iteration_legs;

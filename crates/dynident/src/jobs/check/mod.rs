@@ -5,6 +5,7 @@ mod findings;
 mod wording;
 
 use crate::error::Error;
+use crate::inputs::InputFiles;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
 use crate::study::{Folders, Study, StudyRobot};
@@ -31,6 +32,7 @@ const NO_INERTIA: f64 = 1e-12;
 /// Everything that [`Error`] names: files, study, logs. Mistakes that are found are no error.
 pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<CheckFile, Error> {
     study.require_training_log(study_path)?;
+    let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let in_study = Error::identification::<IdentificationError>(study_path);
@@ -38,7 +40,7 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     let task = study.task_with(settings, &robot, &folders)?;
     let sources = study.log_sources(&folders)?;
     study.check_overlap(&sources, &task.recordings).map_err(Error::study(study_path))?;
-    let examined = examine_study(&task, options.execution()).map_err(in_study)?;
+    let examined = files.while_unchanged(|| examine_study(&task, options.execution()).map_err(in_study))?;
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },

@@ -7,7 +7,7 @@ use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::seen_from;
+use crate::jobs::provenance::{motion_provenance, seen_from};
 use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
@@ -70,11 +70,11 @@ pub fn check_trajectory(
         None => trajectory.display().to_string(),
     };
     let origin = MotionOrigin::given(&setup, name, given, &information);
-    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
-        (study, study_path),
-        options,
-        &[("trajectory", StudyInput::File(trajectory.to_owned()))],
-    )
+    let read = [("trajectory", StudyInput::File(trajectory.to_owned()))];
+    let data = options.data.as_deref();
+    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, study_path, data, &read))?;
+    let review = MotionReview { duration_s, rate_hz, information, check };
+    Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
 /// Judges a log of the study, by its name or its file: what the finished run says about each parameter.
@@ -120,11 +120,11 @@ pub fn check_log(
         .fold(0, |best, piece| if pieces[piece].duration_s() > pieces[best].duration_s() { piece } else { best });
     let information = MotionInformation { plain, weighted };
     let origin = MotionOrigin::given(&setup, study.log_name(index), pieces.swap_remove(longest), &information);
-    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
-        (study, study_path),
-        options,
-        &[("log", source.into())],
-    )
+    let read = [("log", source.into())];
+    let data = options.data.as_deref();
+    let provenance = setup.inputs.while_unchanged(|| motion_provenance(study, study_path, data, &read))?;
+    let review = MotionReview { duration_s, rate_hz, information, check };
+    Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
 /// Which log is meant: by its name in reports, or by its file.

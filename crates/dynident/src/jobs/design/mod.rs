@@ -21,6 +21,7 @@ pub(super) use table::trajectory as trajectory_table;
 
 use crate::error::{Error, Expected};
 use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::motion_provenance;
 use crate::result::WindowedFile;
 use crate::study::{CriterionChoice, DesignSection, Study};
 use core::ops::ControlFlow;
@@ -51,6 +52,9 @@ pub fn design_study(
     let mut setup = DesignSetup::for_search(study, study_path, options)?;
     let longest = Expected::Range(0.0, DesignSection::longest_s(setup.robot.model()));
     longest.check("duration_s", setup.section.duration_s).map_err(Error::section(study_path, "design"))?;
+    // A search takes long: the files may change once they have been read and hashed.
+    let provenance =
+        setup.inputs.while_unchanged(|| motion_provenance(study, study_path, options.data.as_deref(), &[]))?;
 
     // The best motion of the family.
     let found = match &setup.section.criterion {
@@ -80,7 +84,7 @@ pub fn design_study(
     let information = setup.information(&times, &motion_at);
     let review = MotionReview { duration_s, rate_hz, information, check };
     let origin = MotionOrigin::search(&setup, found);
-    DesignOutcome::new(setup, origin, review).with_provenance((study, study_path), options, &[])
+    Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
 }
 
 /// What a windowed design leaves to the check.

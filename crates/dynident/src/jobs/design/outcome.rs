@@ -7,11 +7,9 @@ use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
-use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::motion_provenance;
 use crate::pages::design as pictures;
-use crate::result::{DESIGN_SCHEMA, DesignFile, WindowedFile};
-use crate::study::{FamilyChoice, Study, StudyInput, StudyRobot};
+use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
+use crate::study::{FamilyChoice, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::families::Given;
@@ -20,7 +18,6 @@ use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
 use dynident_model::Model;
 use nalgebra::DMatrix;
-use std::path::Path;
 use std::time::Instant;
 
 /// Rate of the pictures, Hz of a usual arm.
@@ -179,15 +176,10 @@ impl DesignOutcome {
         Self { file, robot, loaded, limits, history: origin.history, family: origin.motion }
     }
 
-    /// The outcome with what it comes from: of the study, and of what else was read.
-    pub(super) fn with_provenance(
-        mut self,
-        (study, study_path): (&Study, &Path),
-        options: &RunOptions<'_>,
-        further: &[(&'static str, StudyInput)],
-    ) -> Result<Self, Error> {
-        self.file.provenance = Some(motion_provenance(study, study_path, options.data.as_deref(), further)?);
-        Ok(self)
+    /// The outcome with what it comes from.
+    pub(super) fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.file.provenance = Some(provenance);
+        self
     }
 
     /// The family of the motion; its parameters are the file's.

@@ -4,6 +4,7 @@ use super::limits_in_force::{LimitsFor, in_force, included, loaded};
 use super::outcome::Stopwatch;
 use super::{prior, table};
 use crate::error::{Error, StudyError};
+use crate::inputs::InputFiles;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
@@ -42,6 +43,8 @@ pub(super) struct DesignSetup {
     pub(super) assumed: Vec<String>,
     pub(super) not_checked: Vec<String>,
     pub(super) stopwatch: Stopwatch,
+    /// The study's files as they were before anything was read.
+    pub(super) inputs: InputFiles,
 }
 
 impl DesignSetup {
@@ -78,6 +81,7 @@ impl DesignSetup {
         let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
         section.validate().map_err(Error::section(study_path, "design"))?;
+        let inputs = InputFiles::of(study, study_path, options.data.as_deref());
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let robot = StudyRobot::new(study, study_path, &folders)?;
         let LimitsInForce { limits, assumed, not_checked } = in_force((study, study_path, &folders), &robot, purpose)?;
@@ -116,6 +120,7 @@ impl DesignSetup {
             assumed,
             not_checked,
             stopwatch,
+            inputs,
         })
     }
 

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use dynident_excitation::Motion;
 use dynident_excitation::families::Given;
+use dynident_files::quoted;
 use dynident_recording::{Derivatives, MotionSettings, cutoff};
 use std::path::Path;
 
@@ -28,7 +29,7 @@ pub(crate) struct Trajectory {
 pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettings) -> Result<Trajectory, Error> {
     let wrong = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
     let broken = |error: &csv::Error| wrong(error.position().map_or(1, csv::Position::line), error.to_string());
-    let file = std::fs::File::open(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+    let file = dynident_files::open(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(file);
     let header = reader.headers().map_err(|error| broken(&error))?.clone();
     let columns = Columns::of(&header, joints).map_err(|message| wrong(1, message))?;
@@ -42,7 +43,9 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
         let number = |place: usize| -> Result<f64, Error> {
             let field = record.get(place).unwrap_or("");
             let finite = field.parse::<f64>().ok().filter(|value| value.is_finite());
-            finite.ok_or_else(|| wrong(line, format!("column `{}`: `{field}` is not a finite number", &header[place])))
+            finite.ok_or_else(|| {
+                wrong(line, format!("column `{}`: `{}` is not a finite number", &header[place], quoted(field)))
+            })
         };
         let time_s = number(columns.time)?;
         if let Some(before) = times_s.last().filter(|before| time_s <= **before) {

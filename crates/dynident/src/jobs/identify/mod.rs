@@ -5,6 +5,7 @@ mod model_files;
 mod sections;
 
 use crate::error::Error;
+use crate::inputs::InputFiles;
 use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
@@ -94,6 +95,16 @@ pub fn identify_with_instruments(
 }
 
 fn identified(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<IdentificationOutcome, Error> {
+    let files = InputFiles::of(study, study_path, options.data.as_deref());
+    files.while_unchanged(|| identified_from_files(study, study_path, options, source))
+}
+
+fn identified_from_files(
     study: &Study,
     study_path: &Path,
     options: &RunOptions<'_>,

@@ -11,6 +11,7 @@ use dynident_excitation::DesignProgress;
 use dynident_iteration::Robot;
 use dynident_iteration::robot::{FolderRobot, ProcessRobot};
 use dynident_iteration::{HeldOutMotion, Leg};
+use dynident_simulation::controllers::ControllerModel;
 use std::path::Path;
 
 /// Spreads the seeds of legs that have an iteration each.
@@ -139,7 +140,9 @@ impl IterationSection {
                 if stage > 0 {
                     settings.folder = settings.folder.join(format!("leg_{}", stage + 1));
                 }
-                vec![Box::new(FolderRobot::new(settings, joints)?)]
+                // Torques are compared with it to find a wrong unit; without it they are not.
+                let prior = ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal()).ok();
+                vec![Box::new(FolderRobot::new(settings, joints)?.with_prior(prior))]
             }
             RobotChoice::Function => Vec::new(),
             RobotChoice::Simulation => {

@@ -10,6 +10,7 @@ mod trajectory;
 pub(super) use trajectory::Trajectory;
 
 use crate::error::{Error, StudyError};
+use crate::inputs::{InputFiles, read_result};
 use crate::jobs::design::{MotionFamily, limits_of, motion_family};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
@@ -137,6 +138,7 @@ fn iterated(
     let begin = Instant::now();
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
+    let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let identification = study.settings(study_path, &robot)?;
@@ -217,7 +219,8 @@ fn iterated(
     let report = IterationReport {
         study,
         study_path,
-        provenance: motion_provenance(study, study_path, options.data.as_deref(), &[])?,
+        // Runs take hours: the files may change once they have been read and hashed.
+        provenance: files.while_unchanged(|| motion_provenance(study, study_path, options.data.as_deref(), &[]))?,
         robot: &robot,
         duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
         truth: truth.map(|truth| truth.base_values),
@@ -321,10 +324,11 @@ fn iterated(
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
     // Runs are not lost because their robot cannot be written.
-    let found = robot_found((study, study_path), &robot, &ended, options, in_iteration).unwrap_or_else(|why| {
-        file.no_result = Some(why.to_string());
-        RobotFiles::none()
-    });
+    let found = robot_found((study, study_path), (&robot, &report.provenance), &ended, options, in_iteration)
+        .unwrap_or_else(|why| {
+            file.no_result = Some(why.to_string());
+            RobotFiles::none()
+        });
     file.base_parameters.clone_from(&found.base_parameters);
     write_set((out, robot_is_own), &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
@@ -407,7 +411,7 @@ fn kept(
     }
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     if resume && path.is_file() {
-        let text = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let text = read_result(path)?;
         let kept: TrajectoryFile = serde_json::from_slice(&text)
             .map_err(|error| wrong(format!("is no trajectory of an iteration ({error}): remove it")))?;
         if kept.fingerprint == fingerprint {

@@ -4,9 +4,9 @@
 use crate::error::Error;
 use crate::jobs::identify::{IdentificationOutcome, Made, written};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{now, provenance, seen_from};
+use crate::jobs::provenance::{later_provenance, now, seen_from};
 use crate::output_set::OutputSet;
-use crate::result::{BaseParameterResult, Timings};
+use crate::result::{BaseParameterResult, Provenance, Timings};
 use crate::study::{Study, StudyInput, StudyRobot};
 use dynident_identification::{IdentificationError, IdentificationTask, Role, identify};
 use dynident_iteration::robot::{RunRequest, controller_json};
@@ -67,7 +67,7 @@ impl RobotFiles {
 /// Logs that are not there any more, rows that carry no estimate.
 pub(super) fn robot_found(
     (study, study_path): (&Study, &Path),
-    robot: &StudyRobot,
+    (robot, begun): (&StudyRobot, &Provenance),
     stages: &[EndedStage<'_>],
     options: &RunOptions<'_>,
     failed: impl Fn(IterationError) -> Error + Copy,
@@ -98,8 +98,7 @@ pub(super) fn robot_found(
     let in_study = Error::identification::<IdentificationError>(study_path);
     let mut found = identify(&task, options.execution()).map_err(&in_study)?;
     found.training.friction_choice = friction_chosen(&last.records);
-    let mut read = vec![("robot", study.robot_input(robot))];
-    read.extend(logs.iter().map(|log| ("log", StudyInput::File(log.clone()))));
+    let read: Vec<_> = logs.iter().map(|log| ("log", StudyInput::File(log.clone()))).collect();
     let timings = Timings {
         logs: found.times.logs_s,
         estimation: found.times.estimation_s,
@@ -109,7 +108,7 @@ pub(super) fn robot_found(
         ..Timings::default()
     };
     let parameters = found.consistent.parameters.clone();
-    let made = Made { timings, provenance: provenance(study, study_path, &read)?, is_payload: false };
+    let made = Made { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
     let mut outcome = written((study, study_path), robot, &task, found, made)?;
     let folder = study_path.parent().unwrap_or(Path::new(""));
     for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {

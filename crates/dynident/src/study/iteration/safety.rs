@@ -206,7 +206,9 @@ impl IterationSection {
                 process.limits = ProcessLimits::default();
                 process.folder = None;
             }
-            RobotChoice::Folder(folder) => folder.wait_s = 0.0,
+            RobotChoice::Folder(folder) => {
+                (folder.wait_s, folder.forms, folder.urscript_rate_hz) = (0.0, Vec::new(), None);
+            }
         }
         let default = Self::default();
         own.envelope = EnvelopeSettings::default();

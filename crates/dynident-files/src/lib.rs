@@ -1,0 +1,257 @@
+//! **May this input file be read, and is it still the same?** Opens regular files only, reads at most a stated number
+//! of bytes, detects files that change while they are read, and shortens what messages quote of them.
+//!
+//! ```
+//! use dynident_files::{SeenFiles, read};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("log.csv");
+//! std::fs::write(&path, "t,q\n0,1\n")?;
+//! let seen = SeenFiles::default();
+//! assert!(seen.is_unchanged(&path)?);
+//! assert_eq!(read(&path, 1 << 20)?.len(), 8);
+//! std::fs::write(&path, "t,q\n0,1\n0.1,2\n")?;
+//! assert_eq!(seen.first_changed(), Some(path));
+//! # Ok::<(), std::io::Error>(())
+//! ```
+#![forbid(unsafe_code)]
+
+use std::collections::BTreeMap;
+use std::fs::{File, Metadata};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// Opens a regular file for reading.
+///
+/// # Errors
+/// If the system refuses it, or it is a folder, a named pipe, a device or a socket: those can block for ever or have no
+/// end, and inputs are read more than once.
+pub fn open(path: &Path) -> io::Result<File> {
+    require_regular(&std::fs::metadata(path)?)?;
+    File::open(path)
+}
+
+/// Reads a whole regular file of at most `most_bytes`.
+///
+/// # Errors
+/// As [`open`], and [`io::ErrorKind::FileTooLarge`] for a longer file, of which no more than `most_bytes` are read.
+pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    // The length that the system reports may be wrong.
+    open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        let problem = format!("it is larger than {} MiB", most_bytes >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
+    }
+    Ok(bytes)
+}
+
+/// Reads a whole text file as [`read`] does.
+///
+/// # Errors
+/// As [`read`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
+pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
+    String::from_utf8(read(path, most_bytes)?)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
+}
+
+fn require_regular(metadata: &Metadata) -> io::Result<()> {
+    if metadata.is_file() {
+        return Ok(());
+    }
+    if metadata.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    let problem =
+        format!("it is {}, not a regular file: copy its content into a file and name that file", kind(metadata));
+    Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
+}
+
+#[cfg(unix)]
+fn kind(metadata: &Metadata) -> &'static str {
+    use std::os::unix::fs::FileTypeExt;
+    let kind = metadata.file_type();
+    if kind.is_fifo() {
+        "a pipe"
+    } else if kind.is_socket() {
+        "a socket"
+    } else {
+        "a device"
+    }
+}
+
+#[cfg(not(unix))]
+fn kind(_: &Metadata) -> &'static str {
+    "a device or a pipe"
+}
+
+/// Characters of a quoted text at most.
+const MOST_QUOTED: usize = 60;
+
+/// A text from an input as a message quotes it: control characters escaped; of a longer text the beginning and its
+/// length.
+pub fn quoted(text: &str) -> String {
+    let shown: String = text.chars().take(MOST_QUOTED).flat_map(char::escape_debug).collect();
+    match text.chars().count() {
+        all if all > MOST_QUOTED => format!("{shown}.. ({all} characters)"),
+        _ => shown,
+    }
+}
+
+/// Characters that a message may have between two backquotes, and as a whole.
+const MOST_BETWEEN_QUOTES: usize = 200;
+const MOST_IN_MESSAGE: usize = 20_000;
+
+/// A message with every text between backquotes shortened to 200 characters, and with 20,000 characters at most. Names,
+/// expressions and lines from files stand between backquotes, and a file may hold a name of megabytes.
+pub fn shortened(message: &str) -> String {
+    let cut = |text: &str, most: usize| {
+        let count = text.chars().count();
+        if count <= most {
+            return text.to_owned();
+        }
+        let shown: String = text.chars().take(most).collect();
+        format!("{shown}.. ({count} characters)")
+    };
+    let parts = message.split('`').enumerate();
+    let parts: Vec<String> =
+        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MOST_BETWEEN_QUOTES } else { usize::MAX })).collect();
+    cut(&parts.join("`"), MOST_IN_MESSAGE)
+}
+
+/// What distinguishes a file from the one that takes its place: length, time of the last change and, on Unix, device
+/// and inode. Content that is replaced within the resolution of the file system's clock, in place and at the same
+/// length, is not detected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileIdentity {
+    bytes: u64,
+    modified: Option<SystemTime>,
+    place: (u64, u64),
+}
+
+impl FileIdentity {
+    /// Reads the identity of the file at `path`, links followed.
+    ///
+    /// # Errors
+    /// If the system refuses it.
+    pub fn of(path: &Path) -> io::Result<Self> {
+        let metadata = std::fs::metadata(path)?;
+        Ok(Self { bytes: metadata.len(), modified: metadata.modified().ok(), place: place(&metadata) })
+    }
+}
+
+#[cfg(unix)]
+fn place(metadata: &Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (metadata.dev(), metadata.ino())
+}
+
+#[cfg(not(unix))]
+fn place(_: &Metadata) -> (u64, u64) {
+    (0, 0)
+}
+
+/// Files with the identity that each had when it was first seen.
+#[derive(Debug, Default)]
+pub struct SeenFiles {
+    first: Mutex<BTreeMap<PathBuf, FileIdentity>>,
+}
+
+impl SeenFiles {
+    /// Whether the file at `path` is the one that the first call with this path found; true for the first call.
+    ///
+    /// # Errors
+    /// If the system refuses a file that was not seen before. A file that was seen and is missing has changed.
+    pub fn is_unchanged(&self, path: &Path) -> io::Result<bool> {
+        let found = FileIdentity::of(path);
+        let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
+        match first.get(path) {
+            Some(known) => Ok(found.is_ok_and(|found| found == *known)),
+            None => {
+                first.insert(path.to_owned(), found?);
+                Ok(true)
+            }
+        }
+    }
+
+    /// The first path, in alphabetical order, whose file is not the one that was first seen.
+    pub fn first_changed(&self) -> Option<PathBuf> {
+        let first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
+        let changed =
+            |(path, known): &(&PathBuf, &FileIdentity)| !FileIdentity::of(path).is_ok_and(|now| now == **known);
+        first.iter().find(changed).map(|(path, _)| path.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_replaced_written_to_or_removed_has_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let change: [&dyn Fn(); 3] = [
+            &|| {
+                // Same length and content, another file.
+                let other = folder.path().join("b");
+                std::fs::write(&other, "abc").unwrap();
+                std::fs::rename(&other, &path).unwrap();
+            },
+            &|| std::fs::write(&path, "abcd").unwrap(),
+            &|| std::fs::remove_file(&path).unwrap(),
+        ];
+        for change in change {
+            std::fs::write(&path, "abc").unwrap();
+            let seen = SeenFiles::default();
+            assert!(seen.is_unchanged(&path).unwrap() && seen.is_unchanged(&path).unwrap());
+            assert_eq!(seen.first_changed(), None);
+            change();
+            // Without inodes only the time of the change distinguishes the first one.
+            assert!(cfg!(not(unix)) || seen.first_changed().is_some() && !seen.is_unchanged(&path).unwrap());
+        }
+        assert!(SeenFiles::default().is_unchanged(&path).is_err());
+    }
+
+    #[test]
+    fn no_more_is_read_than_allowed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, vec![b'a'; 3 << 20]).unwrap();
+        assert_eq!(read(&path, 3 << 20).unwrap().len(), 3 << 20);
+        let error = read(&path, 2 << 20).unwrap_err();
+        assert_eq!((error.kind(), &error.to_string()[..]), (io::ErrorKind::FileTooLarge, "it is larger than 2 MiB"));
+        assert_eq!(open(folder.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+    }
+
+    #[test]
+    fn a_long_text_is_quoted_by_its_beginning() {
+        assert_eq!(quoted("q1\n"), "q1\\n");
+        assert_eq!(quoted(&"é".repeat(60)), "é".repeat(60));
+        assert_eq!(quoted(&"(".repeat(200_000)), format!("{}.. (200000 characters)", "(".repeat(60)));
+    }
+
+    #[test]
+    fn a_message_is_shortened_where_it_quotes() {
+        let long = "x".repeat(1000);
+        assert_eq!(shortened("joint `a` is not `b`"), "joint `a` is not `b`");
+        let path = format!("/data/{long}: cannot be read");
+        assert_eq!(shortened(&path), path);
+        let message = shortened(&format!("no joint `{long}`: give `a`"));
+        assert_eq!(message, format!("no joint `{}.. (1000 characters)`: give `a`", "x".repeat(200)));
+        assert!(shortened(&"a ".repeat(100_000)).ends_with("a .. (200000 characters)"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_without_a_writer_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let error = read_text(&path, 1 << 20).unwrap_err().to_string();
+        assert!(error.contains("a pipe") && error.contains("copy its content"), "{error}");
+        assert!(open(Path::new("/dev/zero")).unwrap_err().to_string().contains("a device"));
+    }
+}

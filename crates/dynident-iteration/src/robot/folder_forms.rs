@@ -1,0 +1,153 @@
+//! Further files of a motion for robots that no program of Dynident's protocol drives: ROS 2, URScript, waypoints,
+//! torques and currents.
+
+use super::handover::{model_torques, write_whole};
+use super::{RobotFault, RunRequest};
+use core::fmt::Write as _;
+use dynident_excitation::Motion;
+use dynident_excitation::export::{
+    ExportError, Sampled, UrScriptSettings, ros2_joint_trajectory, urscript, waypoints_csv,
+};
+use dynident_simulation::Reference;
+use dynident_simulation::controllers::ControllerModel;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A form of a motion, which `design --to` writes too, or of the torques along it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum FolderForm {
+    /// `trajectory.ros2.yaml`: a ROS 2 `JointTrajectory`.
+    Ros2,
+    /// `trajectory.script`: a URScript program of `servoj` calls, for the six joints of a UR arm.
+    Urscript,
+    /// `waypoints.csv`: time and positions.
+    Waypoints,
+    /// `torque.csv`: time and the torque that the model expects, Nm (N), for a controller that takes a feed-forward.
+    Torque,
+    /// `current.csv`: the same as currents, A, by `torque_constants`.
+    Current,
+}
+
+/// Which forms are written, and what they need.
+#[derive(Clone, Debug)]
+pub(super) struct FormSettings {
+    pub(super) forms: Vec<FolderForm>,
+    pub(super) urscript_rate_hz: f64,
+    /// Torque for one ampere, Nm/A (N/A), joint by joint.
+    pub(super) torque_constants: Option<Vec<f64>>,
+}
+
+/// Writes the forms of a run's motion, and of the ways to it and back, into its folder. Torques need a model: without
+/// one their files are left out.
+///
+/// # Errors
+/// A motion that a form cannot hold, a file that cannot be written.
+pub(super) fn write_forms(
+    request: &RunRequest<'_>,
+    joints: &[String],
+    settings: &FormSettings,
+    folder: &Path,
+) -> Result<(), RobotFault> {
+    let ways = request.ways.map(|ways| [("approach", &ways.approach), ("return", &ways.back)]);
+    for (part, reference) in [("trajectory", request.reference)].into_iter().chain(ways.into_iter().flatten()) {
+        for form in &settings.forms {
+            let path = folder.join(file_name(part, *form));
+            let text = text(*form, (reference, request.model), joints, settings);
+            let fault = |error: ExportError| RobotFault::File { path: path.clone(), reason: error.to_string() };
+            match text.map_err(fault)? {
+                Some(text) => write_whole(&path, &text)?,
+                // Of an earlier call whose controller had a model.
+                None if path.exists() => {
+                    let fault =
+                        |error: std::io::Error| RobotFault::File { path: path.clone(), reason: error.to_string() };
+                    std::fs::remove_file(&path).map_err(fault)?;
+                }
+                None => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The names that `design` gives, for the motion; those of the ways begin with theirs.
+fn file_name(part: &str, form: FolderForm) -> String {
+    let table = |name: &str| if part == "trajectory" { name.to_owned() } else { format!("{part}_{name}") };
+    match form {
+        FolderForm::Ros2 => format!("{part}.ros2.yaml"),
+        FolderForm::Urscript => format!("{part}.script"),
+        FolderForm::Waypoints => table("waypoints.csv"),
+        FolderForm::Torque => table("torque.csv"),
+        FolderForm::Current => table("current.csv"),
+    }
+}
+
+fn text(
+    form: FolderForm,
+    (reference, model): (&Reference, Option<&ControllerModel>),
+    joints: &[String],
+    settings: &FormSettings,
+) -> Result<Option<String>, ExportError> {
+    let exported = |rate_hz: f64, write: &dyn Fn(&Sampled<'_>) -> Result<String, ExportError>| {
+        let (times_s, motion) = sampled(reference, rate_hz);
+        write(&Sampled { joints, times_s: &times_s, motion: &motion }).map(Some)
+    };
+    match form {
+        FolderForm::Ros2 => exported(reference.rate_hz(), &ros2_joint_trajectory),
+        FolderForm::Waypoints => exported(reference.rate_hz(), &waypoints_csv),
+        FolderForm::Urscript => {
+            let own = UrScriptSettings { rate_hz: settings.urscript_rate_hz, ..UrScriptSettings::default() };
+            exported(own.rate_hz, &|sampled| urscript(sampled, &own))
+        }
+        FolderForm::Torque => Ok(model.map(|model| torque_csv(reference, model, "tau", None))),
+        FolderForm::Current => {
+            let constants = settings.torque_constants.as_deref();
+            Ok(model.zip(constants).map(|(model, constants)| torque_csv(reference, model, "i", Some(constants))))
+        }
+    }
+}
+
+/// The motion at a rate, straight between the reference's samples; its end is the last time.
+fn sampled(reference: &Reference, rate_hz: f64) -> (Vec<f64>, Motion) {
+    let own = reference.motion();
+    let duration_s = reference.duration_s();
+    let whole = (duration_s * rate_hz + 1e-9).floor() as usize;
+    let mut times_s: Vec<f64> = (0..=whole).map(|k| k as f64 / rate_hz).collect();
+    if duration_s - times_s[whole] > 1e-9 {
+        times_s.push(duration_s);
+    }
+    let at = |values: &[f64]| -> Vec<f64> {
+        let of_joint = |joint: usize| {
+            let values = &values[own.of(joint)];
+            times_s.iter().map(move |time| {
+                let place = (time * reference.rate_hz()).clamp(0.0, (own.samples - 1) as f64);
+                let from = (place + 1e-9).floor() as usize;
+                let next = (from + 1).min(own.samples - 1);
+                values[from] + (place - from as f64).max(0.0) * (values[next] - values[from])
+            })
+        };
+        (0..own.joints).flat_map(of_joint).collect()
+    };
+    let (q, dq, ddq) = (at(&own.q), at(&own.dq), at(&own.ddq));
+    let motion = Motion { samples: times_s.len(), joints: own.joints, q, dq, ddq, dddq: Vec::new() };
+    (times_s, motion)
+}
+
+/// `t_s` and the model's torque of every joint, over its constant where there are some.
+fn torque_csv(reference: &Reference, model: &ControllerModel, prefix: &str, constants: Option<&[f64]>) -> String {
+    let mut text = String::from("t_s");
+    for joint in 1..=reference.joints() {
+        // Writing to a string cannot fail, here and below.
+        let _ = write!(text, ",{prefix}{joint}");
+    }
+    text.push('\n');
+    for (sample, torques) in model_torques(reference, model).enumerate() {
+        let _ = write!(text, "{}", sample as f64 / reference.rate_hz());
+        for (joint, torque) in torques.iter().enumerate() {
+            let _ = write!(text, ",{}", torque / constants.map_or(1.0, |constants| constants[joint]));
+        }
+        text.push('\n');
+    }
+    text
+}
