@@ -2,7 +2,11 @@
 
 use crate::rotation::{quaternion, z_y_x_angles};
 use dynident_model::{InertialParameters, Mat3, Vec3};
+use dynident_text::identifier;
 use nalgebra::Matrix3;
+
+/// Longest identifier of RAPID.
+const RAPID_LENGTH: usize = 32;
 
 /// Whose controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +38,8 @@ pub struct PayloadBody {
 pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
-    let ([x, y, z], name) = (com, crate::robot_model::identifier(&payload.name));
+    let ([x, y, z], mut name) = (com, identifier(&payload.name));
+    name.truncate(RAPID_LENGTH);
     let mm = com.map(|x| 1e3 * x);
     Some(match reader {
         PayloadReader::UniversalRobots => format!(

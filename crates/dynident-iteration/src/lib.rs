@@ -112,6 +112,7 @@ mod run_motion;
 mod run_offsets;
 mod runs_folder;
 mod safety;
+mod sealed;
 mod settings;
 mod status;
 mod step_by_step;
