@@ -67,7 +67,7 @@ pub(crate) fn watched() -> bool {
     io::stderr().is_terminal()
 }
 
-/// What people read: no character steers the terminal, and no line is longer than anyone reads.
+/// Text for people: no character controls the terminal, and long lines are shortened.
 pub(crate) fn readable(text: &str) -> String {
     shortened_lines(&visible(text)).into_owned()
 }
@@ -80,6 +80,9 @@ mod tests {
     fn nothing_steers_the_terminal_and_nothing_fills_it() {
         let text = format!("a\u{1b}[31mb\u{9b}2J\r\u{202e}c\nλ Ü 関節 {}", "x".repeat(100_000));
         let shown = readable(&text);
-        assert!(shown.starts_with("a\\u001b[31mb\\u009b2J\\u000d\\u202ec\nλ Ü 関節 xxx") && shown.len() < 2200, "{shown}");
+        assert!(
+            shown.starts_with("a\\u001b[31mb\\u009b2J\\u000d\\u202ec\nλ Ü 関節 xxx") && shown.len() < 2200,
+            "{shown}"
+        );
     }
 }

@@ -38,7 +38,9 @@ pub enum ExportError {
         value: f64,
     },
     /// The equations of motion overflow.
-    #[error("the equations of motion hold the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again")]
+    #[error(
+        "the equations of motion hold the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
+    )]
     Overflow {
         /// The number.
         value: f64,

@@ -25,8 +25,8 @@ impl RobotModel {
     /// Nm s/rad, kg m², as the terms say).
     ///
     /// # Errors
-    /// If a body has no inertial parameters or too large ones, values are not finite or not one for each term, or a term
-    /// acts on a joint that is not there.
+    /// If a body has no inertial parameters or too large ones, values are not finite or not one for each term, or a
+    /// term acts on a joint that is not there.
     pub fn new(model: Model, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
         if values.len() != terms.len() {
             return Err(ExportError::Values { expected: terms.len(), found: values.len() });

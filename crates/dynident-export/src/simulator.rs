@@ -175,7 +175,8 @@ impl SimulatorFile {
     /// # Errors
     /// [`ExportError::Json`], for numbers that are none.
     pub fn json(&self) -> Result<Exported, ExportError> {
-        let text = dynident_text::json::to_string_pretty(self).map_err(|error| ExportError::Json { message: error.to_string() });
+        let text = dynident_text::json::to_string_pretty(self)
+            .map_err(|error| ExportError::Json { message: error.to_string() });
         Ok(Exported { text: text? + "\n", notes: self.notes.clone() })
     }
 

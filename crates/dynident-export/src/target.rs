@@ -72,15 +72,15 @@ impl Target {
 /// Writes the robot in the form `target`; `further` are notes of the caller's own, that is where the model comes from.
 ///
 /// # Errors
-/// A torque term that is no function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint that moves no inertia; numbers
-/// that overflow.
+/// A torque term that is no function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint that moves no inertia;
+/// numbers that overflow.
 pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<Exported, ExportError> {
     let temperatures = reference_temperatures(robot);
     let at_reference = temperatures
         .iter()
         .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."));
     let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
-    // What a form forgot to escape is shown here: no text leaves with invisible characters.
+    // A second line of defence: shows invisible characters that a form did not escape.
     let finished = |exported: Exported| Exported { text: visible(&exported.text).into_owned(), ..exported };
     let code = |write: fn(&Source<'_>) -> String, notes: Vec<String>| {
         let equations = Equations::of(robot)?;

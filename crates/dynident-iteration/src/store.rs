@@ -273,8 +273,10 @@ impl IterationStore {
         }
         let folder = self.runs.join(name(again));
         let value = serde_json::json!({ "schema": INTERRUPTED_SCHEMA, "run": run, "outcome": how });
-        let text = dynident_text::json::to_string(&value)
-            .map_err(|error| IterationError::State { path: folder.join(INTERRUPTED_FILE), problem: error.to_string() })?;
+        let text = dynident_text::json::to_string(&value).map_err(|error| IterationError::State {
+            path: folder.join(INTERRUPTED_FILE),
+            problem: error.to_string(),
+        })?;
         self.keep_whole(&folder, (INTERRUPTED_FILE, &text), runs, None)?;
         Ok(Some(folder))
     }

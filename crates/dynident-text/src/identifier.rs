@@ -3,8 +3,8 @@
 /// Longest identifier: with what the exported functions append it stays below the 63 characters of C99 and MATLAB.
 pub const IDENTIFIER_LENGTH: usize = 40;
 
-/// Lower-case letters, digits and `_` of a name, beginning with a letter, at most [`IDENTIFIER_LENGTH`] of them; `robot`
-/// where nothing is left. It is a prefix of names in code and may be a keyword itself.
+/// Lower-case letters, digits and `_` of a name, beginning with a letter, at most [`IDENTIFIER_LENGTH`] characters;
+/// `robot` where nothing is left. It is a prefix of names in code and may be a keyword itself.
 ///
 /// ```
 /// assert_eq!(dynident_text::identifier("2 Arms; import os"), "robot_2_arms__import_os");

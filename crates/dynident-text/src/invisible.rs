@@ -28,8 +28,8 @@ const FORMAT: [(char, char); 21] = [
     ('\u{e0020}', '\u{e007f}'),
 ];
 
-/// Whether a character has no shape of its own and may change how the characters around it look, or what a program
-/// makes of them: the Unicode classes Cc (control), Cf (format, with the overrides of the writing direction), Zl and Zp
+/// Whether a character is invisible and may change how the characters around it look or how a program reads them: the
+/// Unicode classes Cc (control), Cf (format, with the overrides of the writing direction), Zl and Zp
 /// (line and paragraph separators), and U+FFFE and U+FFFF, which XML forbids.
 pub fn is_invisible(c: char) -> bool {
     // Almost all text is ASCII.

@@ -46,7 +46,11 @@ fn string_length(text: &str, quotes: &str) -> usize {
         } else if text[at..].starts_with(quotes) {
             at += quotes.len();
             // Up to two more quotes belong to a string on several lines.
-            let more = if quotes.len() == 3 { text[at..].bytes().take(2).take_while(|b| *b == quotes.as_bytes()[0]).count() } else { 0 };
+            let more = if quotes.len() == 3 {
+                text[at..].bytes().take(2).take_while(|b| *b == quotes.as_bytes()[0]).count()
+            } else {
+                0
+            };
             return at + more;
         } else {
             at += text[at..].chars().next().map_or(1, char::len_utf8);
@@ -63,7 +67,11 @@ fn string(piece: &str, quotes: &str, hidden: impl Fn(char) -> bool) -> String {
     let inside = piece.strip_prefix(quotes).unwrap_or(piece);
     let inside = inside.strip_suffix(quotes).unwrap_or(inside);
     // A newline right behind the quotes is no part of the text.
-    let inside = if quotes.len() == 3 { inside.strip_prefix("\r\n").or(inside.strip_prefix('\n')).unwrap_or(inside) } else { inside };
+    let inside = if quotes.len() == 3 {
+        inside.strip_prefix("\r\n").or(inside.strip_prefix('\n')).unwrap_or(inside)
+    } else {
+        inside
+    };
     let mut out = String::from("\"");
     push_quoted(&mut out, inside);
     out.push('"');

@@ -2,9 +2,9 @@
 //!
 //! Only `<inertial>` and the two friction values of `<dynamics>` change; every other byte stays, with its comments,
 //! order, spacing and line ends, except invisible characters, which become references to them
-//! ([`dynident_text::xml::document`]). A body is lumped from links that are fixed to each other, and a log cannot distinguish
-//! them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the links fixed to
-//! it, and says so in a comment.
+//! ([`dynident_text::xml::document`]). A body is lumped from links that are fixed to each other, and a log cannot
+//! distinguish them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the
+//! links fixed to it, and says so in a comment.
 
 use super::prefixes::without_undeclared;
 use super::{MAX_MAGNITUDE, UrdfError, parse};

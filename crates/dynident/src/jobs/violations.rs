@@ -1,4 +1,4 @@
-//! What of a full set of parameters is not physically consistent.
+//! Parameters of a full set that are not physically consistent.
 
 use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;

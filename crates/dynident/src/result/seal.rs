@@ -5,7 +5,7 @@ use crate::digest::hexadecimal;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Where the hash stands in a result.
+/// The key of the hash in a result.
 pub(super) const PLACE: &str = "provenance.content_sha256";
 
 impl ResultFile {
@@ -20,7 +20,7 @@ impl ResultFile {
     }
 }
 
-/// SHA-256 of a result's content, whatever its layout, without what may differ between equal results.
+/// SHA-256 of a result's content in any layout, without the keys that may differ between equal results.
 pub(super) fn content_sha256(result: &Value) -> String {
     let mut content = result.clone();
     if let Some(all) = content.as_object_mut() {

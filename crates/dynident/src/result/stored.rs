@@ -60,8 +60,8 @@ impl ResultFile {
     /// Reads a result of `identify`.
     ///
     /// # Errors
-    /// A file that cannot be read, is no result, is one of another version, was edited or damaged, or holds numbers that
-    /// no result has.
+    /// A file that cannot be read, is no result, is one of another version, was edited or damaged, or holds numbers
+    /// that no result has.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
         Self::parse(&bytes, path)

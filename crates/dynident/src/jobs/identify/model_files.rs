@@ -230,9 +230,7 @@ fn commented_xml(urdf: &str, line: &str) -> String {
 /// Where the values come from, in a line that no comment of XML or TOML ends in.
 fn provenance_line(provenance: &Provenance) -> String {
     let robot = provenance.inputs.iter().find(|input| input.what == "robot");
-    let named = |input: Option<&InputFile>| {
-        input.map_or_else(|| "in memory".to_owned(), |input| input.file.clone())
-    };
+    let named = |input: Option<&InputFile>| input.map_or_else(|| "in memory".to_owned(), |input| input.file.clone());
     let line = format!(
         "{}, identity {}: identified from the study {} and the description {}; result.json has the rest",
         provenance.version,
