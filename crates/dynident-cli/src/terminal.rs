@@ -55,10 +55,11 @@ pub(crate) fn remark(message: &str) {
     let _ = writeln!(out, "note: {}", readable(message));
 }
 
-/// A question, on standard error; the answer comes on the same line.
+/// A question, on standard error; the answer comes on the same line. It is not shortened: nothing of a command that a
+/// person allows is left out.
 pub(crate) fn ask(question: &str) {
     let mut out = io::stderr().lock();
-    let _ = write!(out, "{}", readable(question));
+    let _ = write!(out, "{}", visible(question));
     let _ = out.flush();
 }
 

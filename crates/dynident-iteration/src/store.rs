@@ -68,6 +68,10 @@ pub struct RunFile {
     pub schema: String,
     /// What the runs depend on, in one number.
     pub fingerprint: String,
+    /// SHA-256 of everything else in the file: a file that was edited or damaged is not read. None in files of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub content_sha256: Option<String>,
     /// The run.
     #[serde(flatten)]
     pub record: RunRecord,
@@ -198,8 +202,12 @@ impl IterationStore {
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
     pub fn keep(&self, record: &RunRecord, runs: &[RobotRun]) -> Result<(), IterationError> {
-        let file =
-            RunFile { schema: RUN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), record: record.clone() };
+        let file = RunFile {
+            schema: RUN_SCHEMA.to_owned(),
+            fingerprint: self.fingerprint.clone(),
+            content_sha256: None,
+            record: record.clone(),
+        };
         let folder = self.run_folder(record.run);
         let text = sealed_json(&file)
             .map_err(|error| IterationError::State { path: folder.join(RUN_FILE), problem: error.to_string() })?;
