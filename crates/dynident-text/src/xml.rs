@@ -21,14 +21,18 @@ fn reference(out: &mut String, c: char) {
 }
 
 /// `text` as the value of an attribute in quotes of either kind, or as the text of an element: markup characters are
-/// entities, invisible characters references. Readers get `text` back, except control characters that XML cannot hold,
-/// which are written as `\u0001`.
+/// entities, invisible characters references. Readers get `text` back, with two exceptions: control characters that XML
+/// cannot hold are written as `\u0001`; `${` and `$(`, which the preprocessor xacro evaluates as Python, as `\u0024{`.
 ///
 /// ```
 /// assert_eq!(dynident_text::xml::escaped("a\"><b/>\u{202e}"), "a&quot;&gt;&lt;b/&gt;&#x202e;");
 /// ```
 pub fn escaped(text: &str) -> Cow<'_, str> {
     let special = |c: char| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_invisible(c);
+    if text.contains("${") || text.contains("$(") {
+        let text = text.replace("${", "\\u0024{").replace("$(", "\\u0024(");
+        return Cow::Owned(escaped(&text).into_owned());
+    }
     replaced(text, special, |out, c| match c {
         '&' => out.push_str("&amp;"),
         '<' => out.push_str("&lt;"),
@@ -154,6 +158,11 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_left_for_xacro() {
+        assert_eq!(escaped("${1+1}$(find a)$$({$"), "\\u0024{1+1}\\u0024(find a)$\\u0024({$");
+    }
+
+    #[test]
     fn comments_hold_no_two_hyphens() {
         assert_eq!(comment("a --> b---"), "a - -> b- - - ");
         assert_eq!(comment("a\n\u{202e}"), "a\\u000a\\u202e");
@@ -161,7 +170,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn readers_get_attributes_and_texts_back(text in "[^\u{0}-\u{8}\u{b}\u{c}\u{e}-\u{1f}\u{fffe}\u{ffff}]{0,40}", note in any::<String>()) {
+        fn readers_get_attributes_and_texts_back(text in "[^$\u{0}-\u{8}\u{b}\u{c}\u{e}-\u{1f}\u{fffe}\u{ffff}]{0,40}", note in any::<String>()) {
             let (own, note) = (escaped(&text), comment(&note));
             let document = format!("<a b=\"{own}\" c='{own}'>{own}<!--{note}--></a>");
             prop_assert!(!document.contains(is_invisible));
