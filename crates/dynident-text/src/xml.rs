@@ -29,8 +29,7 @@ fn reference(out: &mut String, c: char) {
 /// ```
 pub fn escaped(text: &str) -> Cow<'_, str> {
     let special = |c: char| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_invisible(c);
-    if text.contains("${") || text.contains("$(") {
-        let text = text.replace("${", "\\u0024{").replace("$(", "\\u0024(");
+    if let Some(text) = without_xacro(text) {
         return Cow::Owned(escaped(&text).into_owned());
     }
     replaced(text, special, |out, c| match c {
@@ -43,10 +42,17 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
     })
 }
 
+/// `text` without the expressions of xacro; none where it has none.
+fn without_xacro(text: &str) -> Option<String> {
+    let has = text.contains("${") || text.contains("$(");
+    has.then(|| text.replace("${", "\\u0024{").replace("$(", "\\u0024("))
+}
+
 /// `text` as a part of one line of a comment: two hyphens are divided, a hyphen at the end is followed by a blank,
-/// invisible characters are written as `\u000a`, long texts are shortened.
+/// invisible characters are written as `\u000a` and `${` as `\u0024{`, long texts are shortened.
 pub fn comment(text: &str) -> String {
-    let text = shortened(text, LINE_LENGTH);
+    let plain = without_xacro(text);
+    let text = shortened(plain.as_deref().unwrap_or(text), LINE_LENGTH);
     let mut out = String::with_capacity(text.len() + 1);
     for c in text.chars() {
         if c == '-' && out.ends_with('-') {
@@ -159,7 +165,9 @@ mod tests {
 
     #[test]
     fn nothing_is_left_for_xacro() {
-        assert_eq!(escaped("${1+1}$(find a)$$({$"), "\\u0024{1+1}\\u0024(find a)$\\u0024({$");
+        for safe in [escaped("${1+1}$(find a)$$({$").into_owned(), comment("${1+1}$(find a)$$({$")] {
+            assert_eq!(safe, "\\u0024{1+1}\\u0024(find a)$\\u0024({$");
+        }
     }
 
     #[test]

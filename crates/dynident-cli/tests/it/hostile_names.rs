@@ -330,7 +330,7 @@ fn names_are_no_elements_of_descriptions() {
             }
         }
         // Xacro, through which ROS reads URDF, evaluates these as Python.
-        let urdf = exported(&robot, Target::Urdf, PLAIN);
+        let urdf = exported(&robot, Target::Urdf, name);
         assert!(!urdf.contains("${") && !urdf.contains("$("), "{urdf}");
         if fits_xml(name) {
             // Readers get the very names back: nothing that refers to a joint by its name is lost.
