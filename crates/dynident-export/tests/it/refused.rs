@@ -62,7 +62,7 @@ fn numbers_that_overflow() {
     assert!(large.contains("body `left`") && large.contains("1e308"), "{large}");
     // The centre of mass is the first moment over the mass.
     let mut light = [0.0; 10];
-    (light[0], light[1]) = (1e-300, 1e8);
+    (light[0], light[1]) = (1e-305, 1e8);
     assert!(with(light).contains("the centre of mass is inf"), "{}", with(light));
     let steep = Stribeck { joint: 0, speed: 1e-300, exponent: 3.0, shape: CoulombShape::Smooth { width: 0.1 } };
     let robot = RobotModel::new(model.clone(), vec![TorqueTerm::Stribeck(steep)], vec![1e300]).unwrap();
