@@ -117,8 +117,7 @@ fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), Export
         ("the inertia about the centre of mass", inertia.as_flattened()),
     ];
     for (quantity, values) in all {
-        // Not a number is no smaller than anything.
-        if let Some(&value) = values.iter().find(|value| !(value.abs() <= MAX_MAGNITUDE)) {
+        if let Some(&value) = values.iter().find(|value| value.is_nan() || value.abs() > MAX_MAGNITUDE) {
             return Err(ExportError::Body { body: body.to_owned(), quantity, value });
         }
     }
