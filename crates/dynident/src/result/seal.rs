@@ -1,7 +1,7 @@
 //! The hash by which a result that was edited or damaged is recognised.
 
 use super::identification::ResultFile;
-use crate::digest::hexadecimal;
+use core::fmt::Write;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -30,7 +30,11 @@ pub(super) fn content_sha256(result: &Value) -> String {
             provenance.remove("content_sha256");
         }
     }
-    hexadecimal(&Sha256::digest(dynident_text::json::canonical(&content)))
+    Sha256::digest(dynident_text::json::canonical(&content)).iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 /// The hash that a result states.
