@@ -22,6 +22,8 @@ class Line:
 
     def __call__(self, stage: str, done: int, total: int | None) -> None:
         now = time.monotonic()
+        # A stage may hold the name of a log, and that any character.
+        stage = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in stage)
         if self._stage[0] != stage:
             self._stage = (stage, now)
         if now - self._begin < PATIENCE_S:

@@ -147,7 +147,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 /// What is wrong with the command line. In colours, unless it holds an argument that would steer the terminal.
 fn refused(error: &clap::Error) {
     let text = error.render().to_string();
-    if terminal::visible(&text) == text {
+    if terminal::readable(&text) == text {
         // Nothing is left to report if the terminal has gone.
         let _ = error.print();
     } else {

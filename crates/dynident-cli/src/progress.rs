@@ -37,7 +37,7 @@ impl Stage {
             if let Ok(style) = ProgressStyle::with_template(template) {
                 bar.set_style(style);
             }
-            bar.set_message(terminal::visible(&self.name));
+            bar.set_message(terminal::readable(&self.name));
             bar.reset_elapsed();
             self.bar = Some(bar);
         }
@@ -52,7 +52,7 @@ impl Progress for Bar {
         if let Ok(mut current) = self.stage.lock() {
             // A stage of unknown size may never say a word: its line is drawn by a clock.
             let bar = total.is_none().then(|| {
-                let bar = ProgressBar::new_spinner().with_message(terminal::visible(stage));
+                let bar = ProgressBar::new_spinner().with_message(terminal::readable(stage));
                 if let Ok(style) = ProgressStyle::with_template(WITHOUT_ROWS) {
                     bar.set_style(style);
                 }

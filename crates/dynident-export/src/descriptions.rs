@@ -9,6 +9,8 @@ use crate::rotation::quaternion;
 use core::fmt::Write;
 use dynident_model::terms::{CouplingEffect, StateFunction, TorqueTerm};
 use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, write_urdf};
+use dynident_text::xml::{self, escaped};
+use std::borrow::Cow;
 
 /// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
 /// leaves rounding, a narrow smooth step in place of a sign some thousandth.
@@ -26,7 +28,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     let mut text = format!(
         "<mujoco model=\"{}\">\n{}  <compiler angle=\"radian\" autolimits=\"true\"/>\n  <option gravity=\"{gx:?} {gy:?} {gz:?}\"/>\n  \
          <worldbody>\n",
-        attribute(model.name()),
+        escaped(model.name()),
         comment(&notes)
     );
     for joint in (0..bodies).filter(|&joint| model.tree_joints()[joint].parent.is_none()) {
@@ -36,7 +38,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     for joint in model.joints() {
         let range = joint.limits.effort.filter(|effort| *effort > 0.0);
         let range = range.map_or(String::new(), |effort| format!(" ctrlrange=\"{:?} {effort:?}\"", -effort));
-        let name = attribute(&joint.name);
+        let name = escaped(&joint.name);
         let _ = writeln!(text, "    <motor name=\"{name}\" joint=\"{name}\"{range}/>");
     }
     text += "  </actuator>\n";
@@ -179,7 +181,7 @@ fn write_body(
     let _ = writeln!(
         text,
         "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\"{range}{spring} armature=\"{:?}\" damping=\"{:?}\" frictionloss=\"{:?}\"/>",
-        attribute(&joint.name),
+        escaped(&joint.name),
         own.map_or(0.0, |own| rotors[own * model.dof() + own]),
         found.viscous,
         found.coulomb
@@ -199,8 +201,8 @@ fn write_followers(text: &mut String, model: &Model) {
     let Some(coupling) = model.coupling() else { return };
     let (mut tendons, mut equalities) = (String::new(), String::new());
     for (index, joint) in model.followers() {
-        let (name, offset) = (attribute(&joint.name), coupling.offset(index));
-        let source = |dof: usize| attribute(&model.joints()[dof].name);
+        let (name, offset) = (escaped(&joint.name), coupling.offset(index));
+        let source = |dof: usize| escaped(&model.joints()[dof].name);
         match *coupling.row(index) {
             [(dof, multiplier)] => {
                 let law = format!("polycoef=\"{offset:?} {multiplier:?} 0 0 0\"");
@@ -224,8 +226,8 @@ fn write_followers(text: &mut String, model: &Model) {
 }
 
 /// A link's name, unless it is the one that MuJoCo keeps for what does not move.
-fn body_name(link: &str) -> String {
-    if link == "world" { "world_link".to_owned() } else { attribute(link) }
+fn body_name(link: &str) -> Cow<'_, str> {
+    if link == "world" { Cow::Borrowed("world_link") } else { escaped(link) }
 }
 
 /// Mass, centre of mass and inertia about it of a body, which simulators read only of one that can be real.
@@ -257,22 +259,11 @@ fn placement(placement: &Transform) -> String {
     format!(" pos=\"{x:?} {y:?} {z:?}\" quat=\"{a:?} {b:?} {c:?} {d:?}\"")
 }
 
-/// Notes as a comment of XML, in which two hyphens may not stand.
+/// Notes as a comment of XML.
 pub(crate) fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();
     }
-    let line = |note: &String| format!("    {}\n", note.replace("--", "- -").replace(['\n', '\r'], " "));
-    let lines = notes.iter().map(line).collect::<Vec<_>>().concat();
+    let lines: String = notes.iter().map(|note| format!("    {}\n", xml::comment(note))).collect();
     format!("  <!--\n{lines}  -->\n")
-}
-
-/// A name as the value of an attribute in double quotes.
-pub(crate) fn attribute(name: &str) -> String {
-    plain(name).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-/// Text on one line, whatever counts as the end of one.
-pub(crate) fn plain(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c }).collect()
 }

@@ -40,7 +40,7 @@ pub(crate) struct Equations {
 
 impl Equations {
     /// # Errors
-    /// A torque term that is no function of the motion, a joint that moves no inertia.
+    /// A torque term that is no function of the motion, a joint that moves no inertia, numbers that overflow.
     pub(crate) fn of(robot: &RobotModel) -> Result<Self, ExportError> {
         let reduced = robot.reduced()?;
         let weightless = reduced.clone().with_gravity(Vec3::ZERO)?;
@@ -138,7 +138,11 @@ impl Equations {
             }
             Ok::<_, ExportError>(functions)
         });
-        Ok(Self { dof, graph, functions: functions? })
+        let functions = functions?;
+        match graph.not_finite() {
+            Some(value) => Err(ExportError::Overflow { value }),
+            None => Ok(Self { dof, graph, functions }),
+        }
     }
 }
 

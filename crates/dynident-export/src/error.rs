@@ -2,6 +2,7 @@
 
 use dynident_dynamics::ParametricModelError;
 use dynident_model::ModelError;
+use dynident_model::urdf::MAX_MAGNITUDE;
 use thiserror::Error;
 
 /// Why a model could not be written.
@@ -22,6 +23,26 @@ pub enum ExportError {
         /// The term's symbol.
         symbol: String,
         /// Its value.
+        value: f64,
+    },
+    /// A body with a number that no simulator takes, or from which one follows.
+    #[error(
+        "body `{body}`: {quantity} is {value:e}; all numbers of a body have to be finite and at most {MAX_MAGNITUDE:e}: identify the model again"
+    )]
+    Body {
+        /// The body.
+        body: String,
+        /// Which of its numbers.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The equations of motion overflow.
+    #[error(
+        "the equations of motion hold the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
+    )]
+    Overflow {
+        /// The number.
         value: f64,
     },
     /// Recorded velocities of another number of joints.

@@ -146,6 +146,14 @@ impl Graph {
         place
     }
 
+    /// The first constant that is not finite.
+    pub(crate) fn not_finite(&self) -> Option<f64> {
+        self.nodes.iter().find_map(|node| match node {
+            Node::Constant(bits) => Some(f64::from_bits(*bits)).filter(|value| !value.is_finite()),
+            _ => None,
+        })
+    }
+
     /// The value of a constant.
     pub(crate) fn number(&self, id: Id) -> Option<f64> {
         match self.node(id) {

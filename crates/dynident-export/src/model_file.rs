@@ -210,7 +210,7 @@ impl ModelFile {
 
 /// The model as JSON.
 pub(crate) fn model_json(robot: &RobotModel, notes: Vec<String>) -> Result<Exported, ExportError> {
-    let text = serde_json::to_string_pretty(&ModelFile::of(robot, &notes));
+    let text = dynident_text::json::to_string_pretty(&ModelFile::of(robot, &notes));
     Ok(Exported { text: text.map_err(|error| ExportError::Json { message: error.to_string() })? + "\n", notes })
 }
 

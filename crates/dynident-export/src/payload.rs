@@ -2,7 +2,11 @@
 
 use crate::rotation::{quaternion, z_y_x_angles};
 use dynident_model::{InertialParameters, Mat3, Vec3};
+use dynident_text::identifier;
 use nalgebra::Matrix3;
+
+/// Longest identifier of RAPID.
+const RAPID_LENGTH: usize = 32;
 
 /// Whose controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +30,8 @@ pub struct PayloadBody {
     pub inertial: InertialParameters,
 }
 
-/// The command, declaration or JSON that tells a controller of the payload. None for a body without mass.
+/// The command, declaration or JSON that tells a controller of the payload. None for a body without mass
+/// or with numbers that are not finite.
 ///
 /// Units and axes are the reader's: UR and Franka take the inertia about the centre of mass in kg m² along the axes of
 /// the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine); KUKA and ABB take the centre of mass in mm,
@@ -34,7 +39,11 @@ pub struct PayloadBody {
 pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
-    let ([x, y, z], name) = (com, crate::robot_model::identifier(&payload.name));
+    let ([x, y, z], mut name) = (com, identifier(&payload.name));
+    name.truncate(RAPID_LENGTH);
+    if ![mass].iter().chain(&com).chain(i.as_flattened()).all(|x| x.is_finite()) {
+        return None;
+    }
     let mm = com.map(|x| 1e3 * x);
     Some(match reader {
         PayloadReader::UniversalRobots => format!(
@@ -141,5 +150,8 @@ mod tests {
     fn nothing_is_no_payload() {
         let nothing = PayloadBody { name: String::new(), inertial: InertialParameters::ZERO };
         assert_eq!(payload_command(&nothing, PayloadReader::Abb), None);
+        let mut huge = box_();
+        huge.inertial.0[1] = 1e308;
+        assert_eq!(payload_command(&huge, PayloadReader::Abb), None);
     }
 }

@@ -4,6 +4,7 @@ use crate::error::ExportError;
 use crate::recorded_velocity::RecordedVelocity;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_model::terms::TorqueTerm;
+use dynident_model::urdf::MAX_MAGNITUDE;
 use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
 
 /// Entries of rotations closer than this to 0 or ±1 are that number: what rounding leaves of a right angle written as
@@ -24,8 +25,8 @@ impl RobotModel {
     /// Nm s/rad, kg m², as the terms say).
     ///
     /// # Errors
-    /// If a body has no inertial parameters, values are not finite or not one for each term, or a term acts on a joint
-    /// that is not there.
+    /// If a body has no inertial parameters or too large ones, values are not finite or not one for each term, or a
+    /// term acts on a joint that is not there.
     pub fn new(model: Model, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
         if values.len() != terms.len() {
             return Err(ExportError::Values { expected: terms.len(), found: values.len() });
@@ -36,6 +37,9 @@ impl RobotModel {
         let bodies: Vec<String> = model.bodies_without_prior().into_iter().map(str::to_owned).collect();
         if !bodies.is_empty() {
             return Err(ExportError::Unknown { bodies });
+        }
+        for (body, inertial) in model.bodies().iter().zip(model.inertials()) {
+            check_numbers(body.name(), inertial)?;
         }
         // Says what is wrong with terms.
         let checked = ParametricModel::new(model, terms)?;
@@ -80,7 +84,7 @@ impl RobotModel {
 
     /// Its name as an identifier of any language: letters, digits and `_`, not beginning with a digit.
     pub fn identifier(&self) -> String {
-        identifier(self.model.name())
+        dynident_text::identifier(self.model.name())
     }
 
     /// A robot with the same torques and fewer numbers: the base parameters stand at the places of their own columns,
@@ -103,17 +107,21 @@ impl RobotModel {
     }
 }
 
-/// Letters, digits and `_` of a name; `robot` where nothing is left.
-pub(crate) fn identifier(name: &str) -> String {
-    let mut text: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect();
-    if !text.chars().any(|c| c.is_ascii_alphanumeric()) {
-        "robot".clone_into(&mut text);
+/// That a body's parameters, and what descriptions hold of them, are numbers that a reader takes.
+fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), ExportError> {
+    let com = inertial.com_m().map_or([0.0; 3], |com| com.0);
+    let inertia = inertial.inertia_at_com().map_or([[0.0; 3]; 3], |inertia| inertia.0);
+    let all = [
+        ("an inertial parameter", &inertial.0[..]),
+        ("the centre of mass", &com[..]),
+        ("the inertia about the centre of mass", inertia.as_flattened()),
+    ];
+    for (quantity, values) in all {
+        if let Some(&value) = values.iter().find(|value| value.is_nan() || value.abs() > MAX_MAGNITUDE) {
+            return Err(ExportError::Body { body: body.to_owned(), quantity, value });
+        }
     }
-    if text.starts_with(|c: char| !c.is_ascii_alphabetic()) {
-        text.insert_str(0, "robot_");
-    }
-    text
+    Ok(())
 }
 
 /// The same model with exact right angles.

@@ -1,12 +1,13 @@
 //! Parameters of a ROS 2 node: what a controller adds to the `robot_description` that it has.
 
-use crate::descriptions::{frictions, plain};
+use crate::descriptions::frictions;
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::model_file::{ModelConstant, ModelTerm, upper_triangle};
 use crate::robot_model::RobotModel;
 use core::fmt::Write;
 use dynident_model::InertialParameters;
+use dynident_text::quoted;
 
 /// YAML of parameters: for each joint mass, centre of mass and inertia of what it moves, drive inertia, the nearest
 /// Coulomb and viscous friction, and all torque terms as they are; gravity; couplings. Arrays hold numbers only, and
@@ -25,14 +26,14 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     }
     let mut text = String::new();
     for note in &notes {
-        let _ = writeln!(text, "# {}", plain(note));
+        let _ = writeln!(text, "# {}", dynident_text::comment(note));
     }
-    let quoted: Vec<String> = names.iter().map(|name| string(name)).collect();
+    let joints: Vec<String> = names.iter().map(|name| quoted(name)).collect();
     let _ = write!(
         text,
         "/**:\n  ros__parameters:\n    robot: {}\n    joints: [{}]\n    # In the frame of the base.\n    gravity_m_s2: {}\n    dynamics:\n",
-        string(model.name()),
-        quoted.join(", "),
+        quoted(model.name()),
+        joints.join(", "),
         array(&model.gravity().0)
     );
     for (index, (joint, key)) in model.joints().iter().zip(&keys).enumerate() {
@@ -49,7 +50,7 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
         let _ = write!(
             text,
             "      {key}:\n        # In the frame of this link; inertia about the centre of mass: xx, xy, xz, yy, yz, zz.\n        link: {}\n        mass_kg: {}\n        com_m: {}\n        inertia_at_com_kgm2: {}\n        {rotor}: {}\n        # {force} = coulomb sign(dq) + viscous dq\n        {moment}: {}\n        {damping}: {}\n",
-            string(body.name()),
+            quoted(body.name()),
             number(inertial.mass_kg()),
             array(&com),
             array(&inertia),
@@ -75,19 +76,19 @@ fn write_terms(text: &mut String, key: &str, terms: &[ModelTerm], depth: usize) 
         let _ = write!(
             text,
             "{pad}  {name}:\n{pad}    kind: {}\n{pad}    value: {}\n{pad}    unit: {}\n",
-            string(&term.kind),
+            quoted(&term.kind),
             number(term.value),
-            string(&term.unit)
+            quoted(&term.unit)
         );
         if let [first, second] = &term.joints[..] {
-            let _ = writeln!(text, "{pad}    joints: [{}, {}]", string(first), string(second));
+            let _ = writeln!(text, "{pad}    joints: [{}, {}]", quoted(first), quoted(second));
         }
         for (constant, value) in &term.constants {
             let value = match value {
                 ModelConstant::Number(value) => number(*value),
                 ModelConstant::Numbers(values) => array(values),
                 ModelConstant::List(values) => array(values),
-                ModelConstant::Word(word) => string(word),
+                ModelConstant::Word(word) => quoted(word),
             };
             let _ = writeln!(text, "{pad}    {constant}: {value}");
         }
@@ -103,12 +104,19 @@ fn about_centre(inertial: &InertialParameters, body: &str) -> Result<([f64; 3], 
     }
 }
 
-/// Letters, digits and `_` of each name, not beginning with a digit, all different.
+/// Words that YAML 1.1 takes for something else than text.
+const NO_TEXT: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
+
+/// Longest key: YAML allows 1024 characters before the colon.
+const KEY_LENGTH: usize = 200;
+
+/// Letters, digits and `_` of each name, not beginning with a digit, no word of YAML, all different.
 fn parameter_names(names: &[&str]) -> Vec<String> {
     let mut taken: Vec<String> = Vec::new();
     for name in names {
-        let mut key: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        let safe = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+        let mut key: String = name.chars().take(KEY_LENGTH).map(safe).collect();
+        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || NO_TEXT.contains(&&*key.to_ascii_lowercase()) {
             key.insert_str(0, "joint_");
         }
         let mut free = key.clone();
@@ -136,11 +144,6 @@ fn array(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// A name in double quotes.
-fn string(name: &str) -> String {
-    format!("\"{}\"", plain(name).replace('\\', "\\\\").replace('"', "\\\""))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,6 +152,7 @@ mod tests {
     fn names_are_safe_and_different() {
         assert_eq!(parameter_names(&["a.b", "a_b", "a-b", "7"]), ["a_b_2", "a_b", "a_b_3", "joint_7"]);
         assert_eq!(parameter_names(&["", "関節", "x"]), ["joint_", "joint___", "x"]);
+        assert_eq!(parameter_names(&["No", "y"]), ["joint_No", "joint_y"]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! SDF, which Gazebo and Drake read.
 
-use crate::descriptions::{attribute, comment, frictions, left_out, real_inertial, spring};
+use crate::descriptions::{comment, frictions, left_out, real_inertial, spring};
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::nearest_friction::NearestFriction;
@@ -8,6 +8,7 @@ use crate::robot_model::RobotModel;
 use crate::rotation::z_y_x_angles;
 use core::fmt::Write;
 use dynident_model::{Body, Joint, JointKind, STANDARD_GRAVITY, Transform};
+use dynident_text::xml::escaped;
 
 /// A model of SDF 1.7, the first version whose poses may be relative to other frames: links with their inertials,
 /// joints with limits, damping and friction, links fixed to others as frames, and the base fixed to the world. No
@@ -140,7 +141,7 @@ impl Names {
 
     /// What is called otherwise than in the description.
     fn notes(&self) -> impl Iterator<Item = String> {
-        let others = self.taken.iter().filter(|(original, name)| attribute(original) != *name);
+        let others = self.taken.iter().filter(|(original, name)| escaped(original) != *name);
         others.map(|(original, name)| {
             format!("SDF allows no second part with the name {original}, or none at all: it is called {name} here.")
         })
@@ -149,6 +150,6 @@ impl Names {
 
 /// A name that SDF allows: not `world`, no `__` around it, no `::` in it.
 fn name(original: &str) -> String {
-    let text = attribute(original).replace("::", "_");
+    let text = escaped(original).replace("::", "_");
     if text.is_empty() || text == "world" || text.starts_with("__") { format!("robot_{text}") } else { text }
 }

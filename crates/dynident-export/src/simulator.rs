@@ -1,12 +1,13 @@
 //! Joint parameters as simulators ask for them, with their error bars.
 
-use crate::descriptions::{left_out, plain};
+use crate::descriptions::left_out;
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::nearest_friction::{ComparedOver, NearestFriction, TermShare};
 use crate::robot_model::RobotModel;
 use core::fmt::Write;
+use dynident_text::markdown;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`SimulatorFile`].
@@ -174,7 +175,8 @@ impl SimulatorFile {
     /// # Errors
     /// [`ExportError::Json`], for numbers that are none.
     pub fn json(&self) -> Result<Exported, ExportError> {
-        let text = serde_json::to_string_pretty(self).map_err(|error| ExportError::Json { message: error.to_string() });
+        let text = dynident_text::json::to_string_pretty(self)
+            .map_err(|error| ExportError::Json { message: error.to_string() });
         Ok(Exported { text: text? + "\n", notes: self.notes.clone() })
     }
 
@@ -182,11 +184,11 @@ impl SimulatorFile {
     pub fn table(&self) -> Exported {
         let mut text = format!(
             "# {}\n\n| joint | armature | damping | frictionloss | friction off by, rms (most) | delay | gain |\n| --- | --- | --- | --- | --- | --- | --- |\n",
-            cell(&self.name)
+            markdown(&self.name)
         );
         let mut remarks = Vec::new();
         for joint in &self.joints {
-            let name = cell(&joint.name);
+            let name = markdown(&joint.name);
             let delay = joint.delay.as_ref();
             let _ = writeln!(
                 text,
@@ -207,7 +209,7 @@ impl SimulatorFile {
                 ("gain", Some(&joint.actuator_gain)),
             ];
             let said = values.into_iter().filter_map(|(what, value)| Some((what, value?.note.as_ref()?)));
-            remarks.extend(said.map(|(what, note)| (format!("{what}: {}", plain(note)), name.clone())));
+            remarks.extend(said.map(|(what, note)| (format!("{what}: {}", markdown(note)), name.clone())));
         }
         text += "\nBars are half the widths of 95 % intervals; `?` where the logs tell none.\n";
         if let Some(delay) = &self.common_delay {
@@ -222,7 +224,7 @@ impl SimulatorFile {
             }
         }
         let remarks = said.into_iter().map(|(remark, joints)| format!("{}, {remark}", joints.join(", ")));
-        let lines: Vec<String> = remarks.chain(self.notes.iter().map(|note| plain(note))).collect();
+        let lines: Vec<String> = remarks.chain(self.notes.iter().map(|note| markdown(note))).collect();
         if !lines.is_empty() {
             let _ = writeln!(text, "\n- {}", lines.join("\n- "));
         }
@@ -254,9 +256,4 @@ fn with_bar(value: &SimulatorValue) -> String {
         }
         None => format!("{:.4} ± ? {unit}", value.value),
     }
-}
-
-/// A name as a cell of a table.
-fn cell(name: &str) -> String {
-    plain(name).replace('|', "\\|")
 }

@@ -10,6 +10,7 @@ use crate::model_file::model_json;
 use crate::robot_model::RobotModel;
 use crate::ros2_parameters::ros2_parameters;
 use crate::sdf::sdf;
+use dynident_text::visible;
 
 /// A form of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,19 +72,22 @@ impl Target {
 /// Writes the robot in the form `target`; `further` are notes of the caller's own, that is where the model comes from.
 ///
 /// # Errors
-/// A torque term that is no function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint that moves no inertia.
+/// A torque term that is no function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint that moves no inertia;
+/// numbers that overflow.
 pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<Exported, ExportError> {
     let temperatures = reference_temperatures(robot);
     let at_reference = temperatures
         .iter()
         .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."));
     let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
+    // A second line of defence: shows invisible characters that a form did not escape.
+    let finished = |exported: Exported| Exported { text: visible(&exported.text).into_owned(), ..exported };
     let code = |write: fn(&Source<'_>) -> String, notes: Vec<String>| {
         let equations = Equations::of(robot)?;
         let text = write(&Source { robot, equations: &equations, notes: &notes });
         Ok(Exported { text, notes })
     };
-    match target {
+    let exported = match target {
         Target::C => code(c_header, notes),
         Target::Cpp => code(cpp_header, notes),
         Target::Rust => code(rust_module, notes),
@@ -95,5 +99,6 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
         // Temperature is not left out here.
         Target::Ros2Yaml => ros2_parameters(robot, further.to_vec()),
         Target::Json => model_json(robot, further.to_vec()),
-    }
+    };
+    exported.map(finished)
 }

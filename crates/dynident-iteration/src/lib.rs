@@ -114,6 +114,7 @@ mod run_offsets;
 mod run_torque_check;
 mod runs_folder;
 mod safety;
+mod sealed;
 mod settings;
 mod status;
 mod step_by_step;

@@ -12,6 +12,7 @@ use crate::runs_folder::{
     HELD_OUT, HELD_OUT_FILE, INTERRUPTED, INTERRUPTED_FILE, PLAN_FILE, PLANNED, RUN_FILE, RunsFolder, UNFINISHED, WAYS,
     remove,
 };
+use crate::sealed::{sealed_json, unsealed};
 use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -70,6 +71,10 @@ pub struct RunFile {
     pub schema: String,
     /// What the runs depend on, in one number.
     pub fingerprint: String,
+    /// SHA-256 of everything else in the file: a file that was edited or damaged is not read. None in files of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub content_sha256: Option<String>,
     /// The run.
     #[serde(flatten)]
     pub record: RunRecord,
@@ -121,7 +126,7 @@ impl IterationStore {
                 Err(error) => return Err(IterationError::file(&path)(error)),
             };
             let state = |problem: String| IterationError::State { path: path.clone(), problem };
-            let file: RunFile = serde_json::from_str(&text)
+            let file: RunFile = unsealed(&text)
                 .map_err(|error| state(format!("is no run of an iteration ({error}); remove its folder")))?;
             if file.schema != RUN_SCHEMA {
                 return Err(state(format!("has the schema {}, not {RUN_SCHEMA}", file.schema)));
@@ -150,7 +155,7 @@ impl IterationStore {
         let folder = self.held_out_folder(run);
         let fingerprint = self.fingerprint.clone();
         let file = HeldOutFile { schema: HELD_OUT_SCHEMA.to_owned(), fingerprint, run, found: found.clone() };
-        let text = serde_json::to_string_pretty(&file)
+        let text = sealed_json(&file)
             .map_err(|error| IterationError::State { path: folder.join(HELD_OUT_FILE), problem: error.to_string() })?;
         self.keep_whole(&folder, (HELD_OUT_FILE, &text), core::slice::from_ref(came), None)
     }
@@ -164,7 +169,7 @@ impl IterationStore {
             Err(error) => return Err(IterationError::file(&path)(error)),
         };
         let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
-        let file: HeldOutFile = serde_json::from_str(&text)
+        let file: HeldOutFile = unsealed(&text)
             .map_err(|error| wrong(format!("is no held-out run of an iteration ({error}); remove its folder")))?;
         if file.schema != HELD_OUT_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
             return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
@@ -200,10 +205,14 @@ impl IterationStore {
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
     pub fn keep(&self, record: &RunRecord, runs: &[RobotRun]) -> Result<(), IterationError> {
-        let file =
-            RunFile { schema: RUN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), record: record.clone() };
+        let file = RunFile {
+            schema: RUN_SCHEMA.to_owned(),
+            fingerprint: self.fingerprint.clone(),
+            content_sha256: None,
+            record: record.clone(),
+        };
         let folder = self.run_folder(record.run);
-        let text = serde_json::to_string_pretty(&file)
+        let text = sealed_json(&file)
             .map_err(|error| IterationError::State { path: folder.join(RUN_FILE), problem: error.to_string() })?;
         self.keep_whole(&folder, (RUN_FILE, &text), runs, record.motion.as_ref())?;
         let plan = self.plan_folder(record.run);
@@ -220,7 +229,7 @@ impl IterationStore {
         let folder = self.plan_folder(run);
         let file =
             PlanFile { schema: PLAN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), run, motion, forecast };
-        let text = serde_json::to_string_pretty(&file)
+        let text = sealed_json(&file)
             .map_err(|error| IterationError::State { path: folder.join(PLAN_FILE), problem: error.to_string() })?;
         self.keep_whole(&folder, (PLAN_FILE, &text), &[], planned.motion.as_ref())
     }
@@ -238,7 +247,7 @@ impl IterationStore {
             Err(error) => return Err(IterationError::file(&path)(error)),
         };
         let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
-        let file: PlanFile = serde_json::from_str(&text)
+        let file: PlanFile = unsealed(&text)
             .map_err(|error| wrong(format!("is no planned motion of an iteration ({error}); remove its folder")))?;
         if file.schema != PLAN_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
             return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
@@ -274,7 +283,11 @@ impl IterationStore {
             again += 1;
         }
         let folder = self.runs.join(name(again));
-        let text = serde_json::json!({ "schema": INTERRUPTED_SCHEMA, "run": run, "outcome": how }).to_string();
+        let value = serde_json::json!({ "schema": INTERRUPTED_SCHEMA, "run": run, "outcome": how });
+        let text = dynident_text::json::to_string(&value).map_err(|error| IterationError::State {
+            path: folder.join(INTERRUPTED_FILE),
+            problem: error.to_string(),
+        })?;
         self.keep_whole(&folder, (INTERRUPTED_FILE, &text), runs, None)?;
         Ok(Some(folder))
     }

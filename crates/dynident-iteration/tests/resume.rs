@@ -135,7 +135,14 @@ fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
     outcome(folder.path()).unwrap();
     let path = folder.path().join("runs/run_2/run.json");
     let good = std::fs::read_to_string(&path).unwrap();
-    let file: serde_json::Value = serde_json::from_str(&good).unwrap();
+    let mut file: serde_json::Value = serde_json::from_str(&good).unwrap();
+    file["outcome"] = "edited".into();
+    std::fs::write(&path, file.to_string()).unwrap();
+    let error = outcome(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("run_2") && error.contains("edited or damaged"), "{error}");
+    // As an earlier version wrote it, without a hash.
+    file = serde_json::from_str(&good).unwrap();
+    file.as_object_mut().unwrap().remove("content_sha256").unwrap();
     let numbers = [
         "/estimate/values",
         "/estimate/std",

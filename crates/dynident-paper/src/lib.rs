@@ -163,7 +163,7 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
         seconds: begun.elapsed().as_secs_f64(),
     };
     let extras = page::Extras { beside, with_noise, own_errors };
-    let json = serde_json::to_string_pretty(&file)
+    let json = dynident::text::json::to_string_pretty(&file)
         .map_err(|error| Error::Result { path: out.join("paper.json"), message: error.to_string() })?;
     let mut set = OutputSet::new(out).file("paper.json", json + "\n");
     set = set.file("report.html", page::page(&file, &tables, &extras)?);

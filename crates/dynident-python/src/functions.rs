@@ -28,7 +28,7 @@ type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// A value as JSON.
 fn json(value: &impl serde::Serialize) -> Result<String, Error> {
-    serde_json::to_string(value)
+    dynident::text::json::to_string(value)
         .map_err(|error| Error::Result { path: PathBuf::from("<result>"), message: error.to_string() })
 }
 

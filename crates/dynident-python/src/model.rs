@@ -116,7 +116,7 @@ impl FittedModel {
     /// `result.json`.
     #[getter]
     fn json(&self) -> PyResult<String> {
-        serde_json::to_string(&self.result).map_err(|error| errors::Error::new_err(error.to_string()))
+        dynident::text::json::to_string(&self.result).map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
     /// The page with all figures, HTML.

@@ -177,7 +177,10 @@ mod tests {
         assert_eq!(svg.matches("class=\"curve\"").count(), 6);
         // Both ends of the velocity's band are near; those of the acceleration are named instead.
         assert_eq!(svg.matches("class=\"limit\"").count(), 4);
-        assert!(svg.contains("limits beyond: -1000000.000, 1000000.000") && svg.contains("a &lt; b &amp; c"), "{svg}");
+        assert!(
+            svg.contains("limits beyond: -1000000.000, 1000000.000") && svg.contains("a &lt; b &amp; \\u0007c"),
+            "{svg}"
+        );
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
         let error = picture.joint("one", vec![curve(None)]).svg().unwrap_err();
         assert!(error.to_string().contains("`one` has 1 entries where 3"), "{error}");

@@ -43,7 +43,7 @@ impl PlotData<'_> {
     /// JSON that may stand inside a script element: without `<`, which alone could end it, and without `>` and `&` for
     /// readers who look for markup.
     pub(crate) fn embedded(&self) -> Result<String, ReportError> {
-        let json = serde_json::to_string(self)?;
+        let json = dynident_text::json::to_string(self)?;
         Ok(json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
     }
 }

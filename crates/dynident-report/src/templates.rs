@@ -1,8 +1,10 @@
 //! The templates of pages and pictures, and how they are filled in.
 
 use crate::error::ReportError;
+use dynident_text::visible;
 use minijinja::{AutoEscape, Environment, HtmlEscape, Value};
 use serde::Serialize;
+use std::borrow::Cow;
 
 pub(crate) const TEMPLATES: [(&str, &str); 16] = [
     ("page.html", include_str!("templates/page.html")),
@@ -36,7 +38,8 @@ fn prose(text: &str) -> Value {
     Value::from_safe_string(parts.iter().enumerate().map(part).collect())
 }
 
-/// A template filled in; everything that is not marked safe is escaped, in SVG as in HTML.
+/// A template filled in; everything that is not marked safe is escaped, in SVG as in HTML. Invisible characters are
+/// shown as escape sequences.
 pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, ReportError> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
@@ -46,12 +49,12 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
     for (name, source) in TEMPLATES.iter().filter(|(name, _)| !name.starts_with("report.")) {
         environment.add_template(name, source)?;
     }
-    let mut text = environment.get_template(name)?.render(view)?;
-    if text.starts_with("<svg") {
-        // XML has no place for control characters.
-        text.retain(|letter| letter == '\n' || !letter.is_control());
-    }
-    Ok(text)
+    let text = environment.get_template(name)?.render(view)?;
+    // In text and in the data of plots alike: the sequences are those of JSON.
+    Ok(match visible(&text) {
+        Cow::Borrowed(_) => text,
+        Cow::Owned(visible) => visible,
+    })
 }
 
 #[cfg(test)]

@@ -271,7 +271,7 @@ pub(crate) fn expression() -> io::Result<Box<dyn Run>> {
 
 /// `result.json`.
 pub(crate) fn result() -> io::Result<Box<dyn Run>> {
-    of_file("result.json", |path| match ResultFile::read(path) {
+    of_file("result.json", |path| match ResultFile::read_edited(path) {
         Ok(_) => true,
         Err(error) => said(&error),
     })

@@ -49,7 +49,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         set.file("benchmark.csv", cells_csv(&file.cells)).write().map_err(message_of)?;
     }
     if context.json {
-        terminal::print(&json(&file)?)?;
+        terminal::print_document(&json(&file)?)?;
     } else if !context.quiet || options.out.is_none() {
         terminal::print(&summary::benchmark(&file))?;
     }

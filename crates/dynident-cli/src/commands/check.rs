@@ -23,7 +23,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let file = check(&study, &options.study, &run).map_err(known_in(&options.study))?;
     let is_problem = file.check.findings.iter().any(|finding| finding.level == Level::Problem);
     if context.json {
-        terminal::print(&json(&file)?)?;
+        terminal::print_document(&json(&file)?)?;
     } else if is_problem || !context.quiet {
         terminal::print(&summary::check(&file))?;
     }

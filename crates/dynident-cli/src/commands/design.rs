@@ -127,7 +127,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::remark("no file for the robot was written: the motion breaks its limits");
     }
     if context.json {
-        terminal::print(&json(&outcome.file)?)?;
+        terminal::print_document(&json(&outcome.file)?)?;
     } else if !context.quiet {
         let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
         terminal::print(&summary::design(&outcome.file, &options.out, &names))?;

@@ -59,7 +59,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         if context.json {
             let table = String::from_utf8_lossy(&table);
             let name = options.quantity.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());
-            terminal::print(&object(name, robot.model.dof(), rows, options.out.as_deref(), &table)?)?;
+            terminal::print_document(&object(name, robot.model.dof(), rows, options.out.as_deref(), &table)?)?;
         }
         return Ok(Verdict::Good);
     }

@@ -5,7 +5,7 @@ use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{Exported, PayloadReader, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile};
-use dynident::{Study, export_model, export_payload, export_simulator, study_inputs};
+use dynident::{ResultFile, Study, export_payload_of, export_result, export_simulator_of, study_inputs};
 use std::path::PathBuf;
 
 /// Options of `export`.
@@ -16,6 +16,9 @@ pub(crate) struct Options {
     /// The study that it was made with; a payload needs none.
     #[arg(long, value_name = "STUDY.toml")]
     study: Option<PathBuf>,
+    /// Use the result although it was edited after it was written. Its numbers are checked all the same.
+    #[arg(long)]
+    accept_edited: bool,
     /// The form.
     #[arg(long, value_enum, value_name = "FORM")]
     to: Form,
@@ -111,19 +114,21 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let study = study.as_ref().map(|(study, path)| (study, *path));
         study.ok_or_else(|| "--study STUDY.toml is missing: name the study that the result was made with".to_owned())
     };
+    let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
+    let stored = read(&options.result).map_err(message_of)?;
     let drives = || -> Result<_, String> {
         let (study, path) = with_study()?;
-        export_simulator(&options.result, (study, path), data).map_err(known_in(path))
+        export_simulator_of(&stored, &options.result, (study, path), data).map_err(known_in(path))
     };
     let exported = match options.to.kind() {
         Kind::Model(target) => {
             let (study, path) = with_study()?;
-            export_model(&options.result, (study, path), data, target).map_err(known_in(path))?
+            export_result(&stored, &options.result, (study, path), (data, target)).map_err(known_in(path))?
         }
         Kind::SimulatorJson => drives()?.json().map_err(|error| error.to_string())?,
         Kind::SimulatorTable => drives()?.table(),
         Kind::Payload(reader) => {
-            export_payload(&options.result, options.payload.as_deref(), reader).map_err(message_of)?
+            export_payload_of(&stored, &options.result, options.payload.as_deref(), reader).map_err(message_of)?
         }
     };
     write(options, context, exported)
@@ -140,14 +145,14 @@ fn write(options: &Options, context: &Context, exported: Exported) -> Result<Ver
         let file = options.out.as_ref().map(|path| path.display().to_string());
         let text = options.out.is_none().then_some(text);
         let schema = EXPORT_SCHEMA.to_owned();
-        terminal::print(&json(&ExportFile { schema, target, notes, file, text })?)?;
+        terminal::print_document(&json(&ExportFile { schema, target, notes, file, text })?)?;
         return Ok(Verdict::Good);
     }
     // A problem of the result is said to whoever asks for quiet as well.
     let said = notes.iter().filter(|note| !context.quiet || note.contains("PROBLEM"));
     said.for_each(|note| terminal::remark(note));
     if options.out.is_none() {
-        terminal::print(text.trim_end())?;
+        terminal::print_document(text.trim_end())?;
     }
     Ok(Verdict::Good)
 }

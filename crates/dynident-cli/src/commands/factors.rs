@@ -23,7 +23,7 @@ pub(super) fn write(factors: &Factors, out: &Path, context: &Context) -> Result<
     write_whole(out, &bytes).map_err(super::message_of)?;
     let file = factors.file(out, bytes.len() as u64);
     if context.json {
-        terminal::print(&json(&file)?)
+        terminal::print_document(&json(&file)?)
     } else if context.quiet {
         Ok(())
     } else {

@@ -73,7 +73,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     set.write().map_err(message_of)?;
     if context.json {
-        terminal::print(&json(result)?)?;
+        terminal::print_document(&json(result)?)?;
     } else if !context.quiet {
         terminal::print(&summary::identification(result, &options.out, &models))?;
     }

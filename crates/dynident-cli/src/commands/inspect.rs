@@ -30,7 +30,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
             .map_err(message_of)?;
     }
     let inspection = inspect_with(&options.robot, &settings).map_err(message_of)?;
-    terminal::print(&if context.json { json(&inspection)? } else { summary::inspection(&inspection) })?;
+    if context.json {
+        terminal::print_document(&json(&inspection)?)?;
+    } else {
+        terminal::print(&summary::inspection(&inspection))?;
+    }
     let Some(out) = &options.fix else { return Ok(verdict(&inspection)) };
     match mended(&options.robot, &settings).map_err(message_of)? {
         MendedDescription::Urdf(text) => {

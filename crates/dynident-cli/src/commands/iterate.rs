@@ -104,7 +104,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         other => other.map_err(known_in(&options.study))?,
     };
     if context.json {
-        terminal::print(&json(&file)?)?;
+        terminal::print_document(&json(&file)?)?;
     } else if !context.quiet {
         terminal::print(&summary::iteration(&file, &options.out))?;
     }
@@ -121,6 +121,10 @@ fn status(out: &Path, context: &Context) -> Result<Verdict, String> {
         return Err(format!("{}: no iteration has been here yet", path.display()));
     }
     let file = IterationsFile::read(&path).map_err(message_of)?;
-    terminal::print(&if context.json { json(&file)? } else { format!("{}\n", file.status_line()) })?;
+    if context.json {
+        terminal::print_document(&json(&file)?)?;
+    } else {
+        terminal::print(&format!("{}\n", file.status_line()))?;
+    }
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }

@@ -13,6 +13,10 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let found = dynident::log_contents(&options.file).map_err(message_of)?;
-    terminal::print(&if context.json { json(&found)? } else { summary::log(&found) })?;
+    if context.json {
+        terminal::print_document(&json(&found)?)?;
+    } else {
+        terminal::print(&summary::log(&found))?;
+    }
     Ok(Verdict::Good)
 }

@@ -58,15 +58,14 @@ pub(crate) fn with_threads<R: Send>(threads: usize, job: impl FnOnce() -> R + Se
 
 /// A value as one line of JSON.
 pub(crate) fn json<T: Serialize>(value: &T) -> Result<String, String> {
-    serde_json::to_string(value).map_err(|error| format!("the result cannot be written as JSON: {error}"))
+    dynident_text::json::to_string(value).map_err(|error| format!("the result cannot be written as JSON: {error}"))
 }
 
 /// A value as JSON for a file: a person may want to read it.
 pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
-    let mut bytes =
-        serde_json::to_vec_pretty(value).map_err(|error| format!("the result cannot be written as JSON: {error}"))?;
-    bytes.push(b'\n');
-    Ok(bytes)
+    let text = dynident_text::json::to_string_pretty(value);
+    let text = text.map_err(|error| format!("the result cannot be written as JSON: {error}"))?;
+    Ok((text + "\n").into_bytes())
 }
 
 /// An error's message.

@@ -58,9 +58,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     dynident::write_whole(&options.out, found.text.as_bytes()).map_err(message_of)?;
 
     if context.json {
-        terminal::print(&json(&found)?)?;
+        terminal::print_document(&json(&found)?)?;
     } else if !context.quiet {
-        terminal::print(found.text.trim_end())?;
+        terminal::print_document(found.text.trim_end())?;
     }
     for unsure in &found.unsure {
         terminal::remark(&format!("look at {}", unsure.sentence()));

@@ -22,7 +22,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let run = RunOptions { data: None, threads: context.threads, progress: &*progress };
     let file = reproduce(&options.out, options.seed, &run).map_err(message_of)?;
     if context.json {
-        terminal::print(&json(&file)?)?;
+        terminal::print_document(&json(&file)?)?;
     } else if !context.quiet {
         terminal::print(&summary::reproduction(&file, &options.out))?;
     }

@@ -40,7 +40,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let set = OutputSet::new(&options.out).file("truth.json", pretty_json(&simulation.file)?);
     set.file("log.csv", simulation.log.as_str()).write().map_err(message_of)?;
     if context.json {
-        terminal::print(&json(&simulation.file)?)?;
+        terminal::print_document(&json(&simulation.file)?)?;
     } else if !context.quiet {
         terminal::print(&summary::simulation(&simulation.file, &options.out))?;
     }

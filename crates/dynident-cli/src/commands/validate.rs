@@ -2,7 +2,7 @@
 
 use super::{Context, json, judged, known_in, message_of, show_problems};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, Study, validate};
+use dynident::{ResultFile, RunOptions, Study, validate_result};
 use std::path::PathBuf;
 
 /// Options of `validate`.
@@ -10,6 +10,9 @@ use std::path::PathBuf;
 pub(crate) struct Options {
     /// The result.json of an identification.
     result: PathBuf,
+    /// Use the result although it was edited after it was written. Its numbers are checked all the same.
+    #[arg(long)]
+    accept_edited: bool,
     /// A study with the same robot; its logs with the role "validate" are used, or all of them if none has it.
     #[arg(long, value_name = "STUDY.toml")]
     study: PathBuf,
@@ -25,8 +28,15 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let study = Study::load(&options.study).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let file = validate(&options.result, &study, &options.study, &run).map_err(known_in(&options.study))?;
-    terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) })?;
+    let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
+    let stored = read(&options.result).map_err(message_of)?;
+    let file = validate_result(&stored, &options.result, (&study, &options.study), &run);
+    let file = file.map_err(known_in(&options.study))?;
+    if context.json {
+        terminal::print_document(&json(&file)?)?;
+    } else {
+        terminal::print(&summary::validation(&file.validation, &file.logs))?;
+    }
     show_problems(&file.problems, "");
     let within = judged(&file.validation, options.max_validation_error);
     Ok(if file.problems.is_empty() { within } else { Verdict::Negative })

@@ -2,6 +2,7 @@
 
 use super::{ExportError, Sampled};
 use core::fmt::Write;
+use dynident_text::quoted;
 
 /// A `JointTrajectory` message with positions, velocities and accelerations, as `ros2 topic pub` and parameter files
 /// read it. Move the arm to the first point before.
@@ -34,25 +35,6 @@ pub fn ros2_joint_trajectory(sampled: &Sampled<'_>) -> Result<String, ExportErro
     Ok(text)
 }
 
-/// A double-quoted YAML scalar.
-fn quoted(name: &str) -> String {
-    let mut text = String::from("\"");
-    for letter in name.chars() {
-        match letter {
-            '"' | '\\' => {
-                text.push('\\');
-                text.push(letter);
-            }
-            letter if letter.is_control() => {
-                let _ = write!(text, "\\U{:08X}", u32::from(letter));
-            }
-            letter => text.push(letter),
-        }
-    }
-    text.push('"');
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -70,10 +52,5 @@ mod tests {
         }
         let line = format!("  - positions: [{:?}, {:?}]", motion.q[3], motion.q[5 + 3]);
         assert!(text.contains(&line), "{line}\n{text}");
-    }
-
-    #[test]
-    fn control_characters_are_escaped() {
-        assert_eq!(quoted("a\nb"), "\"a\\U0000000Ab\"");
     }
 }

@@ -2,8 +2,9 @@
 
 use super::{ExportError, Sampled};
 use core::fmt::Write;
+use dynident_text::csv_field;
 
-/// `t_s, <joint names>`, one row per time, rad (m); a name with a comma, a quote or a line break is quoted (RFC 4180).
+/// `t_s, <joint names>`, one row per time, rad (m); names are fields of RFC 4180 ([`csv_field`]).
 ///
 /// # Errors
 /// Names, times and motion that do not belong together, and numbers that are not finite.
@@ -12,11 +13,7 @@ pub fn waypoints_csv(sampled: &Sampled<'_>) -> Result<String, ExportError> {
     let mut text = String::from("t_s");
     for name in sampled.joints {
         text.push(',');
-        if name.contains([',', '"', '\n', '\r']) {
-            let _ = write!(text, "\"{}\"", name.replace('"', "\"\""));
-        } else {
-            text.push_str(name);
-        }
+        text.push_str(&csv_field(name));
     }
     text.push('\n');
     for (sample, time) in sampled.times_s.iter().enumerate() {

@@ -39,16 +39,15 @@ impl Source<'_> {
     fn comment(&self, mark: &str) -> String {
         let title = format!(
             "Dynamics of {} ({} joints), written by dynident {}.",
-            self.robot.model().name().replace(['\n', '\r'], " "),
+            self.robot.model().name(),
             self.dof(),
             env!("CARGO_PKG_VERSION")
         );
         let units = "SI units: rad, Nm (m, N at joints that slide); joint vectors in this order:".to_owned();
         let joints = self.robot.model().joints().iter().enumerate();
-        let joints = joints.map(|(place, joint)| format!("  {place}  {}", joint.name.replace(['\n', '\r'], " ")));
+        let joints = joints.map(|(place, joint)| format!("  {place}  {}", joint.name));
         let lines = [title, units].into_iter().chain(joints).chain(self.notes.iter().cloned());
-        // A name may hold what would end a comment of C.
-        lines.map(|line| format!("{mark} {}", line.replace("*/", "* /"))).collect::<Vec<_>>().join("\n")
+        lines.map(|line| format!("{mark} {}", dynident_text::comment(&line))).collect::<Vec<_>>().join("\n")
     }
 }
 

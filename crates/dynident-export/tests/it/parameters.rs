@@ -128,7 +128,7 @@ fn parameters_of_ros() {
     let exported = export(&robot, Target::Ros2Yaml, &["one\nline\u{2028}only".to_owned()]).unwrap();
     let (text, nearest) = (&exported.text, NearestFriction::of(&robot, 1));
     for said in [
-        "# one line only\n",
+        "# one\\u000aline\\u2028only\n",
         "/**:\n  ros__parameters:\n    robot: \"2 branches\"\n    joints: [\"turn\", \"slide\", \"wrist\", \"swing\"]\n",
         "    gravity_m_s2: [0.0, 0.0, -9.81]\n",
         "      slide:\n",

@@ -2,8 +2,8 @@
 
 use super::common::{all_terms, tree};
 use dynident_export::{RobotModel, Target, export};
-use dynident_model::read_urdf;
-use dynident_model::terms::{CoulombShape, LoadFriction, MaxwellSlip, Offset, TorqueTerm};
+use dynident_model::terms::{CoulombShape, LoadFriction, MaxwellSlip, Offset, Stribeck, TorqueTerm};
+use dynident_model::{InertialParameters, read_urdf};
 
 fn message(term: TorqueTerm) -> String {
     let model = tree().model().clone();
@@ -47,4 +47,27 @@ fn a_term_by_temperature_is_noted() {
     let note = "fvT1 is left out: the drive counts as being at 25 °C.";
     assert_eq!(exported.notes, [note]);
     assert!(exported.text.contains(note));
+}
+
+/// Numbers from which infinity follows: no form writes `inf`.
+#[test]
+fn numbers_that_overflow() {
+    let model = tree().model().clone();
+    let with = |body: [f64; 10]| {
+        let mut inertials = model.inertials().to_vec();
+        inertials[1] = InertialParameters(body);
+        RobotModel::new(model.with_inertials(&inertials).unwrap(), Vec::new(), Vec::new()).unwrap_err().to_string()
+    };
+    let large = with([1e308; 10]);
+    assert!(large.contains("body `left`") && large.contains("1e308"), "{large}");
+    // The centre of mass is the first moment over the mass.
+    let mut light = [0.0; 10];
+    (light[0], light[1]) = (1e-305, 1e8);
+    assert!(with(light).contains("the centre of mass is inf"), "{}", with(light));
+    let steep = Stribeck { joint: 0, speed: 1e-300, exponent: 3.0, shape: CoulombShape::Smooth { width: 0.1 } };
+    let robot = RobotModel::new(model.clone(), vec![TorqueTerm::Stribeck(steep)], vec![1e300]).unwrap();
+    for target in Target::ALL {
+        let written = export(&robot, target, &[]).map(|written| written.text.to_lowercase());
+        assert!(written.as_ref().is_ok_and(|text| !text.contains("inf")) || written.is_err(), "{written:?}");
+    }
 }

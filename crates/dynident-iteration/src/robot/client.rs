@@ -189,7 +189,7 @@ impl Client {
             ToClient::Stop { .. } => self.stop_sent = true,
             ToClient::Torque { .. } | ToClient::Finish {} | ToClient::Bye {} => {}
         }
-        let sent = serde_json::to_string(message).ok().and_then(|mut text| {
+        let sent = dynident_text::json::to_string(message).ok().and_then(|mut text| {
             text.push('\n');
             let input = self.input.as_mut()?;
             input.write_all(text.as_bytes()).and_then(|()| input.flush()).ok()

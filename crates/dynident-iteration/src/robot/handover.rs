@@ -125,7 +125,7 @@ fn fed_forward<'a>(request: &RunRequest<'a>) -> Option<&'a ControllerModel> {
 /// The two files of a request: where they go, and what is in them.
 fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[(PathBuf, String); 2], RobotFault> {
     let [trajectory, controller] = ["trajectory.csv", "controller.json"].map(|name| folder.join(name));
-    let mut text = serde_json::to_string_pretty(&controller_json(request, joints))
+    let mut text = dynident_text::json::to_string_pretty(&controller_json(request, joints))
         .map_err(|error| RobotFault::File { path: controller.clone(), reason: error.to_string() })?;
     text.push('\n');
     Ok([(trajectory, trajectory_csv(request.reference, fed_forward(request))), (controller, text)])

@@ -104,7 +104,7 @@ pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) 
         }
     }
     let mark = &original[..original.len() - text.len()];
-    Ok(format!("{mark}{document}"))
+    Ok(dynident_text::toml_document(&format!("{mark}{document}")).into_owned())
 }
 
 /// A row of the table as tables of either kind hold it: `[[joint]]`, or an element of `joint = [..]`.
@@ -162,7 +162,7 @@ fn set_inertial(row: &mut dyn TableLike, inertial: &InertialParameters) {
 
 /// The note as a comment on a line of its own before `inertial`.
 fn set_note(row: &mut dyn TableLike, note: &str) {
-    let line = format!("{SIGNATURE}{}\n", note.replace(char::is_control, " "));
+    let line = format!("{SIGNATURE}{}\n", dynident_text::comment(note));
     let with_note = |before: Option<&str>| -> String {
         let others =
             before.unwrap_or("").split_inclusive('\n').filter(|line| !line.trim_start().starts_with(SIGNATURE));

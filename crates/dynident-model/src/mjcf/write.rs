@@ -1,6 +1,7 @@
 //! Writing identified values back into the user's own MJCF.
 //!
-//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change; every other byte stays.
+//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change; every other byte
+//! stays, except invisible characters, which become references to them ([`dynident_text::xml::document`]).
 //! A body that is fixed to one with a joint gets an `<inertial>` without mass instead of none, for without any its
 //! geoms would weigh.
 
@@ -13,8 +14,9 @@ use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Transform, Vec3};
 use crate::urdf::{JointChange, LinkChange, MAX_MAGNITUDE};
 use crate::xml::MAX_NODES;
-use crate::xml::edit::{Source, comment_text, edited};
+use crate::xml::edit::{Source, edited};
 use core::fmt::Write;
+use dynident_text::xml;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -245,7 +247,7 @@ fn inertial_line(
         i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]
     );
     Ok(match note {
-        Some(note) => format!("{tag}><!-- {} --></inertial>", comment_text(note)),
+        Some(note) => format!("{tag}><!-- {} --></inertial>", xml::comment(note)),
         None => format!("{tag}/>"),
     })
 }

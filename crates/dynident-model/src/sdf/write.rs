@@ -13,7 +13,8 @@ use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Transform, Vec3};
 use crate::urdf::{JointChange, LinkChange, MAX_MAGNITUDE};
 use crate::xml::MAX_NODES;
-use crate::xml::edit::{Line, Source, comment_text, edited};
+use crate::xml::edit::{Line, Source, edited};
+use dynident_text::xml;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashSet;
 use std::ops::Range;
@@ -154,7 +155,7 @@ fn write_inertial(
     }
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines: Vec<Line> = vec![(0, "<inertial>".to_owned())];
-    lines.extend(note.map(|note| (1, format!("<!-- {} -->", comment_text(note)))));
+    lines.extend(note.map(|note| (1, format!("<!-- {} -->", xml::comment(note)))));
     lines.push((1, format!("<pose>{x:?} {y:?} {z:?} 0 0 0</pose>")));
     lines.push((1, format!("<mass>{mass:?}</mass>")));
     lines.push((1, "<inertia>".to_owned()));

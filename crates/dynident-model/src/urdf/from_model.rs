@@ -5,6 +5,7 @@ use crate::joint::{Joint, JointKind};
 use crate::spatial::{Mat3, Transform};
 use crate::tree::{Body, Model, STANDARD_GRAVITY};
 use core::fmt::Write;
+use dynident_text::xml::{comment, escaped};
 
 /// The model as URDF: links, joints with placement, axis, limits and friction, and the inertials of links that have
 /// any. Reading it gives the model again, with these differences: URDF holds no gravity; a revolute joint without stops
@@ -14,7 +15,7 @@ use core::fmt::Write;
 ///
 /// Angles are the fixed-axis roll, pitch and yaw of the placement, `R = Rz(yaw) Ry(pitch) Rx(roll)`, in rad.
 pub fn write_urdf(model: &Model) -> String {
-    let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", attribute(model.name()));
+    let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", escaped(model.name()));
     if model.gravity() != STANDARD_GRAVITY {
         let [x, y, z] = model.gravity().0;
         let _ =
@@ -33,7 +34,7 @@ pub fn write_urdf(model: &Model) -> String {
 /// what does not move.
 fn write_links(text: &mut String, body: &Body, is_base: bool) {
     for (number, link) in body.links.iter().enumerate() {
-        let name = attribute(&link.name);
+        let name = escaped(&link.name);
         // What URDF cannot say, moments without mass for one, is left unknown.
         let inertial = link.inertial.filter(|_| !is_base);
         let lines = inertial.and_then(|inertial| inertial_lines(&link.name, &inertial, None).ok());
@@ -49,7 +50,7 @@ fn write_links(text: &mut String, body: &Body, is_base: bool) {
                 text,
                 "  <joint name=\"{name}_fixed\" type=\"fixed\">\n    {}\n    <parent link=\"{}\"/>\n    <child link=\"{name}\"/>\n  </joint>",
                 origin(&link.placement),
-                attribute(body.name())
+                escaped(body.name())
             );
         }
     }
@@ -66,11 +67,11 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
     let _ = writeln!(
         text,
         "  <joint name=\"{}\" type=\"{}\">\n    {}\n    <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    <axis xyz=\"{x:?} {y:?} {z:?}\"/>",
-        attribute(&joint.name),
+        escaped(&joint.name),
         kind.name(),
         origin(&joint.placement),
-        attribute(parent),
-        attribute(child),
+        escaped(parent),
+        escaped(child),
     );
     let needs_limit = kind != JointKind::Continuous || limits.velocity.is_some() || limits.effort.is_some();
     if needs_limit {
@@ -98,7 +99,7 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
     match joint.mimic.as_ref().map(|mimic| (&mimic.sources[..], mimic.offset)) {
         None | Some(([], _)) => {}
         Some(([source], offset)) => {
-            let name = attribute(&source.joint);
+            let name = escaped(&source.joint);
             let _ = writeln!(
                 text,
                 "    <mimic joint=\"{name}\" multiplier=\"{:?}\" offset=\"{offset:?}\"/>",
@@ -106,8 +107,8 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
             );
         }
         Some((sources, offset)) => {
-            let shares = sources.iter().map(|s| format!("{:?} {} + ", s.multiplier, attribute(&s.joint)));
-            let law = format!("{}{offset:?}", shares.collect::<String>()).replace("--", "- -");
+            let shares = sources.iter().map(|s| format!("{:?} {} + ", s.multiplier, s.joint));
+            let law = comment(&format!("{}{offset:?}", shares.collect::<String>()));
             let _ = writeln!(text, "    <!-- follows {law}, which URDF does not hold -->");
         }
     }
@@ -130,22 +131,6 @@ fn roll_pitch_yaw(r: &Mat3) -> [f64; 3] {
         return [0.0, pitch, (-r[0][1]).atan2(r[1][1])];
     }
     [r[2][1].atan2(r[2][2]), pitch, r[1][0].atan2(r[0][0])]
-}
-
-/// A name as the value of an attribute in double quotes. XML has no way to say control characters.
-fn attribute(name: &str) -> String {
-    let mut text = String::with_capacity(name.len());
-    for c in name.chars() {
-        match c {
-            '&' => text += "&amp;",
-            '<' => text += "&lt;",
-            '>' => text += "&gt;",
-            '"' => text += "&quot;",
-            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => text.push(' '),
-            c => text.push(c),
-        }
-    }
-    text
 }
 
 #[cfg(test)]

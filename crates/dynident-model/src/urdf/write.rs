@@ -1,15 +1,17 @@
 //! Writing identified values back into the user's own URDF.
 //!
 //! Only `<inertial>` and the two friction values of `<dynamics>` change; every other byte stays, with its comments,
-//! order, spacing and line ends. A body is lumped from links that are fixed to each other, and a log cannot distinguish
-//! them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the links fixed to
-//! it, and says so in a comment.
+//! order, spacing and line ends, except invisible characters, which become references to them
+//! ([`dynident_text::xml::document`]). A body is lumped from links that are fixed to each other, and a log cannot
+//! distinguish them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the
+//! links fixed to it, and says so in a comment.
 
 use super::prefixes::without_undeclared;
 use super::{MAX_MAGNITUDE, UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
-use crate::xml::edit::{Line, Source, comment_text, edited, start_tag_length};
+use crate::xml::edit::{Line, Source, edited, start_tag_length};
+use dynident_text::xml;
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -231,7 +233,7 @@ pub(super) fn inertial_lines(
     }
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines = vec![(0, "<inertial>".to_owned())];
-    lines.extend(note.map(|note| (1, format!("<!-- {} -->", comment_text(note)))));
+    lines.extend(note.map(|note| (1, format!("<!-- {} -->", xml::comment(note)))));
     lines.push((1, format!(r#"<origin xyz="{x:?} {y:?} {z:?}" rpy="0 0 0"/>"#)));
     lines.push((1, format!(r#"<mass value="{:?}"/>"#, inertial.mass_kg())));
     lines.push((

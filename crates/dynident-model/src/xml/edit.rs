@@ -1,9 +1,11 @@
 //! Edits of a text that leave every other byte alone: elements replaced or put in, with the indentation around them.
 
 use roxmltree::Node;
+use std::borrow::Cow;
 use std::ops::Range;
 
-/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays.
+/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays but for invisible
+/// characters, which become references and escape sequences ([`dynident_text::xml::document`]).
 pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
     // What is put in before a piece that is replaced comes first.
     edits.sort_by_key(|(range, _)| (range.start, range.end));
@@ -15,23 +17,14 @@ pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> 
         done = range.end;
     }
     text += &original[done..];
-    text
+    match dynident_text::xml::document(&text) {
+        Cow::Borrowed(_) => text,
+        Cow::Owned(safe) => safe,
+    }
 }
 
 /// A line of a new element, with its depth below the element's own indentation.
 pub(crate) type Line = (usize, String);
-
-/// XML allows neither two hyphens in a row nor control characters in a comment.
-pub(crate) fn comment_text(note: &str) -> String {
-    let mut text = String::with_capacity(note.len());
-    for c in note.chars() {
-        if c == '-' && text.ends_with('-') {
-            text.push(' ');
-        }
-        text.push(if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c });
-    }
-    text
-}
 
 /// The original text and how it breaks lines.
 pub(crate) struct Source<'a> {

@@ -106,7 +106,7 @@ fn only_the_touched_elements_differ() {
       <inertia ixx="0.006" ixy="0.0" ixz="0.0003" iyy="0.05" iyz="0" izz="0.051"/>
     </inertial>"#,
             r#"<inertial>
-      <!-- from a log - - - and more -->
+      <!-- from a log - - - and\u0009more -->
       <origin xyz="0.25 0.0 0.0" rpy="0 0 0"/>
       <mass value="2.0"/>
       <inertia ixx="0.5" ixy="0.0" ixz="0.0" iyy="0.5" iyz="0.0" izz="0.5"/>

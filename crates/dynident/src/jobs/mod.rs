@@ -18,3 +18,4 @@ mod recorded_velocities;
 pub(crate) mod reduce;
 pub(crate) mod simulate;
 pub(crate) mod validate;
+mod violations;

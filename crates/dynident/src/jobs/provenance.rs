@@ -79,7 +79,7 @@ fn identified_by(study: &Study, own: Option<InputFile>, inputs: Vec<InputFile>) 
     }
     let mut identity = hexadecimal(&identity.finalize());
     identity.truncate(DIGITS);
-    Provenance { identity, version: version.to_owned(), command: None, study: own, inputs }
+    Provenance { identity, version: version.to_owned(), command: None, content_sha256: None, study: own, inputs }
 }
 
 /// What is known of `source`, which was read as `what`, seen from `folder`.

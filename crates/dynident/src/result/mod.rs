@@ -14,7 +14,9 @@ mod new_study;
 mod numbers;
 mod problems;
 mod provenance;
+mod seal;
 mod simulation;
+mod sound;
 pub(crate) mod stored;
 mod validation;
 

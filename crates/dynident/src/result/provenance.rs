@@ -15,6 +15,10 @@ pub struct Provenance {
     /// when it was not the command.
     #[serde(default)]
     pub command: Option<String>,
+    /// SHA-256 of the content of this `result.json` without `timings_s` and `command`: a result that was edited or
+    /// damaged is not read. None in other files and in results of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub content_sha256: Option<String>,
     /// The study's file; none when it was not read from a file.
     pub study: Option<InputFile>,
     /// Everything else that was read.

@@ -1,6 +1,7 @@
 //! A finished model, read back from `result.json`: what later jobs take from it.
 
 use super::identification::{RESULT_SCHEMA, ResultFile};
+use super::seal::{PLACE, content_sha256, stated_sha256};
 use crate::error::Error;
 use crate::inputs::read_result;
 use crate::study::{FrictionTerm, JointDrive, Study};
@@ -10,19 +11,27 @@ use dynident_identification::payload::{KnownArm, Refit, known_payloads};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::path::Path;
+
+/// Whether a result may be used whose content is not what was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Edits {
+    Refused,
+    Accepted,
+}
 
 /// Reads the keys of `T` from a result of `identify`, of this version's schema; all others may be there or not.
 ///
 /// # Errors
-/// A file that cannot be read, is no result, or is one of another version.
+/// A file that cannot be read, is no result, is one of another version, or was edited or damaged.
 pub(crate) fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     let bytes = read_result(path)?;
-    part_of(&bytes, path)
+    part_of(&bytes, path, Edits::Refused)
 }
 
 /// The same from the text of a result.
-fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T, Error> {
+fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path, edits: Edits) -> Result<T, Error> {
     #[derive(Deserialize)]
     struct Schema {
         schema: String,
@@ -36,26 +45,51 @@ fn part_of<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T, Error> {
     if schema != RESULT_SCHEMA {
         return Err(wrong(format!("schema `{schema}`, not `{RESULT_SCHEMA}`: identify again with this version")));
     }
-    serde_json::from_slice(bytes).map_err(not_a_result)
+    let part = serde_json::from_slice(bytes).map_err(not_a_result)?;
+    if edits == Edits::Refused {
+        let content: Value = serde_json::from_slice(bytes).map_err(not_a_result)?;
+        if stated_sha256(&content).is_some_and(|stated| stated != content_sha256(&content)) {
+            return Err(wrong(format!(
+                "its content does not match {PLACE}: the file was edited or damaged; identify again, or call `export` or `validate` with --accept-edited if you trust the changes"
+            )));
+        }
+    }
+    Ok(part)
 }
 
 impl ResultFile {
     /// Reads a result of `identify`.
     ///
     /// # Errors
-    /// A file that cannot be read, is no result, or is one of another version.
+    /// A file that cannot be read, is no result, is one of another version, was edited or damaged, or holds numbers
+    /// that no result has.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes = read_result(path)?;
         Self::parse(&bytes, path)
     }
 
+    /// Reads a result of `identify` that somebody may have edited: its content is not compared with its hash. Numbers
+    /// that no result has are refused all the same.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), but for the hash.
+    pub fn read_edited(path: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        Self::checked(&bytes, path, Edits::Accepted)
+    }
+
     /// Reads the text of a result of `identify`; messages call it `path`.
     ///
     /// # Errors
-    /// A text that is no result, or one of another version.
+    /// A text that is no result, is one of another version, was edited or damaged, or holds numbers that no result has.
     pub fn parse(text: &[u8], path: &Path) -> Result<Self, Error> {
+        Self::checked(text, path, Edits::Refused)
+    }
+
+    fn checked(text: &[u8], path: &Path, edits: Edits) -> Result<Self, Error> {
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-        let stored: Self = part_of(text, path)?;
+        let stored: Self = part_of(text, path, edits)?;
+        stored.require_sound_numbers().map_err(wrong)?;
         for joint in &stored.friction_choice {
             let mut terms = joint.drive.iter().flat_map(|drive| drive.terms.iter().flatten());
             terms

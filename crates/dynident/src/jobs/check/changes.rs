@@ -8,6 +8,7 @@ use dynident_identification::Role;
 use dynident_identification::diagnosis::{Channels, Mistake};
 use dynident_recording::LogFormat;
 use dynident_recording::log::{ChannelGroup, ColumnRef, OneOrMany, TimeUnit};
+use dynident_text::quoted;
 
 /// Places of a log's format in its study: what is written for it.
 pub(super) struct StudyFormat<'a> {
@@ -159,7 +160,7 @@ impl<'a> StudyFormat<'a> {
             .iter()
             .map(|column| match column {
                 ColumnRef::Index(index) => index.to_string(),
-                ColumnRef::Name(name) => format!("{name:?}"),
+                ColumnRef::Name(name) => quoted(name),
             })
             .collect();
         Some(StudyChange { table, line: format!("columns = {}", list(&names)) })

@@ -7,5 +7,5 @@ mod units;
 
 pub(in crate::jobs) use families::{Family, best, families};
 pub(in crate::jobs) use meaning::{JointKey, Quantity, Source};
-pub(in crate::jobs) use spelling::{column_list, quoted};
+pub(in crate::jobs) use spelling::column_list;
 pub(in crate::jobs) use units::{time_as_toml, time_unit_s, unit};

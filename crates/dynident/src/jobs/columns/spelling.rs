@@ -1,5 +1,7 @@
 //! Names of columns as a study writes them.
 
+use dynident_text::quoted;
+
 /// A name as what its siblings share and what is its own: `q12_rad` is `q{}_rad` and `12`, `tau[elbow]` is `tau[]` and
 /// `elbow`.
 fn parted(name: &str) -> (String, String) {
@@ -41,11 +43,6 @@ pub(in crate::jobs) fn column_list(names: &[String]) -> String {
         return columns(&members);
     }
     format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
-}
-
-/// A text in quotes, as TOML has it.
-pub(in crate::jobs) fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ pub(in crate::jobs) fn time_as_toml(name: &str) -> String {
         Some(1e-9) => ", unit = \"ns\"",
         _ => "",
     };
-    format!("{{ column = {}{unit} }}", super::spelling::quoted(name))
+    format!("{{ column = {}{unit} }}", dynident_text::quoted(name))
 }
 
 #[cfg(test)]

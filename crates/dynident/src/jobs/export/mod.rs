@@ -6,6 +6,7 @@ pub use simulator::{export_simulator, export_simulator_of};
 
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
+use crate::jobs::violations::violations;
 use crate::result::ResultFile;
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_export::{ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, payload_command};
@@ -85,7 +86,14 @@ fn robot_model(
         term.map(|term| term.value)
             .ok_or_else(|| wrong(format!("no value of `{symbol}`: use the study that the result was made with")))
     };
-    let values = robot.terms().iter().map(|term| value(term.symbol())).collect::<Result<_, _>>()?;
+    let values: Vec<f64> = robot.terms().iter().map(|term| value(term.symbol())).collect::<Result<_, _>>()?;
+    let violations = violations(&robot.parametric, &inertials, &values);
+    if stored.physical.consistent && !violations.is_empty() {
+        return Err(wrong(format!(
+            "not physically consistent, which physical.consistent promises ({}): the file was edited or damaged; identify again",
+            violations.join("; ")
+        )));
+    }
     // Results of before velocities were kept have none.
     let training = stored.logs.iter().filter(|log| log.role == Role::Identify);
     let velocities = recorded_velocities(training.map(|log| &log.velocities[..]), model.dof());

@@ -224,6 +224,7 @@ pub(in crate::jobs) fn written(
     for log in &mut result.logs {
         log.import.file = seen_from(folder, Path::new(&log.import.file));
     }
+    result.seal();
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
     Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, mjcf, sdf, traces })

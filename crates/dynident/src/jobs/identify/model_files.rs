@@ -230,20 +230,16 @@ fn commented_xml(urdf: &str, line: &str) -> String {
 /// Where the values come from, in a line that no comment of XML or TOML ends in.
 fn provenance_line(provenance: &Provenance) -> String {
     let robot = provenance.inputs.iter().find(|input| input.what == "robot");
-    let named = |input: Option<&InputFile>| {
-        // No comment holds two hyphens in a row, nor a line's end; the second time for what the first one joins.
-        input.map_or_else(
-            || "in memory".to_owned(),
-            |input| input.file.replace("--", "- -").replace("--", "- -").replace(char::is_control, " "),
-        )
-    };
-    format!(
+    let named = |input: Option<&InputFile>| input.map_or_else(|| "in memory".to_owned(), |input| input.file.clone());
+    let line = format!(
         "{}, identity {}: identified from the study {} and the description {}; result.json has the rest",
         provenance.version,
         provenance.identity,
         named(provenance.study.as_ref()),
         named(robot)
-    )
+    );
+    // One form for both: comments of XML allow less than those of TOML.
+    dynident_text::xml::comment(&line)
 }
 
 /// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while

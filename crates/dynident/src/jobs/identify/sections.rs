@@ -1,5 +1,6 @@
 //! From an estimate to the sections of `result.json`.
 
+use crate::jobs::violations::violations;
 use crate::result::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, MethodSummary, PhysicalBodyResult,
     PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingErrors, TrainingJoint, TrainingResult,
@@ -285,21 +286,7 @@ fn training_errors(
 }
 
 pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
-    let mut violations = Vec::new();
-    for (body, inertial) in model.model().bodies().iter().zip(inertials) {
-        let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
-        if inertial.mass_kg() <= 0.0 {
-            violations.push(format!("{}: mass {:.4} kg", body.name(), inertial.mass_kg()));
-        } else if least <= 0.0 {
-            violations
-                .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
-        }
-    }
-    for (term, value) in model.terms().iter().zip(&parameters[model.model().inertial_count()..]) {
-        if *value < 0.0 && term.is_nonnegative() {
-            violations.push(format!("{} = {value:.4} {}", term.symbol(), term.unit()));
-        }
-    }
+    let violations = violations(&model.parametric, inertials, &parameters[model.model().inertial_count()..]);
     PhysicalVerdict {
         consistent: violations.is_empty(),
         violations,

@@ -356,7 +356,7 @@ fn write_set(
     page: Option<String>,
     found: RobotFiles,
 ) -> Result<(), Error> {
-    let bytes = serde_json::to_vec_pretty(file)
+    let bytes = dynident_text::json::to_string_pretty(file)
         .map_err(|error| Error::Result { path: out.join(ITERATIONS), message: error.to_string() })?;
     let set = found.added_to(OutputSet::new(out).file(ITERATIONS, bytes), robot_is_own);
     match page {
@@ -420,7 +420,7 @@ fn kept(
         return Err(wrong(other_settings(&kept.fingerprint, fingerprint)));
     }
     let kept = TrajectoryFile { fingerprint: fingerprint.to_owned(), all: make()? };
-    let bytes = serde_json::to_vec(&kept).map_err(|error| wrong(error.to_string()))?;
-    write_whole(path, &bytes)?;
+    let bytes = dynident_text::json::to_string(&kept).map_err(|error| wrong(error.to_string()))?;
+    write_whole(path, bytes.as_bytes())?;
     Ok(kept.all)
 }

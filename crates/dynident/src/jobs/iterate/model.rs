@@ -114,6 +114,7 @@ pub(super) fn robot_found(
     for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {
         summary.import.file = seen_from(folder, path);
     }
+    outcome.result.seal();
     let mut files = vec![
         (RESULT, json(&outcome.result)?),
         (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
@@ -129,10 +130,9 @@ pub(super) fn robot_found(
 }
 
 fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
-    let mut bytes = serde_json::to_vec_pretty(value)
+    let text = dynident_text::json::to_string_pretty(value)
         .map_err(|error| Error::Result { path: PathBuf::from(RESULT), message: error.to_string() })?;
-    bytes.push(b'\n');
-    Ok(bytes)
+    Ok((text + "\n").into_bytes())
 }
 
 /// The controller of a next run, with these parameters as its model.

@@ -2,6 +2,7 @@
 
 use crate::result::{StudyChange, Unsure};
 use core::fmt::Write;
+use dynident_text::{comment, toml_document};
 
 /// A key with its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,25 +112,21 @@ impl Draft {
         for table in self.tables.iter().filter(|table| !is_empty(table)) {
             text.push('\n');
             if !table.reason.is_empty() {
-                let _ = writeln!(text, "# {}", one_line(&table.reason));
+                let _ = writeln!(text, "# {}", comment(&table.reason));
             }
             if !table.heading.is_empty() {
                 let _ = writeln!(text, "{}", table.heading);
             }
             for Line { key, value, reason, is_sure } in &table.lines {
                 if !reason.is_empty() {
-                    let _ = writeln!(text, "# {}{}", if *is_sure { "" } else { "UNSURE: " }, one_line(reason));
+                    let _ = writeln!(text, "# {}{}", if *is_sure { "" } else { "UNSURE: " }, comment(reason));
                 }
                 let _ = writeln!(text, "{key} = {value}");
             }
         }
-        text
+        // Values come from several places, which all write TOML.
+        toml_document(&text).into_owned()
     }
-}
-
-/// A text as a comment holds it.
-fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ mod paths;
 
 use crate::error::{Error, NewStudyError};
 use crate::jobs::check::check;
-use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, quoted, time_as_toml};
+use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, time_as_toml};
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
@@ -17,6 +17,7 @@ use draft::{Draft, Table};
 use drives::{DriveInertia, drive_inertia};
 use dynident_model::{JointKind, Model, load_robot};
 use dynident_recording::Level;
+use dynident_text::quoted;
 use paths::seen_from;
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,43 @@
+//! The hash by which a result that was edited or damaged is recognised.
+
+use super::identification::ResultFile;
+use core::fmt::Write;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+/// The key of the hash in a result.
+pub(super) const PLACE: &str = "provenance.content_sha256";
+
+impl ResultFile {
+    /// Hashes the content and keeps the hash in `provenance`. To be called after the last change; `timings_s` and
+    /// `provenance.command` may change later. A result without provenance has no place for it.
+    pub fn seal(&mut self) {
+        // A value that JSON cannot hold is reported when the file is written.
+        let hash = serde_json::to_value(&*self).ok().map(|content| content_sha256(&content));
+        if let Some(provenance) = &mut self.provenance {
+            provenance.content_sha256 = hash;
+        }
+    }
+}
+
+/// SHA-256 of a result's content in any layout, without the keys that may differ between equal results.
+pub(super) fn content_sha256(result: &Value) -> String {
+    let mut content = result.clone();
+    if let Some(all) = content.as_object_mut() {
+        all.remove("timings_s");
+        if let Some(provenance) = all.get_mut("provenance").and_then(Value::as_object_mut) {
+            provenance.remove("command");
+            provenance.remove("content_sha256");
+        }
+    }
+    Sha256::digest(dynident_text::json::canonical(&content)).iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// The hash that a result states.
+pub(super) fn stated_sha256(result: &Value) -> Option<&str> {
+    result.get("provenance")?.get("content_sha256")?.as_str()
+}
