@@ -44,6 +44,7 @@
 
 #[cfg(doctest)]
 pub mod book;
+mod clock;
 mod cpu_time;
 mod digest;
 mod error;
@@ -54,6 +55,7 @@ mod output;
 mod output_set;
 mod pages;
 pub mod result;
+mod robot_file;
 pub mod study;
 
 pub use dynident_dynamics as dynamics;
@@ -66,9 +68,11 @@ pub use dynident_model as model;
 pub use dynident_online as online;
 pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
+pub use dynident_system as system;
 
 pub use dynident_identification::{Progress, Role, Silent};
-pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError};
+pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
+pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
@@ -95,4 +99,5 @@ pub use pages::identification::identification_report;
 pub use result::{
     CheckFile, DesignFile, Inspection, IterationsFile, LogContents, ResultFile, SimulationFile, ValidationFile,
 };
+pub use robot_file::{LoadSettings, XacroSettings, load_robot};
 pub use study::{Folders, Study, StudyRobot};

@@ -2,7 +2,9 @@
 
 use crate::terminal;
 use dynident::iteration::StopSignal;
+use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
 
 /// Exit status of a program that was interrupted.
 pub(crate) const STATUS: u8 = 130;
@@ -10,23 +12,56 @@ pub(crate) const STATUS: u8 = 130;
 /// Set by the first Ctrl-C.
 static PRESSED: AtomicBool = AtomicBool::new(false);
 
+/// Who hears of Ctrl-C.
+static STOP: Mutex<Option<StopSignal>> = Mutex::new(None);
+
 /// From now on the first Ctrl-C asks for a stop: searches end with the best, robots stop. The second kills every
 /// program that serves a robot, with all its processes, and ends this one.
 pub(crate) fn listen(stop: &StopSignal) {
-    let stop = stop.clone();
-    // Without a handler Ctrl-C ends the program as ever.
-    let _ = ctrlc::set_handler(move || {
-        if PRESSED.swap(true, Ordering::SeqCst) {
-            if stop.kill_robots() {
-                terminal::remark(
-                    "the robot's program was killed before it said that the robot stands: nobody knows whether it \
-                     does, look at it before anything else",
-                );
-            }
+    static HANDLER: Once = Once::new();
+    *STOP.lock().unwrap_or_else(PoisonError::into_inner) = Some(stop.clone());
+    // Without a handler Ctrl-C ends the program as usual.
+    HANDLER.call_once(|| drop(ctrlc::set_handler(on_ctrl_c)));
+}
+
+fn on_ctrl_c() {
+    // Nobody listens any more.
+    let Some(stop) = STOP.lock().unwrap_or_else(PoisonError::into_inner).clone() else {
+        std::process::exit(i32::from(STATUS));
+    };
+    if PRESSED.swap(true, Ordering::SeqCst) {
+        if stop.kill_robots() {
+            terminal::remark(
+                "the robot's program was killed before it said that the robot stands: nobody knows whether it \
+                 does, look at it before anything else",
+            );
+        }
+        std::process::exit(i32::from(STATUS));
+    }
+    stop.request();
+}
+
+/// Calls `job`, which may run a program to its end. Ctrl-C stops that program with all its processes, and then ends the
+/// command.
+pub(crate) fn while_program_runs<R>(
+    job: impl FnOnce(&dyn Fn() -> bool) -> Result<R, dynident::Error>,
+) -> Result<R, String> {
+    let begun = Cell::new(false);
+    let is_stopped = || {
+        // A file that needs no program leaves Ctrl-C as it is.
+        if !begun.replace(true) {
+            listen(&StopSignal::default());
+        }
+        pressed()
+    };
+    let outcome = job(&is_stopped);
+    if begun.get() {
+        if pressed() {
             std::process::exit(i32::from(STATUS));
         }
-        stop.request();
-    });
+        *STOP.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+    outcome.map_err(|error| error.to_string())
 }
 
 /// Whether Ctrl-C was pressed.

@@ -8,7 +8,6 @@ use dynident_model::INERTIAL_NAMES;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings, FrictionCompensation, Measured, Target};
 use dynident_simulation::{Reference, ReferenceSample};
 use serde_json::{Value, json};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Name and version of the schema of `controller.json`.
@@ -159,15 +158,11 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
     Ok(Value::Object(file))
 }
 
-/// Writes under another name in the same folder, then renames; what is there already with the same text stays.
+/// Writes a file whole; a file with the same text stays as it is.
 fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
     if std::fs::read_to_string(path).is_ok_and(|there| there == text) {
         return Ok(());
     }
-    let fault = |error: std::io::Error| RobotFault::File { path: path.to_owned(), reason: error.to_string() };
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fault)?;
-    file.write_all(text.as_bytes()).and_then(|()| file.as_file().sync_all()).map_err(fault)?;
-    file.persist(path).map_err(|error| fault(error.error))?;
-    Ok(())
+    dynident_system::write_whole(path, text.as_bytes())
+        .map_err(|error| RobotFault::File { path: path.to_owned(), reason: error.to_string() })
 }

@@ -10,7 +10,6 @@ mod handover;
 mod held_torque;
 mod log_table;
 mod process;
-mod process_group;
 mod process_settings;
 mod protocol;
 mod recorder;
