@@ -16,8 +16,8 @@ pub struct XacroSettings {
 }
 
 impl XacroSettings {
-    /// The default time limit, s. xacro takes 0.2 to 1 s for published robots; a first start from a slow disk takes
-    /// several seconds.
+    /// The default time limit, s. xacro 2.1.1 expands a UR10 in 0.06 s of processor time, in 0.8 s on a busy computer;
+    /// the limit leaves room for large robots and a first start from a slow disk.
     pub const DEFAULT_LIMIT_S: f64 = 30.0;
 
     /// Checks the settings.

@@ -1,6 +1,7 @@
 //! Ctrl-C (and what else asks a program to end: SIGTERM, a terminal that goes away).
 
 use crate::terminal;
+use dynident::Error;
 use dynident::iteration::StopSignal;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -43,9 +44,7 @@ fn on_ctrl_c() {
 
 /// Calls `job`, which may run a program to its end. Ctrl-C stops that program with all its processes, and then ends the
 /// command.
-pub(crate) fn while_program_runs<R>(
-    job: impl FnOnce(&dyn Fn() -> bool) -> Result<R, dynident::Error>,
-) -> Result<R, String> {
+pub(crate) fn while_program_runs<R>(job: impl FnOnce(&dyn Fn() -> bool) -> Result<R, Error>) -> Result<R, Error> {
     let begun = Cell::new(false);
     let is_stopped = || {
         // A file that needs no program leaves Ctrl-C as it is.
@@ -61,7 +60,7 @@ pub(crate) fn while_program_runs<R>(
         }
         *STOP.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
-    outcome.map_err(|error| error.to_string())
+    outcome
 }
 
 /// Whether Ctrl-C was pressed.

@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 
 /// Options of `iterate`.
 #[derive(clap::Args)]
-#[allow(clippy::struct_excessive_bools, reason = "switches of a command line, each for itself")]
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,

@@ -1,6 +1,6 @@
 //! What a person is asked before a program is started or a robot moves.
 
-use super::{answer, interruption, message_of};
+use super::{answer, interruption, known_in, message_of};
 use crate::terminal;
 use dynident::iteration::{NextMotion, RunPurpose};
 use dynident::model::Robot;
@@ -47,11 +47,12 @@ impl XacroOptions {
     /// Reads a robot file. xacro is started if that is permitted.
     pub(crate) fn load_robot(&self, path: &Path) -> Result<Robot, String> {
         let decisions = self.programs.decisions();
-        decisions.with(|programs| {
+        let loaded = decisions.with(|programs| {
             interruption::while_program_runs(|is_stopped| {
                 load_robot(path, &LoadSettings { xacro: self.settings(), programs, is_stopped: Some(is_stopped) })
             })
-        })
+        });
+        loaded.map_err(message_of)
     }
 }
 
@@ -64,9 +65,10 @@ impl ProgramOptions {
     /// Reads a study. xacro is started for its robot file if the file needs it and that is permitted.
     pub(crate) fn load_study(&self, path: &Path, data: Option<&Path>) -> Result<Study, String> {
         let mut study = Study::load(path).map_err(message_of)?;
-        self.decisions().with(|programs| {
+        let expanded = self.decisions().with(|programs| {
             interruption::while_program_runs(|is_stopped| study.expand_robot(path, data, programs, Some(is_stopped)))
-        })?;
+        });
+        expanded.map_err(known_in(path))?;
         Ok(study)
     }
 }

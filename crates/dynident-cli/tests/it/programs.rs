@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 
 /// A good study with a robot file that has macros, and a program `xacro` that writes its arguments into `ran` and then
 /// does what `rest` says.
-fn folder(rest: &str) -> tempfile::TempDir {
+pub(crate) fn folder(rest: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for name in ["log.csv", "good.toml"] {
@@ -36,10 +36,10 @@ fn folder(rest: &str) -> tempfile::TempDir {
     folder
 }
 
-const EXPANDS: &str = "cat \"$here/expanded.urdf\"";
+pub(crate) const EXPANDS: &str = "cat \"$here/expanded.urdf\"";
 
 /// The command with the script on its PATH.
-fn with_xacro(folder: &Path, arguments: &[&str]) -> Command {
+pub(crate) fn with_xacro(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = command(folder, arguments);
     command.env("PATH", format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap()));
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -56,7 +56,7 @@ fn run_in(folder: &Path, arguments: &[&str]) -> CommandOutcome {
 }
 
 /// The arguments with which the script was started, a line for each start.
-fn starts(folder: &Path) -> Vec<String> {
+pub(crate) fn starts(folder: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(folder.join("bin/ran")).unwrap_or_default();
     text.lines().map(str::to_owned).collect()
 }
@@ -144,7 +144,7 @@ fn xacro_arguments_are_checked() {
     std::fs::copy(broken().join("arm.urdf"), at.join("plain.urdf")).unwrap();
     let cases: [(&[&str], &str); 4] = [
         (&["inspect", "plain.urdf", "--xacro", "a=1"], "no xacro macros"),
-        (&["inspect", "arm.urdf", "--xacro", "--output=x"], "invalid xacro argument"),
+        (&["inspect", "arm.urdf", "--xacro=--output=x"], "invalid xacro argument"),
         (&["inspect", "arm.urdf", "--xacro", "a"], "KEY=VALUE"),
         (&["inspect", "arm.urdf", "--xacro-limit-s", "0"], "xacro_limit_s"),
     ];
