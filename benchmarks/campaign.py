@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-CLIENT = ROOT / "examples" / "robots" / "mujoco_client.py"
+CLIENTS = {name: ROOT / "examples" / "robots" / f"{name}_client.py" for name in ("mujoco", "pinocchio")}
 
 SEARCH = """
 [design]
@@ -145,6 +145,24 @@ envelope = { tracking_error = 3.0 }
         "stribeck": [2, 2, 1.2, 0.6, 0.6, 0.3], "load": [0.03] * 6, "torque_noise": 0.1, "step": 2.5e-4,
         "clip": [132, 132, 103, 3.5, 43, 31], "catch": [2, 0.5, 0.15, 15.0],
     },
+    # Gravity acts on the slide alone, and there it is constant; N, N s/m and kg at the slide.
+    "scara": {
+        "urdf": "benchmarks/robots/scara.urdf",
+        "study": searched(["shoulder", "elbow", "slide", "flange"], [2.0, 2.5, 0.4, 4.0], [8, 10, 3, 20], [90.0, 45.0, 110.0, 9.0],
+                          "bandwidth_hz = 4.0\n"),
+        "friction": [4, 2.5, 8, 0.6], "damping": [3, 2, 20, 0.3], "armature": [0.5, 0.2, 3, 0.03], "stribeck": [1, 0.7, 2, 0.2],
+        "stribeck-speed": [0.05, 0.05, 0.01, 0.05], "load": [0.03] * 4, "torque_noise": 0.05, "step": 2.5e-4,
+        "clip": [15, 8, 45, 0.9], "catch": [1, 0.5, 0.15, 8.0],
+    },
+    # The last joint is much lighter than its effort limit suggests.
+    "gripper-arm": {
+        "urdf": "benchmarks/robots/gripper_arm.urdf",
+        "study": searched(["waist", "shoulder", "elbow", "wrist", "gripper"], [2.0] * 5, [6, 5, 6, 8, 8], [22.0, 45.0, 22.0, 22.0, 22.0],
+                          "bandwidth_hz = 4.0\n"),
+        "friction": [0.6, 0.8, 0.6, 0.3, 0.1], "damping": [0.4, 0.5, 0.4, 0.2, 0.05], "armature": [0.05, 0.08, 0.05, 0.03, 0.009],
+        "stribeck": [0.2, 0.3, 0.2, 0.1, 0.03], "load": [0.03] * 5, "torque_noise": 0.02, "step": 2.5e-4,
+        "clip": [2.0, 12, 4, 0.6, 0.25], "catch": [2, 1.0, 0.15, 3.0],
+    },
 }
 FAULTS = ["clips", "lags", "catches", "other-lengths"]
 
@@ -153,13 +171,14 @@ def numbers(values):
     return ",".join(f"{value:g}" for value in values)
 
 
-def robot_of(name, fault, seed):
-    """The robot's command, and the seconds that its sensors and drives are late."""
+def robot_of(name, fault, seed, client="mujoco", **more):
+    """The robot's command, and the seconds that its sensors and drives are late; `more` are further options of the client."""
     arm = ARMS[name]
     random = np.random.default_rng(1000 + seed)
     late = 1e-3 * random.uniform(0.0, 8.0)
     shares = random.uniform(0.0, 1.0)
-    options = {key: numbers(arm[key]) for key in ("friction", "damping", "armature", "stribeck", "load", "gravity", "kp", "kd") if key in arm}
+    options = {key: numbers(arm[key]) for key in (
+        "friction", "damping", "armature", "stribeck", "stribeck-speed", "load", "gravity", "kp", "kd") if key in arm}
     options |= {"masses": 30, "seed": seed, "step": arm["step"], "quantum": 1e-5, "speed-filter": 100, "torque-noise": arm["torque_noise"]}
     if "kp" in arm:
         # The drives close their loop themselves: what is late is what they tell.
@@ -174,14 +193,16 @@ def robot_of(name, fault, seed):
         options["catch"] = numbers(arm["catch"])
     elif fault == "other-lengths":
         options["lengths"] = 12
-    words = [sys.executable, str(CLIENT), str(ROOT / arm["urdf"]), "--truth", "truth.json"]
-    # `--key=value`: values may begin with a minus.
-    return words + [f"--{key}={value}" for key, value in options.items()], late
+    options |= more
+    words = [sys.executable, str(CLIENTS[client]), str(ROOT / arm["urdf"]), "--truth", "truth.json"]
+    # `--key=value`: values may begin with a minus. True stands for an option without a value.
+    return words + [f"--{key}" if value is True else f"--{key}={value}" for key, value in options.items()], late
 
 
-def write_study(name, seed, command, to):
+def write_study(name, seed, command, to, tables=None):
+    """`tables` are design and iteration, where they are not the arm's."""
     arm = ARMS[name]
-    tables = arm["study"].replace("SEED", str(seed)).replace("KP", json.dumps(arm.get("kp"))).replace("KD", json.dumps(arm.get("kd")))
+    tables = (tables or arm["study"]).replace("SEED", str(seed)).replace("KP", json.dumps(arm.get("kp"))).replace("KD", json.dumps(arm.get("kd")))
     gravity = f"gravity_m_s2 = {arm['gravity']}\n" if "gravity" in arm else ""
     drive = "drive_inertia = true\n" if any(arm["armature"]) else ""
     to.write_text(
@@ -244,6 +265,25 @@ def judged(folder, status):
     return row
 
 
+def run_study(dynident, folder):
+    """Runs study.toml in this folder into result/; exit status, seconds, and seconds of processor time with the robot's program."""
+    start = time.monotonic()
+    with open(folder / "output.txt", "w", encoding="utf-8") as output:
+        process = subprocess.Popen([dynident, "iterate", "study.toml", "--out", "result", "--allow-command", "--fresh"], cwd=folder,
+                                   stdout=output, stderr=subprocess.STDOUT, env=os.environ | {"OMP_NUM_THREADS": "1"})
+        _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, round(time.monotonic() - start, 1), round(usage.ru_utime + usage.ru_stime, 1)
+
+
+def write_csv(rows, to):
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    with open(to, "w", newline="", encoding="utf-8") as text:
+        writer = csv.DictWriter(text, keys)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 def iterate(dynident, name, fault, seed, out):
     """One iteration, unless it is there."""
     folder = out / f"{name}_{fault or 'sound'}_{seed}"
@@ -253,12 +293,8 @@ def iterate(dynident, name, fault, seed, out):
     folder.mkdir(parents=True, exist_ok=True)
     command, late = robot_of(name, fault, seed)
     write_study(name, seed, command, folder / "study.toml")
-    start = time.monotonic()
-    with open(folder / "output.txt", "w", encoding="utf-8") as output:
-        status = subprocess.run([dynident, "iterate", "study.toml", "--out", "result", "--allow-command", "--fresh"], cwd=folder,
-                                stdout=output, stderr=subprocess.STDOUT, env=os.environ | {"OMP_NUM_THREADS": "1"}).returncode
-    row = {"arm": name, "fault": fault or "", "seed": seed, "late_ms": round(1e3 * late, 2),
-           "seconds": round(time.monotonic() - start, 1)} | judged(folder, status)
+    status, seconds, _ = run_study(dynident, folder)
+    row = {"arm": name, "fault": fault or "", "seed": seed, "late_ms": round(1e3 * late, 2), "seconds": seconds} | judged(folder, status)
     done.write_text(json.dumps(row), encoding="utf-8")
     print(f"{name} {fault or 'sound'} {seed}: {row['status']}, {row['runs']} runs, {row['seconds']} s", flush=True)
     return row
@@ -304,11 +340,7 @@ def main():
     rows = [iterate(dynident, name, fault, seed, out) for seed in range(options.first_seed, options.first_seed + seeds)
             for name in names for fault in [None, *faults]]
     (out / "table.md").write_text(table(rows), encoding="utf-8")
-    keys = list(dict.fromkeys(key for row in rows for key in row))
-    with open(out / "runs.csv", "w", newline="", encoding="utf-8") as text:
-        writer = csv.DictWriter(text, keys)
-        writer.writeheader()
-        writer.writerows(rows)
+    write_csv(rows, out / "runs.csv")
     print(table(rows), end="")
     wrong = [row for row in rows if (row["fault"] and row["converged"]) or not row["stopped"]]
     for row in wrong:

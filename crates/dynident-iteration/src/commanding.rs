@@ -19,7 +19,7 @@ use std::time::Instant;
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) controller: ControllerSettings,
-    model: Option<ControllerModel>,
+    pub(crate) model: Option<ControllerModel>,
     /// Of each leg.
     pub(crate) ways: Vec<Option<FoundWays>>,
     pub(crate) rehearsal: Option<Rehearsal>,

@@ -5,6 +5,7 @@ use crate::evidence::Clipping;
 use crate::lengths::OtherLength;
 use crate::record::RunRecord;
 use crate::settings::IterationSettings;
+use crate::torque_check::TorqueCause;
 use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -176,6 +177,9 @@ pub enum Shortfall {
         "{}: {:.3} Nm of joint {}'s torque are then left in place of {:.3}", length_words(.0), .0.left_with_nm, .0.explained_joint, .0.left_nm
     )]
     Length(OtherLength),
+    /// The logged torque is not the torque that the controller commanded.
+    #[error("{0}")]
+    Torque(TorqueCause),
 }
 
 fn length_words(other: &OtherLength) -> String {
@@ -236,6 +240,7 @@ impl Shortfall {
             Self::Unexplained { .. } => {
                 "other friction terms (friction = \"auto\"), the right lengths and axes in the description, or a larger settled.most_unexplained_percent"
             }
+            Self::Torque(cause) => cause.remedy(),
             Self::Length(_) => {
                 "the description of this very arm: measure the length; where it is right, what else grows with that distance (elasticity, a tool, axes that are not parallel)"
             }
@@ -258,8 +263,21 @@ pub(crate) struct Names {
 
 /// What is not met after the last of `records`; nothing if the iteration has converged.
 pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
-    let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
     let Some(last) = records.last() else { return vec![Shortfall::TooFewRuns { good: 0 }] };
+    let wrong_torque = last.torque_causes().iter().cloned().map(Shortfall::Torque);
+    // All else that a wrong torque log shows is a consequence.
+    if last.torque_causes().iter().any(TorqueCause::is_determined) {
+        return wrong_torque.collect();
+    }
+    let mut found: Vec<Shortfall> = wrong_torque.collect();
+    found.extend(unmet(records, settings, names));
+    found
+}
+
+/// What is not met besides the scale of the torque.
+fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
+    let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
+    let Some(last) = records.last() else { return Vec::new() };
     if !last.accepted {
         let reason = last.reason.clone().unwrap_or_else(|| last.outcome.clone());
         return vec![Shortfall::LastRunRejected { reason }];

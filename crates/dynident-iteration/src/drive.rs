@@ -1,7 +1,7 @@
 //! Robots, records and the policy together.
 
 use crate::before_motion::motions;
-use crate::commanding::Came;
+use crate::commanding::{Came, Prepared};
 use crate::convergence::Shortfall;
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
@@ -146,13 +146,15 @@ impl Iteration {
             }
         }
         let mut record = self.recorded((plan, next), prepared.controller.name(), legs, &runs);
-        record.rehearsal = prepared.rehearsal;
+        record.rehearsal.clone_from(&prepared.rehearsal);
         record.warm_up = warm_up.shown();
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
-            self.examine(&mut record, &records, before, earlier)?;
+            self.examine(&mut record, &records, before, (earlier, &prepared))?;
         } else {
             self.judge(&mut record, before)?;
+            let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
+            record.torque_check = self.torque_check(&record, &records, before, (&[], &prepared), None)?;
         }
         Ok(PlannedRun::Run(Box::new(record), runs))
     }
@@ -163,7 +165,7 @@ impl Iteration {
         record: &mut RunRecord,
         records: &[Record],
         before: &[RunRecord],
-        earlier: &[GoodLog],
+        (earlier, prepared): (&[GoodLog], &Prepared),
     ) -> Result<(), IterationError> {
         let fatal = |error: &IterationError| {
             matches!(
@@ -190,7 +192,10 @@ impl Iteration {
             Err(error) => record.reason = record.reason.take().or_else(|| Some(error.to_string())),
         }
         self.judge(record, before)?;
-        let Some(own) = record.estimate.clone().filter(|_| record.accepted) else { return Ok(()) };
+        let Some(own) = record.estimate.clone().filter(|_| record.accepted) else {
+            record.torque_check = self.torque_check(record, records, before, (earlier, prepared), None)?;
+            return Ok(());
+        };
         let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
         let run = RunLog {
             run: record.run,
@@ -218,6 +223,8 @@ impl Iteration {
             add_tracking_floors(evidence, &task, records, &self.settings, known, errors);
             evidence.other_length = other_length(&task, &runs, &settings, after)?;
         }
+        let fitted = Some((&task, &runs[..], &*settings));
+        record.torque_check = self.torque_check(record, records, before, (earlier, prepared), fitted)?;
         Ok(())
     }
 
@@ -273,6 +280,7 @@ impl Iteration {
             estimate: None,
             pooled: None,
             evidence: None,
+            torque_check: None,
             held_out: None,
         }
     }

@@ -29,6 +29,11 @@ impl GoodLog {
         Self { run: record.run, legs, records, joint_sigma, differentiator, rest_margins }
     }
 
+    /// Number of the run.
+    pub(crate) fn run(&self) -> usize {
+        self.run
+    }
+
     pub(crate) fn as_run(&self) -> RunLog<'_> {
         let differentiator = self.differentiator.as_ref();
         RunLog {

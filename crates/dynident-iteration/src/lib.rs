@@ -110,6 +110,7 @@ mod run_information;
 mod run_logs;
 mod run_motion;
 mod run_offsets;
+mod run_torque_check;
 mod runs_folder;
 mod safety;
 mod settings;
@@ -117,6 +118,7 @@ mod status;
 mod step_by_step;
 mod store;
 mod supervision;
+mod torque_check;
 mod torque_of_all;
 mod tracking_floor;
 mod typical_drives;
@@ -156,4 +158,7 @@ pub use settings::{IterationSettings, RunIdentificationSettings, RunOffsets, Sch
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use supervision::{NextMotion, NextWays, Supervisor};
+pub use torque_check::{
+    CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck, TorqueCheckSettings,
+};
 pub use warm_up::WarmUp;

@@ -157,7 +157,7 @@ fn differentiator(settings: &DifferentiatorSettings, q: &[f64], joints: usize, r
 }
 
 /// The values at as many equal steps from the first time to the last.
-fn on_uniform_clock(record: &Record, values: &[f64]) -> Vec<f64> {
+pub(crate) fn on_uniform_clock(record: &Record, values: &[f64]) -> Vec<f64> {
     let (samples, times) = (record.samples, &record.times_s);
     let step = (times[samples - 1] - times[0]) / (samples - 1) as f64;
     let uniform = times.iter().enumerate().all(|(k, t)| (t - times[0] - k as f64 * step).abs() <= UNIFORM * step);

@@ -7,6 +7,7 @@ use crate::model_parameters::ModelParameters;
 use crate::record::RunRecord;
 use crate::settings::{IterationSettings, StartWith};
 use crate::status::IterationStatus;
+use crate::torque_check::TorqueCause;
 use dynident_simulation::PerJoint;
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
 use thiserror::Error;
@@ -71,6 +72,9 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
             }
         };
     };
+    if let Some(cause) = last.torque_causes().iter().find(|cause| cause.is_determined()) {
+        return Next::Finished(IterationStatus::Refused { reason: wrong_torque(last, cause) });
+    }
     let newest = model_of(last);
     if shortfalls(records, settings, names).is_empty() {
         return Next::Finished(IterationStatus::Converged);
@@ -214,6 +218,11 @@ pub(crate) fn verdict(
         return Err(Rejection::TracksWorse { now, then });
     }
     Ok(())
+}
+
+/// A model that is identified from a wrong torque log must not be loaded into a controller.
+fn wrong_torque(record: &RunRecord, cause: &TorqueCause) -> String {
+    format!("run {}: {cause}; {}, then begin anew (--fresh)", record.run, cause.remedy())
 }
 
 fn failed(record: &RunRecord) -> String {

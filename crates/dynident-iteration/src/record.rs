@@ -7,6 +7,7 @@ use crate::held_out_motion::HeldOutRun;
 use crate::model_parameters::ModelParameters;
 use crate::rehearsal::Rehearsal;
 use crate::run_motion::RunMotion;
+use crate::torque_check::{TorqueCause, TorqueCheck};
 use crate::warm_up::WarmUp;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
@@ -64,6 +65,10 @@ pub struct RunRecord {
     /// What its log shows beside parameters; none where it did not get to its end, and in runs of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
+    /// Whether its logged torque is the torque that the controller commanded; none where too little was recorded, and in
+    /// runs of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_check: Option<TorqueCheck>,
     /// The run of the held-out motion that came after it; kept in a folder of its own.
     #[serde(skip)]
     pub held_out: Option<HeldOutRun>,
@@ -123,6 +128,11 @@ impl RunRecord {
             }
         }
         Ok(())
+    }
+
+    /// Why its logged torque is not the commanded one; empty if it is, or where it was not checked.
+    pub fn torque_causes(&self) -> &[TorqueCause] {
+        self.torque_check.as_ref().map_or(&[], |check| &check.causes)
     }
 
     /// What is known after it: what all good runs say together, or else what it says alone.

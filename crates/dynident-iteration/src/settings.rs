@@ -1,6 +1,7 @@
 //! Settings of an iteration.
 
 use crate::safety::SafetySettings;
+use crate::torque_check::TorqueCheckSettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
@@ -212,6 +213,8 @@ pub struct IterationSettings {
     pub max_runs: usize,
     /// When all has settled.
     pub settled: SettledSettings,
+    /// When a difference between logged and commanded torque counts; `None` disables the check.
+    pub torque_check: Option<TorqueCheckSettings>,
     /// What keeps runs safe.
     pub safety: SafetySettings,
 }
@@ -233,6 +236,7 @@ impl Default for IterationSettings {
             most_model_free: 4,
             max_runs: 8,
             settled: SettledSettings::default(),
+            torque_check: Some(TorqueCheckSettings::default()),
             safety: SafetySettings::default(),
         }
     }
@@ -268,6 +272,7 @@ impl IterationSettings {
         self.safety.validate(joints)?;
         self.model_free.validate(joints)?;
         self.controller.validate(joints)?;
+        self.torque_check.as_ref().map_or(Ok(()), TorqueCheckSettings::validate)?;
         self.first.as_ref().map_or(Ok(()), |first| first.validate(joints))?;
         if self.model_free.needs_model() {
             return Err(SimulationError::NoModel { controller: self.model_free.name() });

@@ -35,16 +35,14 @@ impl TemporaryFolder {
     fn locked_in(parent: &Path) -> io::Result<Self> {
         remove_abandoned(parent);
         for _ in 0..ATTEMPTS {
-            let mut folder = Self::create_in(parent, PREFIX)?;
-            let lock = File::open(&folder.path).ok();
+            let path = created(parent, PREFIX, 0o700)?;
+            let lock = File::open(&path).ok();
             // Another program may have found it before it was locked, and removed it. Where the system has no locks,
             // nobody removes it.
             let _ = lock.as_ref().map(File::lock);
-            if folder.path.exists() {
-                folder._lock = lock;
-                return Ok(folder);
+            if path.exists() {
+                return Ok(Self { path, is_kept: false, _lock: lock });
             }
-            folder.is_kept = true;
         }
         Err(io::Error::new(io::ErrorKind::WouldBlock, "other programs keep removing the temporary folder"))
     }
@@ -54,7 +52,7 @@ impl TemporaryFolder {
     /// # Errors
     /// The system's reason.
     pub fn create_in(parent: &Path, prefix: &str) -> io::Result<Self> {
-        Self::create(parent, prefix, 0o700)
+        Ok(Self { path: created(parent, prefix, 0o700)?, is_kept: false, _lock: None })
     }
 
     /// As [`create_in`](Self::create_in), accessible to all users whom the user's mask lets in.
@@ -62,20 +60,7 @@ impl TemporaryFolder {
     /// # Errors
     /// The system's reason.
     pub fn create_open_in(parent: &Path, prefix: &str) -> io::Result<Self> {
-        Self::create(parent, prefix, 0o777)
-    }
-
-    #[cfg_attr(not(unix), allow(unused_variables, reason = "other systems have no such mode"))]
-    fn create(parent: &Path, prefix: &str, mode: u32) -> io::Result<Self> {
-        let mut builder = Builder::new();
-        builder.prefix(prefix).rand_bytes(RANDOM_CHARACTERS);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(mode));
-        }
-        let path = builder.tempdir_in(parent)?.keep();
-        Ok(Self { path, is_kept: false, _lock: None })
+        Ok(Self { path: created(parent, prefix, 0o777)?, is_kept: false, _lock: None })
     }
 
     /// Where it is.
@@ -97,6 +82,19 @@ impl Drop for TemporaryFolder {
             let _ = remove_folder(&self.path);
         }
     }
+}
+
+/// A new folder with a mode, from which the user's mask is taken.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "other systems have no such mode"))]
+fn created(parent: &Path, prefix: &str, mode: u32) -> io::Result<PathBuf> {
+    let mut builder = Builder::new();
+    builder.prefix(prefix).rand_bytes(RANDOM_CHARACTERS);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(mode));
+    }
+    Ok(builder.tempdir_in(parent)?.keep())
 }
 
 /// Removes the temporary folders in `parent` whose programs have ended. What cannot be removed stays.

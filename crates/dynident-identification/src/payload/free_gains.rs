@@ -22,7 +22,7 @@ pub(crate) fn free_gains(gains: &[DriveGain]) -> Vec<usize> {
 ///
 /// # Errors
 /// Values of another number of columns.
-pub(crate) fn with_free_gains(
+pub fn with_free_gains(
     problem: LinearProblem,
     free: &[usize],
     (known, values): (&[Vec<f64>], &[f64]),

@@ -11,11 +11,12 @@ mod result;
 
 pub use columns::{LoadColumns, Payload, known_payloads};
 pub use error::PayloadError;
+pub use free_gains::with_free_gains;
 pub use gains::DriveGain;
 pub use known_arm::{KnownArm, Refit};
 pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
 
 pub(crate) use columns::SeenColumns;
-pub(crate) use free_gains::{free_gains, with_free_gains};
+pub(crate) use free_gains::free_gains;
 pub(crate) use gain_error::with_gain_error;
 pub(crate) use gains::{Gains, drive_gains, known_loads};

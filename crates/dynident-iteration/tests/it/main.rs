@@ -17,5 +17,6 @@ mod robots;
 mod run_offsets;
 mod simulated_arm;
 mod stops;
+mod torque_check;
 mod verdict;
 mod warm_up;

@@ -1,5 +1,6 @@
 //! `report.html` of an iteration.
 
+use super::torque_check::torque_section;
 use crate::error::Error;
 use crate::result::{IterationParameter, IterationRun, IterationsFile, UnmetCondition};
 use dynident_iteration::IterationStore;
@@ -146,6 +147,7 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
         page.add(Heading::new("From positions to velocities and accelerations"));
         page.add(Text { paragraphs: Vec::new(), points });
     }
+    torque_section(&mut page, file);
     page.add(Heading::new("Tracking"));
     tracking(&mut page, file, traces);
     page.add(Heading::new("Parameters"));

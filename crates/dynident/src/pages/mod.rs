@@ -6,3 +6,4 @@ pub(crate) mod identification;
 pub(crate) mod iteration;
 mod payloads;
 mod provenance;
+mod torque_check;

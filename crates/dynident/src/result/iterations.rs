@@ -5,7 +5,7 @@ use super::provenance::Provenance;
 use crate::error::Error;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{
-    DifferentiatorChoice, HeldOutRun, LoweredBandwidth, RunEvidence, RunOffset, Shortfall, WarmUp,
+    DifferentiatorChoice, HeldOutRun, LoweredBandwidth, RunEvidence, RunOffset, Shortfall, TorqueCheck, WarmUp,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -229,6 +229,9 @@ pub struct IterationRun {
     /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
+    /// Whether its logged torque is the torque that its controller commanded; none where too little was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_check: Option<TorqueCheck>,
     /// What its motion was expected to bring, and what came of it; none where motions are not designed with what is
     /// known, and where nothing was known.
     #[serde(default, skip_serializing_if = "Option::is_none")]

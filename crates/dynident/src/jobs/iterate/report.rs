@@ -99,6 +99,7 @@ impl IterationReport<'_> {
                 pooled: parameters(record.pooled.as_ref()),
                 run_offsets: record.pooled.as_ref().map_or_else(Vec::new, |all| all.run_offsets.clone()),
                 evidence: record.evidence.clone(),
+                torque_check: record.torque_check.clone(),
                 differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
                 forecast: record.forecast.as_ref().map(|forecast| {
                     let known = record.knowledge().filter(|_| record.accepted);

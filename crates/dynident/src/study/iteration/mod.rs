@@ -21,7 +21,7 @@ use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
     IterationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings, Scheme,
-    SettledSettings, StartWith,
+    SettledSettings, StartWith, TorqueCheckSettings,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
@@ -156,6 +156,8 @@ pub struct IterationSection {
     pub max_runs: usize,
     /// When all has settled.
     pub settled: SettledSettings,
+    /// When a difference between logged and commanded torque counts.
+    pub torque_check: TorqueCheckSettings,
 }
 
 impl Default for IterationSection {
@@ -203,6 +205,7 @@ impl Default for IterationSection {
             most_model_free,
             max_runs,
             settled,
+            torque_check: TorqueCheckSettings::default(),
         }
     }
 }
@@ -276,6 +279,7 @@ impl IterationSection {
             most_model_free: self.most_model_free,
             max_runs: self.max_runs,
             settled: self.settled.clone(),
+            torque_check: Some(self.torque_check.clone()),
             safety: SafetySettings::default(),
         })
     }

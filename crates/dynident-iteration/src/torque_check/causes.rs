@@ -1,0 +1,280 @@
+//! From what is found of single joints to one statement about the log.
+
+use super::explanation::{Explanation, Fitted, TorqueCandidate};
+use super::{CheckWith, CommandSource, RowScale, TorqueCheck};
+use crate::leg::IterationTask;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Scales of several joints are one scale if they differ by less than this.
+const SAME_SCALE: f64 = 0.02;
+
+/// Why the logged torque of a run is not the commanded one.
+#[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(tag = "cause", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum TorqueCause {
+    /// The logged torque has another scale.
+    #[error("the logged torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times the commanded torque")]
+    Scale {
+        /// The joint.
+        joint: String,
+        /// Logged per commanded torque.
+        factor: f64,
+        /// Half the width of its 95 % interval.
+        half_width_95: f64,
+    },
+    /// The logged torques of all joints have another scale.
+    #[error("the logged torques of all joints are {factor:.3} times the commanded torques")]
+    CommonScale {
+        /// Logged per commanded torque.
+        factor: f64,
+    },
+    /// The logged torque has the opposite sign.
+    #[error("the logged torque of {} has the opposite sign of the commanded torque", listed(.joints))]
+    Sign {
+        /// The joints.
+        joints: Vec<String>,
+    },
+    /// Two joints have each other's torque.
+    #[error("the logged torque of joint {joint} is the commanded torque of joint {of}: their columns are exchanged")]
+    Exchanged {
+        /// The joint.
+        joint: String,
+        /// The joint whose torque it has.
+        of: String,
+    },
+    /// Gravity was subtracted.
+    #[error("gravity is missing in the logged torque of {}", listed(.joints))]
+    Gravity {
+        /// The joints.
+        joints: Vec<String>,
+    },
+    /// Friction was subtracted.
+    #[error("friction is missing in the logged torque of {}", listed(.joints))]
+    Friction {
+        /// The joints.
+        joints: Vec<String>,
+    },
+    /// The drive gives less than was commanded.
+    #[error(
+        "the logged torque of joint {joint} stays at {torque:.3} Nm where more is commanded: the drive is at its limit"
+    )]
+    Clipped {
+        /// The joint.
+        joint: String,
+        /// The limit, Nm (N).
+        torque: f64,
+    },
+    /// Positions and torques of the log belong to different instants.
+    #[error("positions and torques of the log are {:.1} ms apart", 1e3 * .lag_s)]
+    Delay {
+        /// By how much the torque comes after the positions, s.
+        lag_s: f64,
+    },
+    /// The log's clock is not the controller's.
+    #[error("the clock of the log is {:.2} % {} than that of the controller", .percent.abs(), if *.percent < 0.0 { "faster" } else { "slower" })]
+    Clock {
+        /// By how much it is slow, percent.
+        percent: f64,
+    },
+    /// The parameters that joints share have other values in the rows of one joint.
+    #[error("the torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times what the torques of the other joints require{}{}", log_words(*.is_commanded), or_words(.or))]
+    JointScale {
+        /// The joint.
+        joint: String,
+        /// Joints whose scale would explain the difference nearly as well.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        or: Vec<String>,
+        /// Its torque per torque that the other joints require.
+        factor: f64,
+        /// Half the width of its 95 % interval.
+        half_width_95: f64,
+        /// Whether the logged torque is the commanded one.
+        is_commanded: bool,
+    },
+    /// None of the known causes explains the difference, or several explain it equally well.
+    #[error("the logged torque of joint {joint} differs from the commanded torque by {difference_percent:.1} %: cause not determined{}", candidate_words(.candidates))]
+    Undetermined {
+        /// The joint.
+        joint: String,
+        /// Root mean square of the difference as a percentage of the joint's torque.
+        difference_percent: f64,
+        /// What explains most of it, the best first.
+        candidates: Vec<TorqueCandidate>,
+    },
+}
+
+impl TorqueCause {
+    /// What to do.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Scale { .. } | Self::CommonScale { .. } => {
+                "correct the scale of the logged torque (torque constant, gear ratio, unit), or the drive's torque gain"
+            }
+            Self::Sign { .. } => "reverse the sign of the logged torque",
+            Self::Exchanged { .. } => "correct the order of the logged torques",
+            Self::Gravity { .. } | Self::Friction { .. } => {
+                "log the complete torque of the drives, including what the robot compensates itself"
+            }
+            Self::Clipped { .. } => "give a slower motion, or the drive's true torque limit in [design.limits]",
+            Self::Delay { .. } => "log positions and torques of the same instant",
+            Self::Clock { .. } => "log the controller's own time",
+            Self::JointScale { is_commanded: true, .. } => {
+                "check the torque gain of this drive: it delivers another torque than the log states"
+            }
+            Self::JointScale { .. } => {
+                "correct the scale of this joint's logged torque (torque constant, gear ratio), or its drive's gain"
+            }
+            Self::Undetermined { .. } => {
+                "compare the logged torque with the commanded torque on the page; log exactly what the drives deliver"
+            }
+        }
+    }
+
+    /// Whether the cause is known; otherwise another run may show more.
+    pub fn is_determined(&self) -> bool {
+        !matches!(self, Self::Undetermined { .. })
+    }
+}
+
+fn listed(joints: &[String]) -> String {
+    match joints {
+        [one] => format!("joint {one}"),
+        several => format!("joints {}", several.join(", ")),
+    }
+}
+
+fn log_words(is_commanded: bool) -> &'static str {
+    if is_commanded { ", although the log holds the commanded torque" } else { "" }
+}
+
+fn or_words(or: &[String]) -> String {
+    if or.is_empty() { String::new() } else { format!(" (or another scale of {})", listed(or)) }
+}
+
+fn candidate_words(candidates: &[TorqueCandidate]) -> String {
+    let names: Vec<&str> = candidates.iter().map(|candidate| candidate.name()).collect();
+    if names.is_empty() { String::new() } else { format!(" (candidates: {})", names.join(", ")) }
+}
+
+impl TorqueCandidate {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Scale => "another scale",
+            Self::Sign => "a reversed sign",
+            Self::Exchanged => "exchanged joints",
+            Self::Gravity => "gravity missing",
+            Self::Friction => "friction missing",
+            Self::Clipped => "a torque limit",
+        }
+    }
+}
+
+/// A candidate that explains less of the squared difference is not listed.
+const LEAST_LISTED: f64 = 0.5;
+
+/// The causes that the joints show together.
+pub(super) fn causes(
+    task: &IterationTask,
+    check: &TorqueCheck,
+    explanations: &[Explanation],
+    with: &CheckWith<'_>,
+) -> Vec<TorqueCause> {
+    let names = task.robot.joint_names();
+    let named: Vec<Option<Fitted>> = explanations.iter().map(Explanation::named).collect();
+    let of = |candidate: TorqueCandidate| -> Vec<usize> {
+        let is_it = |found: &Option<Fitted>| found.is_some_and(|found| found.candidate == candidate);
+        (0..named.len()).filter(|&joint| explanations[joint].matters && is_it(&named[joint])).collect()
+    };
+    let listed = |joints: &[usize]| joints.iter().map(|&joint| names[joint].clone()).collect::<Vec<_>>();
+    let mut found = Vec::new();
+    let scaled = of(TorqueCandidate::Scale);
+    let scale = |joint: usize| named[joint].map_or(1.0, |found| found.value);
+    let determined = explanations.iter().filter(|own| own.scale.is_some()).count();
+    let mean = scaled.iter().map(|&joint| scale(joint)).sum::<f64>() / scaled.len().max(1) as f64;
+    let is_common = scaled.len() > 1
+        && scaled.len() == determined
+        && scaled.iter().all(|&joint| (scale(joint) - mean).abs() < SAME_SCALE);
+    if is_common {
+        found.push(TorqueCause::CommonScale { factor: mean });
+    } else {
+        found.extend(scaled.iter().map(|&joint| TorqueCause::Scale {
+            joint: names[joint].clone(),
+            factor: scale(joint),
+            half_width_95: 1.96 * explanations[joint].scale_std.unwrap_or(0.0),
+        }));
+    }
+    for (candidate, cause) in [
+        (TorqueCandidate::Sign, (|joints| TorqueCause::Sign { joints }) as fn(Vec<String>) -> TorqueCause),
+        (TorqueCandidate::Gravity, |joints| TorqueCause::Gravity { joints }),
+        (TorqueCandidate::Friction, |joints| TorqueCause::Friction { joints }),
+    ] {
+        let joints = of(candidate);
+        if !joints.is_empty() {
+            found.push(cause(listed(&joints)));
+        }
+    }
+    for joint in of(TorqueCandidate::Exchanged) {
+        let of = named[joint].map_or(joint, |found| found.value as usize);
+        found.push(TorqueCause::Exchanged { joint: names[joint].clone(), of: names[of].clone() });
+    }
+    for joint in of(TorqueCandidate::Clipped) {
+        let torque = named[joint].map_or(0.0, |found| found.value);
+        found.push(TorqueCause::Clipped { joint: names[joint].clone(), torque });
+    }
+    // Timing means nothing beside torque that is another one.
+    let has_timing = !explanations.iter().any(|own| own.matters);
+    for (joint, explanation) in explanations.iter().enumerate() {
+        if explanation.matters && explanation.is_certain && named[joint].is_none() {
+            let likely = explanation.candidates.iter().filter(|one| one.explained >= LEAST_LISTED);
+            found.push(TorqueCause::Undetermined {
+                joint: names[joint].clone(),
+                difference_percent: explanation.difference_percent,
+                candidates: likely.map(|one| one.candidate).collect(),
+            });
+        }
+    }
+    if has_timing {
+        found.extend(timing(check, with));
+    }
+    // Which joint is wrong is clearer once torque is fed forward.
+    let is_early = check.source == CommandSource::PathOnly && with.feeds_forward_later;
+    if found.is_empty() && !is_early {
+        found.extend(row_scale_causes(check, with.row_scales, &names));
+    }
+    found
+}
+
+/// What the timing shows. A controller that sees positions before the log does has them at their true instants: the log
+/// has them late.
+fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
+    let settings = with.settings;
+    let mut found = Vec::new();
+    let lag_s = check.torque_lag_s + check.feedback_delay_s[0].min(0.0);
+    if lag_s.abs() > with.most_lag_s {
+        found.push(TorqueCause::Delay { lag_s });
+    }
+    let clock_std = check.clock_percent_std.unwrap_or(f64::INFINITY);
+    let clock = check.clock_percent.abs();
+    if clock > settings.clock_percent && clock > settings.sigmas * clock_std {
+        found.push(TorqueCause::Clock { percent: check.clock_percent });
+    }
+    found
+}
+
+/// Joints whose rows disagree with those of the others.
+fn row_scale_causes(check: &TorqueCheck, row_scales: &[Option<RowScale>], names: &[String]) -> Vec<TorqueCause> {
+    let of_joint = |(joint, scale): (usize, &Option<RowScale>)| {
+        let RowScale { value, std, is_wrong, or } = scale.as_ref()?;
+        is_wrong.then(|| TorqueCause::JointScale {
+            joint: names[joint].clone(),
+            or: or.iter().map(|&other| names[other].clone()).collect(),
+            factor: *value,
+            half_width_95: 1.96 * std,
+            is_commanded: check.source == CommandSource::Controller,
+        })
+    };
+    row_scales.iter().enumerate().filter_map(of_joint).collect()
+}

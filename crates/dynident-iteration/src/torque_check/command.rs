@@ -1,0 +1,216 @@
+//! The torque that the controller commanded along a log, computed again from what it was given: the reference, its
+//! model, and the positions in the log.
+
+use super::separable_fit::{JointColumns, SHARED, SharedParameter};
+use crate::leg::Leg;
+use crate::motion::on_uniform_clock;
+use dynident_recording::{DecimationSettings, Decimator, Derivatives, DifferentiatorSettings, Place};
+use dynident_simulation::Record;
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings, Measured, Target};
+
+/// Positions are smoothed at this multiple of the cut-off of the comparison, so that the smoothing itself is not
+/// compared.
+const SMOOTHING_RATIO: f64 = 4.0;
+/// Rows per second after decimation, as a multiple of the cut-off.
+const ROWS_PER_CUTOFF: f64 = 4.0;
+/// Shared parameters: delays of the positions and of the velocities in the controller, lag of the logged torque (s),
+/// relative rate of the log's clock, and delay of the torque that is fed forward (s). The expected sizes only matter
+/// where the rows determine nothing.
+const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 20e-3), (1e-3, 20e-3), (1e-3, 20e-3), (1e-4, 1e-2), (1e-3, 20e-3)];
+
+/// Delays at which the search begins for drives with unknown gains: a late position looks like a stiffer loop.
+const DELAYS_S: &[f64] = &[-0.03, -0.02, -0.015, -0.01, -0.0075, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02];
+
+/// How the torque follows from reference and positions.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum CommandLaw<'a> {
+    /// A control law that is completely known: one column, the commanded torque.
+    Known {
+        /// The law.
+        controller: &'a ControllerSettings,
+        /// Its model, if it has one.
+        model: Option<&'a ControllerModel>,
+    },
+    /// The drives close their own position loop with unknown gains. The columns are the torque that is fed forward, the
+    /// position error, its rate and its integral.
+    OwnLoop {
+        /// What is fed forward; none in a run with nothing but a path.
+        model: Option<&'a ControllerModel>,
+    },
+}
+
+impl CommandLaw<'_> {
+    /// The shared parameters of the comparison.
+    pub(super) fn parameters(self) -> [SharedParameter; SHARED] {
+        core::array::from_fn(|k| {
+            let (difference, expected) = PARAMETERS[k];
+            let starts = if matches!(self, Self::OwnLoop { .. }) && k == 0 { DELAYS_S } else { &[0.0] };
+            SharedParameter { difference, expected, starts }
+        })
+    }
+}
+
+/// One log along one leg, smoothed.
+#[derive(Debug)]
+pub(super) struct ObservedLeg<'a> {
+    leg: &'a Leg,
+    joints: usize,
+    rate_hz: f64,
+    first_time_s: f64,
+    samples: usize,
+    /// Joint-major.
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    ddq: Vec<f64>,
+    decimator: Decimator,
+    /// The logged torque of each joint, filtered and decimated.
+    pub(super) torque: Vec<Vec<f64>>,
+}
+
+impl<'a> ObservedLeg<'a> {
+    /// The log, compared below `cutoff_hz`; none where it is too short for the filter or not finite.
+    pub(super) fn new(leg: &'a Leg, record: &Record, cutoff_hz: f64) -> Option<Self> {
+        let (joints, samples) = (record.joints.len(), record.samples);
+        if samples < 4 || joints != leg.reference().joints() {
+            return None;
+        }
+        let first_time_s = record.times_s[0];
+        let rate_hz = (samples - 1) as f64 / (record.times_s[samples - 1] - first_time_s);
+        let is_usable = rate_hz.is_finite() && rate_hz > 2.5 * cutoff_hz;
+        if !is_usable || record.q.iter().chain(&record.tau).any(|value| !value.is_finite()) {
+            return None;
+        }
+        let smoothing_hz = (SMOOTHING_RATIO * cutoff_hz).min(0.4 * rate_hz);
+        let butterworth = DifferentiatorSettings::Butterworth { order: 2, cutoff_hz: Some(smoothing_hz) };
+        let butterworth = butterworth.build_following(smoothing_hz, None).ok()?;
+        let raw = on_uniform_clock(record, &record.q);
+        let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; joints * samples]);
+        for joint in 0..joints {
+            let own = joint * samples..(joint + 1) * samples;
+            let out = Derivatives { q: &mut q[own.clone()], dq: &mut dq[own.clone()], ddq: &mut ddq[own.clone()] };
+            butterworth.differentiate_at(Place { rate_hz, joint, first_time_s }, &raw[own], out).ok()?;
+        }
+        let factor = ((rate_hz / (ROWS_PER_CUTOFF * cutoff_hz)).floor() as usize).clamp(1, 1000);
+        let settings = DecimationSettings { factor, cutoff_hz: Some(cutoff_hz), ..DecimationSettings::default() };
+        let decimator = Decimator::new(&settings, rate_hz, joints).ok()?;
+        let mut observed =
+            Self { leg, joints, rate_hz, first_time_s, samples, q, dq, ddq, decimator, torque: Vec::new() };
+        observed.torque = observed.decimated(&on_uniform_clock(record, &record.tau), joints);
+        (observed.rows() > 0).then_some(observed)
+    }
+
+    /// Rows after decimation.
+    pub(super) fn rows(&self) -> usize {
+        self.torque.first().map_or(0, Vec::len)
+    }
+
+    /// Columns of `count` series of samples each, filtered and decimated.
+    fn decimated(&self, panel: &[f64], count: usize) -> Vec<Vec<f64>> {
+        let mut decimator = self.decimator.with_columns(count);
+        let mut out = Vec::new();
+        let rows = decimator.push(panel, self.samples, &mut out);
+        if rows == 0 { vec![Vec::new(); count] } else { out.chunks_exact(rows).map(<[f64]>::to_vec).collect() }
+    }
+
+    /// The measured positions, velocities and accelerations, filtered and decimated like the torque.
+    pub(super) fn motion(&self) -> [Vec<Vec<f64>>; 3] {
+        [&self.q, &self.dq, &self.ddq].map(|values| self.decimated(values, self.joints))
+    }
+
+    /// The columns of each joint at some timing: delays of positions and velocities in the controller, lag of the
+    /// torque, and relative rate of the log's clock.
+    pub(super) fn columns(&self, law: CommandLaw<'_>, timing: &[f64; SHARED]) -> Vec<JointColumns> {
+        let series = match law {
+            CommandLaw::Known { controller, model } => self.commanded(controller, model, timing),
+            CommandLaw::OwnLoop { model } => Some(self.own_loop(model, timing)),
+        };
+        let Some(series) = series else { return vec![Vec::new(); self.joints] };
+        let mut columns: Vec<JointColumns> = vec![Vec::new(); self.joints];
+        for of_all in &series {
+            for (joint, column) in self.decimated(of_all, self.joints).into_iter().enumerate() {
+                columns[joint].push(column);
+            }
+        }
+        columns
+    }
+
+    /// The commanded torque, joint-major.
+    fn commanded(
+        &self,
+        controller: &ControllerSettings,
+        model: Option<&ControllerModel>,
+        timing: &[f64; SHARED],
+    ) -> Option<Vec<Vec<f64>>> {
+        let mut controller = controller.build(self.joints, model).ok()?;
+        let mut out = vec![0.0; self.joints * self.samples];
+        let mut tau = vec![0.0; self.joints];
+        self.each_instant(timing, &mut |sample, time_s, target, measured| {
+            controller.torque(time_s, target, measured, &mut tau);
+            for (joint, tau) in tau.iter().enumerate() {
+                out[joint * self.samples + sample] = *tau;
+            }
+        });
+        out.iter().all(|value| value.is_finite()).then(|| vec![out])
+    }
+
+    /// What drives with their own loop get and see, joint-major: torque fed forward, position error, its rate, and its
+    /// integral.
+    fn own_loop(&self, model: Option<&ControllerModel>, timing: &[f64; SHARED]) -> Vec<Vec<f64>> {
+        let mut model = model.cloned();
+        let mut out = vec![vec![0.0; self.joints * self.samples]; 4];
+        let mut ahead = vec![0.0; self.joints];
+        let mut integral = vec![0.0; self.joints];
+        let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; self.joints]);
+        let [_, _, _, _, ahead_s] = *timing;
+        self.each_instant(timing, &mut |sample, time_s, target, measured| {
+            if let Some(model) = &mut model {
+                self.reference(time_s - ahead_s, [&mut q, &mut dq, &mut ddq]);
+                model.reference_torque(&q, &dq, &ddq, &mut ahead);
+            }
+            for joint in 0..self.joints {
+                let error = target.q[joint] - measured.q[joint];
+                integral[joint] += error / self.rate_hz;
+                let values = [ahead[joint], error, target.dq[joint] - measured.dq[joint], integral[joint]];
+                let at = joint * self.samples + sample;
+                out.iter_mut().zip(values).for_each(|(out, value)| out[at] = value);
+            }
+        });
+        out
+    }
+
+    /// Calls `then` with each sample, its time, and what the controller followed and saw.
+    fn each_instant(&self, timing: &[f64; SHARED], then: &mut dyn FnMut(usize, f64, Target<'_>, Measured<'_>)) {
+        let [position_delay_s, velocity_delay_s, torque_lag_s, clock_rate, _] = *timing;
+        let [mut q, mut dq, mut ddq, mut seen_q, mut seen_dq] = [(); 5].map(|()| vec![0.0; self.joints]);
+        for sample in 0..self.samples {
+            let log_time_s = self.first_time_s + sample as f64 / self.rate_hz - torque_lag_s;
+            let time_s = log_time_s * (1.0 + clock_rate);
+            self.reference(time_s, [&mut q, &mut dq, &mut ddq]);
+            for joint in 0..self.joints {
+                seen_q[joint] = self.between(&self.q, &self.dq, joint, log_time_s - position_delay_s);
+                seen_dq[joint] = self.between(&self.dq, &self.ddq, joint, log_time_s - velocity_delay_s);
+            }
+            let target = Target { q: &q, dq: &dq, ddq: &ddq };
+            then(sample, time_s, target, Measured { q: &seen_q, dq: &seen_dq });
+        }
+    }
+
+    /// Position, velocity and acceleration of each joint as commanded.
+    fn reference(&self, time_s: f64, [q, dq, ddq]: [&mut [f64]; 3]) {
+        for joint in 0..self.joints {
+            [q[joint], dq[joint], ddq[joint]] = self.leg.commanded().at(joint, time_s);
+        }
+    }
+
+    /// Cubic Hermite interpolation of a joint's values with their derivatives; the end values outside of the log.
+    fn between(&self, values: &[f64], slopes: &[f64], joint: usize, time_s: f64) -> f64 {
+        let own = joint * self.samples;
+        let place = ((time_s - self.first_time_s) * self.rate_hz).clamp(0.0, (self.samples - 1) as f64);
+        let before = (place.floor() as usize).min(self.samples - 2);
+        let s = place - before as f64;
+        let (v0, v1) = (values[own + before], values[own + before + 1]);
+        let (m0, m1) = (slopes[own + before] / self.rate_hz, slopes[own + before + 1] / self.rate_hz);
+        let rise = v1 - v0;
+        v0 + s * (m0 + s * (3.0 * rise - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * rise)))
+    }
+}

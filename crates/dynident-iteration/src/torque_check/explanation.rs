@@ -1,0 +1,274 @@
+//! What explains that the logged torque of a joint is not the commanded one.
+//!
+//! Each candidate is a correction of the commanded torque `u` with few unknowns, and a constant is free in all of them.
+//! A candidate explains the share `1 − RSS_c / RSS_0` of the difference's square. One is named only if it explains
+//! nearly all, and clearly more than every other.
+
+use super::TorqueCheckSettings;
+use super::separable_fit::{JointColumns, centred, coefficients, dot, residual_of, rms, square};
+use crate::leg::IterationTask;
+use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
+use serde::{Deserialize, Serialize};
+
+/// Share of the squared difference that a named candidate explains at least.
+const LEAST_EXPLAINED: f64 = 0.85;
+/// What the runner-up leaves of the squared difference, at least, in units of what the named candidate leaves.
+const CLEARLY_BETTER: f64 = 2.0;
+/// Share of the torque that the position error makes in drives whose logged torque has the wrong sign.
+const PUSHES: f64 = 0.3;
+/// Time blocks of the jackknife of a scale.
+const BLOCKS: usize = 10;
+/// Widths of the steps of friction that are tried, as shares of the joint's highest speed.
+const STEP_WIDTHS: [f64; 3] = [0.02, 0.08, 0.3];
+/// Rows with torque below this share of the largest are not at a limit.
+const BELOW_LIMIT: f64 = 0.85;
+/// Limits of torque that are tried, as shares of the largest commanded torque.
+const CLIP_SHARES: usize = 40;
+
+/// A candidate, without its numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum TorqueCandidate {
+    /// Another scale, positive.
+    Scale,
+    /// A reversed sign.
+    Sign,
+    /// The torque of another joint.
+    Exchanged,
+    /// Gravity is missing.
+    Gravity,
+    /// Friction is missing.
+    Friction,
+    /// The torque is limited.
+    Clipped,
+}
+
+/// A candidate with its numbers for one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fitted {
+    pub(super) candidate: TorqueCandidate,
+    /// Scale, limit of the torque (Nm, N), or number of the other joint.
+    pub(super) value: f64,
+    /// Share of the squared difference that it explains.
+    pub(super) explained: f64,
+}
+
+/// What the comparison shows of one joint.
+#[derive(Clone, Debug)]
+pub(super) struct Explanation {
+    pub(super) scale: Option<f64>,
+    pub(super) scale_std: Option<f64>,
+    pub(super) difference_percent: f64,
+    /// The commanded torque, with its constant.
+    pub(super) commanded: Vec<f64>,
+    /// Whether the difference matters.
+    pub(super) matters: bool,
+    /// Whether the control law is completely known, so that a difference without a cause is one.
+    pub(super) is_certain: bool,
+    /// All candidates, the best first; empty where the difference does not matter.
+    pub(super) candidates: Vec<Fitted>,
+}
+
+impl Explanation {
+    /// The candidate that is named.
+    pub(super) fn named(&self) -> Option<Fitted> {
+        let best = *self.candidates.first().filter(|best| best.explained >= LEAST_EXPLAINED)?;
+        let left = |of: &Fitted| 1.0 - of.explained;
+        let is_clear = self.candidates[1..].iter().all(|other| left(other) >= CLEARLY_BETTER * left(&best));
+        is_clear.then_some(best)
+    }
+}
+
+/// The torques and motions of all joints, row by row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JointData<'a> {
+    pub(super) task: &'a IterationTask,
+    pub(super) torque: &'a [Vec<f64>],
+    /// The first column is the commanded torque, or what is fed forward; further ones are the drives' own loop.
+    pub(super) columns: &'a [JointColumns],
+    pub(super) q: &'a [Vec<f64>],
+    pub(super) dq: &'a [Vec<f64>],
+}
+
+/// Compares one joint, and finds what explains a difference.
+pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheckSettings) -> Explanation {
+    let (y, columns) = (&data.torque[joint], &data.columns[joint]);
+    let size = rms(y).max(f64::MIN_POSITIVE);
+    let (first, own_loop) = columns.split_first().map_or((&[][..], &[][..]), |(first, rest)| (&first[..], rest));
+    // As it should be: the scale one, the drives' own loop as it fits.
+    let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
+    let difference = residual_of(own_loop, &beside, &coefficients(own_loop, &beside));
+    let total = square(&difference).max(f64::MIN_POSITIVE);
+    let free = coefficients(columns, y);
+    let std = jackknife(columns, y);
+    let (scale, scale_std) = (free[0], std[0]);
+    let is_scaled = (scale - 1.0).abs() > (0.01 * settings.scale_percent).max(settings.sigmas * scale_std);
+    // Drives that push away from the path would not follow it.
+    let by_error = own_loop.first().map_or(0.0, |error| free[1] * rms(error));
+    let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
+    let difference_percent = 100.0 * rms(&difference) / size;
+    let matters = is_scaled || pushes_away || difference_percent > settings.difference_percent;
+    let mut out = Explanation {
+        scale: scale_std.is_finite().then_some(scale),
+        scale_std: scale_std.is_finite().then_some(scale_std),
+        difference_percent,
+        commanded: y.iter().zip(&difference).map(|(y, r)| y - r).collect(),
+        matters,
+        is_certain: own_loop.is_empty(),
+        candidates: Vec::new(),
+    };
+    if !matters {
+        return out;
+    }
+    let fitted = |candidate, value, left: &[f64]| Fitted { candidate, value, explained: 1.0 - square(left) / total };
+    let mut candidates = Vec::new();
+    let left = residual_of(columns, y, &free);
+    if pushes_away {
+        candidates.push(Fitted { candidate: TorqueCandidate::Sign, value: -1.0, explained: 1.0 });
+    } else if scale_std.is_finite() {
+        let candidate = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
+        candidates.push(fitted(candidate, scale, &left));
+    }
+    candidates.extend(exchanged(data, joint, total));
+    // What is missing, beside the drives' own loop as it then fits.
+    let missing = |extra: &[Vec<f64>]| {
+        let all: Vec<Vec<f64>> = extra.iter().chain(own_loop).cloned().collect();
+        let found = coefficients(&all, &beside);
+        let left = residual_of(&all, &beside, &found);
+        let sum = |row: usize| -extra.iter().zip(&found).map(|(column, value)| column[row] * value).sum::<f64>();
+        ((0..y.len()).map(sum).collect::<Vec<f64>>(), left)
+    };
+    if let Some(gravity) = gravity_columns(data, joint) {
+        let (gravity, left) = missing(&gravity);
+        if is_of_nominal_size(data, joint, &gravity) {
+            candidates.push(fitted(TorqueCandidate::Gravity, 1.0, &left));
+        }
+    }
+    let (friction, left) = missing(&friction_columns(data, joint));
+    // Friction takes energy out.
+    if dot(&friction, &data.dq[joint]) > 0.0 {
+        candidates.push(fitted(TorqueCandidate::Friction, 1.0, &left));
+    }
+    candidates.extend(clipped(y, columns, total));
+    candidates.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+    // Another joint that explains the torque alike is no rival of the best one.
+    for one in candidates {
+        if !out.candidates.iter().any(|other| other.candidate == one.candidate) {
+            out.candidates.push(one);
+        }
+    }
+    out
+}
+
+/// What may be missing in the torque of each joint: its gravity, and its friction.
+pub(super) fn may_be_missing(data: &JointData<'_>) -> [Vec<Vec<Vec<f64>>>; 2] {
+    let joints = 0..data.torque.len();
+    let gravity = joints.clone().map(|joint| gravity_columns(data, joint).unwrap_or_default()).collect();
+    [gravity, joints.map(|joint| friction_columns(data, joint)).collect()]
+}
+
+/// Viscous friction, and steps of several widths.
+fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f64>> {
+    let dq = &data.dq[joint];
+    let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
+    if fastest == 0.0 {
+        return Vec::new();
+    }
+    let steps = STEP_WIDTHS.map(|width| dq.iter().map(|dq| (dq / (width * fastest)).tanh()).collect());
+    core::iter::once(dq.clone()).chain(steps).collect()
+}
+
+/// The torque of each other joint.
+fn exchanged(data: &JointData<'_>, joint: usize, total: f64) -> Vec<Fitted> {
+    let y = &data.torque[joint];
+    let of = |other: usize| {
+        let (theirs, own_loop) = data.columns[other].split_first()?;
+        let beside: Vec<f64> = y.iter().zip(theirs).map(|(y, u)| y - u).collect();
+        let left = residual_of(own_loop, &beside, &coefficients(own_loop, &beside));
+        let explained = 1.0 - square(&left) / total;
+        Some(Fitted { candidate: TorqueCandidate::Exchanged, value: other as f64, explained })
+    };
+    (0..data.torque.len()).filter(|&other| other != joint).filter_map(of).collect()
+}
+
+/// A limit of the torque. The gains of drives with their own loop follow from the rows below it.
+fn clipped(y: &[f64], columns: &[Vec<f64>], total: f64) -> Option<Fitted> {
+    let (first, own_loop) = columns.split_first()?;
+    let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    let below: Vec<usize> = (0..y.len()).filter(|&row| y[row].abs() < BELOW_LIMIT * highest).collect();
+    let kept = |values: &[f64]| -> Vec<f64> { below.iter().map(|&row| values[row]).collect() };
+    let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
+    let of_loop = coefficients(&own_loop.iter().map(|column| kept(column)).collect::<Vec<_>>(), &kept(&beside));
+    let commanded: Vec<f64> = residual_of(own_loop, &beside, &of_loop).iter().zip(y).map(|(r, y)| y - r).collect();
+    let most = commanded.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    let at = |share: usize| {
+        let limit = most * share as f64 / CLIP_SHARES as f64;
+        let left = centred(&y.iter().zip(&commanded).map(|(y, u)| y - u.clamp(-limit, limit)).collect::<Vec<_>>());
+        Fitted { candidate: TorqueCandidate::Clipped, value: limit, explained: 1.0 - square(&left) / total }
+    };
+    (1..CLIP_SHARES).map(at).max_by(|a, b| a.explained.total_cmp(&b.explained))
+}
+
+/// The columns of the joint's gravity torque for the mass and the first moments of each body.
+fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> {
+    let model = data.task.robot.model();
+    let (dof, count) = (model.dof(), model.inertial_count());
+    let mut workspace = Workspace::new(model);
+    let (mut q, rest) = (vec![0.0; dof], vec![0.0; dof]);
+    let rows = data.torque[joint].len();
+    let used: Vec<usize> = (0..count).filter(|column| column % 10 < 4).collect();
+    let mut columns = vec![vec![0.0; rows]; used.len()];
+    for row in 0..rows {
+        q.iter_mut().zip(data.q).for_each(|(to, from)| *to = from[row]);
+        let y = torque_regressor(model, &mut workspace, &q, &rest, &rest);
+        columns.iter_mut().zip(&used).for_each(|(to, &column)| to[row] = y[joint * count + column]);
+    }
+    columns.retain(|column| rms(&centred(column)) > 1e-9);
+    (!columns.is_empty()).then_some(columns)
+}
+
+/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
+/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
+fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
+    let robot = &data.task.robot;
+    let model = robot.model();
+    let mut workspace = Workspace::new(model);
+    let mut q = vec![0.0; model.dof()];
+    let nominal: Vec<f64> = (0..missing.len())
+        .map(|row| {
+            q.iter_mut().zip(data.q).for_each(|(to, from)| *to = from[row]);
+            gravity_torque(model, &mut workspace, &q)[joint]
+        })
+        .collect();
+    let (nominal, missing) = (centred(&nominal), centred(missing));
+    let own = square(&nominal);
+    own == 0.0 || (0.5..=2.0).contains(&(dot(&nominal, &missing) / own))
+}
+
+/// Standard deviation of each coefficient, by leaving out one time block after the other; infinite where the rows do not
+/// determine it.
+fn jackknife(columns: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
+    let rows = y.len();
+    if rows < 2 * BLOCKS {
+        return vec![f64::INFINITY; columns.len() + 1];
+    }
+    let without = |values: &[f64], block: usize| -> Vec<f64> {
+        let (from, to) = (block * rows / BLOCKS, (block + 1) * rows / BLOCKS);
+        values[..from].iter().chain(&values[to..]).copied().collect()
+    };
+    let found: Vec<Vec<f64>> = (0..BLOCKS)
+        .map(|block| {
+            let columns: Vec<Vec<f64>> = columns.iter().map(|column| without(column, block)).collect();
+            coefficients(&columns, &without(y, block))
+        })
+        .collect();
+    let count = BLOCKS as f64;
+    let std = |k: usize| {
+        let is_excited = columns.get(k).is_none_or(|column| rms(&centred(column)) > 1e-9 * rms(y));
+        let mean = found.iter().map(|values| values[k]).sum::<f64>() / count;
+        let square: f64 = found.iter().map(|values| (values[k] - mean).powi(2)).sum();
+        if is_excited { ((count - 1.0) / count * square).sqrt() } else { f64::INFINITY }
+    };
+    (0..=columns.len()).map(std).collect()
+}

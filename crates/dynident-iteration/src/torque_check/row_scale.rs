@@ -1,0 +1,132 @@
+//! What the parameters that several joints share show about the scale of each joint's torque.
+//!
+//! Masses and inertias of a body enter the torque of all joints before it. If the torque of one joint is scaled, its
+//! rows require other values of these parameters than the rows of the other joints. Around an estimate θ̂ the torque of
+//! joint j with the scale `1 + κ_j` is
+//!
+//! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
+//!
+//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
+//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint with the largest deviation
+//! in units of its bar is taken as wrong, and the others are tested again with its κ free. Parameters that one joint
+//! alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little with the
+//! others gets a wide bar.
+
+use crate::error::IterationError;
+use crate::estimate::RunEstimate;
+use crate::leg::IterationTask;
+use crate::run_logs::{RunLog, identification_settings, recordings};
+use crate::settings::{RunIdentificationSettings, Scheme};
+use dynident_estimation::{LinearProblem, WeightedSettings, weighted_least_squares};
+use dynident_identification::estimators::estimate;
+use dynident_identification::payload::with_free_gains;
+use dynident_identification::{Execution, Logs, RegressorModel, training_rows};
+
+/// A wider standard deviation says nothing.
+const WIDEST_STD: f64 = 0.3;
+/// Another joint that explains the rows nearly as well, by its deviation in bars as a share of the largest.
+const AS_LIKELY: f64 = 0.8;
+
+/// The scale of one joint's torque relative to the other joints.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RowScale {
+    pub(crate) value: f64,
+    pub(crate) std: f64,
+    /// Whether it is taken as wrong.
+    pub(crate) is_wrong: bool,
+    /// Joints whose scale explains the rows nearly as well, if it is wrong.
+    pub(crate) or: Vec<usize>,
+}
+
+/// The smallest deviation that counts: share of the torque, and number of standard deviations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeastDeviation {
+    pub(crate) share: f64,
+    pub(crate) sigmas: f64,
+}
+
+/// The relative torque scale of each joint by all `runs`; none where it is not determined. `task` is with the friction
+/// in force, `known` the estimate of these runs.
+///
+/// # Errors
+/// Records that do not belong to the task.
+pub(crate) fn row_scales(
+    task: &IterationTask,
+    runs: &[RunLog<'_>],
+    settings: &RunIdentificationSettings,
+    (known, least): (&RunEstimate, LeastDeviation),
+) -> Result<Vec<Option<RowScale>>, IterationError> {
+    let dof = task.robot.dof();
+    let cannot = settings.scheme != Scheme::AllJoints || !task.known.is_empty() || !settings.payloads.is_empty();
+    if cannot || dof < 2 {
+        return Ok(vec![None; dof]);
+    }
+    let motions = recordings(task, runs, settings)?;
+    let mut identification = identification_settings(task, settings, runs.len());
+    identification.friction.clear();
+    identification.motion.torque_lag_s = known.lag.taken_off();
+    let all: Vec<usize> = (0..motions.len()).collect();
+    let found = || {
+        let model = RegressorModel::from(task.robot.clone());
+        let execution = Execution::default();
+        let logs = Logs::new(task.robot.model(), &motions, identification.filters(), &all, None, execution).ok()?;
+        let training = training_rows((&logs, &identification), model, &all, &[], None).ok()?;
+        let found = estimate(&training.rows((&logs, &identification), &all), None).ok()?.estimate;
+        let mut out = vec![None; dof];
+        let scales = tested(&training.problem, &found.values, least);
+        for (&joint, mut scale) in training.joints.iter().zip(scales) {
+            if let Some(scale) = &mut scale {
+                scale.or.iter_mut().for_each(|other| *other = training.joints[*other]);
+            }
+            out[joint] = scale;
+        }
+        Some(out)
+    };
+    Ok(found().unwrap_or_else(|| vec![None; dof]))
+}
+
+/// Tests one joint after the other, by their places in the problem.
+fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec<Option<RowScale>> {
+    let joints = problem.joints().len();
+    let mut wrong: Vec<(usize, Vec<usize>)> = Vec::new();
+    loop {
+        let chosen: Vec<usize> = wrong.iter().map(|(joint, _)| *joint).collect();
+        let of_joint = |joint: usize| -> Option<(f64, f64)> {
+            let free: Vec<usize> =
+                if chosen.contains(&joint) { chosen.clone() } else { chosen.iter().copied().chain([joint]).collect() };
+            let place = free.iter().position(|&one| one == joint)?;
+            kappa(problem, values, &free, place)
+        };
+        let found: Vec<Option<(f64, f64)>> = (0..joints).map(of_joint).collect();
+        let bars = |joint: usize| found[joint].map_or(0.0, |(kappa, std)| kappa.abs() / std);
+        let counts = |&joint: &usize| {
+            found[joint].is_some_and(|(kappa, _)| kappa.abs() > least.share && bars(joint) > least.sigmas)
+        };
+        let open: Vec<usize> = (0..joints).filter(|joint| !chosen.contains(joint)).collect();
+        let worst = open.iter().copied().filter(counts).max_by(|&a, &b| bars(a).total_cmp(&bars(b)));
+        // More than half of the joints cannot all be wrong against the rest.
+        if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints) {
+            let is_rival = |&other: &usize| other != worst && bars(other) > AS_LIKELY * bars(worst);
+            wrong.push((worst, open.iter().copied().filter(is_rival).collect()));
+            continue;
+        }
+        let scale = |joint: usize| {
+            let (kappa, std) = found[joint]?;
+            let or = wrong.iter().find(|(one, _)| *one == joint).map(|(_, or)| or.clone());
+            Some(RowScale { value: 1.0 + kappa, std, is_wrong: or.is_some(), or: or.unwrap_or_default() })
+        };
+        return (0..joints).map(scale).collect();
+    }
+}
+
+/// κ of the joint `free[place]` with its standard deviation, where the joints `free` have one.
+fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<(f64, f64)> {
+    let columns = problem.columns().len();
+    let without_load = vec![vec![0.0; columns]; problem.logs().len()];
+    let wider = with_free_gains(problem.clone(), free, (&without_load, values)).ok()?;
+    let found = weighted_least_squares(&wider, &WeightedSettings::default()).ok()?;
+    let column = columns + place;
+    let std = found.std[column];
+    let is_fixed = found.rank.fixed.iter().any(|fixed| fixed.column == column);
+    (!is_fixed && std > 0.0 && std < WIDEST_STD).then(|| (found.values[column], std))
+}

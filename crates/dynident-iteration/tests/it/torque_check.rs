@@ -1,0 +1,211 @@
+//! The logged torque against the commanded one: every fault of a log is named, no correct log is doubted, and nothing
+//! converges on a wrong one.
+
+use super::simulated_arm::{self, Simulated, arm};
+use dynident_dynamics::{Workspace, gravity_torque};
+use dynident_iteration::{
+    Iteration, IterationOutcome, IterationSettings, Next, Robot, RobotRun, RunRequest, Shortfall, SimulatedRobot,
+    TorqueCause, iterate,
+};
+use dynident_simulation::controllers::PositionLoopSettings;
+use dynident_simulation::{ControllerSettings, Record, SensorSettings, SimulationError};
+
+/// A robot whose log is not what its drives did.
+struct Faulty<'a> {
+    inner: SimulatedRobot,
+    fault: &'a dyn Fn(&mut Record),
+}
+
+impl core::fmt::Debug for Faulty<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.inner.fmt(f)
+    }
+}
+
+impl Robot for Faulty<'_> {
+    fn name(&self) -> &'static str {
+        "faulty"
+    }
+
+    fn joints(&self) -> &[String] {
+        self.inner.joints()
+    }
+
+    fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
+        let mut run = self.inner.run(request)?;
+        (self.fault)(&mut run.record);
+        // A robot outside tells no truth.
+        Ok(RobotRun { truth: None, ..run })
+    }
+}
+
+fn iterated(simulated: &Simulated, settings: IterationSettings, fault: &dyn Fn(&mut Record)) -> IterationOutcome {
+    let iteration = Iteration::new(simulated_arm::task(), settings).unwrap();
+    let mut robot = Faulty { inner: simulated.robot(), fault };
+    iterate(&iteration, &mut [&mut robot], None, &mut |_, _| {}).unwrap()
+}
+
+/// Multiplies the torque of the joints.
+fn scaled(record: &mut Record, factors: [f64; 2]) {
+    for (joint, factor) in factors.into_iter().enumerate() {
+        let own = record.of(joint);
+        record.tau[own].iter_mut().for_each(|tau| *tau *= factor);
+    }
+}
+
+/// The torque of each joint of the true robot that holds it against gravity.
+fn without_gravity(record: &mut Record) {
+    let model = arm(1.0, Simulated::default().tip_kg);
+    let mut workspace = Workspace::new(&model);
+    for sample in 0..record.samples {
+        let q: Vec<f64> = (0..2).map(|joint| record.q[record.of(joint)][sample]).collect();
+        let gravity = gravity_torque(&model, &mut workspace, &q).to_vec();
+        for (joint, gravity) in gravity.into_iter().enumerate() {
+            let place = record.of(joint).start + sample;
+            record.tau[place] -= gravity;
+        }
+    }
+}
+
+/// What its drives lose by friction is missing.
+fn without_friction(record: &mut Record) {
+    let times = record.times_s.clone();
+    for (joint, (viscous, dry)) in [(0.8, 1.5), (0.5, 1.0)].into_iter().enumerate() {
+        let own = record.of(joint);
+        let q = record.q[own.clone()].to_vec();
+        for sample in 0..record.samples {
+            let (before, after) = (sample.saturating_sub(10), (sample + 10).min(record.samples - 1));
+            let speed = (q[after] - q[before]) / (times[after] - times[before]);
+            record.tau[own.start + sample] -= viscous * speed + dry * (speed / 0.1).tanh();
+        }
+    }
+}
+
+fn exchanged(record: &mut Record) {
+    let samples = record.samples;
+    let (first, second) = record.tau.split_at_mut(samples);
+    first.swap_with_slice(second);
+}
+
+fn cut(record: &mut Record) {
+    let own = record.of(0);
+    let most = record.tau[own.clone()].iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
+    record.tau[own].iter_mut().for_each(|tau| *tau = tau.clamp(-0.8 * most, 0.8 * most));
+}
+
+fn causes(outcome: &IterationOutcome) -> Vec<TorqueCause> {
+    let of = |unmet: &Shortfall| if let Shortfall::Torque(cause) = unmet { Some(cause.clone()) } else { None };
+    outcome.shortfalls.iter().filter_map(of).collect()
+}
+
+/// No fault, for sensors with noise, with a late feedback, and with a controller that differentiates its encoders: the
+/// check passes in every run, and its scales are one within a percent.
+#[test]
+fn correct_logs_pass() {
+    let noisy = Simulated::default().sensors;
+    let late = SensorSettings { feedback_delay_samples: 2, ..noisy.clone() };
+    for sensors in [noisy, late] {
+        let simulated = Simulated { sensors, ..Simulated::default() };
+        let outcome = iterated(&simulated, simulated_arm::settings(), &|_| {});
+        assert!(outcome.status.is_converged(), "{:?}", outcome.shortfalls);
+        for run in &outcome.runs {
+            let check = run.torque_check.as_ref().unwrap();
+            assert!(check.causes.is_empty(), "{check:?}");
+            for joint in &check.joints {
+                let (scale, std) = (joint.scale.unwrap(), joint.scale_std.unwrap());
+                assert!((scale - 1.0).abs() < 0.01 && std < 0.01, "{scale} ± {std}");
+                assert!(joint.difference_percent.unwrap() < 3.0, "{:?}", joint.difference_percent);
+            }
+        }
+    }
+}
+
+/// Each fault is named after the first run, and the model of its log never reaches a controller.
+#[test]
+fn a_wrong_torque_is_named_and_never_loaded() {
+    let named = |fault: &dyn Fn(&mut Record)| -> Vec<TorqueCause> {
+        let outcome = iterated(&Simulated::default(), simulated_arm::settings(), fault);
+        assert!(
+            !outcome.status.is_converged() && outcome.runs.len() == 1,
+            "{}: {:?}",
+            outcome.status,
+            outcome.shortfalls
+        );
+        causes(&outcome)
+    };
+    let joint = |k: usize| format!("joint{k}");
+    let both = || vec![joint(1), joint(2)];
+    for factor in [0.85, 0.95, 1.06] {
+        let [TorqueCause::Scale { joint: name, factor: found, half_width_95 }] =
+            &named(&|log| scaled(log, [1.0, factor]))[..]
+        else {
+            panic!("{factor}")
+        };
+        assert!(*name == joint(2) && (found - factor).abs() < half_width_95.max(0.01), "{found} ± {half_width_95}");
+        let [TorqueCause::CommonScale { factor: found }] = named(&|log| scaled(log, [factor; 2]))[..] else {
+            panic!("{factor}")
+        };
+        assert!((found - factor).abs() < 0.01, "{found}");
+    }
+    assert_eq!(named(&|log| scaled(log, [-1.0, 1.0])), [TorqueCause::Sign { joints: vec![joint(1)] }]);
+    assert_eq!(named(&|log| scaled(log, [-1.0, -1.0])), [TorqueCause::Sign { joints: both() }]);
+    assert_eq!(named(&without_gravity), [TorqueCause::Gravity { joints: both() }]);
+    assert_eq!(named(&without_friction), [TorqueCause::Friction { joints: both() }]);
+    let exchange = |joint, of| TorqueCause::Exchanged { joint, of };
+    assert_eq!(named(&exchanged), [exchange(joint(1), joint(2)), exchange(joint(2), joint(1))]);
+    assert!(matches!(&named(&cut)[..], [TorqueCause::Clipped { joint: name, .. }] if *name == joint(1)));
+    let drift = |log: &mut Record| log.times_s.iter_mut().for_each(|time| *time /= 1.003);
+    assert!(matches!(named(&drift)[..], [TorqueCause::Clock { percent }] if (percent - 0.3).abs() < 0.05));
+    let late = |log: &mut Record| {
+        let samples = log.samples;
+        for own in log.q.chunks_exact_mut(samples) {
+            own.copy_within(..samples - 10, 10);
+        }
+    };
+    assert!(matches!(named(&late)[..], [TorqueCause::Delay { lag_s }] if (lag_s + 0.02).abs() < 2e-3));
+}
+
+/// Torque that follows nothing known: it is said so, and no cause is claimed.
+#[test]
+fn a_difference_without_a_known_cause_has_none() {
+    let wave = |log: &mut Record| {
+        let own = log.of(1);
+        for (tau, time) in log.tau[own].iter_mut().zip(&log.times_s) {
+            *tau += 3.0 * (2.0 * core::f64::consts::TAU * time).sin();
+        }
+    };
+    let outcome = iterated(&Simulated::default(), simulated_arm::settings(), &wave);
+    assert!(!outcome.status.is_converged());
+    let found = causes(&outcome);
+    assert!(matches!(&found[..], [TorqueCause::Undetermined { joint, .. }] if joint == "joint2"), "{found:?}");
+}
+
+/// Drives that deliver less than their log states, and drives with their own loop: the parameters that both joints'
+/// torques share have other values in the rows of one of them.
+#[test]
+fn a_drive_that_delivers_less_is_found_by_the_other_joint() {
+    let mut settings = simulated_arm::settings();
+    settings.first = None;
+    let own = PositionLoopSettings {
+        kp: Some(4000.0.into()),
+        kd: Some(300.0.into()),
+        ..PositionLoopSettings::of_robot(true)
+    };
+    settings.controller = ControllerSettings::PositionLoop(own);
+    let outcome = iterated(&Simulated::default(), settings.clone(), &|_| {});
+    assert!(causes(&outcome).is_empty(), "{:?}", outcome.shortfalls);
+    let outcome = iterated(&Simulated::default(), settings, &|log| scaled(log, [1.0, 1.12]));
+    assert!(!outcome.status.is_converged());
+    let found = causes(&outcome);
+    assert!(!found.is_empty(), "{:?}", outcome.shortfalls);
+}
+
+/// What the records decide, and nothing else: a run with a wrong log ends the iteration, and says how to go on.
+#[test]
+fn after_a_wrong_log_no_run_is_planned() {
+    let iteration = Iteration::new(simulated_arm::task(), simulated_arm::settings()).unwrap();
+    let mut robot = Faulty { inner: Simulated::default().robot(), fault: &|log| scaled(log, [1.0, 0.8]) };
+    let outcome = iterate(&iteration, &mut [&mut robot], None, &mut |_, _| {}).unwrap();
+    let Next::Finished(status) = iteration.next(&outcome.runs).unwrap() else { panic!("a run is planned") };
+    assert!(status.to_string().contains("joint2") && status.to_string().contains("--fresh"), "{status}");
+}
