@@ -103,7 +103,7 @@ impl Decisions {
         let question = format!("{}:\n  {command}\nStart it?", request.purpose);
         let decision = self.is_allowed || agreed(&question).unwrap_or(false);
         if decision {
-            terminal::remark(&format!("started {}: {command}", request.purpose));
+            terminal::remark(&format!("starting {}: {command}", request.purpose));
         }
         self.made.borrow_mut().insert(request.command.clone(), decision);
         decision

@@ -97,7 +97,7 @@ fn xacro_starts_after_a_yes_on_the_terminal() {
     let mut permitted = OnTerminal::start(with_xacro(folder.path(), &new));
     permitted.awaits("Start it? [y/N]", 1);
     permitted.types("y\n");
-    permitted.awaits("note: started the program that expands the robot file: xacro arm.urdf", 1);
+    permitted.awaits("note: starting the program that expands the robot file: xacro arm.urdf", 1);
     while !folder.path().join("new.toml").exists() {
         // Lines of the new study that are not sure.
         permitted.types("\n");

@@ -111,7 +111,7 @@ fn permitted_macros_are_expanded_once_with_their_arguments() {
     let outcome = run_in(at, &["inspect", "arm.urdf", "--json", "--allow-command"]);
     assert_eq!(outcome.status, plain.status, "{}", outcome.stderr);
     assert_eq!(json(&outcome.stdout), json(&plain.stdout));
-    assert!(outcome.stderr.contains("note: started the program that expands the robot file: xacro arm.urdf\n"));
+    assert!(outcome.stderr.contains("note: starting the program that expands the robot file: xacro arm.urdf\n"));
     assert_eq!(starts(at), ["arm.urdf"]);
 
     let arguments = ["--xacro", "ur_type=ur5e", "--xacro", "note:=a b", "--xacro-limit-s", "20", "--allow-command"];
