@@ -57,13 +57,11 @@ impl StudyRobot {
     /// # Errors
     /// If the description cannot be read or contains macros, or names in the study are not in it.
     pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
-        let robot = match &study.robot.description {
-            Some(robot) => (**robot).clone(),
-            None => {
-                let path = folders.find(&study.robot.file, study.source.as_deref())?;
-                let settings = LoadSettings { xacro: study.robot.xacro_settings(), ..LoadSettings::default() };
-                load_robot(&path, &settings)?
-            }
+        let robot = if let Some(robot) = &study.robot.description {
+            (**robot).clone()
+        } else {
+            let path = folders.find(&study.robot.file, study.source.as_deref())?;
+            load_robot(&path, &LoadSettings { xacro: study.robot.xacro_settings(), ..LoadSettings::default() })?
         };
         let in_study = Error::study::<ModelError>(study_path);
 
