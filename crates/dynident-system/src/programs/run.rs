@@ -172,7 +172,8 @@ fn end_of(message: &str) -> String {
     message[start..].replace('\n', " ")
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::{ProgramPermission, ProgramPurpose, ProgramRequest};
