@@ -197,7 +197,8 @@ fn a_drive_that_delivers_less_is_found_by_the_other_joint() {
     let outcome = iterated(&Simulated::default(), settings, &|log| scaled(log, [1.0, 1.12]));
     assert!(!outcome.status.is_converged());
     let found = causes(&outcome);
-    assert!(!found.is_empty(), "{:?}", outcome.shortfalls);
+    let checks: Vec<_> = outcome.runs.iter().map(|run| run.torque_check.as_ref().map(|check| (check.feedback_delay_s, check.torque_lag_s, check.joints.iter().map(|j| (j.scale, j.scale_std, j.difference_percent, j.row_scale, j.row_scale_std)).collect::<Vec<_>>()))).collect();
+    assert!(!found.is_empty(), "{:?} {checks:?}", outcome.shortfalls);
 }
 
 /// What the records decide, and nothing else: a run with a wrong log ends the iteration, and says how to go on.

@@ -4,7 +4,9 @@
 use crate::simulated_arm::{Simulated, described, friction, iterated, settings, strokes_in_turn};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::robot::EnvelopeSettings;
-use dynident_iteration::{Iteration, IterationOutcome, IterationStatus, IterationTask, Shortfall, iterate};
+use dynident_iteration::{
+    Iteration, IterationOutcome, IterationStatus, IterationTask, Shortfall, TorqueCause, iterate,
+};
 use dynident_model::terms::CoulombShape;
 use dynident_simulation::controllers::JointPdSettings;
 use dynident_simulation::{ControllerSettings, RunLimits, SensorSettings};
@@ -143,7 +145,9 @@ fn a_long_lag_is_no_success() {
     let words = words(&outcome);
     assert!(!outcome.status.is_converged(), "{words}");
     let lags = outcome.shortfalls.iter().filter_map(|unmet| match unmet {
-        Shortfall::LongLag { lag_s, .. } | Shortfall::Lag { lag_s, .. } => Some(lag_s.abs()),
+        Shortfall::LongLag { lag_s, .. }
+        | Shortfall::Lag { lag_s, .. }
+        | Shortfall::Torque(TorqueCause::Delay { lag_s }) => Some(lag_s.abs()),
         _ => None,
     });
     assert!(lags.into_iter().any(|lag_s| (lag_s - 25e-3).abs() < 1e-3), "{words}");
