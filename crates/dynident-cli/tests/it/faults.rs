@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The library; `None`, with a line that says so, where there is no compiler.
+#[allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 fn library(folder: &Path) -> Option<PathBuf> {
     let library = folder.join("faults.so");
     let source = repository("crates/dynident-cli/tests/faults.c");
