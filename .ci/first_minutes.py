@@ -63,7 +63,10 @@ def with_macros(dynident, scratch):
     macros.write_text(text[:begin] + head + text[end + 1 :].replace("shoulder_lift_joint", "${lift}_joint"))
     assert "${lift}_joint" in macros.read_text()
     path = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    seen = [json.loads(called(dynident, "inspect", robot, "--json", path=path)) for robot in (ROBOT, macros)]
+    seen = [json.loads(called(dynident, "inspect", robot, "--json", "--allow-command", path=path)) for robot in (ROBOT, macros)]
+    # xacro runs Python code of the file: without permission nothing of it runs.
+    refused = subprocess.run([str(dynident), "inspect", str(macros)], capture_output=True, text=True)
+    assert refused.returncode == 2 and "--allow-command" in refused.stderr, refused.stderr
     for key in ["joints", "bodies", "base_parameters", "moving_mass_kg"]:
         assert seen[0][key] == seen[1][key], key
 

@@ -56,19 +56,21 @@ class Inspection:
         return "\n".join(lines) or f"{self.result['name']}: nothing stands against it"
 
 
-def inspect(robot: Robot | str | PathLike[str], *, total_mass_kg: float | None = None) -> Inspection:
+def inspect(
+    robot: Robot | str | PathLike[str], *, total_mass_kg: float | None = None, allow_command: bool = False
+) -> Inspection:
     """Reads and audits a robot's description as it was read (keys of ``[robot]`` are not in force): masses, centres of
     mass and inertias that cannot be, limits, slips of exporters; lists its base parameters.
 
     ``robot`` is a ``Robot`` or a description's path; ``total_mass_kg`` what all masses, the base's with them, should add
-    up to.
+    up to; ``allow_command`` as of ``Robot.load``.
 
     >>> import dynident
     >>> found = dynident.inspect("robots/ur10.urdf")
     >>> found.ok, len(found.base_parameters)
     (True, 36)
     """
-    own = robot if isinstance(robot, Robot) else Robot.load(robot)
+    own = robot if isinstance(robot, Robot) else Robot.load(robot, allow_command=allow_command)
     text, fixed = _native._inspect(own, total_mass_kg)
     return Inspection(json.loads(text), fixed)
 
@@ -81,6 +83,8 @@ class NewStudy:
     """``dynident new --json`` as a dictionary."""
     path: Path
     """Where it stands or would stand: files in it are as seen from there."""
+    allow_command: bool = False
+    """Whether the program ``xacro`` may expand its robot file."""
 
     @property
     def text(self) -> str:
@@ -100,7 +104,7 @@ class NewStudy:
 
     def study(self) -> Study:
         """The study, read."""
-        return Study.parse(self.text, self.path)
+        return Study.parse(self.text, self.path, allow_command=self.allow_command)
 
     def __str__(self) -> str:
         return self.text
@@ -113,6 +117,8 @@ def new(
     *,
     rate_hz: float | None = None,
     stated: Iterable[Mapping[str, Any]] = (),
+    xacro: Mapping[str, str] | None = None,
+    allow_command: bool = False,
     force: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -122,7 +128,8 @@ def new(
 
     With ``out`` it is written there, over what is there only with ``force``; without, it is as for ``study.toml`` in the
     working folder, and nothing is written. ``rate_hz`` is for recordings without times; ``stated`` are lines in place of
-    those that are not sure, as ``unsure`` proposes them: ``[line for one in found.unsure for line in one["proposed"]]``.
+    those that are not sure, as ``unsure`` proposes them: ``[line for one in found.unsure for line in one["proposed"]]``. A robot file with xacro macros needs ``allow_command=True``; ``xacro`` are arguments of the program
+    that expands them, ``{"ur_type": "ur5e"}``, and are written into the study.
 
     >>> import dynident
     >>> logs = ["examples/ur10_simulated/train.csv", "examples/ur10_simulated/test.csv"]
@@ -135,8 +142,18 @@ def new(
         raise StudyError(f"{place} is there already, and may hold what somebody wrote: give another out, or force=True")
     files = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
     lines = json.dumps([dict(line) for line in stated])
-    text = _native._new(fspath(robot), [fspath(file) for file in files], place, rate_hz, lines, threads, progress)
-    found = NewStudy(json.loads(text), place)
+    text = _native._new(
+        fspath(robot),
+        [fspath(file) for file in files],
+        place,
+        rate_hz,
+        lines,
+        dict(xacro or {}),
+        allow_command,
+        threads,
+        progress,
+    )
+    found = NewStudy(json.loads(text), place, allow_command)
     if out is not None:
         _native._write_files(place.parent, {place.name: found.text})
     return found

@@ -11,7 +11,7 @@ from typing import Any
 
 from . import _native
 from ._model import Model
-from ._native import ResultError, Robot, Run, Study, StudyError
+from ._native import ResultError, Robot, Run, Study
 from ._study import study as make_study
 
 RobotFunction = Callable[[Run], object]
@@ -62,8 +62,8 @@ def iterate(
     """Runs a robot again and again, each time with the better model, until all has settled.
 
     ``robot`` is a function that runs a robot under the controller of each ``Run`` it is given (``dynident.mujoco`` has
-    one for a MuJoCo model); without it the study says which: its simulation, a program, a folder. A program of a study
-    is started only with ``allow_command``. ``out`` keeps all runs: called again it goes on where it ended, unless
+    one for a MuJoCo model); without it the study says which: its simulation, a program, a folder. Programs that the
+    files name or need are started only with ``allow_command``. ``out`` keeps all runs: called again it goes on where it ended, unless
     ``resume`` is False. ``heard(run, largest tracking error)`` is called after every run. A robot that is a function
     needs gains that somebody stands for, or ``iteration={"bandwidth_hz": 2.0, ...}``, as every robot outside.
 
@@ -74,12 +74,8 @@ def iterate(
     elif isinstance(study, Robot):
         whole = make_study(study, **sections)
     else:
-        whole = Study.load(fspath(study))
+        whole = Study.load(fspath(study), allow_command=allow_command)
     if sections and not isinstance(study, Robot):
         raise TypeError(f"{', '.join(sections)}: a study has its sections already")
-    if robot is None and not allow_command:
-        choice = (json.loads(whole.to_json()).get("iteration") or {}).get("robot") or {}
-        if isinstance(choice, dict) and choice.get("command"):
-            raise StudyError(f"the study starts {' '.join(choice['command'])}: look at it, and give allow_command=True")
-    text = _native._iterate(whole, fspath(out), robot, resume, threads, heard)
+    text = _native._iterate(whole, fspath(out), robot, resume, allow_command, threads, heard)
     return Iteration(json.loads(text), Path(out), whole)

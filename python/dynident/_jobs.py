@@ -27,7 +27,9 @@ class ProblemWarning(UserWarning):
     """What stands against a result: whoever loads the model into a robot should know it."""
 
 
-def _study_of(study: Study | Robot | str | PathLike[str], logs: Log | Iterable[Log] | None, sections: Any) -> Study:
+def _study_of(
+    study: Study | Robot | str | PathLike[str], logs: Log | Iterable[Log] | None, sections: Any, allow_command: bool
+) -> Study:
     if isinstance(study, Study):
         if sections:
             raise TypeError(f"{', '.join(sections)}: a study has its sections already")
@@ -36,8 +38,8 @@ def _study_of(study: Study | Robot | str | PathLike[str], logs: Log | Iterable[L
         return make_study(study, () if logs is None else logs, **sections)
     path = fspath(study)
     if logs is None and not sections and path.endswith(".toml"):
-        return Study.load(path)
-    return make_study(Robot.load(path), () if logs is None else logs, **sections)
+        return Study.load(path, allow_command=allow_command)
+    return make_study(Robot.load(path, allow_command=allow_command), () if logs is None else logs, **sections)
 
 
 def _watched(progress: bool | Progress | None, job: Callable[[Progress | None], Found]) -> Found:
@@ -62,6 +64,7 @@ def identify(
     study: Study | Robot | str | PathLike[str],
     logs: Log | Iterable[Log] | None = None,
     *,
+    allow_command: bool = False,
     threads: int | None = None,
     progress: bool | Progress | None = None,
     **sections: Any,
@@ -72,11 +75,12 @@ def identify(
     as ``dynident.study`` takes them. The result is the same, bit for bit, as that of ``dynident identify`` for the
     same study, for any number of threads. What stands against the model is warned of as ``ProblemWarning`` and stands
     in ``Model.problems``. ``progress`` shows where the job is: by default on a terminal and in a notebook; a callable
-    hears ``(stage, rows done, rows in all or None)``.
+    hears ``(stage, rows done, rows in all or None)``. A path whose robot file has xacro macros needs ``allow_command=
+    True``: the program ``xacro`` expands them, and runs Python code of the file.
 
     Raises ``StudyError``, ``RobotError`` or ``LogError`` with file, place and what to do. Ctrl-C ends it.
     """
-    whole = _study_of(study, logs, sections)
+    whole = _study_of(study, logs, sections, allow_command)
     return _warned(Model(_watched(progress, lambda hear: _native._identify(whole, threads, hear))))
 
 
@@ -84,6 +88,7 @@ def check(
     study: Study | Robot | str | PathLike[str],
     logs: Log | Iterable[Log] | None = None,
     *,
+    allow_command: bool = False,
     threads: int | None = None,
     progress: bool | Progress | None = None,
     **sections: Any,
@@ -91,7 +96,7 @@ def check(
     """Examines a study against its robot and its logs before any fit is believed: units, signs, order of joints,
     mounting, clock, and more. Each finding names the key to write. Arguments as of ``identify``.
     """
-    whole = _study_of(study, logs, sections)
+    whole = _study_of(study, logs, sections, allow_command)
     return Check(json.loads(_watched(progress, lambda hear: _native._check(whole, threads, hear))))
 
 
@@ -172,13 +177,14 @@ def design(
     study: Study | Robot | str | PathLike[str],
     *,
     rate_hz: float | None = None,
+    allow_command: bool = False,
     threads: int | None = None,
     **sections: Any,
 ) -> Design:
     """Finds the motion that says most about a robot inside every limit. ``study`` is a ``Study``, the path of one, or a
     robot with sections (``design={...}``); ``rate_hz`` is the rate of the arrays.
     """
-    whole = _study_of(study, None, sections)
+    whole = _study_of(study, None, sections, allow_command)
     text, csv, svg, time_s, (q, dq, ddq) = _native._design(whole, rate_hz, threads)
     return Design(json.loads(text), csv, svg, time_s, q, dq, ddq)
 
@@ -204,12 +210,16 @@ class Simulation:
 
 
 def simulate(
-    study: Study | Robot | str | PathLike[str], *, threads: int | None = None, **sections: Any
+    study: Study | Robot | str | PathLike[str],
+    *,
+    allow_command: bool = False,
+    threads: int | None = None,
+    **sections: Any,
 ) -> Simulation:
     """Lets the simulated robot of a study (``[simulation]``) run its trajectory (``[iteration] trajectory``, or its
     ``[design]``) under its ``[controller]``.
     """
-    whole = _study_of(study, None, sections)
+    whole = _study_of(study, None, sections, allow_command)
     truth, csv = _native._simulate(whole, threads)
     header, _, body = csv.partition("\n")
     names = header.split(",")

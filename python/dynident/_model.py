@@ -32,10 +32,12 @@ class Model:
         self._native = native
 
     @classmethod
-    def load(cls, folder: str | PathLike[str], study: Study | str | PathLike[str]) -> Model:
+    def load(
+        cls, folder: str | PathLike[str], study: Study | str | PathLike[str], *, allow_command: bool = False
+    ) -> Model:
         """The model in a folder that ``dynident identify`` or ``save`` wrote, with its study."""
         place = Path(folder)
-        own = study if isinstance(study, Study) else Study.load(study)
+        own = study if isinstance(study, Study) else Study.load(study, allow_command=allow_command)
 
         def text(name: str) -> str | None:
             return (place / name).read_text(encoding="utf-8") if (place / name).is_file() else None

@@ -45,6 +45,8 @@ _Array = npt.NDArray[np.float64]
 _Samples = tuple[Sequence[str], Sequence[npt.NDArray[np.float64]]]
 
 class _RobotSettings(TypedDict, total=False):
+    xacro: Mapping[str, str]
+    xacro_limit_s: float
     joints: Sequence[str]
     lock: Mapping[str, float]
     drop: Sequence[str]
@@ -68,7 +70,9 @@ class StudyError(Error): ...
 @final
 class Robot:
     @staticmethod
-    def load(path: str | PathLike[str], **settings: Unpack[_RobotSettings]) -> Robot: ...
+    def load(
+        path: str | PathLike[str], *, allow_command: bool = False, **settings: Unpack[_RobotSettings]
+    ) -> Robot: ...
     @staticmethod
     def from_urdf(source: str | PathLike[str], **settings: Unpack[_RobotSettings]) -> Robot: ...
     @staticmethod
@@ -125,9 +129,9 @@ class Robot:
 @final
 class Study:
     @staticmethod
-    def load(path: str | PathLike[str]) -> Study: ...
+    def load(path: str | PathLike[str], *, allow_command: bool = False) -> Study: ...
     @staticmethod
-    def parse(text: str, path: str | PathLike[str] = ...) -> Study: ...
+    def parse(text: str, path: str | PathLike[str] = ..., *, allow_command: bool = False) -> Study: ...
     @staticmethod
     def _assemble(
         sections: str,
@@ -280,6 +284,7 @@ def _iterate(
     out: str | PathLike[str],
     robot: Callable[[Run], object] | None = None,
     resume: bool = False,
+    allow_command: bool = False,
     threads: int | None = None,
     heard: Callable[[int, float], object] | None = None,
 ) -> str: ...
@@ -290,6 +295,8 @@ def _new(
     out: str | PathLike[str],
     rate_hz: float | None = None,
     stated: str | None = None,
+    xacro: Mapping[str, str] | None = None,
+    allow_command: bool = False,
     threads: int | None = None,
     progress: _Progress | None = None,
 ) -> str: ...

@@ -22,10 +22,12 @@ def study(
     name: str | None = None,
     friction: str | None = None,
     estimator: str | Mapping[str, Any] | Callable[..., object] | None = None,
+    allow_command: bool = False,
     **sections: Any,
 ) -> Study:
     """A study of a robot and its logs.
 
+    ``allow_command`` lets the program ``xacro`` expand a robot file with macros, as of ``Robot.load``.
     ``friction`` is ``"auto"`` (chosen from the data, which is the default) or ``"stated"`` (that of ``drive``).
     ``estimator`` is a method's name or the keys of ``[estimator]``. Further keyword arguments are sections of a study
     by their names, each a mapping of its keys (a list of mappings where the study has ``[[...]]``): ``drive``,
@@ -52,7 +54,7 @@ def study(
     >>> own.log_names, "drive_inertia = true" in own.to_toml()
     ([], True)
     """
-    robot = robot if isinstance(robot, Robot) else Robot.load(robot)
+    robot = robot if isinstance(robot, Robot) else Robot.load(robot, allow_command=allow_command)
     logs = [logs] if isinstance(logs, Log) else list(logs)
     section: dict[str, Any] = {"file": fspath(robot.path), **json.loads(robot._settings)}
     drive = dict(sections.pop("drive", {}))

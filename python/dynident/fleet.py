@@ -79,6 +79,7 @@ def reduce(
     like: Model | None = None,
     arm: str | None = None,
     recorded_at: datetime | float | None = None,
+    allow_command: bool = False,
     segments: int = 16,
     threads: int | None = 1,
     progress: bool | Progress | None = False,
@@ -91,7 +92,7 @@ def reduce(
     say whose log it is; ``segments`` are kept of each log: error bars of few logs need many, of hundreds one will do.
     Other arguments as of ``dynident.identify``; one thread by default, for a fleet has a worker for each processor.
     """
-    whole = _study_of(study, logs, sections)
+    whole = _study_of(study, logs, sections, allow_command)
     seconds = _seconds(recorded_at)
     native = None if like is None else like._native
     return _watched(progress, lambda hear: _native._reduce(whole, native, arm, seconds, segments, threads, hear))

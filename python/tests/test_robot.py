@@ -14,6 +14,37 @@ from conftest import motion
 import dynident
 
 
+def test_a_robot_file_with_macros_needs_permission(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = (root / "robots" / "planar2r.urdf").read_text()
+    declared = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" '
+    arm = tmp_path / "arm.urdf"
+    arm.write_text(plain.replace("<robot ", declared, 1).replace("</robot>", '<xacro:property name="m" value="${1}"/></robot>'))
+    program = tmp_path / "xacro"
+    program.write_text(f"#!/bin/sh\necho \"$@\" >>'{tmp_path}/ran'\ncat '{root}/robots/planar2r.urdf'\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    study = tmp_path / "study.toml"
+    study.write_text('[robot]\nfile = "arm.urdf"\n')
+    for refused in [
+        lambda: dynident.Robot.load(arm),
+        lambda: dynident.Robot.from_urdf(arm),
+        lambda: dynident.inspect(arm),
+        lambda: dynident.study(arm),
+        lambda: dynident.design(study),
+        lambda: dynident.new(arm, tmp_path / "log.csv"),
+    ]:
+        with pytest.raises(dynident.RobotError, match="allow_command=True"):
+            refused()
+    assert not (tmp_path / "ran").exists()
+    robot = dynident.Robot.load(arm, allow_command=True, xacro={"ur_type": "ur5e"})
+    assert robot.joint_names == dynident.Robot.load(root / "robots" / "planar2r.urdf").joint_names
+    assert (tmp_path / "ran").read_text() == f"{arm} ur_type:=ur5e\n"
+    assert 'ur_type = "ur5e"' in dynident.study(robot).to_toml()
+    assert pickle.loads(pickle.dumps(robot)).joint_names == robot.joint_names
+    dynident.Study.load(study, allow_command=True)
+    assert len((tmp_path / "ran").read_text().splitlines()) == 2
+
+
 def test_shapes_follow_the_samples(ur10: dynident.Robot) -> None:
     q = np.random.default_rng(0).normal(size=(3, 4, 6))
     n, bodies = ur10.n, len(ur10.body_names)

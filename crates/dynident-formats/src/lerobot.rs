@@ -21,9 +21,8 @@ pub(crate) fn folder(path: &Path) -> Option<&Path> {
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let listed = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
         let io = |source| FileError::Io { file: folder.to_owned(), source };
-        let entries = std::fs::read_dir(folder).map_err(io)?;
-        let mut found =
-            entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>().map_err(io)?;
+        let names = dynident_system::names(folder).map_err(io)?;
+        let mut found: Vec<PathBuf> = names.into_iter().map(|name| folder.join(name)).collect();
         // Numbers in names have as many digits as they need beyond three or six.
         found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
         Ok(found)

@@ -1,7 +1,8 @@
 //! What stands in `runs/`, and what of it may be removed: only what an iteration wrote there.
 
 use crate::error::IterationError;
-use std::fs::{self, DirEntry};
+use dynident_system::names;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What a run's folder begins with until it is whole.
@@ -45,31 +46,30 @@ impl RunsFolder {
     pub(crate) fn look(runs: &Path) -> Result<Self, IterationError> {
         let (mut kept, mut planned, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
         let mut held_out = Vec::new();
-        for entry in fs::read_dir(runs).map_err(IterationError::file(runs))? {
-            let entry = entry.map_err(IterationError::file(runs))?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if name.starts_with(UNFINISHED) && is_folder(&entry) {
-                unfinished.push(entry.path());
+        for path in files(runs)? {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if name.starts_with(UNFINISHED) && is_folder(&path) {
+                unfinished.push(path);
             } else if let Some(number) = name.strip_prefix(RUN)
                 && number.parse::<usize>().is_ok()
             {
-                if !is_folder(&entry) || !entry.path().join(RUN_FILE).is_file() {
+                if !is_folder(&path) || !path.join(RUN_FILE).is_file() {
                     let problem = "stands where a run is to be kept, and no iteration wrote it: move it away";
-                    return Err(IterationError::State { path: entry.path(), problem: problem.to_owned() });
+                    return Err(IterationError::State { path, problem: problem.to_owned() });
                 }
-                kept.push(entry.path());
-            } else if name.starts_with(INTERRUPTED) && is_folder(&entry) {
-                kept.push(entry.path());
+                kept.push(path);
+            } else if name.starts_with(INTERRUPTED) && is_folder(&path) {
+                kept.push(path);
             } else if let Some(number) = name.strip_prefix(PLANNED)
                 && let Ok(number) = number.parse()
-                && is_folder(&entry)
+                && is_folder(&path)
             {
-                planned.push((number, entry.path()));
+                planned.push((number, path));
             } else if let Some(number) = name.strip_prefix(HELD_OUT)
                 && let Ok(number) = number.parse()
-                && is_folder(&entry)
+                && is_folder(&path)
             {
-                held_out.push((number, entry.path()));
+                held_out.push((number, path));
             }
         }
         Ok(Self { runs: runs.to_owned(), kept, planned, held_out, unfinished })
@@ -147,13 +147,13 @@ impl RunsFolder {
 }
 
 /// A folder itself, not a link to one.
-fn is_folder(entry: &DirEntry) -> bool {
-    entry.file_type().is_ok_and(|kind| kind.is_dir())
+fn is_folder(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|found| found.is_dir())
 }
 
 fn files(folder: &Path) -> Result<Vec<PathBuf>, IterationError> {
-    let entries = fs::read_dir(folder).map_err(IterationError::file(folder))?;
-    entries.map(|entry| Ok(entry.map_err(IterationError::file(folder))?.path())).collect()
+    let names = names(folder).map_err(IterationError::file(folder))?;
+    Ok(names.into_iter().map(|name| folder.join(name)).collect())
 }
 
 /// Whether it is a file by a name that an iteration gives.

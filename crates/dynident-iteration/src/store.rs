@@ -14,6 +14,7 @@ use crate::runs_folder::{
 };
 use crate::sealed::{sealed_json, unsealed};
 use dynident_simulation::Record;
+use dynident_system::TemporaryFolder;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::Write;
@@ -300,10 +301,7 @@ impl IterationStore {
         runs: &[RobotRun],
         motion: Option<&RunMotion>,
     ) -> Result<(), IterationError> {
-        let fresh = tempfile::Builder::new()
-            .prefix(UNFINISHED)
-            .tempdir_in(&self.runs)
-            .map_err(IterationError::file(&self.runs))?;
+        let fresh = TemporaryFolder::create_in(&self.runs, UNFINISHED).map_err(IterationError::file(&self.runs))?;
         for (leg, run) in runs.iter().enumerate() {
             write_synced(&fresh.path().join(log_name(leg)), run.record.csv().as_bytes())?;
             for (way, record) in run.ways.iter().flat_map(|ways| WAYS.into_iter().zip([&ways.approach, &ways.back])) {

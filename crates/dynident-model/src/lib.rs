@@ -86,7 +86,10 @@ pub use loops::{LoopClosure, LoopError};
 pub use mjcf::{MjcfError, MjcfFault, MjcfNotice, MjcfRobot, MjcfWriteError, read_mjcf, read_mjcf_with, rewrite_mjcf};
 pub use own_scale::OwnScale;
 pub use place::{Located, line_and_column};
-pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot, read_robot};
+pub use read::{
+    DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, has_xacro_macros, load_robot, load_robot_with,
+    read_robot,
+};
 pub use sdf::{SdfError, SdfFault, SdfLoss, SdfNotice, SdfRobot, SdfWriteError, read_sdf, rewrite_sdf};
 pub use spatial::{Mat3, Transform, Vec3};
 pub use steps::{Hang, JointStep, StepRotation};

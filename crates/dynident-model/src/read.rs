@@ -6,7 +6,7 @@ use crate::place::line_and_column;
 use crate::sdf::{SdfError, SdfNotice, is_sdf, read_sdf};
 use crate::tree::Model;
 use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
-use crate::xacro::{XacroFailure, has_macros, written_out};
+use crate::xacro::has_macros;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -36,7 +36,8 @@ pub struct Robot {
     pub format: DescriptionFormat,
     /// The file.
     pub path: PathBuf,
-    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes; of macros what they write out.
+    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes; of a file with xacro macros the expanded
+    /// text.
     pub text: String,
     /// Elements of a URDF that were not read.
     pub unread: Vec<UnreadElement>,
@@ -94,13 +95,12 @@ pub enum ReadError {
         /// What to do.
         fix: &'static str,
     },
-    /// The program that writes out macros says that it cannot.
-    #[error("{}: xacro cannot write it out: {reason}; fix what it names, or give the URDF", path.display())]
-    Xacro {
+    /// The file contains xacro macros. xacro evaluates Python expressions of the file, so that this crate does not
+    /// start it.
+    #[error("{}: the file contains xacro macros: expand it first (`xacro robot.urdf.xacro > robot.urdf`)", path.display())]
+    Macros {
         /// The file.
         path: PathBuf,
-        /// What the program says.
-        reason: String,
     },
     /// The URDF is faulty.
     #[error("{}:{source}", path.display())]
@@ -138,29 +138,46 @@ pub enum ReadError {
 
 /// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF
 /// if its root element is `<mujoco>`, as SDF if it is `<sdf>`, else as URDF. Files that an MJCF includes are looked for
-/// from its folder. A file with macros is written out by the program `xacro` where that is installed.
+/// from its folder. No program is started: a file with xacro macros is refused.
 ///
 /// # Errors
-/// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the
-/// file.
+/// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty or contains xacro macros;
+/// every message names the file.
 #[doc(alias("urdf", "mjcf", "mujoco", "denavit-hartenberg"))]
 pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
-    let path = path.as_ref();
+    load_robot_with(path.as_ref(), |path| Err(ReadError::Macros { path: path.to_owned() }))
+}
+
+/// As [`load_robot`]; `expand` gives the expanded text of a file with xacro macros, and is called for no other.
+///
+/// # Errors
+/// As [`load_robot`], and those of `expand`.
+pub fn load_robot_with<E: From<ReadError>>(
+    path: &Path,
+    expand: impl FnOnce(&Path) -> Result<String, E>,
+) -> Result<Robot, E> {
+    let text = description_text(path)?;
+    let text = if has_macros(&text) { expand(path)? } else { text };
+    Ok(read_robot(text, path)?)
+}
+
+/// Whether a robot file contains xacro macros, so that only the program `xacro` can expand it.
+///
+/// # Errors
+/// If the file cannot be read, is too large, no UTF-8, or another kind of file.
+pub fn has_xacro_macros(path: &Path) -> Result<bool, ReadError> {
+    Ok(has_macros(&description_text(path)?))
+}
+
+/// The text of a robot file.
+fn description_text(path: &Path) -> Result<String, ReadError> {
     let named = || path.to_owned();
     let bytes = bounded(path)?;
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     if let Some((what, fix)) = other_kind(&bytes, extension.as_deref()) {
         return Err(ReadError::NoDescription { path: named(), what, fix });
     }
-    let mut text = decode(bytes, path)?;
-    if has_macros(&text) {
-        let written_out = written_out(path, MAX_DESCRIPTION_BYTES).map_err(|failure| match failure {
-            XacroFailure::TooLarge => ReadError::TooLarge { path: named() },
-            XacroFailure::Refused(reason) => ReadError::Xacro { path: named(), reason },
-        })?;
-        text = written_out.unwrap_or(text);
-    }
-    read_robot(text, path)
+    decode(bytes, path)
 }
 
 /// Reads the text of a robot description; what it is written in is told as by [`load_robot`], from the extension of
@@ -168,8 +185,7 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
 /// need not exist.
 ///
 /// # Errors
-/// If the text is empty or faulty; every message names `path`. Macros are refused: [`load_robot`] of a file has the
-/// program that writes them out.
+/// If the text is empty or faulty; every message names `path`. Macros are refused.
 pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
     let named = || path.to_owned();
     if text.trim_start_matches('\u{feff}').trim().is_empty() {

@@ -29,6 +29,7 @@ pub use piece::{Deviation, PaperCell, PaperFigure, PaperPicture, PaperReference,
 use arm::Arm;
 use deviations::deviations;
 use dynident::{Error, OutputSet, RunOptions, check_writable};
+use dynident_system::TemporaryFolder;
 use joint_runs::JointRuns;
 use references::references;
 use serde::{Deserialize, Serialize};
@@ -99,7 +100,7 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
     let done = || options.progress.end();
     stage("1 of 5: base parameters and strokes");
     // The studies are read as a user's own would be, and appear with everything else in the end.
-    let folder = tempfile::tempdir().map_err(|source| Error::Output { path: std::env::temp_dir(), source })?;
+    let folder = TemporaryFolder::new().map_err(|source| Error::Output { path: std::env::temp_dir(), source })?;
     let arm = Arm::written(folder.path())?;
     let (table_2, difference) = base_parameters::table_2(&arm);
     done();

@@ -46,10 +46,11 @@ pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
         Job::StudyAt { path, line, column, .. } => {
             (StudyError::new_err(message), Some(path), Some(u64::from(*line)), Some(*column))
         }
-        Job::Study { path, .. } | Job::Identification { path, .. } => {
+        Job::Study { path, .. } | Job::Identification { path, .. } | Job::NotPermitted { path, .. } => {
             (StudyError::new_err(message), Some(path), None, None)
         }
         Job::Robot(_) => (RobotError::new_err(message), None, None, None),
+        Job::Xacro { path, .. } => (RobotError::new_err(message), Some(path), None, None),
         Job::Recording { .. } | Job::NewStudy(_) => (LogError::new_err(message), None, None, None),
         Job::States { path, line, .. } => (LogError::new_err(message), Some(path), Some(*line), None),
         Job::Missing { file, .. } => (StudyError::new_err(message), Some(file), None, None),

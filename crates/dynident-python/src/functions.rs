@@ -5,7 +5,7 @@ use crate::errors;
 use crate::function_robot::{Raised, robot_of};
 use crate::jobs::{Watch, run, run_to_its_stop, threads as threads_or_all};
 use crate::model::{FittedModel, RESULT};
-use crate::robot::Robot;
+use crate::robot::{Robot, described};
 use crate::study::Study;
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
@@ -13,9 +13,9 @@ use dynident::excitation::export::{ExportError, Sampled, trajectory_csv};
 use dynident::iteration::{RobotRun, RunRecord, StopSignal};
 use dynident::result::StudyChange;
 use dynident::{
-    Error, InspectSettings, IterationWatch, MendedDescription, NewStudy, OutputSet, RunOptions, check, design_study,
-    identify, inspect_robot, iterate_study, iterate_with_robot, log_contents, mended_robot, new_study, simulate_study,
-    validate_result,
+    Error, InspectSettings, IterationWatch, MendedDescription, NewStudy, OutputSet, ProgramPermission, RunOptions,
+    XacroSettings, check, design_study, identify, inspect_robot, iterate_study, iterate_with_robot, log_contents,
+    mended_robot, new_study, simulate_study, validate_result,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -131,13 +131,15 @@ pub(crate) fn _simulate(study: &Bound<'_, Study>, threads: Option<usize>) -> PyR
 /// Iterates a study's robot, or a function in its place, into the folder `out`: JSON. `heard` is called after every run
 /// with its number and its largest tracking error, rad (m).
 #[pyfunction]
-#[pyo3(signature = (study, out, robot=None, resume=false, threads=None, heard=None))]
+#[pyo3(signature = (study, out, robot=None, resume=false, allow_command=false, threads=None, heard=None))]
+#[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn _iterate(
     py: Python<'_>,
     study: &Bound<'_, Study>,
     out: PathBuf,
     robot: Option<Py<PyAny>>,
     resume: bool,
+    allow_command: bool,
     threads: Option<usize>,
     heard: Option<Py<PyAny>>,
 ) -> PyResult<String> {
@@ -157,7 +159,8 @@ pub(crate) fn _iterate(
                 }));
             }
         };
-        let mut watch = IterationWatch { design: &design, run: &mut made, stop: asked.clone(), allow: None };
+        let programs = ProgramPermission::from_flag(allow_command);
+        let mut watch = IterationWatch { stop: asked.clone(), programs, ..IterationWatch::new(&design, &mut made) };
         let file = match robot {
             None => iterate_study(&study, &path, &out, resume, &options, &mut watch),
             Some(function) => {
@@ -198,7 +201,7 @@ pub(crate) fn _inspect(
 /// Writes the text of a study from a robot's file and recordings, as seen from `out`: JSON. `stated` are lines that a
 /// person states: JSON.
 #[pyfunction]
-#[pyo3(signature = (robot, logs, out, rate_hz=None, stated=None, threads=None, progress=None))]
+#[pyo3(signature = (robot, logs, out, rate_hz=None, stated=None, xacro=None, allow_command=false, threads=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn _new(
     py: Python<'_>,
@@ -207,13 +210,17 @@ pub(crate) fn _new(
     out: PathBuf,
     rate_hz: Option<f64>,
     stated: Option<&str>,
+    xacro: Option<BTreeMap<String, String>>,
+    allow_command: bool,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
     let stated: Option<Vec<StudyChange>> = stated.map(serde_json::from_str).transpose().map_err(|error| {
         errors::StudyError::new_err(format!("stated: {error}; give lines as `proposed` of `unsure` has them"))
     })?;
-    let request = NewStudy { robot, logs, out, rate_hz, stated: stated.unwrap_or_default() };
+    let xacro = XacroSettings { arguments: xacro.unwrap_or_default(), ..XacroSettings::default() };
+    let description = Some(Box::new(described(py, &robot, xacro.clone(), allow_command)?));
+    let request = NewStudy { robot, description, xacro, logs, out, rate_hz, stated: stated.unwrap_or_default() };
     let threads = threads_or_all(threads);
     run(py, threads, progress, move |watch| {
         json(&new_study(&request, &RunOptions { data: None, threads, progress: watch })?)

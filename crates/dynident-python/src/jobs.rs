@@ -6,6 +6,7 @@ use dynident::iteration::StopSignal;
 use dynident::{Error, Progress};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -67,6 +68,21 @@ impl Progress for Watch {
 /// Threads that a job may take: as many as asked for, else as there are processors.
 pub(crate) fn threads(asked: Option<usize>) -> usize {
     asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1)
+}
+
+/// Calls `job` on this thread. Ctrl-C makes the function that it is given return true, and is raised afterwards.
+pub(crate) fn interruptible<T>(py: Python<'_>, job: impl FnOnce(&dyn Fn() -> bool) -> Result<T, Error>) -> PyResult<T> {
+    let interrupted = RefCell::new(None);
+    let outcome = job(&|| {
+        if let Err(interruption) = py.check_signals() {
+            *interrupted.borrow_mut() = Some(interruption);
+        }
+        interrupted.borrow().is_some()
+    });
+    match interrupted.take() {
+        Some(interruption) => Err(interruption),
+        None => outcome.map_err(|error| errors::job(py, &error)),
+    }
 }
 
 /// As [`run`], where Ctrl-C asks `stop` first and the job is waited for: a robot is not left moving. A second one

@@ -4,13 +4,14 @@ use crate::arrays::{Motion, array, joint_major};
 use crate::assembled::{assembled, json_of};
 use crate::callables::Callables;
 use crate::errors;
+use crate::jobs::interruptible;
 use dynident::dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, Workspace, all_columns,
     forward_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, mass_matrix, regressor_panels,
 };
 use dynident::model::terms::JointMotion;
-use dynident::model::{DescriptionFormat, Model, Robot as Description, load_robot, read_robot};
-use dynident::{Folders, StudyRobot};
+use dynident::model::{DescriptionFormat, Model, Robot as Description, read_robot};
+use dynident::{Folders, LoadSettings, ProgramPermission, StudyRobot, XacroSettings, load_robot};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -58,9 +59,22 @@ impl Robot {
         self.base.get_or_init(|| BaseParameters::new(&self.model, &[], &BaseParameterSettings::default()))
     }
 
-    /// The description with the keys of ``[robot]`` in force.
-    fn new(py: Python<'_>, description: Description, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    /// A description of one format with the keys of ``[robot]`` in force: `source` is its text if it holds one, else
+    /// the file's path.
+    fn new(
+        py: Python<'_>,
+        source: &Path,
+        (wanted, name): (DescriptionFormat, &str),
+        is_text: impl FnOnce(&str) -> bool,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
         let settings = settings.map_or_else(|| Ok("{}".to_owned()), |settings| json_of(py, settings))?;
+        let text = source.to_string_lossy();
+        let description = if is_text(&text) {
+            of_text(&text, wanted, name)?
+        } else {
+            of_format(described(py, source, xacro_settings(source, &settings)?, false)?, wanted)?
+        };
         Self::with_settings(py, description, settings)
     }
 
@@ -145,18 +159,33 @@ fn study_of(path: &Path, settings: &str) -> PyResult<String> {
     serde_json::to_string(&serde_json::json!({ "robot": section })).map_err(wrong)
 }
 
-/// A description of the format `wanted`: `source` is its text if it holds one, else the file's path.
-fn described(
-    source: &str,
-    wanted: DescriptionFormat,
-    name: &str,
-    is_text: impl FnOnce(&str) -> bool,
+/// Reads a robot file; the program `xacro` expands one with macros if that is allowed. Ctrl-C stops it.
+pub(crate) fn described(
+    py: Python<'_>,
+    path: &Path,
+    xacro: XacroSettings,
+    allow_command: bool,
 ) -> PyResult<Description> {
-    let found = if is_text(source) {
-        read_robot(source.to_owned(), Path::new(name)).map_err(errors::robot)?
-    } else {
-        load_robot(source).map_err(errors::robot)?
-    };
+    let programs = ProgramPermission::from_flag(allow_command);
+    interruptible(py, |is_stopped| load_robot(path, &LoadSettings { xacro, programs, is_stopped: Some(is_stopped) }))
+}
+
+/// The arguments of xacro among the keys of ``[robot]``.
+fn xacro_settings(path: &Path, settings: &str) -> PyResult<XacroSettings> {
+    let wrong = |error: serde_json::Error| errors::RobotError::new_err(error.to_string());
+    let settings: serde_json::Map<String, serde_json::Value> = serde_json::from_str(settings).map_err(wrong)?;
+    let own = settings.into_iter().filter(|(key, _)| key.starts_with("xacro"));
+    let own = serde_json::to_string(&own.collect::<serde_json::Map<_, _>>()).map_err(wrong)?;
+    let study = dynident::Study::from_json(&study_of(path, &own)?, path);
+    Ok(study.map_err(|error| errors::StudyError::new_err(error.to_string()))?.robot.xacro_settings())
+}
+
+/// The text of a description of the format `wanted`.
+fn of_text(text: &str, wanted: DescriptionFormat, name: &str) -> PyResult<Description> {
+    of_format(read_robot(text.to_owned(), Path::new(name)).map_err(errors::robot)?, wanted)
+}
+
+fn of_format(found: Description, wanted: DescriptionFormat) -> PyResult<Description> {
     if found.format == wanted {
         Ok(found)
     } else {
@@ -181,44 +210,49 @@ fn in_blocks(out: &mut [f64], size: usize, each: impl Fn((usize, &mut [f64])) + 
 
 #[pymethods]
 impl Robot {
-    /// Reads a description: URDF, MJCF, SDF or a D-H table in TOML, told by its content.
+    /// Reads a description: URDF, MJCF, SDF or a D-H table in TOML, recognised by its content. The program ``xacro``
+    /// expands a file with macros only with ``allow_command=True``: it runs Python code of the file. Its arguments are
+    /// ``xacro={"ur_type": "ur5e"}``.
     #[staticmethod]
-    #[pyo3(signature = (path, **settings))]
-    fn load(py: Python<'_>, path: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        Self::new(py, load_robot(&path).map_err(errors::robot)?, settings)
+    #[pyo3(signature = (path, *, allow_command=false, **settings))]
+    fn load(
+        py: Python<'_>,
+        path: PathBuf,
+        allow_command: bool,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let settings = settings.map_or_else(|| Ok("{}".to_owned()), |settings| json_of(py, settings))?;
+        let description = described(py, &path, xacro_settings(&path, &settings)?, allow_command)?;
+        Self::with_settings(py, description, settings)
     }
 
     /// A robot of a URDF: a path, or the text itself.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_urdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let source = source.to_string_lossy();
-        Self::new(py, described(&source, DescriptionFormat::Urdf, "robot.urdf", is_xml)?, settings)
+        Self::new(py, &source, (DescriptionFormat::Urdf, "robot.urdf"), is_xml, settings)
     }
 
     /// A robot of MuJoCo's MJCF: a path, or the text itself.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_mjcf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let source = source.to_string_lossy();
-        Self::new(py, described(&source, DescriptionFormat::Mjcf, "robot.xml", is_xml)?, settings)
+        Self::new(py, &source, (DescriptionFormat::Mjcf, "robot.xml"), is_xml, settings)
     }
 
     /// A robot of Gazebo's SDF: a path, or the text itself.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_sdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let source = source.to_string_lossy();
-        Self::new(py, described(&source, DescriptionFormat::Sdf, "robot.sdf", is_xml)?, settings)
+        Self::new(py, &source, (DescriptionFormat::Sdf, "robot.sdf"), is_xml, settings)
     }
 
     /// A robot of a Denavit-Hartenberg table in TOML: a path, or the text itself, which has more than one line.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_dh(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let source = source.to_string_lossy();
         let is_text = |source: &str| source.contains('\n');
-        Self::new(py, described(&source, DescriptionFormat::Dh, "robot.toml", is_text)?, settings)
+        Self::new(py, &source, (DescriptionFormat::Dh, "robot.toml"), is_text, settings)
     }
 
     /// The inverse of ``__reduce__``.

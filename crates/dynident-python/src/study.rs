@@ -4,7 +4,9 @@ use crate::arrays::array;
 use crate::assembled::assembled;
 use crate::callables::Callables;
 use crate::errors;
+use crate::jobs::interruptible;
 use crate::robot::Robot;
+use dynident::ProgramPermission;
 use dynident::model::read_robot;
 use dynident::recording::{LogSource, MemoryLog};
 use numpy::{PyArrayDyn, PyReadonlyArray1};
@@ -31,6 +33,17 @@ pub(crate) struct Study {
 }
 
 impl Study {
+    /// A study as read. Its robot file is expanded if it has macros and that is allowed; where it is not, the job that
+    /// needs the robot reports it.
+    fn read(py: Python<'_>, mut study: dynident::Study, path: PathBuf, allow_command: bool) -> PyResult<Self> {
+        if allow_command {
+            interruptible(py, |is_stopped| {
+                study.expand_robot(&path, None, ProgramPermission::Allow, Some(is_stopped))
+            })?;
+        }
+        Ok(Self { study, path, callables: Callables::default() })
+    }
+
     /// The study and where it stands, as jobs take it on another thread.
     pub(crate) fn owned(&self) -> (dynident::Study, PathBuf) {
         (self.study.clone(), self.path.clone())
@@ -39,19 +52,22 @@ impl Study {
 
 #[pymethods]
 impl Study {
-    /// Reads a study file.
+    /// Reads a study file. With ``allow_command=True`` the program ``xacro`` expands its robot file if that has macros:
+    /// xacro runs Python code of the file.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (path, *, allow_command=false))]
+    fn load(py: Python<'_>, path: PathBuf, allow_command: bool) -> PyResult<Self> {
         let study = dynident::Study::load(&path).map_err(|error| errors::job(py, &error))?;
-        Ok(Self { study, path, callables: Callables::default() })
+        Self::read(py, study, path, allow_command)
     }
 
     /// Reads the text of a study; files that it names are looked for beside ``path``, which need not exist.
+    /// ``allow_command`` as of ``load``.
     #[staticmethod]
-    #[pyo3(signature = (text, path=PathBuf::from("<study>")))]
-    fn parse(py: Python<'_>, text: &str, path: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (text, path=PathBuf::from("<study>"), *, allow_command=false))]
+    fn parse(py: Python<'_>, text: &str, path: PathBuf, allow_command: bool) -> PyResult<Self> {
         let study = dynident::Study::parse(text, &path).map_err(|error| errors::job(py, &error))?;
-        Ok(Self { study, path, callables: Callables::default() })
+        Self::read(py, study, path, allow_command)
     }
 
     /// Sections as JSON, with a robot and with samples in memory: one entry for each log, None for one in a file.

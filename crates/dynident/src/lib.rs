@@ -44,6 +44,7 @@
 
 #[cfg(doctest)]
 pub mod book;
+mod clock;
 mod cpu_time;
 mod digest;
 mod error;
@@ -54,6 +55,7 @@ mod output;
 mod output_set;
 mod pages;
 pub mod result;
+mod robot_file;
 pub mod study;
 
 pub use dynident_dynamics as dynamics;
@@ -67,10 +69,12 @@ pub use dynident_online as online;
 pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 pub use dynident_text as text;
+pub use dynident_system as system;
 
 pub use dynident_files::shortened;
 pub use dynident_identification::{Progress, Role, Silent};
-pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError};
+pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
+pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};
 pub use jobs::check::check;
@@ -97,4 +101,5 @@ pub use pages::identification::identification_report;
 pub use result::{
     CheckFile, DesignFile, Inspection, IterationsFile, LogContents, ResultFile, SimulationFile, ValidationFile,
 };
+pub use robot_file::{LoadSettings, XacroSettings, load_robot};
 pub use study::{Folders, Study, StudyRobot};

@@ -1,39 +1,21 @@
 //! Files appear whole or not at all.
 
 use crate::error::Error;
-use std::io::Write;
 use std::path::Path;
 
-/// Writes `contents` to `path` by way of a temporary file in the same folder: a reader sees the old file or the new
-/// one, never a half of one, and an error leaves what was there.
+/// Writes `contents` to `path` through a temporary file in the same folder: a reader finds the old file or the new one,
+/// never a part, and an error leaves what was there. Temporary files of this file that killed writers left are removed.
 ///
 /// # Errors
 /// [`Error::Output`] with the system's reason.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Error> {
-    let cannot = |source| Error::Output { path: path.to_owned(), source };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(cannot)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(cannot)?;
-    file.write_all(contents).map_err(cannot)?;
-    file.as_file().sync_all().map_err(cannot)?;
-    // A temporary file is private to its owner; a result is for everybody whom the folder lets in.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(cannot)?;
-    }
-    file.persist(path).map_err(|error| cannot(error.error))?;
-    Ok(())
+    dynident_system::write_whole(path, contents).map_err(|source| Error::Output { path: path.to_owned(), source })
 }
 
-/// Finds out before a long job whether [`write_whole`] will be able to write into `folder`, which need not exist yet.
-/// Leaves nothing behind.
+/// Tests before a long job whether [`write_whole`] can write into `folder`, which need not exist yet. Leaves nothing.
 ///
 /// # Errors
 /// [`Error::Output`] with the system's reason.
 pub fn check_writable(folder: &Path) -> Result<(), Error> {
-    let cannot = |source| Error::Output { path: folder.to_owned(), source };
-    let nearest = folder.ancestors().find(|ancestor| ancestor.exists() || ancestor.as_os_str().is_empty());
-    let nearest = nearest.filter(|ancestor| !ancestor.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    tempfile::NamedTempFile::new_in(nearest).map(drop).map_err(cannot)
+    dynident_system::check_writable(folder).map_err(|source| Error::Output { path: folder.to_owned(), source })
 }

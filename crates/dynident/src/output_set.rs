@@ -1,6 +1,7 @@
 //! The files of one result change together, or not at all: `docs/decisions/0017-output-sets.md`.
 
 use crate::error::Error;
+use dynident_system::{TemporaryFolder, names, remove_folder};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Component, Path, PathBuf};
@@ -106,15 +107,8 @@ struct Stage {
 impl Stage {
     /// Writes the new files, all the way to the disk. On failure nothing is left.
     fn fill(set: &OutputSet) -> Result<Self, Failed> {
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(STAGE);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // Readers go through this folder while files change; the user's mask applies.
-            builder.permissions(fs::Permissions::from_mode(0o777));
-        }
-        let temporary = builder.tempdir_in(&set.folder).map_err(at(&set.folder))?;
+        // Readers go through this folder while files change.
+        let temporary = TemporaryFolder::create_open_in(&set.folder, STAGE).map_err(at(&set.folder))?;
         let names: Vec<String> = set.files.iter().map(|(name, _)| name.clone()).collect();
         let path = temporary.path().to_owned();
         for folder in [NEW, OLD, PLACE_NEW, PLACE_OLD, LINKS] {
@@ -218,7 +212,7 @@ impl Stage {
         }
         if settled && self.places_synced().is_ok() {
             // A stage that stays is only rubbish.
-            let _ = fs::remove_dir_all(&self.path);
+            let _ = remove_folder(&self.path);
         }
     }
 
@@ -259,7 +253,7 @@ impl Stage {
             !old.exists() || fs::rename(old, self.folder.join(name)).is_ok()
         };
         if self.names.iter().all(back) {
-            let _ = fs::remove_dir_all(&self.path);
+            let _ = remove_folder(&self.path);
         }
         failed
     }
@@ -273,7 +267,7 @@ impl Stage {
             }
         }
         // A stage that stays is only rubbish.
-        let _ = fs::remove_dir_all(&self.path);
+        let _ = remove_folder(&self.path);
         Ok(())
     }
 
@@ -311,12 +305,12 @@ impl Stage {
 
 /// Clears up after a program that was killed: links give way to the files of the set that is in force.
 fn settle_interrupted(folder: &Path) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(STAGE)) {
-        let names = fs::read_to_string(entry.path().join(NAMES)).unwrap_or_default();
+    let stages = names(folder).unwrap_or_default().into_iter().filter(|name| name.to_string_lossy().starts_with(STAGE));
+    for path in stages.map(|name| folder.join(name)) {
+        let names = fs::read_to_string(path.join(NAMES)).unwrap_or_default();
         let inside = |name: &&str| Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
         let names = names.lines().filter(inside).map(str::to_owned).collect();
-        let stage = Stage { folder: folder.to_owned(), path: entry.path(), names };
+        let stage = Stage { folder: folder.to_owned(), path, names };
         if stage.path.join(DECIDED).exists() {
             let _ = stage.put_rest();
         } else if stage.path.join(MOVED).exists() {

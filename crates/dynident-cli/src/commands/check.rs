@@ -1,9 +1,10 @@
 //! `dynident check STUDY.toml`.
 
-use super::{Context, json, known_in, message_of};
+use super::permission::ProgramOptions;
+use super::{Context, json, known_in};
 use crate::{Verdict, summary, terminal};
 use dynident::recording::Level;
-use dynident::{RunOptions, Study, check};
+use dynident::{RunOptions, check};
 use std::path::PathBuf;
 
 /// Options of `check`.
@@ -14,10 +15,12 @@ pub(crate) struct Options {
     /// Folder of the recordings, in place of the study's own.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let study = Study::load(&options.study).map_err(message_of)?;
+    let study = options.programs.load_study(&options.study, options.data.as_deref())?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let file = check(&study, &options.study, &run).map_err(known_in(&options.study))?;

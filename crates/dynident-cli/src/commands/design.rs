@@ -1,5 +1,6 @@
 //! `dynident design STUDY.toml --out DIR`.
 
+use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
@@ -62,6 +63,8 @@ pub(crate) struct Options {
     /// Folder of the robot description, in place of the study's own.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -80,7 +83,7 @@ fn rate(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let mut study = Study::load(&options.study).map_err(message_of)?;
+    let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
     }

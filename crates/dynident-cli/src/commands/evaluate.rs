@@ -1,5 +1,6 @@
 //! `dynident evaluate ROBOT --states S.csv --quantity Q`.
 
+use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
@@ -22,6 +23,8 @@ pub(crate) struct Options {
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    xacro: XacroOptions,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -49,7 +52,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let inputs = [options.robot.clone(), options.states.clone()];
         dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;
     }
-    let robot = dynident::model::load_robot(&options.robot).map_err(|error| error.to_string())?;
+    let robot = options.xacro.load_robot(&options.robot)?;
     if context.json || options.out.is_some() {
         let mut table = Vec::new();
         let rows = dynident::evaluate(&robot.model, &options.states, quantity, &mut table).map_err(message_of)?;

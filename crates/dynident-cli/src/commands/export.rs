@@ -1,11 +1,12 @@
 //! `dynident export DIR/result.json --study STUDY.toml --to FORM`.
 
+use super::permission::ProgramOptions;
 use super::{Context, json, known_in, message_of};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{Exported, PayloadReader, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile};
-use dynident::{ResultFile, Study, export_payload_of, export_result, export_simulator_of, study_inputs};
+use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, study_inputs};
 use std::path::PathBuf;
 
 /// Options of `export`.
@@ -31,6 +32,8 @@ pub(crate) struct Options {
     /// A further folder in which the study's files are looked for.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -102,8 +105,8 @@ impl Form {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let data = options.data.as_deref();
-    let study = options.study.as_deref().map(|path| Study::load(path).map(|study| (study, path)));
-    let study = study.transpose().map_err(message_of)?;
+    let study = options.study.as_deref().map(|path| options.programs.load_study(path, data).map(|study| (study, path)));
+    let study = study.transpose()?;
     if let Some(out) = &options.out {
         let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "torque", "log"]));
         let mut inputs = named.unwrap_or_default();

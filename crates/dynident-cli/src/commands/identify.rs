@@ -1,10 +1,9 @@
 //! `dynident identify STUDY.toml --out DIR`, or of factors in place of a study and its logs.
 
+use super::permission::ProgramOptions;
 use super::{Context, factors, json, judged, known_in, message_of, pretty_json, refuse_overwriting, show_problems};
 use crate::{Verdict, summary, terminal};
-use dynident::{
-    Factors, IdentificationOutcome, OutputSet, RunOptions, Study, check_writable, identify, identify_factors,
-};
+use dynident::{Factors, IdentificationOutcome, OutputSet, RunOptions, check_writable, identify, identify_factors};
 use std::path::{Path, PathBuf};
 
 /// The user's description with the new values.
@@ -38,6 +37,8 @@ pub(crate) struct Options {
     /// Exit with status 1 if the relative error on any held-out log is larger, or if none is held out.
     #[arg(long, value_name = "PERCENT", value_parser = super::percentage)]
     max_validation_error: Option<f64>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 /// What is written.
@@ -84,7 +85,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
 
 /// The model of a study and its logs.
 fn of_study(path: &Path, options: &Options, run: &RunOptions<'_>) -> Result<IdentificationOutcome, String> {
-    let study = Study::load(path).map_err(message_of)?;
+    let study = options.programs.load_study(path, options.data.as_deref())?;
     let named = (&study, path, options.data.as_deref());
     let sections = ["robot", "torque", "log", "arm", "format", "motion", "estimator"];
     refuse_overwriting((&options.out, &FILES), named, &sections, &[])?;

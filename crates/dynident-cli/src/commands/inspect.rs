@@ -1,8 +1,11 @@
 //! `dynident inspect ROBOT`.
 
+use super::permission::XacroOptions;
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
-use dynident::{InspectSettings, Inspection, MendedDescription, inspect_with, mended, write_whole};
+use dynident::{
+    InspectSettings, Inspection, MendedDescription, inspect_robot, inspect_with, mended_robot, write_whole,
+};
 use std::path::PathBuf;
 
 /// Options of `inspect`.
@@ -16,6 +19,8 @@ pub(crate) struct Options {
     /// What all masses, the base's with them, should add up to, kg; by default what a comment of the file says.
     #[arg(long, value_name = "KG", value_parser = kilograms)]
     total_mass: Option<f64>,
+    #[command(flatten)]
+    xacro: XacroOptions,
 }
 
 fn kilograms(text: &str) -> Result<f64, String> {
@@ -29,14 +34,15 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         dynident::refuse_overwriting(core::slice::from_ref(out), core::slice::from_ref(&options.robot))
             .map_err(message_of)?;
     }
-    let inspection = inspect_with(&options.robot, &settings).map_err(message_of)?;
+    let robot = options.xacro.load_robot(&options.robot)?;
+    let inspection = inspect_robot(&robot, &settings).map_err(message_of)?;
     if context.json {
         terminal::print_document(&json(&inspection)?)?;
     } else {
         terminal::print(&summary::inspection(&inspection))?;
     }
     let Some(out) = &options.fix else { return Ok(verdict(&inspection)) };
-    match mended(&options.robot, &settings).map_err(message_of)? {
+    match mended_robot(&robot, &settings).map_err(message_of)? {
         MendedDescription::Urdf(text) => {
             write_whole(out, text.as_bytes()).map_err(message_of)?;
             let left = inspect_with(out, &settings).map_err(message_of)?;

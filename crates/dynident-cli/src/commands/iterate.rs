@@ -1,5 +1,6 @@
 //! `dynident iterate STUDY.toml --out DIR`.
 
+use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
@@ -8,13 +9,13 @@ use dynident::iteration::{NextMotion, RobotRun, RunRecord, StopSignal};
 use dynident::result::INTERRUPTED;
 use dynident::study::LegOrder;
 use dynident::{
-    Error, IterationWatch, IterationsFile, Progress, RunOptions, Silent, Study, check_writable, iterate_study,
+    Error, IterationWatch, IterationsFile, ProgramPermission, ProgramRequest, Progress, RunOptions, Silent,
+    check_writable, iterate_study,
 };
 use std::path::{Path, PathBuf};
 
 /// Options of `iterate`.
 #[derive(clap::Args)]
-#[allow(clippy::struct_excessive_bools, reason = "switches of a command line, each for itself")]
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
@@ -31,9 +32,8 @@ pub(crate) struct Options {
     /// Seed of the simulated sensors' noise, in place of the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Start the program that the study names as its robot, without asking.
-    #[arg(long)]
-    allow_command: bool,
+    #[command(flatten)]
+    programs: ProgramOptions,
     /// Ask on the terminal before each run.
     #[arg(long)]
     confirm: bool,
@@ -46,7 +46,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if options.status {
         return status(&options.out, context);
     }
-    let mut study = Study::load(&options.study).map_err(message_of)?;
+    let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
@@ -67,7 +67,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let sections = ["robot", "torque", "design", "iteration", "simulation", "controller"];
     refuse_overwriting((&options.out, &names), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
-    permission::for_command(&study, options.allow_command)?;
+    let decisions = options.programs.decisions();
+    decisions.decide_on_robot(&study, &options.study)?;
     if options.confirm {
         permission::somebody()?;
     }
@@ -88,7 +89,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     };
     let mut allow = |motion: &NextMotion| permission::for_motion(motion);
     let design = |at: &DesignProgress| search.hear(at);
-    let mut watch = IterationWatch { stop, ..IterationWatch::new(&design, &mut hear) };
+    let decide = |request: &ProgramRequest| decisions.decide(request);
+    let programs = ProgramPermission::Ask(&decide);
+    let mut watch = IterationWatch { stop, programs, ..IterationWatch::new(&design, &mut hear) };
     if options.confirm {
         watch.allow = Some(&mut allow);
     }

@@ -134,9 +134,9 @@ pub(crate) fn refuse_overwriting(
 /// The message of an error that a study led to. Where it speaks of another file, the study that names that file is
 /// named as well.
 pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
-    use dynident::Error::{Missing, Recording, Robot};
+    use dynident::Error::{Missing, Recording, Robot, Xacro};
     move |error| match error {
-        Recording { .. } | Missing { .. } | Robot(_) => format!("{}: {error}", study.display()),
+        Recording { .. } | Missing { .. } | Robot(_) | Xacro { .. } => format!("{}: {error}", study.display()),
         _ => error.to_string(),
     }
 }

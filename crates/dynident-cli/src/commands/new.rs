@@ -1,6 +1,6 @@
 //! `dynident new --robot ROBOT --log FILE..`.
 
-use super::permission::{agreed, text_asked};
+use super::permission::{XacroOptions, agreed, text_asked};
 use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
 use dynident::result::{StudyChange, Unsure};
@@ -25,6 +25,8 @@ pub(crate) struct Options {
     /// Write over a study that is there.
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    xacro: XacroOptions,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
@@ -41,10 +43,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         return Err("--rate-hz: give samples a second, more than 0".to_owned());
     }
 
+    let description = options.xacro.load_robot(&options.robot)?;
     let progress = context.progress();
     let run = RunOptions { data: None, threads: context.threads, progress: &*progress };
     let mut request = NewStudy {
         robot: options.robot.clone(),
+        description: Some(Box::new(description)),
+        xacro: options.xacro.settings(),
         logs: options.logs.clone(),
         out: options.out.clone(),
         rate_hz: options.rate_hz,

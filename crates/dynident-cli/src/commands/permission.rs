@@ -1,29 +1,112 @@
-//! What a person is asked before a robot moves.
+//! What a person is asked before a program is started or a robot moves.
 
-use super::answer;
+use super::{answer, interruption, known_in, message_of};
 use crate::terminal;
 use dynident::iteration::{NextMotion, RunPurpose};
+use dynident::model::Robot;
 use dynident::study::{RobotChoice, Study};
+use dynident::{Error, LoadSettings, ProgramPermission, ProgramRequest, XacroSettings, load_robot};
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::io::IsTerminal;
+use std::path::Path;
 
-/// A study names a program, and whoever wrote the study may be somebody else: it is shown, and started only by who was
-/// told `--allow-command`, or says yes.
-pub(crate) fn for_command(study: &Study, allowed: bool) -> Result<(), String> {
-    let robot = study.iteration.as_ref().map(|section| &section.robot);
-    let Some(RobotChoice::Process(process)) = robot else { return Ok(()) };
-    let command = shown(&process.command);
-    if allowed {
-        terminal::remark(&format!("the robot's program: {command}"));
-        return Ok(());
+/// Options of every command that may start a program.
+#[derive(clap::Args)]
+pub(crate) struct ProgramOptions {
+    /// Start the programs that the files need without asking: xacro for a robot file with macros, and the robot's
+    /// program of a study. Give it only for files that you trust.
+    #[arg(long)]
+    allow_command: bool,
+}
+
+/// Options of every command that reads a robot file without a study.
+#[derive(clap::Args)]
+pub(crate) struct XacroOptions {
+    #[command(flatten)]
+    programs: ProgramOptions,
+    /// An argument of xacro, for a robot file with macros; may be given several times.
+    #[arg(long = "xacro", value_name = "KEY=VALUE", value_parser = argument)]
+    arguments: Vec<(String, String)>,
+    /// Time limit of xacro, s.
+    #[arg(long, value_name = "S", default_value_t = XacroSettings::DEFAULT_LIMIT_S)]
+    xacro_limit_s: f64,
+}
+
+fn argument(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("give KEY=VALUE, such as ur_type=ur5e")?;
+    Ok((key.strip_suffix(':').unwrap_or(key).to_owned(), value.to_owned()))
+}
+
+impl XacroOptions {
+    /// How xacro is called.
+    pub(crate) fn settings(&self) -> XacroSettings {
+        XacroSettings { arguments: self.arguments.iter().cloned().collect(), limit_s: self.xacro_limit_s }
     }
-    let question = format!("the study starts this program as the robot:\n  {command}\nStart it?");
-    match agreed(&question) {
-        Some(true) => Ok(()),
-        Some(false) => Err("the robot's program was not allowed: nothing was run".to_owned()),
-        None => Err(format!(
-            "the study starts a program as the robot: {command}\nRead it; if you trust it, call again with \
-             --allow-command. Nothing was run"
-        )),
+
+    /// Reads a robot file. xacro is started if that is permitted.
+    pub(crate) fn load_robot(&self, path: &Path) -> Result<Robot, String> {
+        let decisions = self.programs.decisions();
+        let loaded = decisions.with(|programs| {
+            interruption::while_program_runs(|is_stopped| {
+                load_robot(path, &LoadSettings { xacro: self.settings(), programs, is_stopped: Some(is_stopped) })
+            })
+        });
+        loaded.map_err(message_of)
+    }
+}
+
+impl ProgramOptions {
+    /// What is decided in the course of a command.
+    pub(crate) fn decisions(&self) -> Decisions {
+        Decisions { is_allowed: self.allow_command, made: RefCell::default() }
+    }
+
+    /// Reads a study. xacro is started for its robot file if the file needs it and that is permitted.
+    pub(crate) fn load_study(&self, path: &Path, data: Option<&Path>) -> Result<Study, String> {
+        let mut study = Study::load(path).map_err(message_of)?;
+        let expanded = self.decisions().with(|programs| {
+            interruption::while_program_runs(|is_stopped| study.expand_robot(path, data, programs, Some(is_stopped)))
+        });
+        expanded.map_err(known_in(path))?;
+        Ok(study)
+    }
+}
+
+/// The decisions of a command about programs: each program is shown once.
+pub(crate) struct Decisions {
+    is_allowed: bool,
+    made: RefCell<HashMap<Vec<String>, bool>>,
+}
+
+impl Decisions {
+    /// Calls `job` with these decisions as its permission.
+    pub(crate) fn with<R>(&self, job: impl FnOnce(ProgramPermission<'_>) -> R) -> R {
+        job(ProgramPermission::Ask(&|request| self.decide(request)))
+    }
+
+    /// Decides on the program of a study's robot, before a job that needs it begins.
+    pub(crate) fn decide_on_robot(&self, study: &Study, path: &Path) -> Result<(), String> {
+        let robot = study.iteration.as_ref().map(|section| &section.robot);
+        let Some(RobotChoice::Process(process)) = robot else { return Ok(()) };
+        let permitted = self.with(|programs| process.permitted(programs));
+        let refused = |source| message_of(Error::NotPermitted { path: path.to_owned(), source });
+        permitted.map(drop).map_err(refused)
+    }
+
+    /// Decides on a program: shown once, started without a question or after a yes.
+    pub(crate) fn decide(&self, request: &ProgramRequest) -> bool {
+        if let Some(&decision) = self.made.borrow().get(&request.command) {
+            return decision;
+        }
+        let command = request.command_line();
+        let question = format!("{}:\n  {command}\nStart it?", request.purpose);
+        let decision = self.is_allowed || agreed(&question).unwrap_or(false);
+        if decision {
+            terminal::remark(&format!("starting {}: {command}", request.purpose));
+        }
+        self.made.borrow_mut().insert(request.command.clone(), decision);
+        decision
     }
 }
 
@@ -90,20 +173,4 @@ pub(crate) fn agreed(question: &str) -> Option<bool> {
     }
     let answer = text_asked(&format!("{question} [y/N]")).unwrap_or_default();
     Some(matches!(answer.to_lowercase().as_str(), "y" | "yes"))
-}
-
-/// Words as a shell would take them, near enough for a person to read.
-fn shown(command: &[String]) -> String {
-    let plain = |word: &str| !word.is_empty() && word.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@%".contains(c));
-    let quoted = |word: &String| if plain(word) { word.clone() } else { format!("{word:?}") };
-    command.iter().map(quoted).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn words_are_shown_apart() {
-        let command = ["sh", "-c", "rm -r \"x\"", ""].map(str::to_owned);
-        assert_eq!(super::shown(&command), "sh -c \"rm -r \\\"x\\\"\" \"\"");
-    }
 }

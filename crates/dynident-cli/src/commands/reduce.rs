@@ -1,5 +1,6 @@
 //! `dynident reduce STUDY.toml --out FILE`.
 
+use super::permission::ProgramOptions;
 use super::{Context, factors, known_in, message_of, refuse_overwriting};
 use crate::Verdict;
 use dynident::{ReduceSettings, ResultFile, Role, RunOptions, Study, reduce, seconds_of};
@@ -32,6 +33,8 @@ pub(crate) struct Options {
     /// Folder of the recordings, in place of the study's own.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -39,7 +42,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let mut study = Study::load(&options.study).map_err(message_of)?;
+    let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
     let (folder, name) = place(&options.out)?;
     let further: Vec<PathBuf> = options.like.iter().cloned().collect();
     let of_study = (&study, &*options.study, options.data.as_deref());

@@ -1,9 +1,10 @@
 //! `dynident simulate STUDY.toml --out DIR`.
 
+use super::permission::ProgramOptions;
 use super::search::{OnInterrupt, Search};
 use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
-use dynident::{OutputSet, RunOptions, Study, check_writable, simulate_study};
+use dynident::{OutputSet, RunOptions, check_writable, simulate_study};
 use std::path::PathBuf;
 
 /// Options of `simulate`.
@@ -20,10 +21,12 @@ pub(crate) struct Options {
     /// Folder of the robot description, in place of the study's own.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let mut study = Study::load(&options.study).map_err(message_of)?;
+    let mut study = options.programs.load_study(&options.study, options.data.as_deref())?;
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }

@@ -1,8 +1,9 @@
 //! `dynident validate DIR/result.json --study STUDY.toml`.
 
-use super::{Context, json, judged, known_in, message_of, show_problems};
+use super::permission::ProgramOptions;
+use super::{Context, json, judged, known_in, show_problems};
 use crate::{Verdict, summary, terminal};
-use dynident::{ResultFile, RunOptions, Study, validate_result};
+use dynident::{ResultFile, RunOptions, validate_result};
 use std::path::PathBuf;
 
 /// Options of `validate`.
@@ -22,10 +23,12 @@ pub(crate) struct Options {
     /// Exit with status 1 if the relative error on any log is larger.
     #[arg(long, value_name = "PERCENT", value_parser = super::percentage)]
     max_validation_error: Option<f64>,
+    #[command(flatten)]
+    programs: ProgramOptions,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let study = Study::load(&options.study).map_err(message_of)?;
+    let study = options.programs.load_study(&options.study, options.data.as_deref())?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };

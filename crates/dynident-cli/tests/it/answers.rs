@@ -1,5 +1,6 @@
 //! Questions on a terminal: what was typed before one is no answer to it, and Ctrl-C ends the wait.
 
+use crate::programs::{self, EXPANDS, starts, with_xacro};
 use crate::robots_outside::{robot, study};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::fs::File;
@@ -18,14 +19,18 @@ struct OnTerminal {
 
 impl OnTerminal {
     fn iterate(study: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dynident"));
+        command.arg("iterate").arg(study).arg("--out").arg(study.with_file_name("result"));
+        command.args(["--allow-command", "--confirm"]);
+        Self::start(command)
+    }
+
+    fn start(mut command: Command) -> Self {
         let keyboard = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&keyboard).unwrap();
         unlockpt(&keyboard).unwrap();
         let name = ptsname(&keyboard, Vec::new()).unwrap().into_string().unwrap();
         let terminal = || Stdio::from(File::options().read(true).write(true).open(&name).unwrap());
-        let mut command = Command::new(env!("CARGO_BIN_EXE_dynident"));
-        command.arg("iterate").arg(study).arg("--out").arg(study.with_file_name("result"));
-        command.args(["--allow-command", "--confirm"]);
         let program = command.stdin(terminal()).stdout(terminal()).stderr(terminal()).spawn().unwrap();
         let keyboard = File::from(keyboard);
         let screen = Arc::new(Mutex::new(String::new()));
@@ -75,6 +80,38 @@ impl OnTerminal {
 /// The robot stops the first run by itself, so that a second question comes.
 const STOPS: &str =
     r#"printf x >>"$1/moved"; sleep 0.3; printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+
+/// A robot file with macros: the command is shown, and xacro starts after a yes. `new` reads the robot several times,
+/// and asks once.
+#[test]
+fn xacro_starts_after_a_yes_on_the_terminal() {
+    let folder = programs::folder(EXPANDS);
+    let mut refused = OnTerminal::start(with_xacro(folder.path(), &["check", "good.toml"]));
+    refused.awaits("Start it? [y/N]", 1);
+    assert!(refused.screen().contains("the program that expands the robot file:\r\n  xacro arm.urdf\r\n"));
+    refused.types("\n");
+    assert_eq!(refused.ends(), Some(2), "{}", refused.screen());
+    assert_eq!(starts(folder.path()), [""; 0]);
+
+    let new = ["new", "--robot", "arm.urdf", "--log", "log.csv", "--out", "new.toml"];
+    let mut permitted = OnTerminal::start(with_xacro(folder.path(), &new));
+    permitted.awaits("Start it? [y/N]", 1);
+    permitted.types("y\n");
+    permitted.awaits("note: starting the program that expands the robot file: xacro arm.urdf", 1);
+    while !folder.path().join("new.toml").exists() {
+        // Lines of the new study that are not sure.
+        permitted.types("\n");
+        std::thread::sleep(Duration::from_millis(200));
+        assert!(
+            permitted.program.try_wait().unwrap().is_none_or(|status| status.code() != Some(2)),
+            "{}",
+            permitted.screen()
+        );
+    }
+    permitted.ends();
+    assert_eq!(starts(folder.path()), ["arm.urdf"]);
+    assert_eq!(permitted.screen().matches("Start it?").count(), 1);
+}
 
 /// An Enter too many, or a whole answer typed ahead, while the robot moves: the next question waits all the same.
 #[test]

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// A study of the fixture's arm with the logs `a` and `b`, and nothing that is left to them.
-fn study(folder: &Path) -> String {
+pub(crate) fn study(folder: &Path) -> String {
     honest_log(folder);
     let log = folder.join("honest.csv").display().to_string();
     let text = std::fs::read_to_string(broken().join("good.toml")).unwrap();

@@ -54,14 +54,14 @@ fn iterate(study: &Path, further: &[&str]) -> Child {
 }
 
 /// Waits for a file, as long as the program lives.
-fn awaited(file: &Path, program: &mut Child) {
+pub(crate) fn awaited(file: &Path, program: &mut Child) {
     while !file.exists() {
         assert!(program.try_wait().unwrap().is_none(), "it ended before {}", file.display());
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
-fn interrupt(program: &Child) {
+pub(crate) fn interrupt(program: &Child) {
     assert!(Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap().success());
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn said(output: &Output) -> String {
 }
 
 /// Whether a process by the number in the file runs.
-fn runs(file: &Path) -> bool {
+pub(crate) fn runs(file: &Path) -> bool {
     let id = std::fs::read_to_string(file).unwrap();
     let state = Command::new("ps").args(["-o", "stat=", "-p", id.trim()]).output().unwrap();
     let state = String::from_utf8_lossy(&state.stdout).trim().to_owned();

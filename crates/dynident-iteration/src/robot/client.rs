@@ -1,13 +1,13 @@
 //! A started robot program: lines there and back, in time, until it ends or is ended.
 
 use super::RobotFault;
-use super::process_group::ProcessGroup;
 use super::process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
 use super::protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost};
 use super::stop_reason::Stopping;
 use super::stop_signal::{Listening, StopSignal};
+use dynident_system::{PermittedProgram, Pipes, ProcessGroup};
 use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{ChildStdin, Command, Stdio};
+use std::process::ChildStdin;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -92,15 +92,15 @@ pub(super) struct Client {
 
 impl Client {
     pub(super) fn start(
+        program: &PermittedProgram,
         settings: &ProcessSettings,
         joints: &[String],
         stop: Option<&StopSignal>,
     ) -> Result<Started, RobotFault> {
-        let program = &settings.command[0];
-        let mut command = Command::new(program);
-        command.args(&settings.command[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut group = ProcessGroup::start(&mut command)
-            .map_err(|error| RobotFault::NotStarted { program: program.clone(), reason: error.to_string() })?;
+        let mut group = ProcessGroup::start(program, Pipes::ALL).map_err(|error| RobotFault::NotStarted {
+            program: program.name().to_owned(),
+            reason: error.to_string(),
+        })?;
         // A queue that a client in a hurry fills, so that it waits and memory does not grow.
         let (sender, events) = sync_channel(QUEUE);
         let waker = sender.clone();

@@ -8,7 +8,6 @@ use dynident_model::INERTIAL_NAMES;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings, FrictionCompensation, Measured, Target};
 use dynident_simulation::{Reference, ReferenceSample};
 use serde_json::{Value, json};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Name and version of the schema of `controller.json`.
@@ -170,23 +169,11 @@ fn of_the_run(text: &str) -> Result<Value, &str> {
 /// Largest file that is compared with what is to be written, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Writes under another name in the same folder, then renames; what is there already with the same text stays. The file
-/// has the permissions of any new file: it is for people and other programs.
+/// Writes a file whole; a file with the same text stays as it is.
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
     if dynident_files::read_text(path, MOST_BYTES).is_ok_and(|there| there == text) {
         return Ok(());
     }
-    let fault = |error: std::io::Error| RobotFault::File { path: path.to_owned(), reason: error.to_string() };
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Less what the user's mask takes away.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder).map_err(fault)?;
-    file.write_all(text.as_bytes()).and_then(|()| file.as_file().sync_all()).map_err(fault)?;
-    file.persist(path).map_err(|error| fault(error.error))?;
-    Ok(())
+    dynident_system::write_whole(path, text.as_bytes())
+        .map_err(|error| RobotFault::File { path: path.to_owned(), reason: error.to_string() })
 }

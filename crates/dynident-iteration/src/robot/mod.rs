@@ -13,7 +13,6 @@ mod log_mistakes;
 mod log_table;
 mod oscillation_watch;
 mod process;
-mod process_group;
 mod process_settings;
 mod protocol;
 mod recorder;

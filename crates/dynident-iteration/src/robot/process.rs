@@ -6,6 +6,7 @@ use super::recorder::Recorder;
 use super::stop_reason::Stopping;
 use super::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, conversation};
 use dynident_simulation::SimulationError;
+use dynident_system::{PermittedProgram, TemporaryFolder};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -16,18 +17,24 @@ use std::time::{Duration, Instant};
 pub struct ProcessRobot {
     settings: ProcessSettings,
     joints: Vec<String>,
+    program: PermittedProgram,
     client: Option<Client>,
-    temporary: Option<tempfile::TempDir>,
+    temporary: Option<TemporaryFolder>,
 }
 
 impl ProcessRobot {
-    /// The robot of a program, with the model's joints.
+    /// The robot of a program, with the model's joints. `program` is the command of the settings, as
+    /// [`ProcessSettings::permitted`] gives it.
     ///
     /// # Errors
     /// As [`ProcessSettings::validate`].
-    pub fn new(settings: ProcessSettings, joints: Vec<String>) -> Result<Self, SimulationError> {
+    pub fn new(
+        settings: ProcessSettings,
+        joints: Vec<String>,
+        program: PermittedProgram,
+    ) -> Result<Self, SimulationError> {
         settings.validate()?;
-        Ok(Self { settings, joints, client: None, temporary: None })
+        Ok(Self { settings, joints, program, client: None, temporary: None })
     }
 
     /// The folder of a run's files.
@@ -37,7 +44,7 @@ impl ProcessRobot {
             folder.clone()
         } else {
             if self.temporary.is_none() {
-                self.temporary = Some(tempfile::tempdir().map_err(file(std::env::temp_dir()))?);
+                self.temporary = Some(TemporaryFolder::new().map_err(file(std::env::temp_dir()))?);
             }
             self.temporary.as_ref().map(|folder| folder.path().to_owned()).unwrap_or_default()
         };
@@ -58,7 +65,7 @@ impl ProcessRobot {
         };
         let client = match &mut self.client {
             Some(client) => client,
-            none => match Client::start(&self.settings, &self.joints, request.stop)? {
+            none => match Client::start(&self.program, &self.settings, &self.joints, request.stop)? {
                 Started::Ready(client) => none.insert(*client),
                 Started::StopRequested => return Ok(not_begun),
             },
@@ -75,7 +82,7 @@ impl ProcessRobot {
 
 impl Robot for ProcessRobot {
     fn name(&self) -> &str {
-        &self.settings.command[0]
+        self.program.name()
     }
 
     fn joints(&self) -> &[String] {

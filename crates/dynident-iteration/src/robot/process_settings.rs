@@ -1,6 +1,7 @@
 //! A robot program and how it is spoken to.
 
 use dynident_simulation::{SimulationError, require};
+use dynident_system::{PermittedProgram, ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -66,6 +67,14 @@ pub struct ProcessSettings {
 }
 
 impl ProcessSettings {
+    /// The permission to start the command.
+    ///
+    /// # Errors
+    /// [`ProgramRefused`] if it may not be started.
+    pub fn permitted(&self, permission: ProgramPermission<'_>) -> Result<PermittedProgram, ProgramRefused> {
+        permission.permit(ProgramRequest::new(ProgramPurpose::Robot, self.command.iter().cloned()))
+    }
+
     /// Checks the settings.
     ///
     /// # Errors

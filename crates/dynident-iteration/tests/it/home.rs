@@ -1,6 +1,6 @@
 //! Where the robot waits: the ways from there to the motion and back, in every mode, watched, stopped, kept.
 
-use super::robots::{client, joints, model, pd};
+use super::robots::{client, joints, model, pd, process_robot};
 use super::simulated_arm::{self, Simulated};
 use dynident_excitation::Motion;
 use dynident_excitation::limits::{FloorLimit, JointLimit, LimitKind, Limits, LinkPoint};
@@ -65,7 +65,7 @@ fn process(mode: ProcessMode, options: &[&str], folder: &Path) -> ProcessRobot {
     let command = words.iter().map(|word| word.to_str().unwrap()).chain(options.iter().copied());
     let limits = ProcessLimits { stop_s: 60.0, bye_s: 0.2, ..ProcessLimits::default() };
     let command = command.map(str::to_owned).collect();
-    ProcessRobot::new(ProcessSettings { command, mode, limits, folder: Some(folder.to_owned()) }, joints()).unwrap()
+    process_robot(ProcessSettings { command, mode, limits, folder: Some(folder.to_owned()) }, joints()).unwrap()
 }
 
 fn run(robot: &mut dyn Robot, ways: Option<&Ways>, envelope: Option<&Envelope>) -> RobotRun {

@@ -15,7 +15,8 @@ use dynident_model::{Model, load_robot};
 use dynident_simulation::controllers::{
     ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings, PositionLoopSettings,
 };
-use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference};
+use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, SimulationError};
+use dynident_system::ProgramPermission;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -64,10 +65,16 @@ fn run(robot: &mut dyn Robot) -> RobotRun {
 }
 
 fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
-    let mut robot = ProcessRobot::new(settings(mode, name), joints()).unwrap();
+    let mut robot = process_robot(settings(mode, name), joints()).unwrap();
     let run = run(&mut robot);
     let RobotStatus::Failed { fault, .. } = run.status.clone() else { panic!("{name}: {}", run.status) };
     (fault, run)
+}
+
+/// The robot of a program that is permitted.
+pub(crate) fn process_robot(settings: ProcessSettings, joints: Vec<String>) -> Result<ProcessRobot, SimulationError> {
+    let program = settings.permitted(ProgramPermission::Allow).unwrap();
+    ProcessRobot::new(settings, joints, program)
 }
 
 /// A program that serves the simulator gives what the simulator gives, bit for bit, whoever runs the loop, though its
@@ -78,7 +85,7 @@ fn programs_give_what_the_simulator_gives() {
     let own = run(&mut SimulatedRobot::new(plant, LoopSettings::default()).unwrap());
     assert!(own.status.is_done());
     for mode in [ProcessMode::Run, ProcessMode::Step] {
-        let mut robot = ProcessRobot::new(settings(mode, ""), joints()).unwrap();
+        let mut robot = process_robot(settings(mode, ""), joints()).unwrap();
         for _ in 0..2 {
             let theirs = run(&mut robot);
             assert!(theirs.status.is_done(), "{mode:?}: {}", theirs.status);
@@ -120,7 +127,7 @@ fn programs_that_fail_have_a_verdict() {
     let (died, run) = fault(ProcessMode::Step, "die");
     assert!(matches!(died, RobotFault::Died { .. }) && run.record.samples == 50, "{died}");
     // A stop that the robot reports is no fault.
-    let stopped = self::run(&mut ProcessRobot::new(settings(ProcessMode::Run, "stop"), joints()).unwrap());
+    let stopped = self::run(&mut process_robot(settings(ProcessMode::Run, "stop"), joints()).unwrap());
     assert!(matches!(&stopped.status, RobotStatus::Stopped { reason } if reason == "protective stop"));
     assert_eq!(stopped.record.samples, 50);
 }
@@ -137,7 +144,7 @@ fn programs_that_hang_are_given_up() {
         (ProcessMode::Run, "deaf", limits(0.4, 20.0, None)),
     ] {
         let start = Instant::now();
-        let mut robot = ProcessRobot::new(ProcessSettings { limits, ..settings(mode, name) }, joints()).unwrap();
+        let mut robot = process_robot(ProcessSettings { limits, ..settings(mode, name) }, joints()).unwrap();
         let run = run(&mut robot);
         assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. }, .. }), "{}", run.status);
         // 3600 s without the limits.
@@ -149,10 +156,10 @@ fn programs_that_hang_are_given_up() {
 fn programs_that_are_not_there_are_named() {
     let command = vec!["/nowhere/robot".to_owned()];
     let settings = ProcessSettings { command, ..settings(ProcessMode::Run, "") };
-    let status = run(&mut ProcessRobot::new(settings.clone(), joints()).unwrap()).status;
+    let status = run(&mut process_robot(settings.clone(), joints()).unwrap()).status;
     assert!(matches!(&status, RobotStatus::Failed { fault: RobotFault::NotStarted { .. }, .. }));
     assert!(status.to_string().contains("/nowhere/robot"));
-    assert!(ProcessRobot::new(ProcessSettings { command: Vec::new(), ..settings }, joints()).is_err());
+    assert!(process_robot(ProcessSettings { command: Vec::new(), ..settings }, joints()).is_err());
 }
 
 /// The folder waits for a whole log, takes it, and says what is wrong with one that cannot be read.
@@ -280,7 +287,7 @@ fn what_is_handed_over_is_enough() {
     assert_eq!(inertial, model.inertials()[1].0);
     assert_eq!(file["model"]["joints"][1]["parent"], "joint1");
     // Requests without meaning are refused before anybody is spoken to.
-    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, ""), joints()).unwrap();
+    let mut robot = process_robot(settings(ProcessMode::Run, ""), joints()).unwrap();
     assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
 }
 
@@ -353,7 +360,7 @@ fn mujoco_is_a_robot() {
         let command = vec![python.clone(), path("examples/robots/mujoco_client.py"), path(urdf)];
         let command = command.into_iter().chain(["--damping", "0.5"].map(str::to_owned)).collect();
         let settings = ProcessSettings { command, ..settings(mode, "") };
-        let mut mujoco = ProcessRobot::new(settings, names.clone()).unwrap();
+        let mut mujoco = process_robot(settings, names.clone()).unwrap();
         let plant = Plant::new(&model, &terms, &[0.5; 7]).unwrap();
         let mut own = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
         for controller in &controllers {

@@ -1,7 +1,7 @@
 //! Stops: asked for, or because a sample leaves its envelope; in every mode, with a robot that answers and with one
 //! that does not; and no process of a robot is left.
 
-use super::robots::{client, joints, pd, reference};
+use super::robots::{client, joints, pd, process_robot, reference};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::robot::{
     Breach, Envelope, EnvelopeQuantity, FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot,
@@ -73,7 +73,7 @@ fn stopped_at_the_mark(robot: &mut ProcessRobot, folder: &Path) -> RobotRun {
 fn a_stop_reaches_the_robot_in_every_mode() {
     for mode in BOTH {
         let folder = tempfile::tempdir().unwrap();
-        let mut robot = ProcessRobot::new(settings(mode, command("wait", folder.path())), joints()).unwrap();
+        let mut robot = process_robot(settings(mode, command("wait", folder.path())), joints()).unwrap();
         let run = stopped_at_the_mark(&mut robot, folder.path());
         assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Confirmed }, "{mode:?}");
         assert_eq!((run.record.samples, run.record.q.len()), (50, 100), "{mode:?}");
@@ -99,7 +99,7 @@ fn a_robot_that_ignores_its_stop_is_killed() {
         }
         let mut settings = settings(ProcessMode::Run, own);
         settings.limits.stop_s = 0.2;
-        let mut robot = ProcessRobot::new(settings, joints()).unwrap();
+        let mut robot = process_robot(settings, joints()).unwrap();
         let run = stopped_at_the_mark(&mut robot, folder.path());
         assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Unanswered });
         assert!(run.status.to_string().contains("look at the robot"));
@@ -166,7 +166,7 @@ fn no_process_of_a_robot_is_left() {
     settings.limits.stop_s = 0.2;
     let (reference, controller) = (reference(), pd());
     let request = RunRequest::new(1, &reference, &controller);
-    let run = ProcessRobot::new(settings.clone(), joints()).unwrap().run(&request).unwrap();
+    let run = process_robot(settings.clone(), joints()).unwrap().run(&request).unwrap();
     assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. }, .. }), "{}", run.status);
     assert!(!runs(&marked(folder.path())));
 
@@ -174,7 +174,7 @@ fn no_process_of_a_robot_is_left() {
     settings = self::settings(ProcessMode::Run, command("orphan", folder.path()));
     // Far longer than this test may last: death is seen by the process.
     settings.limits.message_s = 3000.0;
-    let run = ProcessRobot::new(settings, joints()).unwrap().run(&request).unwrap();
+    let run = process_robot(settings, joints()).unwrap().run(&request).unwrap();
     let RobotStatus::Failed { fault: RobotFault::Died { exit, said, .. }, .. } = &run.status else {
         panic!("{}", run.status)
     };
@@ -188,7 +188,7 @@ fn robots_can_be_killed_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut settings = settings(ProcessMode::Run, command("hang", folder.path()));
     settings.limits.message_s = 3000.0;
-    let mut robot = ProcessRobot::new(settings, joints()).unwrap();
+    let mut robot = process_robot(settings, joints()).unwrap();
     let stop = StopSignal::default();
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -224,7 +224,7 @@ fn watched(mode: ProcessMode, envelope: &Envelope, folder: &Path, unwatched: boo
         own.extend(["--unwatched", "yes"].map(str::to_owned));
     }
     let (reference, controller) = (reference(), pd());
-    let mut robot = ProcessRobot::new(settings(mode, own), joints()).unwrap();
+    let mut robot = process_robot(settings(mode, own), joints()).unwrap();
     robot.run(&RunRequest { envelope: Some(envelope), ..RunRequest::new(1, &reference, &controller) }).unwrap()
 }
 
@@ -365,7 +365,7 @@ fn samples_may_come_afterwards() {
     settings.limits.message_s = 2.0;
     let reference = Reference::standing(&[-0.4, 0.3], 100.0, 6.0).unwrap();
     let controller = pd();
-    let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    let run = process_robot(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
     assert!(run.status.is_done(), "{}", run.status);
 }
 
@@ -413,7 +413,7 @@ fn a_stop_between_runs_ends_the_iteration() {
     let folder = tempfile::tempdir().unwrap();
     let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
-    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
+    let mut robot = process_robot(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
     for runs in [1, 2] {
         let mut watcher = watcher(1);
         let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap();
@@ -431,7 +431,7 @@ fn a_run_that_is_cut_short_is_kept_aside() {
     let folder = tempfile::tempdir().unwrap();
     let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
-    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("wait", folder.path())), joints()).unwrap();
+    let mut robot = process_robot(settings(ProcessMode::Run, command("wait", folder.path())), joints()).unwrap();
     let mut watcher = watcher(0);
     let stop = watcher.stop.clone();
     let outcome = std::thread::scope(|scope| {
@@ -460,7 +460,7 @@ fn a_fault_in_the_middle_of_a_motion_is_a_stop() {
         own.extend(["--brakes".to_owned(), "700".to_owned()]);
         let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
         let store = IterationStore::open(folder.path(), "test", true).unwrap();
-        let mut robot = ProcessRobot::new(settings(ProcessMode::Run, own), joints()).unwrap();
+        let mut robot = process_robot(settings(ProcessMode::Run, own), joints()).unwrap();
         let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher(0)).unwrap();
         let IterationStatus::Refused { reason } = &outcome.status else { panic!("{fault}: {}", outcome.status) };
         let words = ["the robot has stopped", "what was recorded of it", "goes on with run 1"];
@@ -477,7 +477,7 @@ fn a_fault_in_the_middle_of_a_motion_is_a_stop() {
         let mut settings = settings(ProcessMode::Run, command(fault, folder.path()));
         (settings.limits.message_s, settings.limits.stop_s) = (0.5, 0.3);
         let (reference, controller) = (reference(), pd());
-        let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller));
+        let run = process_robot(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller));
         let status = run.unwrap().status;
         let RobotStatus::Failed { stopping: Some(stopping), .. } = &status else { panic!("{fault}: {status}") };
         assert_eq!(*stopping, expected, "{fault}");
@@ -497,7 +497,7 @@ fn the_run_after_a_breach_begins_slow_again() {
         ..SafetySettings::default()
     };
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
-    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
+    let mut robot = process_robot(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
     let outcome =
         iterate_supervised(&iteration(safety(Some(tight), &[])), &mut [&mut robot], Some(&store), &mut watcher(0));
     assert!(!outcome.unwrap().runs[0].done);
@@ -516,7 +516,7 @@ fn after_an_early_end_somebody_looks() {
     let tight = Envelope { tracking_error: vec![Some(0.01); 2], ..envelope() };
     let iteration = iteration(SafetySettings { outside: true, envelope: Some(tight), ..SafetySettings::default() });
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
-    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
+    let mut robot = process_robot(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
     for runs in [1, 2] {
         let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher(0)).unwrap();
         let IterationStatus::Waiting { reason } = &outcome.status else { panic!("{}", outcome.status) };

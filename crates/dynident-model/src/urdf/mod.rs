@@ -137,9 +137,7 @@ pub enum UrdfFault {
         hint: &'static str,
     },
     /// Macros that were not expanded.
-    #[error(
-        "`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`), or install xacro, which is then asked"
-    )]
+    #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
     Xacro {
         /// The macro.
         what: String,

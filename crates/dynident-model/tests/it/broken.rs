@@ -1,7 +1,9 @@
 //! Broken descriptions: each is refused with file, line, column and the fix, and nothing panics.
 
 use crate::common::{ARM, mutate, mutations};
-use dynident_model::{audit, link_changes, load_robot, read_dh, read_urdf, rewrite_urdf};
+use dynident_model::{
+    ReadError, audit, has_xacro_macros, link_changes, load_robot, load_robot_with, read_dh, read_urdf, rewrite_urdf,
+};
 use dynident_testing::count;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -51,7 +53,7 @@ fn every_broken_file_is_refused_at_its_place_with_a_fix() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
         let (place, fragment) = expected.remove(name).unwrap_or_else(|| panic!("{name} is not in broken.tsv"));
-        // Macros are asked of a program, if it is installed: here it must not matter.
+        // The file as a whole is refused for its macros; here the place of the first one is tested.
         let message = if name.starts_with("xacro_") {
             let text = std::fs::read_to_string(&path).unwrap();
             format!("{}:{}", path.display(), read_urdf(&text).expect_err(name))
@@ -65,6 +67,25 @@ fn every_broken_file_is_refused_at_its_place_with_a_fix() {
         assert!(FIXES.iter().any(|fix| message.contains(fix)), "{message}\nnames no fix");
     }
     assert!(expected.is_empty(), "not in the corpus: {expected:?}");
+}
+
+/// A file with macros is refused whole, with the program to run; `load_robot_with` takes its expanded text.
+#[test]
+fn a_file_with_macros_is_refused_or_expanded_by_the_caller() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    let start = r#"<robot name="planar_arm" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:a/>"#;
+    std::fs::write(&path, start).unwrap();
+    let message = load_robot(&path).unwrap_err().to_string();
+    assert!(message.starts_with(&format!("{}: ", path.display())) && message.contains("`xacro robot"), "{message}");
+    assert!(has_xacro_macros(&path).unwrap());
+    let expanded = load_robot_with::<ReadError>(&path, |_| Ok(ARM.to_owned())).unwrap();
+    assert_eq!((&*expanded.text, &expanded.path, expanded.model), (ARM, &path, read_urdf(ARM).unwrap().model));
+    // An expanded file often keeps the declaration.
+    let declared = ARM.replacen("<robot ", "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" ", 1);
+    std::fs::write(&path, declared).unwrap();
+    assert!(!has_xacro_macros(&path).unwrap());
+    load_robot_with::<ReadError>(&path, |_| panic!("nothing to expand")).unwrap();
 }
 
 #[test]

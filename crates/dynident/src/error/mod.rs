@@ -3,15 +3,18 @@
 mod factors;
 mod new_study;
 mod study;
+mod xacro;
 
 pub use factors::FactorsError;
 pub use new_study::NewStudyError;
 pub use study::{Expected, StudyError};
+pub use xacro::XacroError;
 
 use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
 use dynident_model::ReadError;
 use dynident_recording::RecordingError;
+use dynident_system::ProgramRefused;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -75,6 +78,25 @@ pub enum Error {
     /// A robot description that cannot be read.
     #[error(transparent)]
     Robot(Box<ReadError>),
+    /// A robot file whose macros cannot be expanded.
+    #[error("{}: {source}", path.display())]
+    Xacro {
+        /// The robot file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<XacroError>,
+    },
+    /// A study's program that was not permitted.
+    #[error(
+        "{}: {source}. Read the command, and if you trust it, permit it (--allow-command; in Python allow_command=True)",
+        path.display()
+    )]
+    NotPermitted {
+        /// The study file.
+        path: PathBuf,
+        /// The program.
+        source: ProgramRefused,
+    },
     /// A log that cannot be read.
     #[error("log `{log}`: {source}")]
     Recording {

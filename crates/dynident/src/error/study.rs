@@ -1,5 +1,6 @@
 //! What can be wrong in a study: the key, the value, and what it may be.
 
+use super::XacroError;
 use core::fmt;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
@@ -173,6 +174,9 @@ pub enum StudyError {
         /// What to do.
         fix: &'static str,
     },
+    /// How the program `xacro` is called.
+    #[error("robot: {0}")]
+    Xacro(Box<XacroError>),
     /// A joint that nothing keeps from moving infinitely fast.
     #[error(
         "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so that the best motion would be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
@@ -258,6 +262,12 @@ pub enum StudyError {
 impl From<IterationError> for StudyError {
     fn from(error: IterationError) -> Self {
         Self::Iteration(Box::new(error))
+    }
+}
+
+impl From<XacroError> for StudyError {
+    fn from(error: XacroError) -> Self {
+        Self::Xacro(Box::new(error))
     }
 }
 

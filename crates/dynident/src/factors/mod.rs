@@ -3,6 +3,7 @@
 
 mod file;
 
+use crate::clock::{LAST_SECOND, utc_of_seconds};
 use crate::digest::hexadecimal;
 use crate::error::FactorsError;
 use crate::result::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
@@ -11,10 +12,7 @@ use dynident_identification::ReducedLog;
 use sha2::{Digest, Sha256};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
-
-/// Seconds from 1970 to the year 10000, which times in text do not reach.
-const LAST_SECOND: f64 = 253_402_300_800.0;
+use std::time::UNIX_EPOCH;
 
 /// One log of [`Factors`].
 #[derive(Clone, Debug)]
@@ -102,16 +100,10 @@ impl Factors {
 
     /// What there is to say of them as a file of so many bytes at `path`.
     pub fn file(&self, path: &Path, bytes: u64) -> FactorsFile {
-        let time = |seconds: f64| {
-            // What the calendar does not have is not written.
-            let since = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds < LAST_SECOND)?;
-            let at: SystemTime = UNIX_EPOCH.checked_add(since)?;
-            Some(humantime::format_rfc3339_seconds(at).to_string())
-        };
         let log = |log: &FactorLog| FactorsLog {
             name: log.log.name.clone(),
             arm: log.arm.clone(),
-            recorded_at: log.recorded_at_s.and_then(time),
+            recorded_at: log.recorded_at_s.and_then(utc_of_seconds),
             sha256: log.sha256.clone(),
             rows: log.log.statistics.filtered_rows,
         };

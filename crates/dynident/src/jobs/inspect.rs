@@ -4,10 +4,11 @@ use crate::error::Error;
 use crate::result::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
 };
+use crate::robot_file::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
 use dynident_model::{
-    DescriptionFormat, InertialParameters, ReadError, Robot, Slip, Slips, UrdfIrregularity, audit, load_robot,
-    rewrite_inertials, slips,
+    DescriptionFormat, InertialParameters, ReadError, Robot, Slip, Slips, UrdfIrregularity, audit, rewrite_inertials,
+    slips,
 };
 use std::path::Path;
 
@@ -42,7 +43,7 @@ pub enum MendedDescription {
 /// # Errors
 /// If the description cannot be read.
 pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescription, Error> {
-    mended_robot(&load_robot(path)?, settings)
+    mended_robot(&load_robot(path, &LoadSettings::default())?, settings)
 }
 
 /// As [`mended`] of a description that is in memory.
@@ -74,7 +75,7 @@ fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, 
 /// # Errors
 /// If the description cannot be read.
 pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspection, Error> {
-    inspect_robot(&load_robot(path)?, settings)
+    inspect_robot(&load_robot(path, &LoadSettings::default())?, settings)
 }
 
 /// As [`inspect_with`] of a description that is in memory.

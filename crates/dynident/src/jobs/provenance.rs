@@ -9,7 +9,6 @@ use dynident_recording::LogSource;
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::{Component, Path};
-use std::time::SystemTime;
 
 /// Hexadecimal digits of an identity.
 const DIGITS: usize = 12;
@@ -138,11 +137,6 @@ pub(crate) fn beside<R>(
         let done = job();
         (provenance.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), done)
     })
-}
-
-/// Now, by the computer's clock: `2026-11-22T10:30:13Z`.
-pub(crate) fn now() -> String {
-    humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
 }
 
 fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {

@@ -1,11 +1,12 @@
 //! Logs to factors, and factors to a model: identification of many logs that need not lie in one place.
 
+use crate::clock::now;
 use crate::error::{Error, FactorsError};
 use crate::factors::{FactorLog, Factors, name_alone};
 use crate::inputs::InputFiles;
 use crate::jobs::identify::{IdentificationOutcome, Made, written};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{factors_provenance, now};
+use crate::jobs::provenance::factors_provenance;
 use crate::result::{ResultFile, Timings};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_identification::{

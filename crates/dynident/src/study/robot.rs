@@ -2,6 +2,7 @@
 
 use super::arrays::exactly;
 use crate::error::StudyError;
+use crate::robot_file::XacroSettings;
 use dynident_model::{LoopClosure, Mimic, MimicSource, Robot};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,6 +18,13 @@ pub struct RobotSection {
     /// The description itself, in place of the file's. Not written.
     #[serde(skip)]
     pub description: Option<Box<Robot>>,
+    /// Arguments of the program `xacro`, which expands a file with macros if it is permitted (`--allow-command`): `{
+    /// ur_type = "ur5e" }` is `xacro FILE ur_type:=ur5e`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub xacro: BTreeMap<String, String>,
+    /// Time limit of the program `xacro`, s. Default 30.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub xacro_limit_s: Option<f64>,
     /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints
     /// of the description that `lock` does not name, in the order of the tree.
     #[serde(default)]
@@ -92,6 +100,12 @@ impl LoopSection {
 }
 
 impl RobotSection {
+    /// How the program `xacro` is called.
+    pub fn xacro_settings(&self) -> XacroSettings {
+        let limit_s = self.xacro_limit_s.unwrap_or(XacroSettings::DEFAULT_LIMIT_S);
+        XacroSettings { arguments: self.xacro.clone(), limit_s }
+    }
+
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
         if let Some(gravity) = self.gravity_m_s2
             && gravity.iter().any(|g| g.abs().is_nan() || g.abs() > MAX_GRAVITY_M_S2)
@@ -102,6 +116,7 @@ impl RobotSection {
                 expected: "finite numbers in m/s^2, at most 1e9 in size",
             });
         }
+        self.xacro_settings().validate()?;
         if self.base_rpy_rad.is_some() && self.base_rpy_deg.is_some() {
             return Err(StudyError::Exclusive { keys: vec!["robot.base_rpy_rad", "robot.base_rpy_deg"] });
         }

@@ -4,11 +4,13 @@
 use super::torque::declared_terms;
 use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, LoopSection, Study};
 use crate::error::{Error, StudyError};
+use crate::robot_file::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
 use dynident_model::terms::{
     CoulombShape, Coupling, CouplingEffect, Declared, DriveChoice, TorqueTerm, terms_per_joint,
 };
-use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, load_robot, loops};
+use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, has_xacro_macros, loops};
+use dynident_system::ProgramPermission;
 use std::path::Path;
 
 /// A study's robot: its description, and what the study makes of it.
@@ -22,15 +24,44 @@ pub struct StudyRobot {
     pub log_joints: Vec<String>,
 }
 
-impl StudyRobot {
-    /// Builds the robot that a study describes.
+impl Study {
+    /// Expands the study's robot file if it has xacro macros, with the program `xacro`, and keeps the expanded
+    /// description in memory: jobs start no program. Other robot files are left for the job to read.
     ///
     /// # Errors
-    /// If the description cannot be read, or names in the study are not in it.
+    /// As [`load_robot`].
+    pub fn expand_robot(
+        &mut self,
+        study_path: &Path,
+        data: Option<&Path>,
+        programs: ProgramPermission<'_>,
+        is_stopped: Option<&dyn Fn() -> bool>,
+    ) -> Result<(), Error> {
+        if self.robot.description.is_some() {
+            return Ok(());
+        }
+        // A file that cannot be read is reported by the job.
+        let Ok(path) = Folders::new(self, study_path, data).find(&self.robot.file, None) else { return Ok(()) };
+        if has_xacro_macros(&path).unwrap_or(false) {
+            let settings = LoadSettings { xacro: self.robot.xacro_settings(), programs, is_stopped };
+            self.robot.description = Some(Box::new(load_robot(&path, &settings)?));
+        }
+        Ok(())
+    }
+}
+
+impl StudyRobot {
+    /// Builds the robot that a study describes. No program is started: a robot file with xacro macros has to be
+    /// expanded before, by [`Study::expand_robot`].
+    ///
+    /// # Errors
+    /// If the description cannot be read or contains macros, or names in the study are not in it.
     pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
-        let robot = match &study.robot.description {
-            Some(robot) => (**robot).clone(),
-            None => load_robot(folders.find(&study.robot.file, study.source.as_deref())?)?,
+        let robot = if let Some(robot) = &study.robot.description {
+            (**robot).clone()
+        } else {
+            let path = folders.find(&study.robot.file, study.source.as_deref())?;
+            load_robot(&path, &LoadSettings { xacro: study.robot.xacro_settings(), ..LoadSettings::default() })?
         };
         let in_study = Error::study::<ModelError>(study_path);
 

@@ -3,7 +3,7 @@
 use crate::common::{recordings, repository};
 use dynident::recording::log::{ChannelGroup, ColumnRef};
 use dynident::result::{StudyChange, Unsure};
-use dynident::{Error, NewStudy, RunOptions, Silent, Study, new_study};
+use dynident::{Error, NewStudy, RunOptions, Silent, Study, XacroSettings, new_study};
 use dynident_identification::Role;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,8 @@ fn reading_keys(study: &Study) -> ([String; 3], [String; 3]) {
 fn request(folder: &Path, robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> NewStudy {
     NewStudy {
         robot: robot.to_owned(),
+        description: None,
+        xacro: XacroSettings::default(),
         logs: logs.to_vec(),
         out: folder.join("study.toml"),
         rate_hz,

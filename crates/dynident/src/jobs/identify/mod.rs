@@ -4,12 +4,13 @@ mod joint_values;
 mod model_files;
 mod sections;
 
+use crate::clock::now;
 use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{beside, now, provenance, seen_from};
+use crate::jobs::provenance::{beside, provenance, seen_from};
 use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};

@@ -12,6 +12,7 @@ use dynident_iteration::Robot;
 use dynident_iteration::robot::{FolderRobot, ProcessRobot};
 use dynident_iteration::{HeldOutMotion, Leg};
 use dynident_simulation::controllers::ControllerModel;
+use dynident_system::PermittedProgram;
 use std::path::Path;
 
 /// Spreads the seeds of legs that have an iteration each.
@@ -121,19 +122,20 @@ impl IterationSection {
         Ok(HeldOutMotion { leg: Leg::whole(trajectory.reference()?)?, every })
     }
 
-    /// The robots of one iteration: the simulator for each of its legs, or the one outside; none where the caller
-    /// brings it.
+    /// The robots of one iteration: the simulator for each of its legs, or the one outside (`program` is the permitted
+    /// program of the study); none where the caller brings it.
     pub(super) fn robots(
         &self,
         (simulation, coupling): (&SimulationSection, &[CouplingSection]),
         robot: &StudyRobot,
-        stage: usize,
-        members: &[usize],
+        (stage, members): (usize, &[usize]),
+        program: Option<&PermittedProgram>,
     ) -> Result<Vec<Box<dyn Robot>>, StudyError> {
         let joints = robot.parametric.joint_names();
         Ok(match &self.robot {
             RobotChoice::Process(settings) => {
-                vec![Box::new(ProcessRobot::new(settings.clone(), joints)?)]
+                let robot = |program: &PermittedProgram| ProcessRobot::new(settings.clone(), joints, program.clone());
+                program.map(robot).transpose()?.into_iter().map(|robot| Box::new(robot) as Box<dyn Robot>).collect()
             }
             RobotChoice::Folder(settings) => {
                 let mut settings = settings.clone();

@@ -27,6 +27,7 @@ use dynident_iteration::{
     Redesign, RunRecord, StopSignal, Supervisor, iterate_supervised, other_settings,
 };
 use dynident_iteration::{Robot, RobotRun};
+use dynident_system::ProgramPermission;
 use fingerprint::fingerprint;
 use model::{EndedStage, RobotFiles, robot_found};
 use report::{IterationReport, Stage, joined};
@@ -44,15 +45,17 @@ pub struct IterationWatch<'a> {
     pub stop: StopSignal,
     /// Whether a motion of a robot outside may be commanded, asked before each; without it all may.
     pub allow: Option<&'a mut dyn FnMut(&NextMotion) -> bool>,
+    /// Whether the program that a study names as its robot may be started. By default it may not.
+    pub programs: ProgramPermission<'a>,
 }
 
 impl<'a> IterationWatch<'a> {
-    /// Hears only; nobody stops it, and every motion may be commanded.
+    /// Hears only; nobody stops it, every motion may be commanded, and no program is started.
     pub fn new(
         design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
         run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
     ) -> Self {
-        Self { design, run, stop: StopSignal::default(), allow: None }
+        Self { design, run, stop: StopSignal::default(), allow: None, programs: ProgramPermission::Refuse }
     }
 }
 
@@ -134,9 +137,18 @@ fn iterated(
         IterationError::State { path, problem } => Error::Result { path, message: problem },
         other => in_section(other.into()),
     };
+    // Before anything is read or searched.
+    let section = study.iteration.clone().unwrap_or_default();
+    let program = match &section.robot {
+        RobotChoice::Process(settings) => Some(
+            settings
+                .permitted(watch.programs)
+                .map_err(|source| Error::NotPermitted { path: study_path.to_owned(), source })?,
+        ),
+        _ => None,
+    };
     // The study's files and settings.
     let begin = Instant::now();
-    let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
     let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -253,7 +265,9 @@ fn iterated(
             Some(motion) => iteration.with_held_out(motion.clone()).map_err(|why| in_section(why.into()))?,
             None => iteration,
         };
-        let mut robots = section.robots((&simulation, &study.coupling), &robot, number, members).map_err(in_section)?;
+        let mut robots = section
+            .robots((&simulation, &study.coupling), &robot, (number, members), program.as_ref())
+            .map_err(in_section)?;
         robots.extend(own_robot.iter_mut().map(|make| make(&robot.parametric.joint_names())));
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
         let leg = (!one).then_some(number + 1);

@@ -1,10 +1,11 @@
 //! The robot that an iteration found, as `identify` writes one: result.json, the description with the new values,
 //! pages.
 
+use crate::clock::now;
 use crate::error::Error;
 use crate::jobs::identify::{IdentificationOutcome, Made, written};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{later_provenance, now, seen_from};
+use crate::jobs::provenance::{later_provenance, seen_from};
 use crate::output_set::OutputSet;
 use crate::result::{BaseParameterResult, Provenance, Timings};
 use crate::study::{Study, StudyInput, StudyRobot};

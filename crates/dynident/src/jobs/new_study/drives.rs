@@ -1,12 +1,11 @@
 //! Whether the torque is that of motors, which turn with their rotors, or that of sensors behind them.
 
+use super::NewStudy;
 use super::draft::{Draft, Table};
 use crate::error::Error;
 use crate::jobs::identify::identify;
 use crate::jobs::options::RunOptions;
-use crate::study::Study;
 use core::fmt::Write;
-use std::path::Path;
 
 /// What the logs say of drive inertia: the table `[drive]` of the study where they show it, for commands that have no
 /// logs to ask; else the figures that do not.
@@ -22,10 +21,14 @@ pub(super) enum DriveInertia {
 ///
 /// # Errors
 /// Those of [`identify()`].
-pub(super) fn drive_inertia(draft: &Draft, out: &Path, options: &RunOptions<'_>) -> Result<DriveInertia, Error> {
+pub(super) fn drive_inertia(
+    request: &NewStudy,
+    draft: &Draft,
+    options: &RunOptions<'_>,
+) -> Result<DriveInertia, Error> {
     let trial = Table::new("[drive]", "").with("friction", "\"stated\"", "");
-    let study = Study::parse(&draft.with(trial).text(), out)?;
-    let found = identify(&study, out, options)?.result.drive_inertia_choice;
+    let study = request.study(&draft.with(trial))?;
+    let found = identify(&study, &request.out, options)?.result.drive_inertia_choice;
     let Some(choice) = found.filter(|choice| !choice.drives.is_empty()) else {
         return Ok(DriveInertia::NotSeen(String::new()));
     };

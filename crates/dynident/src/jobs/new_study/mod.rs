@@ -11,11 +11,12 @@ use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families
 use crate::jobs::log::log_contents;
 use crate::jobs::options::RunOptions;
 use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
+use crate::robot_file::{LoadSettings, XacroSettings, load_robot};
 use crate::study::Study;
 use channels::{LoggedJoints, in_order, logged_joints};
 use draft::{Draft, Table};
 use drives::{DriveInertia, drive_inertia};
-use dynident_model::{JointKind, Model, load_robot};
+use dynident_model::{JointKind, Model, Robot};
 use dynident_recording::Level;
 use dynident_text::quoted;
 use paths::seen_from;
@@ -34,6 +35,10 @@ const MOST_TURNS: f64 = 4.0;
 pub struct NewStudy {
     /// The description: URDF, MJCF, SDF, or D-H table in TOML.
     pub robot: PathBuf,
+    /// The description as [`load_robot`] reads it; `None` reads the file, which may then have no xacro macros.
+    pub description: Option<Box<Robot>>,
+    /// How the program `xacro` expands the file: written into the study if arguments are given.
+    pub xacro: XacroSettings,
     /// The recordings, at least one.
     pub logs: Vec<PathBuf>,
     /// Where the study will stand: paths in it are as seen from there.
@@ -45,6 +50,15 @@ pub struct NewStudy {
     pub stated: Vec<StudyChange>,
 }
 
+impl NewStudy {
+    /// The study of a draft, with the description that is in memory.
+    fn study(&self, draft: &Draft) -> Result<Study, Error> {
+        let mut study = Study::parse(&draft.text(), &self.out)?;
+        study.robot.description.clone_from(&self.description);
+        Ok(study)
+    }
+}
+
 /// Writes a study: which joints the columns are by their names and their number, units by names, limits and spread,
 /// which part tests the model; then examines it as [`check`] does and writes what that names without an alternative,
 /// and fits once to see whether drives have inertia, which `design` and `iterate` cannot see.
@@ -54,7 +68,10 @@ pub struct NewStudy {
 /// A description or a recording that cannot be read, or without columns of positions and torques that could be
 /// recognised.
 pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStudyFile, Error> {
-    let robot = load_robot(&request.robot).map_err(|source| Error::Robot(Box::new(source)))?;
+    let robot = match &request.description {
+        Some(robot) => (**robot).clone(),
+        None => load_robot(&request.robot, &LoadSettings { xacro: request.xacro.clone(), ..LoadSettings::default() })?,
+    };
     let logs: Vec<(&Path, LogContents)> =
         request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
     let recorded = Recorded::find(&robot.model, &logs).map_err(Error::NewStudy)?;
@@ -70,7 +87,7 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
     let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
     if !unsure.iter().any(without_rate) {
         for _ in 0..MOST_ROUNDS {
-            let study = Study::parse(&draft.text(), &request.out)?;
+            let study = request.study(&draft)?;
             let found = check(&study, &request.out, options)?.check;
             let changed = mend(&mut draft, &found);
             examined = Some(found);
@@ -86,7 +103,7 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
         reason: finding.sentence(),
     }));
     if unsure.is_empty() && examined.is_some() {
-        match drive_inertia(&draft, &request.out, options)? {
+        match drive_inertia(request, &draft, options)? {
             DriveInertia::Seen(table) => draft = draft.with(table),
             DriveInertia::NotSeen(figures) => draft = draft.with(Table::new("", figures)),
         }
@@ -232,7 +249,19 @@ impl Recorded {
 
     fn of_robot(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
         let LoggedJoints { joints, reason, is_sure } = &self.logged;
-        let table = Table::new("[robot]", "").with("file", quoted(&seen_from(&request.robot, from)), "");
+        let mut table = Table::new("[robot]", "").with("file", quoted(&seen_from(&request.robot, from)), "");
+        if !request.xacro.arguments.is_empty() {
+            let arguments: Vec<String> = request
+                .xacro
+                .arguments
+                .iter()
+                .map(|(name, value)| format!("{} = {}", key(name), quoted(value)))
+                .collect();
+            table = table.with("xacro", format!("{{ {} }}", arguments.join(", ")), "As given: arguments of xacro");
+        }
+        if request.xacro.limit_s != XacroSettings::DEFAULT_LIMIT_S {
+            table = table.with("xacro_limit_s", format!("{:?}", request.xacro.limit_s), "As given");
+        }
         if joints.len() == model.dof() && joints.is_sorted() {
             return table;
         }
@@ -350,6 +379,11 @@ impl Recorded {
         };
         self.files.iter().enumerate().map(table).collect()
     }
+}
+
+/// The name of an argument as a key of TOML.
+fn key(name: &str) -> String {
+    if name.contains(['.', '/']) { quoted(name) } else { name.to_owned() }
 }
 
 /// What says that a family is what it is taken for.

@@ -1,0 +1,10 @@
+//! Programs that Dynident starts: who permits them, and how they are stopped.
+
+mod command_line;
+mod group;
+mod permission;
+mod run;
+
+pub use group::{GroupId, Pipes, ProcessGroup};
+pub use permission::{PermittedProgram, ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
+pub use run::{RunError, RunLimits, run_to_end};

@@ -1,0 +1,137 @@
+//! Which programs may be started.
+
+use super::command_line::shell_words;
+use core::fmt;
+use thiserror::Error;
+
+/// What a program is started for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ProgramPurpose {
+    /// It serves the robot of an iteration: `[iteration] robot = { kind = "process" }` of a study.
+    Robot,
+    /// It expands the xacro macros of a robot file. xacro evaluates Python expressions of that file.
+    Xacro,
+}
+
+impl fmt::Display for ProgramPurpose {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Robot => "the program of the robot",
+            Self::Xacro => "the program that expands the robot file",
+        })
+    }
+}
+
+/// A program that is to be started.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct ProgramRequest {
+    /// What it is started for.
+    pub purpose: ProgramPurpose,
+    /// The program and its arguments.
+    pub command: Vec<String>,
+}
+
+impl ProgramRequest {
+    /// The request for a command.
+    pub fn new<S: Into<String>>(purpose: ProgramPurpose, command: impl IntoIterator<Item = S>) -> Self {
+        Self { purpose, command: command.into_iter().map(Into::into).collect() }
+    }
+
+    /// The command as a person types it into a POSIX shell. May contain characters that control a terminal.
+    pub fn command_line(&self) -> String {
+        shell_words(&self.command)
+    }
+}
+
+/// A program was not permitted, and was not started.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{} was not permitted and not started: {}", .request.purpose, .request.command_line())]
+pub struct ProgramRefused {
+    /// The program.
+    pub request: ProgramRequest,
+}
+
+/// Which programs Dynident may start. Files from strangers name or need programs (a study its robot's program, a robot
+/// file with macros `xacro`), so that nothing is permitted by default.
+#[derive(Clone, Copy, Default)]
+pub enum ProgramPermission<'a> {
+    /// No program is started.
+    #[default]
+    Refuse,
+    /// Every program is started that the files of a job name or need.
+    Allow,
+    /// A function decides on each program before it is started: `true` permits it.
+    Ask(&'a dyn Fn(&ProgramRequest) -> bool),
+}
+
+impl fmt::Debug for ProgramPermission<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Refuse => "Refuse",
+            Self::Allow => "Allow",
+            Self::Ask(_) => "Ask(..)",
+        })
+    }
+}
+
+impl ProgramPermission<'_> {
+    /// `Allow` or `Refuse`.
+    pub fn from_flag(is_allowed: bool) -> Self {
+        if is_allowed { Self::Allow } else { Self::Refuse }
+    }
+
+    /// Decides on a program.
+    ///
+    /// # Errors
+    /// [`ProgramRefused`] if it may not be started.
+    pub fn permit(&self, request: ProgramRequest) -> Result<PermittedProgram, ProgramRefused> {
+        let is_permitted = match self {
+            Self::Refuse => false,
+            Self::Allow => true,
+            Self::Ask(decide) => decide(&request),
+        };
+        if is_permitted { Ok(PermittedProgram { request }) } else { Err(ProgramRefused { request }) }
+    }
+}
+
+/// A program that may be started: only [`ProgramPermission::permit`] makes one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PermittedProgram {
+    request: ProgramRequest,
+}
+
+impl PermittedProgram {
+    /// What was permitted.
+    pub fn request(&self) -> &ProgramRequest {
+        &self.request
+    }
+
+    /// The program without its arguments.
+    pub fn name(&self) -> &str {
+        self.request.command.first().map_or("", String::as_str)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::cell::Cell;
+
+    #[test]
+    fn nothing_is_permitted_without_a_yes() {
+        let request = || ProgramRequest::new(ProgramPurpose::Robot, ["python3", "client.py"]);
+        let refused = ProgramPermission::default().permit(request()).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "the program of the robot was not permitted and not started: python3 client.py"
+        );
+        assert!(ProgramPermission::from_flag(false).permit(request()).is_err());
+        assert_eq!(ProgramPermission::Allow.permit(request()).unwrap().name(), "python3");
+        let asked = Cell::new(0);
+        let decide = |request: &ProgramRequest| {
+            asked.set(asked.get() + 1);
+            request.purpose == ProgramPurpose::Xacro
+        };
+        assert!(ProgramPermission::Ask(&decide).permit(request()).is_err() && asked.get() == 1);
+    }
+}

@@ -1,0 +1,140 @@
+//! Folders that are removed when they are no longer needed, also after a writer was killed.
+
+use crate::folder::{names, remove_folder};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use tempfile::Builder;
+
+/// What the name of a folder in the system's temporary folder begins with.
+const PREFIX: &str = ".dynident-temporary-";
+/// Random characters at the end of the name.
+const RANDOM_CHARACTERS: usize = 6;
+/// Attempts to create a folder that no other program takes for an abandoned one.
+const ATTEMPTS: usize = 100;
+
+/// A folder that is removed with everything in it when this value is dropped. Unlike that of `tempfile`, removing it
+/// never panics.
+#[derive(Debug)]
+pub struct TemporaryFolder {
+    path: PathBuf,
+    is_kept: bool,
+    /// Locked as long as it is open: nobody takes the folder for an abandoned one.
+    _lock: Option<File>,
+}
+
+impl TemporaryFolder {
+    /// A folder in the system's temporary folder. Folders that killed programs left there are removed.
+    ///
+    /// # Errors
+    /// The system's reason.
+    pub fn new() -> io::Result<Self> {
+        Self::locked_in(&std::env::temp_dir())
+    }
+
+    fn locked_in(parent: &Path) -> io::Result<Self> {
+        remove_abandoned(parent);
+        for _ in 0..ATTEMPTS {
+            let path = created(parent, PREFIX, 0o700)?;
+            let lock = File::open(&path).ok();
+            // Another program may have found it before it was locked, and removed it. Where the system has no locks,
+            // nobody removes it.
+            let _ = lock.as_ref().map(File::lock);
+            if path.exists() {
+                return Ok(Self { path, is_kept: false, _lock: lock });
+            }
+        }
+        Err(io::Error::new(io::ErrorKind::WouldBlock, "other programs keep removing the temporary folder"))
+    }
+
+    /// A folder in `parent` whose name begins with `prefix`. It is private to its owner.
+    ///
+    /// # Errors
+    /// The system's reason.
+    pub fn create_in(parent: &Path, prefix: &str) -> io::Result<Self> {
+        Ok(Self { path: created(parent, prefix, 0o700)?, is_kept: false, _lock: None })
+    }
+
+    /// As [`create_in`](Self::create_in), accessible to all users whom the user's mask lets in.
+    ///
+    /// # Errors
+    /// The system's reason.
+    pub fn create_open_in(parent: &Path, prefix: &str) -> io::Result<Self> {
+        Ok(Self { path: created(parent, prefix, 0o777)?, is_kept: false, _lock: None })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where it is; it is not removed any more.
+    pub fn keep(mut self) -> PathBuf {
+        self.is_kept = true;
+        self.path.clone()
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            // What cannot be removed now, the next program removes.
+            let _ = remove_folder(&self.path);
+        }
+    }
+}
+
+/// A new folder with a mode, from which the user's mask is taken.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "other systems have no such mode"))]
+fn created(parent: &Path, prefix: &str, mode: u32) -> io::Result<PathBuf> {
+    let mut builder = Builder::new();
+    builder.prefix(prefix).rand_bytes(RANDOM_CHARACTERS);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(mode));
+    }
+    Ok(builder.tempdir_in(parent)?.keep())
+}
+
+/// Removes the temporary folders in `parent` whose programs have ended. What cannot be removed stays.
+fn remove_abandoned(parent: &Path) {
+    for name in names(parent).unwrap_or_default() {
+        let is_temporary = name.to_str().and_then(|name| name.strip_prefix(PREFIX)).is_some_and(|random| {
+            random.len() == RANDOM_CHARACTERS && random.bytes().all(|byte| byte.is_ascii_alphanumeric())
+        });
+        let path = parent.join(&name);
+        if is_temporary
+            && fs::symlink_metadata(&path).is_ok_and(|found| found.is_dir())
+            && let Ok(folder) = File::open(&path)
+            && folder.try_lock().is_ok()
+        {
+            let _ = remove_folder(&path);
+        }
+    }
+}
+
+#[cfg(unix)]
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_of_killed_programs_are_removed_and_no_others() {
+        let parent = tempfile::tempdir().unwrap();
+        let running = TemporaryFolder::locked_in(parent.path()).unwrap();
+        fs::write(running.path().join("file"), "").unwrap();
+        let others = ["dynident-a1b2c3", ".dynident-temporary-a1b2c", ".dynident-temporary-a1b2c34"];
+        for name in others.iter().chain(&[".dynident-temporary-a1b2c3"]) {
+            fs::create_dir_all(parent.path().join(name).join("below")).unwrap();
+        }
+        let kept = running.path().to_owned();
+        let next = TemporaryFolder::locked_in(parent.path()).unwrap();
+        assert!(kept.join("file").exists() && !parent.path().join(".dynident-temporary-a1b2c3").exists());
+        assert!(others.iter().all(|name| parent.path().join(name).exists()));
+        drop((running, next));
+        assert_eq!(names(parent.path()).unwrap().len(), others.len());
+        let kept = TemporaryFolder::create_in(parent.path(), "x-").unwrap().keep();
+        assert!(kept.is_dir());
+    }
+}

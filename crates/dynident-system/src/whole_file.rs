@@ -1,0 +1,146 @@
+//! Files that appear whole or not at all, and the temporary files of writers that were killed.
+
+use crate::folder::names;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::Path;
+use tempfile::{Builder, NamedTempFile};
+
+/// What follows the name of the file in the name of its temporary file: `.model.json.dynident-a1b2c3`.
+const MARK: &str = ".dynident-";
+/// Random characters at the end of the name of a temporary file.
+const RANDOM_CHARACTERS: usize = 6;
+/// Largest part of the file's name in that of its temporary file, bytes: both must fit into the 255 of a file system.
+const MAX_NAME_BYTES: usize = 200;
+/// Attempts to create a temporary file that no other writer takes for an abandoned one.
+const ATTEMPTS: usize = 100;
+
+/// Writes a file through a temporary file in the same folder. A reader finds the old file or the new one, never a part,
+/// and an error changes nothing. Temporary files of this file that writers left when they were killed are removed;
+/// those of running writers are locked and stay.
+///
+/// # Errors
+/// The system's reason.
+pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let prefix = temporary_prefix(path.file_name().unwrap_or_default());
+    remove_abandoned(folder, &prefix);
+    let mut file = created(folder, &prefix)?;
+    file.write_all(contents)?;
+    file.as_file().sync_all()?;
+    // A temporary file is private to its owner; a result is readable for all users that can enter the folder.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.as_file().set_permissions(fs::Permissions::from_mode(0o644))?;
+    }
+    file.persist(path).map(drop).map_err(|error| error.error)
+}
+
+/// Tests whether a file can be created in `folder`, or in the nearest folder above it that exists. Leaves nothing.
+///
+/// # Errors
+/// The system's reason.
+pub fn check_writable(folder: &Path) -> io::Result<()> {
+    let nearest = folder.ancestors().find(|ancestor| ancestor.exists() || ancestor.as_os_str().is_empty());
+    let nearest = nearest.filter(|ancestor| !ancestor.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // On Linux a file without a name, of which a kill leaves nothing.
+    tempfile::tempfile_in(nearest).map(drop)
+}
+
+/// What the names of a file's temporary files begin with.
+fn temporary_prefix(name: &OsStr) -> String {
+    let name = name.to_string_lossy();
+    let end = (0..=name.len().min(MAX_NAME_BYTES)).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
+    format!(".{}{MARK}", &name[..end])
+}
+
+/// A new temporary file, locked as long as it is open.
+fn created(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
+    for _ in 0..ATTEMPTS {
+        let file = Builder::new().prefix(prefix).rand_bytes(RANDOM_CHARACTERS).tempfile_in(folder)?;
+        // Another writer may have found it before it was locked, and removed it. Where the system has no locks, nobody
+        // removes it.
+        let _ = file.as_file().lock();
+        if file.path().exists() {
+            return Ok(file);
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::WouldBlock, "other writers keep removing the temporary file"))
+}
+
+/// Removes temporary files whose writers have ended. What cannot be removed stays.
+fn remove_abandoned(folder: &Path, prefix: &str) {
+    for name in names(folder).unwrap_or_default() {
+        let is_temporary = name.to_str().and_then(|name| name.strip_prefix(prefix)).is_some_and(|random| {
+            random.len() == RANDOM_CHARACTERS && random.bytes().all(|byte| byte.is_ascii_alphanumeric())
+        });
+        let path = folder.join(&name);
+        if is_temporary && fs::symlink_metadata(&path).is_ok_and(|found| found.is_file()) {
+            // Its writer holds the lock until it ends.
+            if let Ok(file) = File::open(&path)
+                && file.try_lock().is_ok()
+            {
+                let _ = fs::remove_file(&path);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn abandoned_temporary_files_are_removed_and_no_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.json");
+        let running = created(folder.path(), &temporary_prefix(OsStr::new("model.json"))).unwrap();
+        let others = [
+            ".model.json.dynident-a1b2c",
+            ".model.json.dynident-a1b2c-",
+            ".model.json.dynident-a1b2c34",
+            ".other.json.dynident-a1b2c3",
+            ".tmpa1b2c3",
+            "model.json.dynident-a1b2c3",
+        ];
+        for name in others.iter().chain(&[".model.json.dynident-a1b2c3", ".model.json.dynident-ZZZZZZ"]) {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        fs::create_dir(folder.path().join(".model.json.dynident-folder")).unwrap();
+        write_whole(&path, b"text").unwrap();
+        let mut expected: Vec<_> = others.iter().map(|name| OsStr::new(name).to_owned()).collect();
+        expected.extend([".model.json.dynident-folder", "model.json"].map(|name| OsStr::new(name).to_owned()));
+        expected.push(running.path().file_name().unwrap().to_owned());
+        expected.sort();
+        assert_eq!(names(folder.path()).unwrap(), expected);
+        assert_eq!(fs::read(&path).unwrap(), b"text");
+        drop(running);
+    }
+
+    #[test]
+    fn writers_at_the_same_time_do_not_disturb_each_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.json");
+        std::thread::scope(|scope| {
+            for writer in 0..4_u8 {
+                let path = &path;
+                scope.spawn(move || (0..50).for_each(|_| write_whole(path, &[writer; 1000]).unwrap()));
+            }
+        });
+        let written = fs::read(&path).unwrap();
+        assert!(written.len() == 1000 && written.iter().all(|byte| *byte == written[0]));
+        assert_eq!(names(folder.path()).unwrap(), ["model.json"]);
+    }
+
+    #[test]
+    fn long_names_are_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("λ".repeat(127));
+        write_whole(&path, b"text").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"text");
+        assert_eq!(names(folder.path()).unwrap().len(), 1);
+    }
+}
