@@ -1,7 +1,7 @@
 //! `dynident validate DIR/result.json --study STUDY.toml`.
 
 use super::permission::ProgramOptions;
-use super::{Context, json, judged, known_in, show_problems};
+use super::{Context, json, judged, known_in, message_of, show_problems};
 use crate::{Verdict, summary, terminal};
 use dynident::{ResultFile, RunOptions, validate_result};
 use std::path::PathBuf;

@@ -7,7 +7,7 @@ use dynident_dynamics::{ParametricModel, Workspace, body_placements};
 use dynident_excitation::check::{LimitReport, check_limits};
 use dynident_excitation::criteria::DOptimal;
 use dynident_excitation::families::{Fourier, FourierSettings};
-use dynident_excitation::limits::{AssumedLimits, LimitSet, Limits, LimitsInForce, ShapesOfLinks};
+use dynident_excitation::limits::{AssumedLimits, LimitSet, Limits, LimitsInForce, ShapesOfLinks, StartPositions};
 use dynident_excitation::{DesignSettings, DesignTask, Family, Motion, design};
 use dynident_model::{Model, Transform, Vec3};
 use std::path::Path;
@@ -81,7 +81,7 @@ fn in_force(folder: &Path, description: &str, pieces: usize) -> (Model, LimitsIn
     let model = dynident_model::read_urdf(&format!("<robot name=\"arm\">{description}</robot>")).unwrap().model;
     let shapes = ShapesOfLinks::of(&model, folder);
     let settings = AssumedLimits { mesh_pieces: pieces, ..AssumedLimits::default() };
-    let limits = LimitsInForce::new(&model, &shapes, &settings, &Limits::default()).unwrap();
+    let limits = LimitsInForce::new(&model, &shapes, &settings, &Limits::default(), &StartPositions::default()).unwrap();
     (model, limits)
 }
 

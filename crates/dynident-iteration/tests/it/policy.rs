@@ -59,7 +59,6 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         estimate: Some(estimate),
         pooled: None,
         evidence: Some(evidence()),
-        torque_check: None,
         held_out: None,
     }
 }

@@ -120,7 +120,7 @@ fn streamed(fault: &str, paced: bool, silence_s: Option<f64>) -> (RobotRun, Dura
     settings.limits.stop_s = if fault == "ignore" { 0.2 } else { 60.0 };
     let (reference, controller) = (Reference::standing(&[-0.4, 0.3], 500.0, 60.0).unwrap(), pd());
     let begin = Instant::now();
-    let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    let run = process_robot(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
     (run, begin.elapsed())
 }
 
@@ -151,7 +151,7 @@ fn a_pause_of_what_is_no_stream_is_nothing() {
     let mut settings = settings(ProcessMode::Run, own);
     settings.limits.silence_s = Some(10.0);
     let (reference, controller) = (Reference::standing(&[-0.4, 0.3], 500.0, 1.5).unwrap(), pd());
-    let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    let run = process_robot(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
     assert!(run.status.is_done(), "{}", run.status);
 }
 
