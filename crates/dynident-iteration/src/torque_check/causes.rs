@@ -179,14 +179,13 @@ const LEAST_LISTED: f64 = 0.5;
 pub(super) fn causes(
     task: &IterationTask,
     check: &TorqueCheck,
-    explanations: &[Explanation],
+    (explanations, named): (&[Explanation], &[Option<Fitted>]),
     with: &CheckWith<'_>,
 ) -> Vec<TorqueCause> {
     let names = task.robot.joint_names();
-    let named: Vec<Option<Fitted>> = explanations.iter().map(Explanation::named).collect();
     let of = |candidate: TorqueCandidate| -> Vec<usize> {
         let is_it = |found: &Option<Fitted>| found.is_some_and(|found| found.candidate == candidate);
-        (0..named.len()).filter(|&joint| explanations[joint].matters && is_it(&named[joint])).collect()
+        (0..named.len()).filter(|&joint| is_it(&named[joint])).collect()
     };
     let listed = |joints: &[usize]| joints.iter().map(|&joint| names[joint].clone()).collect::<Vec<_>>();
     let mut found = Vec::new();
@@ -253,7 +252,8 @@ fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
     let settings = with.settings;
     let mut found = Vec::new();
     let lag_s = check.torque_lag_s + check.feedback_delay_s[0].min(0.0);
-    if lag_s.abs() > with.most_lag_s {
+    let lag_std_s = check.torque_lag_std_s.unwrap_or(f64::INFINITY);
+    if lag_s.abs() - settings.sigmas * lag_std_s > with.most_lag_s {
         found.push(TorqueCause::Delay { lag_s });
     }
     let clock_std = check.clock_percent_std.unwrap_or(f64::INFINITY);

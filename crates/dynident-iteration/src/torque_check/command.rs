@@ -15,8 +15,8 @@ const SMOOTHING_RATIO: f64 = 4.0;
 const ROWS_PER_CUTOFF: f64 = 4.0;
 /// Shared parameters: delays of the positions and of the velocities in the controller, lag of the logged torque (s),
 /// relative rate of the log's clock, and delay of the torque that is fed forward (s). The expected sizes only matter
-/// where the rows determine nothing.
-const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 20e-3), (1e-3, 20e-3), (1e-3, 20e-3), (1e-4, 1e-2), (1e-3, 20e-3)];
+/// where the rows determine little, or where another law explains them.
+const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 5e-3), (1e-3, 5e-3), (1e-3, 5e-3), (1e-4, 2e-3), (1e-3, 5e-3)];
 
 /// Delays at which the search begins for drives with unknown gains: a late position looks like a stiffer loop.
 const DELAYS_S: &[f64] = &[-0.03, -0.02, -0.015, -0.01, -0.0075, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02];
@@ -39,14 +39,18 @@ pub(super) enum CommandLaw<'a> {
     },
 }
 
+/// The shared parameters of the comparison.
+pub(super) fn shared_parameters() -> [SharedParameter; SHARED] {
+    PARAMETERS.map(|(difference, expected)| SharedParameter { difference, expected })
+}
+
 impl CommandLaw<'_> {
-    /// The shared parameters of the comparison.
-    pub(super) fn parameters(self) -> [SharedParameter; SHARED] {
-        core::array::from_fn(|k| {
-            let (difference, expected) = PARAMETERS[k];
-            let starts = if matches!(self, Self::OwnLoop { .. }) && k == 0 { DELAYS_S } else { &[0.0] };
-            SharedParameter { difference, expected, starts }
-        })
+    /// Where the search for the shared parameters begins.
+    pub(super) fn starts(self) -> Vec<[f64; SHARED]> {
+        match self {
+            Self::Known { .. } => vec![[0.0; SHARED]],
+            Self::OwnLoop { .. } => DELAYS_S.iter().map(|&delay_s| [delay_s, delay_s, 0.0, 0.0, 0.0]).collect(),
+        }
     }
 }
 

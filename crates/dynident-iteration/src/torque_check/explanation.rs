@@ -10,12 +10,15 @@ use crate::leg::IterationTask;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 use serde::{Deserialize, Serialize};
 
-/// Share of the squared difference that a named candidate explains at least.
-const LEAST_EXPLAINED: f64 = 0.85;
-/// What the runner-up leaves of the squared difference, at least, in units of what the named candidate leaves.
-const CLEARLY_BETTER: f64 = 2.0;
+/// Rows per independent one: neighbouring rows share most of what the candidates leave.
+const CORRELATED_ROWS: f64 = 3.0;
+/// Independent rows that a candidate has beyond its unknowns, at least. In a run of a few strokes everything looks like
+/// everything; only a torque that stays at its limit is known sooner.
+const LEAST_FREEDOM: f64 = 16.0;
 /// Share of the torque that the position error makes in drives whose logged torque has the wrong sign.
 const PUSHES: f64 = 0.3;
+/// Gravity is constant where it varies by less than this share.
+const CONSTANT: f64 = 0.05;
 /// Time blocks of the jackknife of a scale.
 const BLOCKS: usize = 10;
 /// Widths of the steps of friction that are tried, as shares of the joint's highest speed.
@@ -44,6 +47,12 @@ pub enum TorqueCandidate {
     Clipped,
 }
 
+impl TorqueCandidate {
+    /// All of them.
+    pub(super) const ALL: [Self; 6] =
+        [Self::Scale, Self::Sign, Self::Exchanged, Self::Gravity, Self::Friction, Self::Clipped];
+}
+
 /// A candidate with its numbers for one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
@@ -64,20 +73,12 @@ pub(super) struct Explanation {
     pub(super) commanded: Vec<f64>,
     /// Whether the difference matters.
     pub(super) matters: bool,
-    /// Whether the control law is completely known, so that a difference without a cause is one.
+    /// Square of the difference as a share of the square of the torque.
+    pub(super) difference_share: f64,
+    /// Whether a difference without a cause is reported: one from a completely known control law.
     pub(super) is_certain: bool,
     /// All candidates, the best first; empty where the difference does not matter.
     pub(super) candidates: Vec<Fitted>,
-}
-
-impl Explanation {
-    /// The candidate that is named.
-    pub(super) fn named(&self) -> Option<Fitted> {
-        let best = *self.candidates.first().filter(|best| best.explained >= LEAST_EXPLAINED)?;
-        let left = |of: &Fitted| 1.0 - of.explained;
-        let is_clear = self.candidates[1..].iter().all(|other| left(other) >= CLEARLY_BETTER * left(&best));
-        is_clear.then_some(best)
-    }
 }
 
 /// The torques and motions of all joints, row by row.
@@ -108,29 +109,42 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     let by_error = own_loop.first().map_or(0.0, |error| free[1] * rms(error));
     let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
     let difference_percent = 100.0 * rms(&difference) / size;
-    let matters = is_scaled || pushes_away || difference_percent > settings.difference_percent;
+    let lacks_weight = difference_percent <= settings.difference_percent
+        && lacks_constant_gravity(data, joint, (&beside, settings.difference_percent));
+    let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.difference_percent;
     let mut out = Explanation {
         scale: scale_std.is_finite().then_some(scale),
         scale_std: scale_std.is_finite().then_some(scale_std),
         difference_percent,
         commanded: y.iter().zip(&difference).map(|(y, r)| y - r).collect(),
         matters,
+        difference_share: total / (size * size * y.len().max(1) as f64),
         is_certain: own_loop.is_empty(),
         candidates: Vec::new(),
     };
     if !matters {
         return out;
     }
-    let fitted = |candidate, value, left: &[f64]| Fitted { candidate, value, explained: 1.0 - square(left) / total };
+    // Per independent row, so that many unknowns explain nothing by their number.
+    let independent = y.len() as f64 / CORRELATED_ROWS;
+    let fitted = |candidate, value, left: &[f64], unknowns: usize| {
+        let free = independent - unknowns as f64;
+        let explained = 1.0 - square(left) / total * independent / free;
+        (free >= LEAST_FREEDOM).then_some(Fitted { candidate, value, explained })
+    };
+    if lacks_weight {
+        out.candidates = vec![Fitted { candidate: TorqueCandidate::Gravity, value: 1.0, explained: 1.0 }];
+        return out;
+    }
     let mut candidates = Vec::new();
     let left = residual_of(columns, y, &free);
     if pushes_away {
         candidates.push(Fitted { candidate: TorqueCandidate::Sign, value: -1.0, explained: 1.0 });
     } else if scale_std.is_finite() {
         let candidate = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
-        candidates.push(fitted(candidate, scale, &left));
+        candidates.extend(fitted(candidate, scale, &left, 1));
     }
-    candidates.extend(exchanged(data, joint, total));
+    candidates.extend(exchanged(data, joint, total).into_iter().filter(|_| independent >= LEAST_FREEDOM));
     // What is missing, beside the drives' own loop as it then fits.
     let missing = |extra: &[Vec<f64>]| {
         let all: Vec<Vec<f64>> = extra.iter().chain(own_loop).cloned().collect();
@@ -140,15 +154,18 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
         ((0..y.len()).map(sum).collect::<Vec<f64>>(), left)
     };
     if let Some(gravity) = gravity_columns(data, joint) {
+        let columns = gravity.len();
         let (gravity, left) = missing(&gravity);
         if is_of_nominal_size(data, joint, &gravity) {
-            candidates.push(fitted(TorqueCandidate::Gravity, 1.0, &left));
+            candidates.extend(fitted(TorqueCandidate::Gravity, 1.0, &left, columns.min(2 * data.torque.len())));
         }
     }
-    let (friction, left) = missing(&friction_columns(data, joint));
+    let friction = friction_columns(data, joint);
+    let columns_of_friction = friction.len();
+    let (friction, left) = missing(&friction);
     // Friction takes energy out.
     if dot(&friction, &data.dq[joint]) > 0.0 {
-        candidates.push(fitted(TorqueCandidate::Friction, 1.0, &left));
+        candidates.extend(fitted(TorqueCandidate::Friction, 1.0, &left, columns_of_friction));
     }
     candidates.extend(clipped(y, columns, total));
     candidates.sort_by(|a, b| b.explained.total_cmp(&a.explained));
@@ -228,20 +245,35 @@ fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> 
     (!columns.is_empty()).then_some(columns)
 }
 
-/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
-/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
-fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
-    let robot = &data.task.robot;
-    let model = robot.model();
+/// Whether the constant that the log lacks is a gravity torque that does not change with the posture, as that of a
+/// vertical slide: half to twice that of the description, and more than the smallest share of the torque that matters.
+fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, (beside, percent): (&[f64], f64)) -> bool {
+    let nominal = nominal_gravity(data, joint);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let (weight, missing) = (mean(&nominal), -mean(beside));
+    let is_constant = rms(&centred(&nominal)) < CONSTANT * weight.abs();
+    is_constant
+        && 100.0 * missing.abs() > percent * rms(&data.torque[joint])
+        && (0.5..=2.0).contains(&(missing / weight))
+}
+
+/// The gravity torque of the description along the rows.
+fn nominal_gravity(data: &JointData<'_>, joint: usize) -> Vec<f64> {
+    let model = data.task.robot.model();
     let mut workspace = Workspace::new(model);
     let mut q = vec![0.0; model.dof()];
-    let nominal: Vec<f64> = (0..missing.len())
+    (0..data.torque[joint].len())
         .map(|row| {
             q.iter_mut().zip(data.q).for_each(|(to, from)| *to = from[row]);
             gravity_torque(model, &mut workspace, &q)[joint]
         })
-        .collect();
-    let (nominal, missing) = (centred(&nominal), centred(missing));
+        .collect()
+}
+
+/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
+/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
+fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
+    let (nominal, missing) = (centred(&nominal_gravity(data, joint)), centred(missing));
     let own = square(&nominal);
     own == 0.0 || (0.5..=2.0).contains(&(dot(&nominal, &missing) / own))
 }

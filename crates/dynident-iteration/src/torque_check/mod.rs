@@ -17,8 +17,10 @@
 //! | `separable_fit` | scales and timing by least squares |
 //! | `explanation` | what explains a difference: the candidates, and when one is named |
 //! | `row_scale` | what the parameters that several joints share show about each joint's torque |
+//! | `agreement` | one cause for all joints, where one explains them all |
 //! | `causes` | from single joints to one statement |
 
+mod agreement;
 mod causes;
 mod command;
 mod explanation;
@@ -31,7 +33,8 @@ pub(crate) use row_scale::{LeastDeviation, RowScale, row_scales};
 
 use crate::leg::{IterationTask, Leg};
 use crate::settings::RunIdentificationSettings;
-use command::{CommandLaw, ObservedLeg};
+use agreement::agreement;
+use command::{CommandLaw, ObservedLeg, shared_parameters};
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Record, SimulationError, require};
 use explanation::{Explanation, JointData, explain, may_be_missing};
@@ -44,6 +47,8 @@ const USUAL_CUTOFF_HZ: f64 = 8.0;
 const MOST_POINTS: usize = 150;
 /// Cycles of the cut-off that a run has at least.
 const CYCLES_PER_RUN: f64 = 12.0;
+/// Another timing is taken where it leaves less than this share of the squared differences.
+const BETTER: f64 = 0.5;
 /// Fewest rows per joint from which anything is concluded.
 const FEWEST_ROWS: usize = 20;
 
@@ -55,8 +60,8 @@ pub struct TorqueCheckSettings {
     /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
     /// have at most 1.5.
     pub scale_percent: f64,
-    /// Largest difference between logged and commanded torque that has no named cause, root mean square as a
-    /// percentage of the joint's torque. Default 15.
+    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
+    /// Default 5: correct logs of the campaign's robots have at most 2.
     pub difference_percent: f64,
     /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
     /// share, percent. Default 5.
@@ -69,7 +74,7 @@ pub struct TorqueCheckSettings {
 
 impl Default for TorqueCheckSettings {
     fn default() -> Self {
-        Self { scale_percent: 3.0, difference_percent: 15.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
+        Self { scale_percent: 3.0, difference_percent: 5.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
     }
 }
 
@@ -137,6 +142,9 @@ pub struct TorqueCheck {
     pub feedback_delay_s: [f64; 2],
     /// By how much the logged torque comes after the commanded one, s.
     pub torque_lag_s: f64,
+    /// Standard deviation of how far positions and torques of the log are apart, s; none where it is not known.
+    #[serde(default)]
+    pub torque_lag_std_s: Option<f64>,
     /// By how much the log's clock is slow compared with the controller's, percent.
     pub clock_percent: f64,
     /// Standard deviation of `clock_percent`; none where the commanded torque is not known.
@@ -190,6 +198,7 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         source,
         feedback_delay_s: [0.0; 2],
         torque_lag_s: 0.0,
+        torque_lag_std_s: None,
         clock_percent: 0.0,
         clock_percent_std: None,
         joints: vec![JointTorqueCheck::without_command(); dof],
@@ -222,8 +231,8 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         }
         out
     };
-    let parameters = observed[0].0.parameters();
-    let mut fit = separable_fit(&torque, &parameters, &mut |timing| columns(timing));
+    let (parameters, starts) = (shared_parameters(), observed[0].0.starts());
+    let mut fit = separable_fit(&torque, (&parameters, &starts), &mut |timing| columns(timing));
     if fit.columns.iter().zip(&torque).any(|(columns, y)| columns.iter().any(|column| column.len() != y.len())) {
         return None;
     }
@@ -232,22 +241,22 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         (0..dof).map(|joint| explain(&data, joint, with.settings)).collect()
     };
     let mut explanations = explained(&fit.columns);
+    let mut found = agreement(&explanations);
     if explanations.iter().any(|own| own.matters) {
         // What is missing in the torque bends the timing: it is found again beside what may be missing.
         let data = JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1] };
         for extra in may_be_missing(&data) {
-            let other = separable_fit(&torque, &parameters, &mut |timing| {
+            let other = separable_fit(&torque, (&parameters, &starts), &mut |timing| {
                 let own = columns(timing).into_iter().zip(&extra);
                 own.map(|(own, extra)| own.into_iter().chain(extra.iter().cloned()).collect()).collect()
             });
             let own = other.columns.iter().zip(&fit.columns);
             let columns: Vec<Vec<Vec<f64>>> = own.map(|(all, base)| all[..base.len()].to_vec()).collect();
             let then = explained(&columns);
-            // It is only taken if it explains everything.
-            if then.iter().any(|own| own.matters) && then.iter().all(|own| !own.matters || own.named().is_some()) {
-                explanations = then;
+            let agreed = agreement(&then);
+            if agreed.left < BETTER * found.left {
+                (explanations, found) = (then, agreed);
                 fit = SeparableFit { columns, ..other };
-                break;
             }
         }
     }
@@ -255,7 +264,8 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
     check.feedback_delay_s = [position_s, velocity_s];
     check.torque_lag_s = lag_s;
     check.clock_percent = 100.0 * clock;
-    check.clock_percent_std = Some(100.0 * fit.std[3]);
+    check.clock_percent_std = Some(100.0 * fit.std_of([0.0, 0.0, 0.0, 1.0, 0.0]));
+    check.torque_lag_std_s = Some(fit.std_of([f64::from(position_s < 0.0), 0.0, 1.0, 0.0, 0.0]));
     for (joint, explanation) in explanations.iter().enumerate() {
         let shown = &mut check.joints[joint];
         (shown.scale, shown.scale_std) = (explanation.scale, explanation.scale_std);
@@ -264,7 +274,7 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         let commanded = explanation.commanded.iter().step_by(step);
         shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
     }
-    check.causes = causes::causes(task, &check, &explanations, with);
+    check.causes = causes::causes(task, &check, (&explanations, &found.named), with);
     Some(check)
 }
 

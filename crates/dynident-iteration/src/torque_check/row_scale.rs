@@ -7,8 +7,8 @@
 //! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
 //!
 //! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
-//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint with the largest deviation
-//! in units of its bar is taken as wrong, and the others are tested again with its κ free. Parameters that one joint
+//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ
+//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Parameters that one joint
 //! alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little with the
 //! others gets a wide bar.
 
@@ -24,8 +24,13 @@ use dynident_identification::{Execution, Logs, RegressorModel, training_rows};
 
 /// A wider standard deviation says nothing.
 const WIDEST_STD: f64 = 0.3;
-/// Another joint that explains the rows nearly as well, by its deviation in bars as a share of the largest.
-const AS_LIKELY: f64 = 0.8;
+/// Share of a joint's torque that no other parameter may explain, at least: below it errors of the model are magnified.
+const LEAST_OWN_SHARE: f64 = 0.02;
+/// Beyond this deviation the linear equations mean nothing.
+const FURTHEST: f64 = 0.6;
+/// The scale of another joint explains the rows nearly as well if their log-likelihood is lower by less than this: three
+/// and a half standard deviations of independent rows.
+const AS_LIKELY: f64 = 6.0;
 
 /// The scale of one joint's torque relative to the other joints.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,42 +96,61 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
     let mut wrong: Vec<(usize, Vec<usize>)> = Vec::new();
     loop {
         let chosen: Vec<usize> = wrong.iter().map(|(joint, _)| *joint).collect();
-        let of_joint = |joint: usize| -> Option<(f64, f64)> {
+        let of_joint = |joint: usize| -> Option<Kappa> {
             let free: Vec<usize> =
                 if chosen.contains(&joint) { chosen.clone() } else { chosen.iter().copied().chain([joint]).collect() };
             let place = free.iter().position(|&one| one == joint)?;
             kappa(problem, values, &free, place)
         };
-        let found: Vec<Option<(f64, f64)>> = (0..joints).map(of_joint).collect();
-        let bars = |joint: usize| found[joint].map_or(0.0, |(kappa, std)| kappa.abs() / std);
+        let found: Vec<Option<Kappa>> = (0..joints).map(of_joint).collect();
+        let likelihood = |joint: usize| found[joint].map_or(f64::NEG_INFINITY, |kappa| kappa.log_likelihood);
         let counts = |&joint: &usize| {
-            found[joint].is_some_and(|(kappa, _)| kappa.abs() > least.share && bars(joint) > least.sigmas)
+            let is_large = |kappa: Kappa| kappa.value.abs() > least.share.max(least.sigmas * kappa.std);
+            found[joint].is_some_and(is_large)
         };
         let open: Vec<usize> = (0..joints).filter(|joint| !chosen.contains(joint)).collect();
-        let worst = open.iter().copied().filter(counts).max_by(|&a, &b| bars(a).total_cmp(&bars(b)));
+        let worst = open.iter().copied().filter(counts).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
         // More than half of the joints cannot all be wrong against the rest.
         if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints) {
-            let is_rival = |&other: &usize| other != worst && bars(other) > AS_LIKELY * bars(worst);
+            let is_rival = |&other: &usize| other != worst && likelihood(other) > likelihood(worst) - AS_LIKELY;
             wrong.push((worst, open.iter().copied().filter(is_rival).collect()));
             continue;
         }
         let scale = |joint: usize| {
-            let (kappa, std) = found[joint]?;
+            let Kappa { value, std, .. } = found[joint]?;
             let or = wrong.iter().find(|(one, _)| *one == joint).map(|(_, or)| or.clone());
-            Some(RowScale { value: 1.0 + kappa, std, is_wrong: or.is_some(), or: or.unwrap_or_default() })
+            Some(RowScale { value: 1.0 + value, std, is_wrong: or.is_some(), or: or.unwrap_or_default() })
         };
         return (0..joints).map(scale).collect();
     }
 }
 
-/// κ of the joint `free[place]` with its standard deviation, where the joints `free` have one.
-fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<(f64, f64)> {
+/// The deviation of a joint's scale.
+#[derive(Clone, Copy, Debug)]
+struct Kappa {
+    value: f64,
+    std: f64,
+    /// Of all rows with it.
+    log_likelihood: f64,
+}
+
+/// κ of the joint `free[place]`, where the joints `free` have one.
+fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<Kappa> {
     let columns = problem.columns().len();
     let without_load = vec![vec![0.0; columns]; problem.logs().len()];
     let wider = with_free_gains(problem.clone(), free, (&without_load, values)).ok()?;
     let found = weighted_least_squares(&wider, &WeightedSettings::default()).ok()?;
     let column = columns + place;
-    let std = found.std[column];
+    let (value, std) = (found.values[column], found.std[column]);
     let is_fixed = found.rank.fixed.iter().any(|fixed| fixed.column == column);
-    (!is_fixed && std > 0.0 && std < WIDEST_STD).then(|| (found.values[column], std))
+    // Of white noise the deviation is σ over the norm of what the other columns leave of the predicted torque.
+    let joint = free[place];
+    let of_joint = problem.equations().iter().filter(|equation| equation.joint == joint);
+    let norm = of_joint.map(|equation| equation.factor.total().torque_norm().powi(2)).sum::<f64>().sqrt();
+    let own_share = found.joint_sigma[joint] / (found.covariance_white[(column, column)].sqrt() * norm);
+    let is_determined = !is_fixed && std > 0.0 && std < WIDEST_STD && own_share > LEAST_OWN_SHARE;
+    let rows = problem.joint_rows();
+    let of_rows = |(sigma, rows): (&f64, &usize)| -(*rows as f64) * sigma.max(f64::MIN_POSITIVE).ln();
+    let log_likelihood = found.joint_sigma.iter().zip(&rows).map(of_rows).sum();
+    (is_determined && value.abs() < FURTHEST).then_some(Kappa { value, std, log_likelihood })
 }

@@ -8,8 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on real logs.
-const MOST_STEPS: usize = 6;
+/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on most logs; a clock that is off takes
+/// more.
+const MOST_STEPS: usize = 15;
 /// A step below this share of the finite difference ends the search.
 const SMALL_STEP: f64 = 1e-2;
 /// Smallest residual that a joint is weighted by, as a share of its torque: exact logs would have infinite weights.
@@ -28,8 +29,6 @@ pub(super) type JointColumns = Vec<Vec<f64>>;
 pub(super) struct SharedParameter {
     pub(super) difference: f64,
     pub(super) expected: f64,
-    /// Values at which the search may begin.
-    pub(super) starts: &'static [f64],
 }
 
 /// The solution.
@@ -37,22 +36,30 @@ pub(super) struct SharedParameter {
 pub(super) struct SeparableFit {
     /// The shared parameters.
     pub(super) shared: [f64; SHARED],
-    /// Their standard deviations, if neighbouring rows had independent residuals.
-    pub(super) std: [f64; SHARED],
+    /// Their covariance, if neighbouring rows had independent residuals; none where it does not exist.
+    pub(super) covariance: Option<DMatrix<f64>>,
     /// Columns of each joint at these.
     pub(super) columns: Vec<JointColumns>,
 }
 
-/// Fits `y[joint]` by `columns(shared)[joint]`.
+impl SeparableFit {
+    /// Standard deviation of a combination of the shared parameters; infinite where it is not determined.
+    pub(super) fn std_of(&self, combination: [f64; SHARED]) -> f64 {
+        let Some(covariance) = &self.covariance else { return f64::INFINITY };
+        let combination = DVector::from_column_slice(&combination);
+        combination.dot(&(covariance * &combination)).max(0.0).sqrt()
+    }
+}
+
+/// Fits `y[joint]` by `columns(shared)[joint]`, from the best of some starts.
 pub(super) fn separable_fit(
     y: &[Vec<f64>],
-    parameters: &[SharedParameter; SHARED],
+    (parameters, starts): (&[SharedParameter; SHARED], &[[f64; SHARED]]),
     columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
 ) -> SeparableFit {
-    // The first parameter may have several minima: the search begins at the best of some values.
-    let starts = parameters[0].starts.iter().map(|start| {
-        let mut shared = [0.0; SHARED];
-        shared[0] = *start;
+    // There may be several minima: the search begins at the best of the starts.
+    let starts = starts.iter().map(|start| {
+        let shared = *start;
         let at = columns(&shared);
         let residuals = projected(y, &at);
         (shared, at, residuals)
@@ -70,7 +77,7 @@ pub(super) fn separable_fit(
         let of_rows: f64 = residuals.iter().zip(sigma).map(|(r, sigma)| square(r) / (sigma * sigma)).sum();
         of_rows + shared.iter().zip(parameters).map(|(p, own)| (p / own.expected).powi(2)).sum::<f64>()
     };
-    let mut std = [f64::INFINITY; SHARED];
+    let mut covariance = None;
     for _ in 0..MOST_STEPS {
         let sigma = scale(&residuals);
         let mut slopes: Vec<Vec<Vec<f64>>> = Vec::with_capacity(SHARED);
@@ -98,8 +105,7 @@ pub(super) fn separable_fit(
         }
         let Some(factor) = normal.cholesky() else { break };
         let step = factor.solve(&right);
-        let covariance = factor.inverse();
-        std = core::array::from_fn(|k| covariance[(k, k)].sqrt());
+        covariance = Some(factor.inverse());
         let before = cost(&residuals, &sigma, &shared);
         let mut taken = None;
         for halving in 0..4 {
@@ -119,7 +125,7 @@ pub(super) fn separable_fit(
             break;
         }
     }
-    SeparableFit { shared, std, columns: at }
+    SeparableFit { shared, covariance, columns: at }
 }
 
 fn projected(y: &[Vec<f64>], columns: &[JointColumns]) -> Vec<Vec<f64>> {
