@@ -119,7 +119,7 @@ def named_causes(iterations):
 
     def add(cause, where):
         joints = where.get("joints") or ([where["joint"]] if where.get("joint") else [])
-        entry = {"cause": cause, "joints": joints, "text": where.get("message") or where.get("text") or ""}
+        entry = {"cause": cause, "joints": joints, "or": where.get("or", []), "text": where.get("message") or where.get("text") or ""}
         if not any((cause, joints) == (other["cause"], other["joints"]) for other in found):
             found.append(entry)
 
@@ -148,7 +148,7 @@ def problems(row, fault, joints):
             continue
         if not re.search(fault.cause, named["cause"]):
             found.append(f"wrong cause: {named['cause']} {','.join(named['joints'])}".strip())
-        elif not set(named["joints"]) <= set(joints):
+        elif not set(named["joints"]) <= set(joints) and not (named["or"] and set(named["or"]) & set(joints)):
             found.append(f"wrong joint: {named['cause']} {','.join(named['joints'])}")
     if row["fault"] == "chatter" and row["converged"] and not row["causes"]:
         found.append("not reported")

@@ -2,14 +2,14 @@
 //! output. What a program for a real robot looks like, and what the tests speak to.
 //!
 //!     robot_client ROBOT.urdf [--fault KIND] [--part PART] [--at SAMPLE] [--marker FILE] [--unwatched yes]
-//!         [--brakes MS]
+//!         [--brakes MS] [--paced yes]
 //!
 //! A stop message, or the end of its input, stops the robot at the next sample; so does a sample outside of the
 //! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
 //! (default 50) of the part (default motion), with a word in the marker file before: die, hang, wait (for a message),
-//! ignore (a stop), orphan (dies while a process that it started holds its output), garbage, nan, null, joints,
-//! backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello: deaf,
-//! protocol, names, modes, homeless (it does not know of ways).
+//! ignore (a stop), pause (a second), orphan (dies while a process that it started holds its output), garbage, nan,
+//! null, joints, backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello: deaf,
+//! protocol, names, modes, homeless (it does not know of ways). `--paced` it runs in real time.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 
@@ -22,7 +22,7 @@ use std::error::Error;
 use std::io::{BufRead, Write};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 type Result<T> = core::result::Result<T, Box<dyn Error>>;
 
@@ -37,6 +37,8 @@ struct Client {
     watched: bool,
     /// Where it misbehaves: how long it needs to stand after its stop, ms; then its marker file says so.
     brakes: u64,
+    /// Whether a sample of the mode run is sent when it is due, not at once.
+    paced: bool,
     /// What the host writes: read aside, so that a stop is heard in the middle of a motion.
     messages: Receiver<Value>,
 }
@@ -48,7 +50,7 @@ fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or("give the robot's URDF file")?;
     let (mut fault, mut at, mut marker, mut watched) = (String::new(), 50, String::new(), true);
-    let mut brakes = 0;
+    let (mut brakes, mut paced) = (0, false);
     let mut part = "motion".to_owned();
     while let Some(name) = arguments.next() {
         let value = arguments.next().ok_or("an option without a value")?;
@@ -59,6 +61,7 @@ fn main() -> Result<()> {
             "--marker" => marker = value,
             "--unwatched" => watched = false,
             "--brakes" => brakes = value.parse()?,
+            "--paced" => paced = true,
             _ => return Err(format!("unknown option {name}").into()),
         }
     }
@@ -75,7 +78,7 @@ fn main() -> Result<()> {
             }
         }
     });
-    let mut client = Client { plant, joints, fault, at, part, marker, watched, brakes, messages };
+    let mut client = Client { plant, joints, fault, at, part, marker, watched, brakes, paced, messages };
     client.hello()?;
     while let Ok(message) = client.messages.recv() {
         match message["type"].as_str() {
@@ -196,6 +199,7 @@ impl Client {
                 self.messages.recv()?;
                 std::thread::sleep(Duration::from_secs(3600));
             }
+            "pause" => std::thread::sleep(Duration::from_secs(1)),
             "garbage" => println!("Segmentation fault (core dumped)"),
             "nan" => println!("{}", message(time_s, json!("Q")).to_string().replace("\"Q\"", "[NaN, 0.0]")),
             "null" => send(&message(time_s, json!([null, 0.0])))?,
@@ -249,6 +253,7 @@ impl Client {
         let mut target = ReferenceSample::new(dof);
         let mut tau = vec![0.0; dof];
         let mut kept = Vec::new();
+        let begin = Instant::now();
         for (place, (part, reference)) in parts.iter().enumerate() {
             // The samples that a way shares with the motion are the motion's.
             let samples = match *part {
@@ -260,6 +265,9 @@ impl Client {
                 let time_s = sample as f64 / rate_hz;
                 let due_s = f64::from(due) / rate_hz;
                 due += 1;
+                if self.paced {
+                    std::thread::sleep(Duration::from_secs_f64(due_s).saturating_sub(begin.elapsed()));
+                }
                 self.plant.set_time_s(due_s);
                 target.take(reference, sample);
                 let measured = Measured { q: self.plant.q(), dq: self.plant.dq() };

@@ -9,7 +9,7 @@ use crate::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
 use crate::robot::{RunPurpose, Ways};
 use crate::settings::IterationSettings;
 use crate::supervision::{NextMotion, NextWays};
-use crate::typical_drives::with_typical_drives;
+use crate::typical_drives::{with_light_drives, with_typical_drives};
 use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Reference, SimulationError};
@@ -98,6 +98,8 @@ pub(crate) fn rehearsed<'a>(
     };
     let known = robot.nominal()[..robot.model().inertial_count()].iter().any(|value| *value != 0.0);
     let typical = with_typical_drives(robot).unwrap_or_else(|| robot.nominal().to_vec());
+    let lightest = rehearsal.lightest_drive();
+    let light = (lightest < 1.0).then(|| with_light_drives(robot, lightest)).flatten();
     let whole = |(leg, found): (&'a Leg, &Option<FoundWays>)| {
         let reference = leg.reference();
         let around = found.as_ref().map(|found| found.ways.around(reference)).transpose()?;
@@ -111,6 +113,8 @@ pub(crate) fn rehearsed<'a>(
         controller,
         model,
         believed: own.or(shown).or(known.then_some(&typical[..])),
+        light: light.as_deref().filter(|_| known && own.or(shown).is_none()),
+        oscillation: settings.safety.oscillation.limits(robot.model()),
         envelope: settings.safety.envelope.as_ref(),
     };
     Ok(rehearsed.run(rehearsal)?.map(Some))

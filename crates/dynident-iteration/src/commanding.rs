@@ -101,6 +101,7 @@ impl Iteration {
         let came = robot.run(&RunRequest {
             model: model.as_ref(),
             envelope: self.settings().safety.envelope.as_ref(),
+            oscillation: self.settings().safety.oscillation.limits(self.task().robot.model()),
             stop: stop.as_ref(),
             speed,
             purpose,
@@ -121,6 +122,7 @@ impl Iteration {
             RobotStatus::Done
             | RobotStatus::Simulated { .. }
             | RobotStatus::Stopped { .. }
+            | RobotStatus::Oscillated { .. }
             | RobotStatus::LeftEnvelope { .. } => Came::Run(came),
         })
     }

@@ -202,6 +202,11 @@ fn clipping_words(stated: bool) -> &'static str {
 }
 
 impl Shortfall {
+    /// Whether it names why the model does not fit, rather than that it does not.
+    fn claims_a_cause(&self) -> bool {
+        matches!(self, Self::Lag { .. } | Self::LongLag { .. } | Self::LagChanges { .. } | Self::Length(_))
+    }
+
     /// What would help.
     pub fn remedy(&self) -> &'static str {
         match self {
@@ -270,7 +275,9 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
         return wrong_torque.collect();
     }
     let mut found: Vec<Shortfall> = wrong_torque.collect();
-    found.extend(unmet(records, settings, names));
+    // Beside a torque that is another one for an unknown reason, no other cause can be claimed.
+    let may_claim = found.is_empty();
+    found.extend(unmet(records, settings, names).into_iter().filter(|own| may_claim || !own.claims_a_cause()));
     found
 }
 

@@ -139,7 +139,7 @@ impl Iteration {
                         "{} run {} ended early: {}. Look at the robot; the same command begins it anew",
                         motion.words(),
                         plan.run,
-                        came.ending(&*motion.reference()?)
+                        came.ending(&*motion.reference()?, self.lowest_oscillation_hz())
                     );
                     return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
                 }
@@ -194,7 +194,7 @@ impl Iteration {
         let of_run =
             chosen.map_or(Cow::Borrowed(&*settings), |way| Cow::Owned(settings.with_differentiator(&way.taken)));
         let rest_margins = record.estimate.as_ref().map(RunEstimate::rest_margins).unwrap_or_default();
-        match examined(&task, records, &of_run, (known, &rest_margins)) {
+        match examined(&task, records, (&of_run, &self.settings.safety.oscillation), (known, &rest_margins)) {
             Ok(evidence) => record.evidence = Some(evidence),
             Err(error) if fatal(&error) => return Err(error),
             Err(error) => record.reason = record.reason.take().or_else(|| Some(error.to_string())),
@@ -279,7 +279,7 @@ impl Iteration {
                 .iter()
                 .zip(legs)
                 .next_back()
-                .map_or_else(String::new, |(run, leg)| run.ending(leg.reference())),
+                .map_or_else(String::new, |(run, leg)| run.ending(leg.reference(), self.lowest_oscillation_hz())),
             max_tracking_error_rad: worst,
             accepted: false,
             reason: None,

@@ -1,6 +1,7 @@
 //! What a run's log shows beside parameters: what the verdict on an iteration rests on.
 
 use crate::lengths::OtherLength;
+use crate::oscillation::Oscillation;
 use serde::{Deserialize, Serialize};
 
 /// What the log of one run shows of one joint.
@@ -9,13 +10,16 @@ use serde::{Deserialize, Serialize};
 pub struct JointEvidence {
     /// Root mean square of the logged torque, Nm (N).
     pub torque_rms: f64,
-    /// Standard deviation of the noise that one logged torque has, Nm (N): the white noise whose density the torque has
-    /// above its motion.
+    /// Standard deviation of the noise that one logged torque has, Nm (N), without steps of friction: the lower
+    /// quartile over short windows, octave by octave above the motion.
     pub torque_noise: f64,
-    /// Standard deviation of the same noise in a row of the fit, Nm (N).
+    /// Standard deviation of the same noise in a row of the fit, Nm (N), by its density just above the motion.
     pub row_noise: f64,
     /// Samples at the drive's limit; none where no torque stands still at its largest.
     pub clipping: Option<Clipping>,
+    /// Torque that oscillates far above the motion's frequencies; none where it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub oscillation: Option<Oscillation>,
     /// What the model of the runs before says of this run, before it was fitted to; none for the first.
     pub prediction: Option<Prediction>,
     /// The distance from the trajectory that the noise of the log, the friction found, the measured lag and the

@@ -102,7 +102,7 @@ impl Iteration {
         };
         let found = HeldOutRun {
             done: came.status.is_done(),
-            outcome: came.ending(held_out.leg.reference()),
+            outcome: came.ending(held_out.leg.reference(), self.lowest_oscillation_hz()),
             max_tracking_error_rad,
             evidence,
             reason,
@@ -123,7 +123,8 @@ impl Iteration {
         let settings = held_out_settings(&settings, records);
         let own = records.last().and_then(|record| record.estimate.as_ref());
         let rest_margins = own.map(RunEstimate::rest_margins).unwrap_or_default();
-        examined(&task, core::slice::from_ref(&came.record), &settings, (Some(known), &rest_margins))
+        let how = (&*settings, &self.settings().safety.oscillation);
+        examined(&task, core::slice::from_ref(&came.record), how, (Some(known), &rest_margins))
     }
 }
 

@@ -61,6 +61,11 @@ impl Iteration {
         &self.settings
     }
 
+    /// The slowest oscillation that is looked for, Hz.
+    pub(crate) fn lowest_oscillation_hz(&self) -> f64 {
+        self.settings.safety.oscillation.lowest_hz(self.task.robot.model())
+    }
+
     /// The legs of a run: the task's, along trajectories of its own where it had some.
     ///
     /// # Errors

@@ -12,8 +12,20 @@ const MARGIN: f64 = core::f64::consts::FRAC_PI_6;
 
 /// The highest natural frequency with that margin, rad/s; infinite without a delay.
 pub(crate) fn highest_omega(ratio: f64, delay_s: f64) -> f64 {
-    let crossover = (2.0 * ratio * ratio + ratio * (4.0 * ratio * ratio + 1.0).sqrt()).sqrt();
-    ((2.0 * crossover).atan() - MARGIN) / (crossover * delay_s)
+    omega_with_margin(ratio, delay_s, (MARGIN, 1.0))
+}
+
+/// The natural frequency at which a joint that is lighter than expected keeps half of that margin, rad/s, with
+/// `K_d = 2 ζ ω m̂` for a damping `ζ`; infinite without a delay.
+pub(crate) fn highest_omega_if_light(ratio: f64, delay_s: f64, damping: f64) -> f64 {
+    omega_with_margin(ratio, delay_s, (0.5 * MARGIN, damping))
+}
+
+/// With a damping `ζ` the crossover is at `x² = 2 ζ² r² + r √(4 ζ⁴ r² + 1)`, and the margin `atan 2 ζ x - ω_c τ`.
+fn omega_with_margin(ratio: f64, delay_s: f64, (margin, damping): (f64, f64)) -> f64 {
+    let damped = damping * damping * ratio;
+    let crossover = (2.0 * damped * ratio + ratio * (4.0 * damped * damped + 1.0).sqrt()).sqrt();
+    ((2.0 * damping * crossover).atan() - margin) / (crossover * delay_s)
 }
 
 /// The share of their natural frequencies `omega` (rad/s) at which joints under velocity gains `kd` (Nms/rad) in a
@@ -37,9 +49,11 @@ mod tests {
     /// at three times that (no margin left) it grows.
     #[test]
     fn the_highest_frequency_is_stable_and_three_times_that_is_not() {
-        for ratio in [1.0, 1.5, 4.0, 10.0] {
-            let delay_s = 0.008;
-            let highest = highest_omega(ratio, delay_s);
+        let delay_s = 0.008;
+        let usual = [1.0, 1.5, 4.0, 10.0].map(|ratio| (ratio, 1.0, highest_omega(ratio, delay_s)));
+        let light = [(4.0, 1.0), (4.0, 0.5), (10.0, 0.5)]
+            .map(|(ratio, damping)| (ratio, damping, highest_omega_if_light(ratio, delay_s, damping)));
+        for (ratio, damping, highest) in usual.into_iter().chain(light) {
             let grows = |omega: f64| {
                 let (step, late) = (1e-5, 800);
                 let (mut q, mut dq) = (1.0_f64, 0.0_f64);
@@ -47,14 +61,14 @@ mod tests {
                 let seconds = 20.0 / omega;
                 for _ in 0..(seconds / step) as usize {
                     let (late_q, late_dq) = seen.pop_front().unwrap();
-                    dq -= step * ratio * (omega * omega * late_q + 2.0 * omega * late_dq);
+                    dq -= step * ratio * (omega * omega * late_q + 2.0 * damping * omega * late_dq);
                     q += step * dq;
                     seen.push_back((q, dq));
                 }
                 q.abs().max(dq.abs() / omega) > 1.0
             };
-            assert!(!grows(highest), "{ratio}");
-            assert!(grows(3.0 * highest), "{ratio}");
+            assert!(!grows(highest), "{ratio} {damping}");
+            assert!(grows(3.0 * highest), "{ratio} {damping}");
         }
     }
 

@@ -2,9 +2,10 @@
 //! loop in simulation with robots that are not quite the model.
 
 use crate::dry_steps::with_dry_steps;
+use crate::oscillation::OscillationLimits;
 use crate::posture::{at_sample, inertia_matrix};
 use crate::rests::highest_speeds;
-use crate::robot::{Breach, Envelope};
+use crate::robot::{Breach, Envelope, JointOscillation, RunOscillations};
 use dynident_dynamics::ParametricModel;
 use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, Model};
@@ -20,6 +21,9 @@ use thiserror::Error;
 const SINGULAR: f64 = 1e-12;
 /// Delay of a controller of which nothing is known, seconds of a usual arm.
 const DELAY_S: f64 = 0.008;
+/// Share of the typical inertia of a drive of which nothing is known: a gripper whose description states 30 Nm had
+/// 0.01 kg m² of 0.1.
+const LIGHTEST_DRIVE: f64 = 0.1;
 /// Longest delay that can be stated, s.
 const MOST_DELAY_S: f64 = 10.0;
 
@@ -39,6 +43,12 @@ pub struct RehearsalSettings {
     /// study by default none where the gains are stated, or the robot waits for every torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
+    /// Least inertia of a drive without a described inertia, as a share of the typical one (which the effort limit
+    /// accelerates by 300 rad/s² of a usual arm): derived gains keep a joint stable down to it, and a robot with such
+    /// drives is simulated. Default 0.1; in a study by default 1 where the gains are stated, because the robot is
+    /// expected to have run with them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lightest_drive: Option<f64>,
     /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.
     /// Default 200.
     pub postures: usize,
@@ -48,7 +58,7 @@ pub struct RehearsalSettings {
 
 impl Default for RehearsalSettings {
     fn default() -> Self {
-        Self { uncertainty_percent: 30.0, robots: 4, delay_s: None, postures: 200, seed: 1 }
+        Self { uncertainty_percent: 30.0, robots: 4, delay_s: None, lightest_drive: None, postures: 200, seed: 1 }
     }
 }
 
@@ -62,8 +72,15 @@ impl RehearsalSettings {
         require((0.0..=90.0).contains(&percent), "rehearsal.uncertainty_percent", percent, "give 0 to 90")?;
         let delay_s = self.delay_s.unwrap_or(0.0);
         require((0.0..=MOST_DELAY_S).contains(&delay_s), "rehearsal.delay_s", delay_s, "give 0 to 10 s")?;
+        let lightest = self.lightest_drive();
+        require((0.001..=1.0).contains(&lightest), "rehearsal.lightest_drive", lightest, "give 0.001 to 1")?;
         require(self.robots <= 1000, "rehearsal.robots", self.robots as f64, "give at most 1000")?;
         require(self.postures <= 1_000_000, "rehearsal.postures", self.postures as f64, "give at most 1000000")
+    }
+
+    /// Least inertia of a drive of which nothing is known, as a share of the typical one.
+    pub fn lightest_drive(&self) -> f64 {
+        self.lightest_drive.unwrap_or(LIGHTEST_DRIVE)
     }
 
     /// How late a controller outside of such a robot may be, s.
@@ -114,6 +131,14 @@ pub enum RehearsalFailure {
         /// How its run ended.
         verdict: RunStatus,
     },
+    /// A robot that may be the true one is held, but oscillates.
+    #[error("in simulation {robot} is not held: {oscillation}")]
+    Oscillates {
+        /// Which robot.
+        robot: String,
+        /// How.
+        oscillation: JointOscillation,
+    },
     /// A robot that may be the true one is held, but a link of it leaves the workspace.
     #[error("in simulation {robot} leaves the envelope: {breach}; keep the motion further inside, or give other gains")]
     Outside {
@@ -146,6 +171,8 @@ struct Rehearsing {
     number: usize,
     /// How late its controller is.
     delay_s: f64,
+    /// Whether its drives are as light as they may be.
+    is_light: bool,
 }
 
 impl Rehearsing {
@@ -159,6 +186,10 @@ impl Rehearsing {
     fn words(self, settings: &RehearsalSettings) -> String {
         let percent = settings.uncertainty_percent;
         let robot = match self.number {
+            _ if self.is_light => format!(
+                "the model with {} of the typical inertia of drives (rehearsal.lightest_drive)",
+                settings.lightest_drive()
+            ),
             0 => "the model itself".to_owned(),
             number => format!("a robot up to {percent} % off the model ({number} of {})", settings.robots),
         };
@@ -179,6 +210,10 @@ pub(crate) struct Rehearsed<'a> {
     pub(crate) model: Option<&'a ControllerModel>,
     /// What is believed of the robot, all parameters: what is simulated.
     pub(crate) believed: Option<&'a [f64]>,
+    /// The same with drives that are as light as they may be; none where all are known.
+    pub(crate) light: Option<&'a [f64]>,
+    /// Oscillation that would stop a run.
+    pub(crate) oscillation: Option<OscillationLimits>,
     pub(crate) envelope: Option<&'a Envelope>,
 }
 
@@ -232,10 +267,17 @@ impl Rehearsed<'_> {
         if let Some(believed) = self.believed.filter(|_| self.controller.can_be_simulated()) {
             let in_drives = matches!(self.controller, ControllerSettings::PositionLoop(_));
             let delay_s = if in_drives { 0.0 } else { settings.delay_s(self.robot.model()) };
-            let late = (0..=settings.robots).map(|number| Rehearsing { number, delay_s });
-            let itself = Rehearsing { number: 0, delay_s: 0.0 };
+            let late = (0..=settings.robots).map(|number| Rehearsing { number, delay_s, is_light: false });
+            let itself = Rehearsing { number: 0, delay_s: 0.0, is_light: false };
             for one in core::iter::once(itself).chain(late.skip(usize::from(delay_s == 0.0))) {
                 if let Err(failure) = self.simulate(believed, (one, settings), &mut random, &mut shown)? {
+                    return Ok(Err(failure));
+                }
+            }
+            // Without a delay: the gains allow for it already, and no joint may be too fast for the controller's rate.
+            if let Some(light) = self.light {
+                let one = Rehearsing { is_light: true, ..itself };
+                if let Err(failure) = self.simulate(light, (one, settings), &mut random, &mut shown)? {
                     return Ok(Err(failure));
                 }
             }
@@ -278,6 +320,11 @@ impl Rehearsed<'_> {
             let largest = shown.largest_tracking_error_rad.iter_mut().zip(&run.max_error);
             largest.for_each(|(most, error)| *most = most.max(*error));
             let outside = self.envelope.and_then(|envelope| envelope.outside(&run.q, run.samples, run.rate_hz));
+            let names = &run.joints;
+            let found = RunOscillations::first(self.oscillation, reference, (&run.q, run.samples), names);
+            if let Some(oscillation) = found {
+                return Ok(Err(RehearsalFailure::Oscillates { robot: one.words(settings), oscillation }));
+            }
             if !run.status.is_done() || outside.is_some() {
                 let robot = one.words(settings);
                 return Ok(Err(match outside.filter(|_| run.status.is_done()) {

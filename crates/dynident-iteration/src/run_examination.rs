@@ -5,10 +5,12 @@ use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::evidence::{JointEvidence, RunEvidence};
 use crate::leg::{IterationTask, Leg};
+use crate::oscillation::{OscillationSettings, Search};
 use crate::prediction::{Known, predictions};
 use crate::rests::RestMargin;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
+use crate::torque_noise::{TorqueNoise, torque_noise};
 use crate::tracking_floor::{KnownLoop, tracking_floor};
 use dynident_identification::friction::JointFriction;
 use dynident_identification::payload::known_payloads;
@@ -43,24 +45,35 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
 pub(crate) fn examined(
     task: &IterationTask,
     records: &[Record],
-    settings: &RunIdentificationSettings,
+    (settings, oscillation): (&RunIdentificationSettings, &OscillationSettings),
     (known, rest_margins): (Option<&RunEstimate>, &[RestMargin]),
 ) -> Result<RunEvidence, IterationError> {
     let dof = task.robot.dof();
-    let noise = torque_noise(records, dof);
+    let noise = torque_noises(records, dof);
     let mut joints = Vec::with_capacity(dof);
-    for (joint, &torque_noise) in noise.iter().enumerate() {
+    for (joint, noise) in noise.into_iter().enumerate() {
         let (mut square, mut count) = (0.0, 0.0);
         for record in records {
             square += record.tau[record.of(joint)].iter().map(|tau| tau * tau).sum::<f64>();
             count += record.samples as f64;
         }
         let limit = task.torque_limits.as_ref().map(|limits| limits[joint]);
+        let torque_rms = if count > 0.0 { (square / count).sqrt() } else { 0.0 };
+        let search = Search {
+            lowest_hz: oscillation.lowest_hz(task.robot.model()),
+            least: 0.01 * oscillation.torque_percent * torque_rms,
+            least_share: 0.01 * oscillation.time_percent,
+            noise: noise.of_sample,
+        };
+        let found = records.iter().filter_map(|record| {
+            crate::oscillation::oscillation(&record.tau[record.of(joint)], record.rate_hz, search)
+        });
         joints.push(JointEvidence {
-            torque_rms: if count > 0.0 { (square / count).sqrt() } else { 0.0 },
-            torque_noise,
-            row_noise: torque_noise * filtered_share(records, settings),
-            clipping: clipping(records, joint, limit, torque_noise),
+            torque_rms,
+            torque_noise: noise.of_sample,
+            row_noise: row_cutoff_hz(records, settings).map_or(noise.of_sample, |cutoff_hz| noise.below(cutoff_hz)),
+            clipping: clipping(records, joint, limit, noise.of_sample),
+            oscillation: found.reduce(|one, other| if other.share > one.share { other } else { one }),
             prediction: None,
             tracking_floor_rad: None,
         });
@@ -76,25 +89,26 @@ pub(crate) fn examined(
     })
 }
 
-/// The largest noise of one torque over the legs, joint by joint.
-fn torque_noise(records: &[Record], dof: usize) -> Vec<f64> {
-    let mut most = vec![0.0_f64; dof];
+/// The largest noise of the torque over the legs, joint by joint.
+fn torque_noises(records: &[Record], dof: usize) -> Vec<TorqueNoise> {
+    let mut most = vec![TorqueNoise::default(); dof];
     for record in records.iter().filter(|record| record.samples > 0) {
-        let columns =
-            |values: &[f64]| -> Vec<Vec<f64>> { values.chunks_exact(record.samples).map(<[f64]>::to_vec).collect() };
-        let (q, tau) = (columns(&record.q), columns(&record.tau));
+        let q: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
         // Torque has faded where positions have: friction at reversals alone goes beyond.
-        let found = position_noise(&tau, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz);
-        most.iter_mut().zip(found).for_each(|(most, noise)| *most = most.max(noise));
+        let motion_hz = cutoff(&q, record.rate_hz).cutoff_hz;
+        for (joint, most) in most.iter_mut().enumerate() {
+            let tau = &record.tau[record.of(joint)];
+            *most = most.or(torque_noise(tau, q[joint], record.rate_hz, motion_hz));
+        }
     }
     most
 }
 
-/// What the parallel filter leaves of white noise.
-fn filtered_share(records: &[Record], settings: &RunIdentificationSettings) -> f64 {
-    let (Some(filter), Some(record)) = (&settings.parallel_filter, records.first()) else { return 1.0 };
+/// The cut-off of the parallel filter, Hz; none without one.
+fn row_cutoff_hz(records: &[Record], settings: &RunIdentificationSettings) -> Option<f64> {
+    let (filter, record) = settings.parallel_filter.as_ref().zip(records.first())?;
     let cutoff_hz = filter.cutoff_hz.unwrap_or(0.4 * record.rate_hz / filter.factor.max(1) as f64);
-    (2.0 * cutoff_hz / record.rate_hz).min(1.0).sqrt()
+    Some(cutoff_hz.min(0.5 * record.rate_hz))
 }
 
 /// Predictions of the legs that carry nothing unknown.

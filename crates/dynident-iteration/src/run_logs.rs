@@ -6,6 +6,7 @@ use crate::motion::measured_motion;
 use crate::rests::{RestMargin, has_dry_friction};
 use crate::settings::RunIdentificationSettings;
 use dynident_identification::examination::LagCandidates;
+use dynident_identification::friction::FrictionSearch;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_identification::{IdentificationSettings, LogNoise, Recording};
 use dynident_recording::DifferentiatorSettings;
@@ -71,7 +72,12 @@ pub(crate) fn identification_settings(
     identification.estimation = settings.estimation.clone();
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
-    identification.friction.clone_from(&settings.friction);
+    // What is hardly known would keep the iteration from converging.
+    let search = |own: &FrictionSearch| FrictionSearch {
+        most_inflation: own.most_inflation.or(Some(FrictionSearch::MOST_INFLATION)),
+        ..own.clone()
+    };
+    identification.friction = settings.friction.iter().map(search).collect();
     identification.friction_before.clone_from(&settings.friction_before);
     // Of runs under one controller friction leaves another lag at each joint, and not the same in every run.
     identification.lags = LagCandidates::Common;

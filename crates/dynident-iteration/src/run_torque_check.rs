@@ -8,7 +8,7 @@ use crate::leg::{IterationTask, Leg};
 use crate::record::RunRecord;
 use crate::run_logs::RunLog;
 use crate::settings::RunIdentificationSettings;
-use crate::torque_check::{CheckedRun, TorqueCheck, check_torque, row_scales};
+use crate::torque_check::{CheckWith, CheckedRun, LeastDeviation, TorqueCheck, check_torque, row_scales};
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 
@@ -30,41 +30,47 @@ impl Iteration {
         fitted: Option<Fitted<'_>>,
     ) -> Result<Option<TorqueCheck>, IterationError> {
         let Some(settings) = &self.settings.torque_check else { return Ok(None) };
+        let least = LeastDeviation { share: 0.01 * settings.row_scale_percent, sigmas: settings.sigmas };
         let scales = match (fitted, record.knowledge()) {
-            (Some((task, runs, settings)), Some(known)) => row_scales(task, runs, settings, known)?,
+            (Some((task, runs, of_fit)), Some(known)) => row_scales(task, runs, of_fit, (known, least))?,
             _ => vec![None; self.task.robot.dof()],
         };
-        let models: Vec<Option<(ControllerSettings, ControllerModel)>> =
+        let models: Vec<Option<(ControllerSettings, Option<ControllerModel>)>> =
             earlier.iter().map(|log| self.of_earlier(log, before)).collect::<Result<_, IterationError>>()?;
         let earlier_runs = earlier.iter().zip(&models).filter_map(|(log, own)| {
             let (controller, model) = own.as_ref()?;
             let RunLog { legs, records, .. } = log.as_run();
-            Some(CheckedRun { legs, records, controller, model: Some(model) })
+            Some(CheckedRun { legs, records, controller, model: model.as_ref() })
         });
         let legs: Vec<Leg> = self.legs_of(record)?.into_owned();
         let (controller, model) = (&prepared.controller, prepared.model.as_ref());
         // A run that ended early has no more records than legs.
         let newest = CheckedRun { legs: &legs, records, controller, model };
         let runs: Vec<CheckedRun<'_>> = earlier_runs.chain([newest]).collect();
-        Ok(check_torque(
-            &self.task,
-            &runs,
-            &self.settings.identification,
-            (settings, self.settings.settled.most_lag_s(self.task.robot.model())),
-            &scales,
-        ))
+        let feeds_forward_later =
+            matches!(&self.settings.controller, ControllerSettings::PositionLoop(own) if own.feed_forward);
+        let with = CheckWith {
+            settings,
+            identification: &self.settings.identification,
+            row_scales: &scales,
+            most_lag_s: self.settings.settled.most_lag_s(self.task.robot.model()),
+            feeds_forward_later,
+        };
+        Ok(check_torque(&self.task, &runs, &with))
     }
 
-    /// The controller of an earlier run, if it had a model.
+    /// The controller of an earlier run, with its model if it had one.
     fn of_earlier(
         &self,
         log: &GoodLog,
         before: &[RunRecord],
-    ) -> Result<Option<(ControllerSettings, ControllerModel)>, IterationError> {
+    ) -> Result<Option<(ControllerSettings, Option<ControllerModel>)>, IterationError> {
         let Some(place) = before.iter().position(|record| record.run == log.run()) else { return Ok(None) };
-        let Some(parameters) = &before[place].controller.model else { return Ok(None) };
+        let Some(parameters) = &before[place].controller.model else {
+            return Ok(Some((self.settings.model_free.clone(), None)));
+        };
         let model = self.controller_model(&before[..place], parameters)?;
         let first = self.settings.first.as_ref().filter(|_| log.run() == 1);
-        Ok(Some((first.unwrap_or(&self.settings.controller).clone(), model)))
+        Ok(Some((first.unwrap_or(&self.settings.controller).clone(), Some(model))))
     }
 }

@@ -1,6 +1,7 @@
 //! What keeps runs safe, apart from the robot itself.
 
 use crate::home::HomeSettings;
+use crate::oscillation::OscillationSettings;
 use crate::rehearsal::RehearsalSettings;
 use crate::robot::Envelope;
 use dynident_simulation::{SimulationError, require};
@@ -13,6 +14,8 @@ pub struct SafetySettings {
     pub outside: bool,
     /// What no sample may leave. Default none.
     pub envelope: Option<Envelope>,
+    /// Thresholds of oscillations: those that stop a run outside, and those that are reported for a log.
+    pub oscillation: OscillationSettings,
     /// How every motion is rehearsed before it is commanded. Default not at all.
     pub rehearsal: Option<RehearsalSettings>,
     /// Shares of its speed at which the motion is run before the first run, slowest first, and again as long as no run
@@ -36,6 +39,7 @@ impl SafetySettings {
         let warm_up_s = self.warm_up_s;
         require((0.0..=1e5).contains(&warm_up_s), "warm_up_s", warm_up_s, "give 0 to 100000 s")?;
         self.home.as_ref().map_or(Ok(()), |home| home.validate(joints))?;
+        self.oscillation.validate()?;
         for &step in &self.speed_steps {
             require(step > 0.0 && step <= 1.0, "speed_steps", step, "give shares of the speed: above 0, at most 1")?;
         }

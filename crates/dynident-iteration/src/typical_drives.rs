@@ -8,7 +8,7 @@ const DRIVE_ACCELERATION: f64 = 300.0;
 /// How much lighter than typical a drive may be: geared arms have up to 500 rad/s².
 pub(crate) const TIMES_THE_LIGHTEST: f64 = 500.0 / DRIVE_ACCELERATION;
 /// Dry friction, and viscous friction at full velocity, as shares of the effort.
-const FRICTION: f64 = 0.05;
+pub(crate) const FRICTION: f64 = 0.05;
 /// Velocity of a joint whose description has no limit, rad/s (m/s) of a usual arm.
 const SPEED: f64 = 2.0;
 
@@ -18,16 +18,25 @@ const SPEED: f64 = 2.0;
 /// it, and as much viscous friction at the velocity limit.
 /// None if nothing was to be filled in.
 pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
-    filled_in(robot, |_| true)
+    filled_in(robot, |_| true, 1.0)
+}
+
+/// The same with this share of the typical inertia at drives without a described one.
+pub(crate) fn with_light_drives(robot: &ParametricModel, share: f64) -> Option<Vec<f64>> {
+    with_typical_inertia(robot).and_then(|_| filled_in(robot, |_| true, share))
 }
 
 /// The same with inertia alone: what a controller may take for true until runs have shown better, for friction that is
 /// not there would be pushed against.
 pub(crate) fn with_typical_inertia(robot: &ParametricModel) -> Option<Vec<f64>> {
-    filled_in(robot, |property| property == JointProperty::DriveInertia)
+    filled_in(robot, |property| property == JointProperty::DriveInertia, 1.0)
 }
 
-fn filled_in(robot: &ParametricModel, is_wanted: impl Fn(JointProperty) -> bool) -> Option<Vec<f64>> {
+fn filled_in(
+    robot: &ParametricModel,
+    is_wanted: impl Fn(JointProperty) -> bool,
+    inertia_share: f64,
+) -> Option<Vec<f64>> {
     let mut parameters = robot.nominal().to_vec();
     let bodies = robot.model().inertial_count();
     let own = robot.model().own_scale();
@@ -40,7 +49,9 @@ fn filled_in(robot: &ParametricModel, is_wanted: impl Fn(JointProperty) -> bool)
             continue;
         }
         let typical = match (term.property(), term.action()) {
-            (Some(JointProperty::DriveInertia), _) => effort / own.acceleration(turns, DRIVE_ACCELERATION),
+            (Some(JointProperty::DriveInertia), _) => {
+                inertia_share * effort / own.acceleration(turns, DRIVE_ACCELERATION)
+            }
             (Some(JointProperty::Friction), _) => FRICTION * effort,
             (Some(JointProperty::Damping), _) => {
                 FRICTION * effort / limits.velocity.unwrap_or(own.velocity(turns, SPEED))

@@ -23,10 +23,11 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 21] = [
+pub(crate) const TARGETS: [Target; 22] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "mjcf", repetitions: 10, new: parsers::mjcf },
     Target { name: "sdf", repetitions: 20, new: parsers::sdf },
+    Target { name: "mesh", repetitions: 20, new: parsers::mesh },
     Target { name: "dh", repetitions: 20, new: parsers::dh },
     Target { name: "study", repetitions: 20, new: parsers::study },
     Target { name: "expression", repetitions: 100, new: parsers::expression },

@@ -3,6 +3,7 @@
 use super::Run;
 use dynident::iteration::IterationStore;
 use dynident::iteration::robot::{ToHost, read_log_table};
+use dynident::model::collision::read_mesh;
 use dynident::model::terms::{Expression, JointNames};
 use dynident::model::{
     AuditFinding, Joint, JointChange, Model, audit, link_changes, read_dh, read_mjcf_with, read_sdf, read_urdf,
@@ -50,6 +51,18 @@ fn of_file(file: &'static str, read: fn(&Path) -> bool) -> io::Result<Box<dyn Ru
         std::fs::create_dir_all(parent)?;
     }
     Ok(Box::new(OfFile { folder, file, read }))
+}
+
+/// A mesh of a collision shape.
+pub(crate) fn mesh() -> io::Result<Box<dyn Run>> {
+    of_file("mesh", |path| match read_mesh(path.parent().unwrap_or(path), "mesh") {
+        Ok(mesh) => {
+            assert!(mesh.vertices.iter().flat_map(|vertex| vertex.0).all(f64::is_finite), "not finite");
+            assert!(mesh.triangles.iter().flatten().all(|place| (*place as usize) < mesh.vertices.len()), "no vertex");
+            true
+        }
+        Err(error) => said(&error),
+    })
 }
 
 /// A message that a person can be shown: one that says something.

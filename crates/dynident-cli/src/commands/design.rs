@@ -1,6 +1,6 @@
 //! `dynident design STUDY.toml --out DIR`.
 
-use super::search::Search;
+use super::search::{KEEPS_THE_BEST, Search};
 use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
@@ -99,7 +99,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     interruption::listen(&StopSignal::default());
-    let search = Search::new(context);
+    let search = Search::new(context, KEEPS_THE_BEST);
     let watch = |at: &DesignProgress| search.hear(at);
     let outcome = match (&options.check, &options.check_log) {
         (Some(trajectory), _) => check_trajectory(&study, &options.study, trajectory, &run),

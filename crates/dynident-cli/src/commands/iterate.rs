@@ -1,6 +1,6 @@
 //! `dynident iterate STUDY.toml --out DIR`.
 
-use super::search::Search;
+use super::search::{ENDS_THE_COMMAND, Search};
 use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use dynident::excitation::DesignProgress;
@@ -76,7 +76,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     // A bar would be drawn over the questions.
     let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let search = Search::new(context);
+    let search = Search::new(context, ENDS_THE_COMMAND);
     let section = study.iteration.clone().unwrap_or_default();
     let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
     let most = section.max_runs * iterations;

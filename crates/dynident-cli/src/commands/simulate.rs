@@ -1,6 +1,6 @@
 //! `dynident simulate STUDY.toml --out DIR`.
 
-use super::search::Search;
+use super::search::{ENDS_THE_COMMAND, Search};
 use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use dynident::{OutputSet, RunOptions, Study, check_writable, simulate_study};
@@ -33,7 +33,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let search = Search::new(context);
+    let search = Search::new(context, ENDS_THE_COMMAND);
     let simulation =
         simulate_study(&study, &options.study, &run, &|at| search.hear(at)).map_err(known_in(&options.study))?;
     search.end();

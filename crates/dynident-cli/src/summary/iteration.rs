@@ -25,6 +25,9 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     if let Some(sentence) = file.lowered_bandwidths_sentence() {
         text += &wrapped(&format!("NOTE: {sentence}."), 4);
     }
+    for sentence in file.oscillation_sentences() {
+        text += &wrapped(&format!("WARNING: {sentence}."), 4);
+    }
     for run in &file.runs {
         if let Some(warm_up) = &run.warm_up {
             text += &wrapped(&format!("Before run {}: {}.", run.run, warm_up.sentence(&file.joints)), 4);

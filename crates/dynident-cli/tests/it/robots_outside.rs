@@ -126,6 +126,25 @@ fn a_second_interruption_kills_the_robot() {
     assert!(!runs(&begun));
 }
 
+/// A key that is held down repeats: two interruptions within 20 ms are one, and the robot has the time to brake.
+#[test]
+fn a_repeated_key_lets_the_robot_brake() {
+    let folder = tempfile::tempdir().unwrap();
+    let rest = r#"printf '%s' "$$" >"$1/pid"; mv "$1/pid" "$1/begun"; read -r stop; sleep 1; touch "$1/stands"
+        printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+    robot(folder.path(), rest);
+    let study = study(folder.path(), ", limits = { stop_s = 60.0 }");
+    let mut program = iterate(&study, &["--allow-command"]);
+    awaited(&folder.path().join("begun"), &mut program);
+    let twice = format!("kill -INT {0}; sleep 0.02; kill -INT {0}", program.id());
+    assert!(Command::new("sh").args(["-c", &twice]).status().unwrap().success());
+    let output = program.wait_with_output().unwrap();
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(folder.path().join("stands").exists() && said.contains("the robot has stopped"), "{said}");
+    assert!(!said.contains("nobody knows"), "{said}");
+}
+
 /// Whose study it is may be somebody else: without permission nothing is started, and the words say what would be.
 #[test]
 fn a_studys_command_needs_permission() {

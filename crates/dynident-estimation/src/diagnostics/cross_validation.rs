@@ -234,6 +234,48 @@ impl JointFolds {
         &self.variable
     }
 
+    /// Variance inflation of a combination `a` of candidate columns, given as (place in [`variable`](Self::variable),
+    /// factor): the factor by which the common columns and the combinations `others` increase the variance of its
+    /// coefficient. It is `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that a combination of those columns explains
+    /// over all rows: 1 where they explain nothing, infinite where they explain all of it.
+    ///
+    /// Source: Belsley, Kuh and Welsch, *Regression Diagnostics*, 1980, section 3.1; not centred.
+    ///
+    /// # Panics
+    /// If a place is out of range.
+    pub fn variance_inflation(&self, combination: &[(usize, f64)], others: &[&[(usize, f64)]]) -> f64 {
+        let Some(fold) = self.folds.last() else { return f64::INFINITY };
+        let count = self.variable.len();
+        let dense = |sparse: &[(usize, f64)]| {
+            let mut dense = DVector::zeros(count);
+            for &(place, factor) in sparse {
+                dense[place] += factor;
+            }
+            dense
+        };
+        let own = dense(combination);
+        let whole = fold.square_of(self.common.len(), combination);
+        // The Gram matrix is that of the parts which the common columns do not explain.
+        let mut basis: Vec<DVector<f64>> = Vec::with_capacity(others.len());
+        let without = |mut vector: DVector<f64>, basis: &[DVector<f64>]| {
+            for one in basis {
+                let share = one.dot(&(&fold.gram * &vector));
+                vector -= share * one;
+            }
+            vector
+        };
+        for other in others {
+            let rest = without(dense(other), &basis);
+            let square = rest.dot(&(&fold.gram * &rest));
+            if square > DEPENDENT * fold.square_of(self.common.len(), other) {
+                basis.push(rest / square.sqrt());
+            }
+        }
+        let rest = without(own, &basis);
+        let left = rest.dot(&(&fold.gram * &rest)).max(0.0);
+        if whole > 0.0 && left > 0.0 { whole / left } else { f64::INFINITY }
+    }
+
     /// The error of the model that has the candidate columns `chosen` (places in [`variable`](Self::variable)) beside
     /// the common ones; those with `nonnegative` set are constrained to coefficients of zero or more.
     ///
@@ -293,6 +335,14 @@ impl Fold {
         let norms = triangle.column_norms();
         let independent = (0..start).map(|row| triangle.entry(row, row) > DEPENDENT * norms[row]).collect();
         Self { gram: columns.tr_mul(&columns), right: columns.tr_mul(&torque), independent, triangle, rows }
+    }
+
+    /// `‖W a‖²` over all rows.
+    fn square_of(&self, start: usize, combination: &[(usize, f64)]) -> f64 {
+        let of_row = |row: usize| -> f64 {
+            combination.iter().map(|&(place, factor)| factor * self.triangle.entry(row, start + place)).sum()
+        };
+        (0..self.triangle.columns()).map(|row| of_row(row).powi(2)).sum()
     }
 
     fn coefficients(&self, chosen: &[usize], nonnegative: &[bool]) -> DVector<f64> {

@@ -56,6 +56,31 @@ fn errors_on_left_out_blocks_equal_those_of_fits_without_them() {
     assert!(excess > 2.0 * error && with.excess_over(&with) == [0.0, 0.0]);
 }
 
+/// `c` is `0.9 a` and a little of `d`: the oracle is a fit of `c` to the others, row by row. What the others make whole is
+/// infinite, and a column that is orthogonal to them is not inflated.
+#[test]
+fn variance_inflation_is_that_of_a_fit_of_the_column() {
+    let mut rows = rows();
+    rows[2] = (0..ROWS).map(|k| 0.9 * rows[0][k] + 0.1 * (0.5 + rows[3][k])).collect();
+    let whole = problem(&[0, 1, 2, 3], &rows, 0..ROWS);
+    let folds = CrossValidation::new(&whole, 5).unwrap();
+    let joint = folds.joint(0, &[0, 1], &[2, 3], &[1.0]).unwrap();
+    let fitted = |columns: &[usize]| {
+        let mut of_c = rows.clone();
+        of_c[4] = rows[2].clone();
+        let fit = ordinary_least_squares(&problem(columns, &of_c, 0..ROWS), &OrdinarySettings::default()).unwrap();
+        let left = |k: usize| rows[2][k] - columns.iter().zip(&fit.values).map(|(&c, v)| rows[c][k] * v).sum::<f64>();
+        let square = |of: &dyn Fn(usize) -> f64| (0..ROWS).map(|k| of(k).powi(2)).sum::<f64>();
+        square(&|k| rows[2][k]) / square(&left)
+    };
+    let alone = joint.variance_inflation(&[(0, 1.0)], &[]);
+    assert!((alone / fitted(&[0, 1]) - 1.0).abs() < 1e-9 && alone > 20.0, "{alone}");
+    let beside_d = joint.variance_inflation(&[(0, 1.0)], &[&[(1, 1.0)]]);
+    assert!((beside_d / fitted(&[0, 1, 3]) - 1.0).abs() < 1e-9 && beside_d > alone, "{beside_d}");
+    assert!(joint.variance_inflation(&[(1, 1.0)], &[]) < 1.1);
+    assert!(joint.variance_inflation(&[(1, 2.0)], &[&[(1, 1.0)]]) > 1e6);
+}
+
 #[test]
 fn a_selection_of_columns_is_the_factor_of_those_columns() {
     let rows = rows();

@@ -16,6 +16,8 @@ pub(super) struct Hull {
 pub(super) struct Link {
     pub(super) body: Option<usize>,
     pub(super) hulls: Vec<Hull>,
+    /// Of each hull a point and a radius about it that holds the hull, m.
+    balls: Vec<(Vec3, f64)>,
     /// No point is farther from the body's origin, m.
     far_m: f64,
 }
@@ -54,8 +56,14 @@ impl Pair {
         // Below this distance the pair matters.
         let matters = self.clearance_m - (worst - 1.0) * self.size_m;
         let mut apart = f64::INFINITY;
-        for first in &self.links[0].hulls {
-            for second in &self.links[1].hulls {
+        let balls = |k: usize| self.links[k].hulls.iter().zip(&self.links[k].balls);
+        for (first, ball) in balls(0) {
+            for (second, other_ball) in balls(1) {
+                let between = (at[0].point(ball.0) - at[1].point(other_ball.0)).norm() - ball.1 - other_ball.1;
+                if between > matters.min(apart) {
+                    apart = apart.min(between);
+                    continue;
+                }
                 let [a, b] = [(first, &at[0]), (second, &at[1])].map(|(hull, at)| {
                     let place = |corner: &Vec3| at.rotation.mul_vec(*corner) + at.translation;
                     hull.corners.iter().map(place).collect::<Vec<_>>()
@@ -78,7 +86,14 @@ impl Link {
                 .fold(hull.radius_m, |far, corner| far.max(corner + hull.radius_m))
         };
         let far_m = hulls.iter().map(far).fold(0.0, f64::max);
-        Self { body, hulls, far_m }
+        let ball = |hull: &Hull| {
+            let sum = hull.corners.iter().fold(Vec3::ZERO, |sum, corner| sum + *corner);
+            let centre = sum.scale(1.0 / hull.corners.len().max(1) as f64);
+            let far = |far: f64, corner: &Vec3| far.max((*corner - centre).norm());
+            (centre, hull.corners.iter().fold(0.0, far) + hull.radius_m)
+        };
+        let balls = hulls.iter().map(ball).collect();
+        Self { body, hulls, balls, far_m }
     }
 
     /// How much lower than `height_m` the lowest point is, m; `worst_m` where that cannot be more.

@@ -1,6 +1,7 @@
 //! Few corners in place of many.
 
 use super::convex::{Placed, hull_distance};
+use super::pieces::spiral;
 use super::self_collision_shapes::LinkShape;
 use dynident_model::collision::Solid;
 use dynident_model::{Transform, Vec3};
@@ -11,11 +12,14 @@ const MOST_CORNERS: usize = 32;
 /// Directions in which corners are looked for.
 const DIRECTIONS: usize = 40;
 
+/// Corners of a closer shape at most.
+const MOST_CLOSER: usize = 80;
+
 impl LinkShape {
     /// The solid on a link. One with many corners, such as a mesh, becomes the hull of its corners farthest out in 40
     /// directions, with a radius that holds all others: it is never smaller than the solid.
     pub fn holding(link: &str, solid: &Solid) -> Self {
-        let Solid { corners_m, radius_m } = solid;
+        let Solid { corners_m, radius_m, .. } = solid;
         let (corners, gap_m) = if corners_m.len() <= MOST_CORNERS {
             (corners_m.clone(), 0.0)
         } else {
@@ -29,17 +33,43 @@ impl LinkShape {
             radius_m: radius_m + gap_m,
         }
     }
+
+    /// A closer shape about the hull of corners on a link: corners are added, always the one farthest out, until all
+    /// are within `gap_m` of the hull, or to 80 of them. The radius holds the rest.
+    pub(super) fn closely(link: &str, corners_m: &[Vec3], radius_m: f64, gap_m: f64) -> Self {
+        let mut hull = if corners_m.len() <= MOST_CORNERS { corners_m.to_vec() } else { outermost(corners_m) };
+        let mut outside = if hull.len() == corners_m.len() { Vec::new() } else { corners_m.to_vec() };
+        // The distance of corners that are near enough only shrinks when the hull grows.
+        let mut near_m = 0.0_f64;
+        let left_m = loop {
+            let mut farthest = (0.0, None);
+            outside.retain(|corner| {
+                let apart = farthest_from(&hull, core::slice::from_ref(corner));
+                if apart > farthest.0 {
+                    farthest = (apart, Some(*corner));
+                }
+                if apart <= gap_m {
+                    near_m = near_m.max(apart);
+                }
+                apart > gap_m
+            });
+            match farthest {
+                (apart, Some(corner)) if apart > gap_m && hull.len() < MOST_CLOSER => hull.push(corner),
+                (apart, _) => break apart.max(near_m),
+            }
+        };
+        Self {
+            link: link.to_owned(),
+            corners_m: hull.iter().map(|corner| corner.0).collect(),
+            radius_m: radius_m + left_m,
+        }
+    }
 }
 
-/// The corners farthest out in evenly spread directions (a spiral on the sphere), each once.
+/// The corners farthest out in evenly spread directions, each once.
 fn outermost(corners: &[Vec3]) -> Vec<Vec3> {
-    let golden = core::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let mut found: Vec<usize> = Vec::new();
-    for k in 0..DIRECTIONS {
-        let z = 1.0 - (2.0 * k as f64 + 1.0) / DIRECTIONS as f64;
-        let (sin, cos) = (golden * k as f64).sin_cos();
-        let across = (1.0 - z * z).sqrt();
-        let direction = Vec3([across * cos, across * sin, z]);
+    for direction in spiral(DIRECTIONS) {
         let mut best = (f64::NEG_INFINITY, 0);
         for (index, corner) in corners.iter().enumerate() {
             let along = corner.dot(direction);
@@ -81,9 +111,14 @@ mod tests {
                 Vec3([0.05 * x, 0.08 * y, 0.3 * z + 0.1])
             })
             .collect();
-        let shape = LinkShape::holding("rod", &Solid { corners_m: corners_m.clone(), radius_m: 0.0 });
+        let shape =
+            LinkShape::holding("rod", &Solid { corners_m: corners_m.clone(), radius_m: 0.0, triangles: Vec::new() });
         assert!(shape.corners_m.len() <= DIRECTIONS && shape.radius_m < 0.02, "{}", shape.radius_m);
         let hull: Vec<Vec3> = shape.corners_m.iter().map(|corner| Vec3(*corner)).collect();
         assert!(farthest_from(&hull, &corners_m) <= shape.radius_m);
+        let closer = LinkShape::closely("rod", &corners_m, 0.0, 0.003);
+        let hull: Vec<Vec3> = closer.corners_m.iter().map(|corner| Vec3(*corner)).collect();
+        assert!(hull.len() <= MOST_CLOSER && closer.radius_m < 0.5 * shape.radius_m, "{}", closer.radius_m);
+        assert!(farthest_from(&hull, &corners_m) <= closer.radius_m);
     }
 }

@@ -166,7 +166,10 @@ impl SolidPairs {
                     self.close.push(pair.of.map(|place| self.solids[place].link.clone()));
                 }
             } else {
-                kept.push(*pair);
+                // Links that are never far apart keep at most half of their largest distance: more would leave no
+                // room to move.
+                let most = if touching { 0.5 * farthest } else { pair.clearance_m };
+                kept.push(SolidPair { clearance_m: pair.clearance_m.min(most), ..*pair });
             }
         }
         self.pairs = kept;

@@ -25,6 +25,7 @@ pub struct SelfCollision {
     /// Also leave out pairs that touch both in the neutral posture (every joint at zero, or as near to it as its limits
     /// allow) and in most of 256 others within the limits: links whose shapes stand in each other. Pairs that are
     /// nearer than `clearance_m` in all of these postures are left out if they touch in none, and else must not touch.
+    /// Of pairs that are nearer than twice `clearance_m` in all of them, half of the largest distance is required.
     pub leave_out_touching: bool,
 }
 

@@ -7,4 +7,5 @@ mod feasibility;
 mod information;
 mod limit_messages;
 mod limits;
+mod meshes;
 mod single_change;

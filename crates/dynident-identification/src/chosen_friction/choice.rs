@@ -199,10 +199,13 @@ fn friction_of_grid(
     let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
     // All candidates as columns of one set of factors, from which each candidate model is a selection.
+    let most_inflation: Vec<f64> =
+        searches.iter().map(|(_, search)| search.most_inflation.unwrap_or(f64::INFINITY)).collect();
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
         let wide = with_terms(&first.model, further).with_load_of_estimate(&first.model, &plain.values);
         let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain.values, &gains))?;
+        let candidates = (candidates, &most_inflation[..]);
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
     };
     // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.

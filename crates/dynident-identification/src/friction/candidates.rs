@@ -183,12 +183,28 @@ pub struct FrictionSearch {
     /// other friction near rest alone (Stribeck, sigmoid, cube root, elements with hysteresis) is no candidate. True by
     /// default.
     pub rows_near_rest: bool,
+    /// Largest variance inflation with which Coulomb friction may differ by direction: `1 / (1 - R²)`, R² the share of
+    /// the difference that gravity, offset and all other columns explain. Where gravity is constant or the joint has an
+    /// offset, only the rows near rest distinguish the difference from them, and its error bar is wider by the square
+    /// root of the inflation. Without a limit by default; an iteration, which does not
+    /// converge while a parameter is hardly known, takes [`MOST_INFLATION`](Self::MOST_INFLATION).
+    pub most_inflation: Option<f64>,
 }
 
 impl FrictionSearch {
+    /// The usual bound of a variance inflation in regression diagnostics.
+    pub const MOST_INFLATION: f64 = 10.0;
+
     /// The search for a joint's friction with the defaults.
     pub fn of(joint: impl Into<String>) -> Self {
-        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: None, rows_near_rest: true }
+        Self {
+            joint: joint.into(),
+            coulomb: None,
+            dead_band: 0.0,
+            width: None,
+            rows_near_rest: true,
+            most_inflation: None,
+        }
     }
 }
 

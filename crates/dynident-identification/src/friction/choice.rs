@@ -165,12 +165,13 @@ pub(super) fn further_columns(
 }
 
 /// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the
-/// stated terms, in which joints count alike if `equal_weights`.
+/// stated terms, in which joints have equal weights if `equal_weights`; `most_inflation` has a number for each of the
+/// candidates' joints.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,
     wide_problem: &LinearProblem,
-    candidates: &[(usize, Vec<CandidateColumn>)],
+    (candidates, most_inflation): (&[(usize, Vec<CandidateColumn>)], &[f64]),
     (plain, equal_weights): (&Estimate, bool),
 ) -> Result<Vec<JointFriction>, EstimationError> {
     let name = |joint: usize| model.model().joints()[joint].name.clone();
@@ -186,7 +187,7 @@ pub(crate) fn choose_friction(
     let place = |term: &TorqueTerm| {
         wide.layout().columns().iter().position(|column| matches!(column, Column::Term(l) if l == term))
     };
-    let of_joint = |joint: usize, columns: &[CandidateColumn], before: &[Option<Vec<usize>>]| {
+    let of_joint = |(joint, columns): (usize, &[CandidateColumn]), inflation: f64, before: &[Option<Vec<usize>>]| {
         let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
         let scale = JointScale::of(model.model(), joint);
@@ -208,7 +209,7 @@ pub(crate) fn choose_friction(
         let further = further_columns((model, plain), (wide, wide_problem));
         let common: Vec<usize> = stated.chain(others.flatten().copied()).chain(further).collect();
         match validation.joint(joint, &common, &variable, &weights) {
-            Ok(prepared) => Ok(search((name(joint), scale), folds, &prepared, columns)),
+            Ok(prepared) => Ok(search((name(joint), scale), (folds, inflation), &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {
                 Ok((refused(joint, "fewer rows than columns once a block is left out"), Vec::new()))
             }
@@ -220,7 +221,8 @@ pub(crate) fn choose_friction(
     for _ in 0..ROUNDS {
         let found: Vec<(JointFriction, Vec<usize>)> = candidates
             .par_iter()
-            .map(|(joint, columns)| of_joint(*joint, columns, &before))
+            .zip(most_inflation)
+            .map(|((joint, columns), inflation)| of_joint((*joint, columns), *inflation, &before))
             .collect::<Result<_, EstimationError>>()?;
         (chosen, before) = found
             .into_iter()

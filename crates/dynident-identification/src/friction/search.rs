@@ -1,5 +1,8 @@
 //! The search for one joint's friction among columns that its factors hold already.
 //!
+//! Coulomb friction that differs by direction is tried where the rows distinguish it from gravity, offsets and the other
+//! columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
+//!
 //! Terms are added one at a time to viscous friction with a Coulomb step, and to that with a sigmoid, the one that
 //! lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one
 //! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the
@@ -127,12 +130,44 @@ fn tuned(
         .unwrap_or_else(|| ScoredCandidate { kinds, places: Vec::new(), errors: folds.errors(&[], &[]) })
 }
 
+/// Variance inflation of the difference between both directions of a model's Coulomb step, with the model's other
+/// columns and the common ones in the fit: `|s|` is constant except near rest, and so may be gravity. 1 for a model
+/// without that step.
+fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &ScoredCandidate) -> f64 {
+    let steps = model.present(columns, FrictionKind::Coulomb);
+    let whole: f64 = steps.iter().map(|(_, value)| value).sum();
+    let (mut difference, mut sum) = (Vec::new(), Vec::new());
+    for (place, value) in steps {
+        // A sign has no number on the grid: the narrowest smooth step is taken in its place.
+        let step = columns[place].grid.unwrap_or(0);
+        let is_direction =
+            |at: &usize| columns[*at].kind == FrictionKind::AsymmetricCoulomb && columns[*at].grid == Some(step);
+        let mut directions = (0..columns.len()).filter(is_direction);
+        let (Some(forward), Some(backward)) = (directions.next(), directions.next()) else { continue };
+        let share = value / whole;
+        difference.extend([(forward, share), (backward, -share)]);
+        sum.extend([(forward, share), (backward, share)]);
+    }
+    if difference.is_empty() {
+        return 1.0;
+    }
+    let others: Vec<[(usize, f64); 1]> = model
+        .places
+        .iter()
+        .filter(|&&place| columns[place].kind != FrictionKind::Coulomb)
+        .map(|&place| [(place, 1.0)])
+        .collect();
+    let others: Vec<&[(usize, f64)]> = others.iter().map(|one| &one[..]).chain([&sum[..]]).collect();
+    folds.variance_inflation(&difference, &others)
+}
+
 /// Terms added one at a time to `start`, each time the one that lowers the error most; all that was tried goes into
 /// `met`.
 fn add_terms(
     folds: &JointFolds,
     columns: &[CandidateColumn],
     start: Vec<FrictionKind>,
+    most_inflation: f64,
     met: &mut Vec<ScoredCandidate>,
 ) {
     let mut additions: Vec<FrictionKind> =
@@ -140,6 +175,9 @@ fn add_terms(
     additions.dedup();
     let mut at = met.len();
     met.push(tuned(folds, columns, start, None));
+    let is_distinct =
+        most_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &met[at]) <= most_inflation;
+    additions.retain(|kind| is_distinct || *kind != FrictionKind::AsymmetricCoulomb);
     for _ in 0..MOST_ADDED {
         let start = met.len();
         for &added in &additions {
@@ -170,13 +208,13 @@ fn add_terms(
 /// The choice for one joint, and the places of its columns.
 pub(super) fn search(
     (joint, scale): (String, JointScale),
-    count: usize,
+    (count, most_inflation): (usize, f64),
     folds: &JointFolds,
     columns: &[CandidateColumn],
 ) -> (JointFriction, Vec<usize>) {
     let mut met = Vec::new();
     for step in [FrictionKind::Coulomb, FrictionKind::Sigmoid] {
-        add_terms(folds, columns, vec![FrictionKind::Viscous, step], &mut met);
+        add_terms(folds, columns, vec![FrictionKind::Viscous, step], most_inflation, &mut met);
     }
     let least =
         (0..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a }).unwrap_or(0);

@@ -178,6 +178,11 @@ impl Client {
         self.limits.message_s
     }
 
+    /// How long a program that streams may be silent, s, where that is stated.
+    pub(super) fn silence_s(&self) -> Option<f64> {
+        self.limits.silence_s
+    }
+
     pub(super) fn send(&mut self, message: &ToClient, waiting_for: &'static str) -> Result<(), RobotFault> {
         match message {
             ToClient::Run { .. } | ToClient::Begin { .. } => (self.moving, self.stop_sent) = (true, false),

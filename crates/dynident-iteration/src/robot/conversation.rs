@@ -4,11 +4,13 @@ use super::client::{Client, Heard};
 use super::protocol::{EndStatus, ToClient, ToHost, WayFiles};
 use super::recorder::Recorder;
 use super::stop_reason::Stopping;
+use super::stream_watch::StreamWatch;
 use super::{RobotFault, RobotStatus, RunRequest, handover};
 use dynident_simulation::Record;
 use dynident_simulation::ReferenceSample;
 use dynident_simulation::controllers::Measured;
 use std::path::Path;
+use std::time::Instant;
 
 /// Samples that are taken for each of the reference: a log may be finer, but not without end.
 const FINEST: usize = 100;
@@ -48,9 +50,17 @@ pub(super) fn run(
     )?;
     let all = request.ways.map_or(0, |ways| ways.approach.samples() + ways.back.samples()) + reference.samples();
     let most = FINEST * all + 1000;
+    let mut stream = StreamWatch::new(client.silence_s());
+    let whole_s = recorder.left_s();
     loop {
         // Samples may come afterwards: what is left of the run counts as well.
-        match client.next("sample", client.message_s() + recorder.left_s())? {
+        let longest_s = client.message_s() + recorder.left_s();
+        let silence_s = stream.limit_s().filter(|limit_s| *limit_s < longest_s && !recorder.is_at_end_of_part());
+        let heard = client.next("sample", silence_s.unwrap_or(longest_s)).map_err(|fault| match (fault, silence_s) {
+            (RobotFault::Hung { limit_s, .. }, Some(own_s)) if limit_s == own_s => RobotFault::Silent { limit_s },
+            (fault, _) => fault,
+        });
+        match heard? {
             Heard::StopRequested => {
                 let stopping = stopped(client, recorder, most, INTERRUPTED);
                 return Ok(RobotStatus::Interrupted { stopping });
@@ -62,9 +72,14 @@ pub(super) fn run(
                 recorder.enter(part)?;
                 let order = (&client.places[..], &client.torque_per_unit[..]);
                 let dq = keep_sample(order, recorder.record(), (t_s, &q, dq.as_deref(), &tau))?;
+                stream.arrived(Instant::now(), whole_s - recorder.left_s());
                 if let Some(breach) = recorder.look(dq.as_deref()) {
                     let stopping = stopped(client, recorder, most, &breach.to_string());
                     return Ok(RobotStatus::LeftEnvelope { breach, stopping });
+                }
+                if let Some(oscillation) = recorder.look_for_oscillation() {
+                    let stopping = stopped(client, recorder, most, &oscillation.to_string());
+                    return Ok(RobotStatus::Oscillated { oscillation, stopping });
                 }
             }
             Heard::Message(ToHost::End { status: EndStatus::Stopped, reason }) => {
@@ -181,6 +196,10 @@ pub(super) fn steps(
         if let Some(breach) = recorder.look(Some(&dq)) {
             let stopping = stopped(client, recorder, 0, &breach.to_string());
             return Ok(RobotStatus::LeftEnvelope { breach, stopping });
+        }
+        if let Some(oscillation) = recorder.look_for_oscillation() {
+            let stopping = stopped(client, recorder, 0, &oscillation.to_string());
+            return Ok(RobotStatus::Oscillated { oscillation, stopping });
         }
         let message = if sample + 1 < reference.samples() {
             ToClient::Torque { tau: in_client_order(client, &tau) }

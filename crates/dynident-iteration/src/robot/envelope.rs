@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 const SPEED_SPAN_S: f64 = 0.01;
 
 /// The default distance from the path that stops a joint that turns, rad.
-const TRACKING_RAD: f64 = 0.3;
+pub(crate) const TRACKING_RAD: f64 = 0.3;
 /// The same of a joint that slides, m of a usual arm.
-const TRACKING_M: f64 = 0.1;
+pub(crate) const TRACKING_M: f64 = 0.1;
 /// Room above the description's velocity and effort: controllers overshoot, and sensors are noisy.
 const ROOM: f64 = 1.1;
 

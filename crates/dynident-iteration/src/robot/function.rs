@@ -1,9 +1,12 @@
 //! A robot that is a function of this process.
 
 use super::envelope::EnvelopeWatch;
+use super::oscillation_watch::RunOscillations;
 use super::recorder::{empty_record, joint_major};
 use super::ways::{RunPart, WayRecords};
-use super::{Breach, Envelope, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal, Stopping};
+use super::{
+    Breach, Envelope, JointOscillation, Robot, RobotFault, RobotRun, RobotStatus, RunRequest, StopSignal, Stopping,
+};
 use dynident_simulation::controllers::{Controller, Measured};
 use dynident_simulation::{Record, Reference, ReferenceSample, SimulationError};
 
@@ -15,6 +18,7 @@ pub struct ControlledRun {
     reference: Reference,
     controller: Box<dyn Controller>,
     envelope: Option<Envelope>,
+    oscillations: RunOscillations,
     stop: Option<StopSignal>,
     target: ReferenceSample,
     tau: Vec<f64>,
@@ -33,6 +37,7 @@ pub struct ControlledRun {
 enum RunEnd {
     Interrupted,
     Breach(Breach),
+    Oscillation(JointOscillation),
     Fault(RobotFault),
 }
 
@@ -45,6 +50,7 @@ impl ControlledRun {
             run: request.run,
             controller: request.controller.build(joints.len(), request.model)?,
             envelope: request.envelope.cloned(),
+            oscillations: RunOscillations::new(request.oscillation),
             stop: request.stop.cloned(),
             target: ReferenceSample::new(joints.len()),
             tau: vec![0.0; joints.len()],
@@ -79,7 +85,8 @@ impl ControlledRun {
 
     /// The drives' torques, Nm (N), for the next sample, where the robot stands at `q` (rad, m) and moves with `dq`
     /// (rad/s, m/s) at `time_s` by its own clock. None where the robot has to be stopped at once: the sample left the
-    /// envelope, a stop was asked for, a number is none, or the run has no further sample. The function then returns.
+    /// envelope, a joint oscillates, a stop was asked for, a number is none, or the run has no further sample. The
+    /// function then returns.
     pub fn torque(&mut self, time_s: f64, q: &[f64], dq: &[f64]) -> Option<&[f64]> {
         let sample = self.record.samples;
         if self.end.is_some() || sample >= self.reference.samples() {
@@ -108,6 +115,13 @@ impl ControlledRun {
             let (part, zero) = self.part_of(sample);
             let time_s = if zero == 0 { time_s } else { time_s - self.record.times_s[zero] };
             self.end = Some(RunEnd::Breach(Breach { time_s, part, ..breach }));
+            return None;
+        }
+        if let Some((joint, found)) = self.oscillations.look(&self.reference, time_s, q) {
+            let (part, zero) = self.part_of(sample);
+            let time_s = if zero == 0 { time_s } else { time_s - self.record.times_s[zero] };
+            let joint = self.record.joints[joint].clone();
+            self.end = Some(RunEnd::Oscillation(JointOscillation { joint, time_s, part, ..found }));
             return None;
         }
         Some(&self.tau)
@@ -174,6 +188,9 @@ impl ControlledRun {
         let status = match (self.end, said) {
             (Some(RunEnd::Interrupted), _) => RobotStatus::Interrupted { stopping: Stopping::Confirmed },
             (Some(RunEnd::Breach(breach)), _) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed },
+            (Some(RunEnd::Oscillation(oscillation)), _) => {
+                RobotStatus::Oscillated { oscillation, stopping: Stopping::Confirmed }
+            }
             (Some(RunEnd::Fault(fault)), _) => RobotStatus::Failed { fault, stopping: None },
             (None, Err(reason)) => RobotStatus::Stopped { reason },
             (None, Ok(())) if is_whole => RobotStatus::Done,

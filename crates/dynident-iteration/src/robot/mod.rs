@@ -11,6 +11,7 @@ mod handover;
 mod held_torque;
 mod log_mistakes;
 mod log_table;
+mod oscillation_watch;
 mod process;
 mod process_group;
 mod process_settings;
@@ -19,26 +20,30 @@ mod recorder;
 mod simulated;
 mod stop_reason;
 mod stop_signal;
+mod stream_watch;
 mod term_description;
 mod ways;
 mod workspace;
 
 pub use envelope::{Envelope, EnvelopeSettings};
+pub(crate) use envelope::{TRACKING_M, TRACKING_RAD};
 pub use folder::{FolderRobot, FolderSettings};
 pub use folder_forms::FolderForm;
 pub use function::{ControlledRun, FunctionRobot};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_mistakes::{ExaminedLog, LogMistake, LogMistakeSettings, examine_log};
 pub use log_table::{LogTableError, read_log_table};
+pub(crate) use oscillation_watch::RunOscillations;
 pub use process::ProcessRobot;
 pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
 pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost, WayFiles};
 pub use simulated::SimulatedRobot;
-pub use stop_reason::{Breach, EnvelopeQuantity, Stopping};
+pub use stop_reason::{Breach, EnvelopeQuantity, JointOscillation, Stopping};
 pub use stop_signal::StopSignal;
 pub use ways::{RunPart, WayRecords, Ways};
 pub use workspace::{WatchedPoint, WorkspaceBox, WorkspaceSettings};
 
+use crate::oscillation::OscillationLimits;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{LimitedQuantity, Record, Reference, Run, RunStatus, SimulationError, require_length};
 use serde::{Deserialize, Serialize};
@@ -76,6 +81,8 @@ pub struct RunRequest<'a> {
     pub model: Option<&'a ControllerModel>,
     /// What no sample may leave; a run that does is stopped. None watches nothing.
     pub envelope: Option<&'a Envelope>,
+    /// Oscillation that stops the run; `None` disables monitoring.
+    pub oscillation: Option<OscillationLimits>,
     /// Who may ask for a stop.
     pub stop: Option<&'a StopSignal>,
     /// Share of the trajectory's own speed that the reference has; 1 but for slow runs before the first.
@@ -96,6 +103,7 @@ impl<'a> RunRequest<'a> {
             controller,
             model: None,
             envelope: None,
+            oscillation: None,
             stop: None,
             speed: 1.0,
             purpose: RunPurpose::Run,
@@ -168,11 +176,14 @@ impl RobotRun {
         Self { status, record: recorder::empty_record(joints, rate_hz), truth: None, ways: None, note: None }
     }
 
-    /// How it ended, in words, and what its record shows of why it left its envelope.
-    pub fn ending(&self, reference: &Reference) -> String {
+    /// How it ended, in words, and what its record shows of why it was stopped: a torque that no longer answered, or an
+    /// oscillation of at least `lowest_hz`.
+    pub fn ending(&self, reference: &Reference, lowest_hz: f64) -> String {
         let of_joint = |at| held_torque::held_torque(reference, &self.record, at);
-        let held = self.status.too_far().and_then(of_joint);
-        let parts = [Some(self.status.to_string()), held.map(|held| held.to_string()), self.note.clone()];
+        let held = self.status.too_far().and_then(of_joint).map(|held| held.to_string());
+        let oscillation = || oscillation_watch::oscillation_at_end(reference, &self.record, lowest_hz);
+        let shown = held.or_else(|| self.status.is_stopped_by_a_limit().then(oscillation)?.map(|own| own.to_string()));
+        let parts = [Some(self.status.to_string()), shown, self.note.clone()];
         parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 
@@ -219,6 +230,13 @@ pub enum RobotStatus {
         /// What became of the stop.
         stopping: Stopping,
     },
+    /// A joint oscillated about its trajectory, and the run was stopped.
+    Oscillated {
+        /// Which, and how.
+        oscillation: JointOscillation,
+        /// What became of the stop.
+        stopping: Stopping,
+    },
     /// The exchange with the robot failed.
     Failed {
         /// How.
@@ -240,6 +258,19 @@ impl RobotStatus {
     /// Whether the whole trajectory was run.
     pub fn is_done(&self) -> bool {
         *self == Self::Done
+    }
+
+    /// Whether a limit of a joint ended it, on either side.
+    fn is_stopped_by_a_limit(&self) -> bool {
+        match self {
+            Self::Simulated { verdict } => !verdict.is_done(),
+            Self::LeftEnvelope { .. } | Self::Stopped { .. } => true,
+            Self::Done
+            | Self::Interrupted { .. }
+            | Self::Oscillated { .. }
+            | Self::Failed { .. }
+            | Self::Waiting { .. } => false,
+        }
     }
 
     /// The joint that was stopped for its distance from the trajectory, and when, s.
@@ -264,6 +295,7 @@ impl core::fmt::Display for RobotStatus {
             Self::Stopped { reason } => write!(f, "the robot stopped: {reason}"),
             Self::Interrupted { stopping } => write!(f, "a stop was asked for: {stopping}"),
             Self::LeftEnvelope { breach, stopping } => write!(f, "out of the envelope: {breach}; {stopping}"),
+            Self::Oscillated { oscillation, stopping } => write!(f, "{stopping}: {oscillation}"),
             Self::Failed { fault, stopping: None } => write!(f, "{fault}"),
             Self::Failed { fault, stopping: Some(stopping) } => write!(f, "{fault}; {stopping}"),
             Self::Waiting { folder, reason } => write!(f, "{}: {reason}", folder.display()),
@@ -300,6 +332,14 @@ pub enum RobotFault {
     Hung {
         /// What was awaited.
         waiting_for: String,
+        /// The limit.
+        limit_s: f64,
+    },
+    /// Samples came in real time, and then none in the middle of the motion.
+    #[error(
+        "the robot program sent its samples in real time and then none for {limit_s:.2} s: look at the program; if such a pause is normal, give a larger limits.silence_s"
+    )]
+    Silent {
         /// The limit.
         limit_s: f64,
     },

@@ -87,7 +87,9 @@ impl Robot for ProcessRobot {
         let mut recorder = Recorder::new(request, &self.joints);
         let status = match self.converse(request, &mut recorder) {
             Ok(status) => {
-                if let RobotStatus::Interrupted { stopping } | RobotStatus::LeftEnvelope { stopping, .. } = &status
+                if let RobotStatus::Interrupted { stopping }
+                | RobotStatus::LeftEnvelope { stopping, .. }
+                | RobotStatus::Oscillated { stopping, .. } = &status
                     && stopping.is_open()
                 {
                     self.client = None;

@@ -26,6 +26,11 @@ pub struct ProcessLimits {
     /// From one message to the next, s. In the mode `run` what is left of the motion comes on top: a program may send
     /// its samples afterwards, and the way to the start and back may take this long. Default 60.
     pub message_s: f64,
+    /// From one sample to the next in the mode `run`, s, while the samples come in real time: a program that falls
+    /// silent in the middle of a motion is stopped after this. Default ten sample periods, at least 0.2 s. Of programs
+    /// that send their samples afterwards, in batches, or faster or slower than real time it means nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub silence_s: Option<f64>,
     /// A whole run, s. Default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_s: Option<f64>,
@@ -37,7 +42,7 @@ pub struct ProcessLimits {
 
 impl Default for ProcessLimits {
     fn default() -> Self {
-        Self { hello_s: 30.0, message_s: 60.0, run_s: None, stop_s: 5.0, bye_s: 2.0 }
+        Self { hello_s: 30.0, message_s: 60.0, silence_s: None, run_s: None, stop_s: 5.0, bye_s: 2.0 }
     }
 }
 
@@ -74,7 +79,8 @@ impl ProcessSettings {
             ("stop_s", limits.stop_s),
             ("bye_s", limits.bye_s),
         ];
-        for (what, value) in all.into_iter().chain(limits.run_s.map(|value| ("run_s", value))) {
+        let optional = [limits.run_s.map(|value| ("run_s", value)), limits.silence_s.map(|value| ("silence_s", value))];
+        for (what, value) in all.into_iter().chain(optional.into_iter().flatten()) {
             require(value > 0.0 && value <= 1e6, format!("limits.{what}"), value, "give more than 0, at most 1e6 s")?;
         }
         Ok(())

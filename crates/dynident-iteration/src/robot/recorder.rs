@@ -1,7 +1,8 @@
 //! What is recorded of a run as it goes: part after part, each watched along its own way.
 
 use super::envelope::EnvelopeWatch;
-use super::stop_reason::Breach;
+use super::oscillation_watch::RunOscillations;
+use super::stop_reason::{Breach, JointOscillation};
 use super::ways::{RunPart, WayRecords};
 use super::{RobotFault, RobotRun, RobotStatus, RunRequest};
 use dynident_simulation::{Record, Reference};
@@ -30,6 +31,7 @@ struct Part<'a> {
     /// Sample-major.
     record: Record,
     watch: EnvelopeWatch<'a>,
+    oscillations: RunOscillations,
 }
 
 /// What is recorded of a run, part after part.
@@ -51,6 +53,7 @@ impl<'a> Recorder<'a> {
             samples: reference.samples() - usize::from(which != RunPart::Motion),
             record: empty_record(joints, reference.rate_hz()),
             watch: EnvelopeWatch::new(request.envelope, reference),
+            oscillations: RunOscillations::new(request.oscillation),
         };
         let mut parts = vec![part(RunPart::Motion, request.reference)];
         if let Some(ways) = request.ways {
@@ -74,6 +77,11 @@ impl<'a> Recorder<'a> {
     pub(super) fn left_s(&self) -> f64 {
         let last = |part: &Part<'_>| part.record.times_s.last().copied().unwrap_or(0.0);
         self.parts[self.at..].iter().map(|part| (part.reference.duration_s() - last(part)).max(0.0)).sum()
+    }
+
+    /// Whether the part that is run now is recorded to its end: no further sample of it is due.
+    pub(super) fn is_at_end_of_part(&self) -> bool {
+        self.require_end().is_ok()
     }
 
     /// Samples from here on are of this part.
@@ -139,6 +147,15 @@ impl<'a> Recorder<'a> {
     pub(super) fn look(&mut self, dq: Option<&[f64]>) -> Option<Breach> {
         let Part { which, record, watch, .. } = &mut self.parts[self.at];
         watch.look(record, dq).map(|breach| Breach { part: *which, ..breach })
+    }
+
+    /// The joint that oscillates up to the newest sample, if one does.
+    pub(super) fn look_for_oscillation(&mut self) -> Option<JointOscillation> {
+        let Part { which, reference, record, oscillations, .. } = &mut self.parts[self.at];
+        let last = record.samples.checked_sub(1)?;
+        let q = &record.q[last * record.joints.len()..];
+        let (joint, found) = oscillations.look(reference, record.times_s[last], q)?;
+        Some(JointOscillation { joint: record.joints[joint].clone(), part: *which, ..found })
     }
 
     /// The run, with what was recorded of it.

@@ -30,6 +30,36 @@ impl core::fmt::Display for Breach {
     }
 }
 
+/// A joint that oscillates about its trajectory.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct JointOscillation {
+    /// The joint.
+    pub joint: String,
+    /// Its frequency, Hz.
+    pub frequency_hz: f64,
+    /// Amplitude of the velocity about that of the trajectory, rad/s (m/s).
+    pub amplitude: f64,
+    /// When it was seen, s from the begin of the part.
+    pub time_s: f64,
+    /// The part of the run: the motion, unless it has ways.
+    #[serde(default, skip_serializing_if = "RunPart::is_motion")]
+    pub part: RunPart,
+}
+
+impl core::fmt::Display for JointOscillation {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { joint, frequency_hz, amplitude, time_s, part } = self;
+        let of = if part.is_motion() { String::new() } else { format!(" of the {}", part.name()) };
+        write!(
+            f,
+            "joint {joint} oscillates at {frequency_hz:.0} Hz, with {amplitude:.3} rad/s (m/s) at {time_s:.3} s{of}: its \
+             loop is too fast for its inertia and its delay; give this joint a lower bandwidth_hz in [iteration] (a list \
+             has one number for each joint), or lower gains where kp and kd are stated"
+        )
+    }
+}
+
 /// What an envelope limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -1,7 +1,7 @@
 //! From what is found of single joints to one statement about the log.
 
 use super::explanation::{Explanation, Fitted, TorqueCandidate};
-use super::{CommandSource, TorqueCheck, TorqueCheckSettings};
+use super::{CheckWith, CommandSource, RowScale, TorqueCheck};
 use crate::leg::IterationTask;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -80,10 +80,13 @@ pub enum TorqueCause {
         percent: f64,
     },
     /// The parameters that joints share have other values in the rows of one joint.
-    #[error("the torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times what the torques of the other joints require{}", log_words(*.is_commanded))]
+    #[error("the torque of joint {joint} is {factor:.3} ± {half_width_95:.3} times what the torques of the other joints require{}{}", log_words(*.is_commanded), or_words(.or))]
     JointScale {
         /// The joint.
         joint: String,
+        /// Joints whose scale would explain the difference nearly as well.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        or: Vec<String>,
         /// Its torque per torque that the other joints require.
         factor: f64,
         /// Half the width of its 95 % interval.
@@ -147,6 +150,10 @@ fn log_words(is_commanded: bool) -> &'static str {
     if is_commanded { ", although the log holds the commanded torque" } else { "" }
 }
 
+fn or_words(or: &[String]) -> String {
+    if or.is_empty() { String::new() } else { format!(" (or another scale of {})", listed(or)) }
+}
+
 fn candidate_words(candidates: &[TorqueCandidate]) -> String {
     let names: Vec<&str> = candidates.iter().map(|candidate| candidate.name()).collect();
     if names.is_empty() { String::new() } else { format!(" (candidates: {})", names.join(", ")) }
@@ -172,18 +179,17 @@ const LEAST_LISTED: f64 = 0.5;
 pub(super) fn causes(
     task: &IterationTask,
     check: &TorqueCheck,
-    explanations: &[Explanation],
-    (settings, most_lag_s): (&TorqueCheckSettings, f64),
+    (explanations, named): (&[Explanation], &[Option<Fitted>]),
+    with: &CheckWith<'_>,
 ) -> Vec<TorqueCause> {
     let names = task.robot.joint_names();
-    let named: Vec<Option<Fitted>> = explanations.iter().map(Explanation::named).collect();
-    let with = |candidate: TorqueCandidate| -> Vec<usize> {
+    let of = |candidate: TorqueCandidate| -> Vec<usize> {
         let is_it = |found: &Option<Fitted>| found.is_some_and(|found| found.candidate == candidate);
-        (0..named.len()).filter(|&joint| explanations[joint].matters && is_it(&named[joint])).collect()
+        (0..named.len()).filter(|&joint| is_it(&named[joint])).collect()
     };
     let listed = |joints: &[usize]| joints.iter().map(|&joint| names[joint].clone()).collect::<Vec<_>>();
     let mut found = Vec::new();
-    let scaled = with(TorqueCandidate::Scale);
+    let scaled = of(TorqueCandidate::Scale);
     let scale = |joint: usize| named[joint].map_or(1.0, |found| found.value);
     let determined = explanations.iter().filter(|own| own.scale.is_some()).count();
     let mean = scaled.iter().map(|&joint| scale(joint)).sum::<f64>() / scaled.len().max(1) as f64;
@@ -204,22 +210,23 @@ pub(super) fn causes(
         (TorqueCandidate::Gravity, |joints| TorqueCause::Gravity { joints }),
         (TorqueCandidate::Friction, |joints| TorqueCause::Friction { joints }),
     ] {
-        let joints = with(candidate);
+        let joints = of(candidate);
         if !joints.is_empty() {
             found.push(cause(listed(&joints)));
         }
     }
-    for joint in with(TorqueCandidate::Exchanged) {
+    for joint in of(TorqueCandidate::Exchanged) {
         let of = named[joint].map_or(joint, |found| found.value as usize);
         found.push(TorqueCause::Exchanged { joint: names[joint].clone(), of: names[of].clone() });
     }
-    for joint in with(TorqueCandidate::Clipped) {
+    for joint in of(TorqueCandidate::Clipped) {
         let torque = named[joint].map_or(0.0, |found| found.value);
         found.push(TorqueCause::Clipped { joint: names[joint].clone(), torque });
     }
-    let is_explained = found.is_empty();
+    // Timing means nothing beside torque that is another one.
+    let has_timing = !explanations.iter().any(|own| own.matters);
     for (joint, explanation) in explanations.iter().enumerate() {
-        if explanation.matters && named[joint].is_none() {
+        if explanation.matters && explanation.is_certain && named[joint].is_none() {
             let likely = explanation.candidates.iter().filter(|one| one.explained >= LEAST_LISTED);
             found.push(TorqueCause::Undetermined {
                 joint: names[joint].clone(),
@@ -228,21 +235,25 @@ pub(super) fn causes(
             });
         }
     }
-    if is_explained {
-        found.extend(timing(check, settings, most_lag_s));
+    if has_timing {
+        found.extend(timing(check, with));
     }
-    if found.is_empty() {
-        found.extend(row_scale_causes(check, &names, settings));
+    // Which joint is wrong is clearer once torque is fed forward.
+    let is_early = check.source == CommandSource::PathOnly && with.feeds_forward_later;
+    if found.is_empty() && !is_early {
+        found.extend(row_scale_causes(check, with.row_scales, &names));
     }
     found
 }
 
 /// What the timing shows. A controller that sees positions before the log does has them at their true instants: the log
 /// has them late.
-fn timing(check: &TorqueCheck, settings: &TorqueCheckSettings, most_lag_s: f64) -> Vec<TorqueCause> {
+fn timing(check: &TorqueCheck, with: &CheckWith<'_>) -> Vec<TorqueCause> {
+    let settings = with.settings;
     let mut found = Vec::new();
     let lag_s = check.torque_lag_s + check.feedback_delay_s[0].min(0.0);
-    if lag_s.abs() > most_lag_s {
+    let lag_std_s = check.torque_lag_std_s.unwrap_or(f64::INFINITY);
+    if lag_s.abs() - settings.sigmas * lag_std_s > with.most_lag_s {
         found.push(TorqueCause::Delay { lag_s });
     }
     let clock_std = check.clock_percent_std.unwrap_or(f64::INFINITY);
@@ -254,17 +265,16 @@ fn timing(check: &TorqueCheck, settings: &TorqueCheckSettings, most_lag_s: f64) 
 }
 
 /// Joints whose rows disagree with those of the others.
-fn row_scale_causes(check: &TorqueCheck, names: &[String], settings: &TorqueCheckSettings) -> Vec<TorqueCause> {
-    let of_joint = |(joint, shown): (usize, &super::JointTorqueCheck)| {
-        let (factor, std) = (shown.row_scale?, shown.row_scale_std?);
-        let off = (factor - 1.0).abs();
-        let counts = 100.0 * off > settings.row_scale_percent && off > settings.sigmas * std;
-        counts.then(|| TorqueCause::JointScale {
+fn row_scale_causes(check: &TorqueCheck, row_scales: &[Option<RowScale>], names: &[String]) -> Vec<TorqueCause> {
+    let of_joint = |(joint, scale): (usize, &Option<RowScale>)| {
+        let RowScale { value, std, is_wrong, or } = scale.as_ref()?;
+        is_wrong.then(|| TorqueCause::JointScale {
             joint: names[joint].clone(),
-            factor,
+            or: or.iter().map(|&other| names[other].clone()).collect(),
+            factor: *value,
             half_width_95: 1.96 * std,
             is_commanded: check.source == CommandSource::Controller,
         })
     };
-    check.joints.iter().enumerate().filter_map(of_joint).collect()
+    row_scales.iter().enumerate().filter_map(of_joint).collect()
 }

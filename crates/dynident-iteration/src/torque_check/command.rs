@@ -6,16 +6,20 @@ use crate::leg::Leg;
 use crate::motion::on_uniform_clock;
 use dynident_recording::{DecimationSettings, Decimator, Derivatives, DifferentiatorSettings, Place};
 use dynident_simulation::Record;
-use dynident_simulation::controllers::{ControllerModel, ControllerSettings, FrictionCompensation, Measured, Target};
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings, Measured, Target};
 
 /// Positions are smoothed at this multiple of the cut-off of the comparison, so that the smoothing itself is not
 /// compared.
 const SMOOTHING_RATIO: f64 = 4.0;
 /// Rows per second after decimation, as a multiple of the cut-off.
 const ROWS_PER_CUTOFF: f64 = 4.0;
-/// Shared parameters: delay of the positions and of the velocities in the controller, lag of the logged torque (s), and
-/// relative rate of the log's clock. The expected sizes only matter where the rows determine nothing.
-const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 20e-3), (1e-3, 20e-3), (1e-3, 20e-3), (1e-4, 1e-2)];
+/// Shared parameters: delays of the positions and of the velocities in the controller, lag of the logged torque (s),
+/// relative rate of the log's clock, and delay of the torque that is fed forward (s). The expected sizes only matter
+/// where the rows determine little, or where another law explains them.
+const PARAMETERS: [(f64, f64); SHARED] = [(1e-3, 5e-3), (1e-3, 5e-3), (1e-3, 5e-3), (1e-4, 2e-3), (1e-3, 5e-3)];
+
+/// Delays at which the search begins for drives with unknown gains: a late position looks like a stiffer loop.
+const DELAYS_S: &[f64] = &[-0.03, -0.02, -0.015, -0.01, -0.0075, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02];
 
 /// How the torque follows from reference and positions.
 #[derive(Clone, Copy, Debug)]
@@ -30,20 +34,23 @@ pub(super) enum CommandLaw<'a> {
     /// The drives close their own position loop with unknown gains. The columns are the torque that is fed forward, the
     /// position error, its rate and its integral.
     OwnLoop {
-        /// What is fed forward.
-        model: &'a ControllerModel,
+        /// What is fed forward; none in a run with nothing but a path.
+        model: Option<&'a ControllerModel>,
     },
 }
 
+/// The shared parameters of the comparison.
+pub(super) fn shared_parameters() -> [SharedParameter; SHARED] {
+    PARAMETERS.map(|(difference, expected)| SharedParameter { difference, expected })
+}
+
 impl CommandLaw<'_> {
-    /// The shared parameters of the comparison.
-    pub(super) fn parameters(self) -> [SharedParameter; SHARED] {
-        core::array::from_fn(|k| {
-            let (difference, expected) = PARAMETERS[k];
-            // Unknown gains cannot distinguish two delays.
-            let is_free = k != 1 || matches!(self, Self::Known { .. });
-            SharedParameter { difference, expected, is_free }
-        })
+    /// Where the search for the shared parameters begins.
+    pub(super) fn starts(self) -> Vec<[f64; SHARED]> {
+        match self {
+            Self::Known { .. } => vec![[0.0; SHARED]],
+            Self::OwnLoop { .. } => DELAYS_S.iter().map(|&delay_s| [delay_s, delay_s, 0.0, 0.0, 0.0]).collect(),
+        }
     }
 }
 
@@ -152,14 +159,18 @@ impl<'a> ObservedLeg<'a> {
 
     /// What drives with their own loop get and see, joint-major: torque fed forward, position error, its rate, and its
     /// integral.
-    fn own_loop(&self, model: &ControllerModel, timing: &[f64; SHARED]) -> Vec<Vec<f64>> {
-        let mut model = model.clone();
+    fn own_loop(&self, model: Option<&ControllerModel>, timing: &[f64; SHARED]) -> Vec<Vec<f64>> {
+        let mut model = model.cloned();
         let mut out = vec![vec![0.0; self.joints * self.samples]; 4];
         let mut ahead = vec![0.0; self.joints];
         let mut integral = vec![0.0; self.joints];
-        self.each_instant(timing, &mut |sample, _, target, measured| {
-            let along = Measured { q: target.q, dq: target.dq };
-            model.torque(along, target, target.ddq, FrictionCompensation::Reference, &mut ahead);
+        let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; self.joints]);
+        let [_, _, _, _, ahead_s] = *timing;
+        self.each_instant(timing, &mut |sample, time_s, target, measured| {
+            if let Some(model) = &mut model {
+                self.reference(time_s - ahead_s, [&mut q, &mut dq, &mut ddq]);
+                model.reference_torque(&q, &dq, &ddq, &mut ahead);
+            }
             for joint in 0..self.joints {
                 let error = target.q[joint] - measured.q[joint];
                 integral[joint] += error / self.rate_hz;
@@ -173,19 +184,25 @@ impl<'a> ObservedLeg<'a> {
 
     /// Calls `then` with each sample, its time, and what the controller followed and saw.
     fn each_instant(&self, timing: &[f64; SHARED], then: &mut dyn FnMut(usize, f64, Target<'_>, Measured<'_>)) {
-        let [position_delay_s, velocity_delay_s, torque_lag_s, clock_rate] = *timing;
-        let commanded = self.leg.commanded();
+        let [position_delay_s, velocity_delay_s, torque_lag_s, clock_rate, _] = *timing;
         let [mut q, mut dq, mut ddq, mut seen_q, mut seen_dq] = [(); 5].map(|()| vec![0.0; self.joints]);
         for sample in 0..self.samples {
             let log_time_s = self.first_time_s + sample as f64 / self.rate_hz - torque_lag_s;
             let time_s = log_time_s * (1.0 + clock_rate);
+            self.reference(time_s, [&mut q, &mut dq, &mut ddq]);
             for joint in 0..self.joints {
-                [q[joint], dq[joint], ddq[joint]] = commanded.at(joint, time_s);
                 seen_q[joint] = self.between(&self.q, &self.dq, joint, log_time_s - position_delay_s);
                 seen_dq[joint] = self.between(&self.dq, &self.ddq, joint, log_time_s - velocity_delay_s);
             }
             let target = Target { q: &q, dq: &dq, ddq: &ddq };
             then(sample, time_s, target, Measured { q: &seen_q, dq: &seen_dq });
+        }
+    }
+
+    /// Position, velocity and acceleration of each joint as commanded.
+    fn reference(&self, time_s: f64, [q, dq, ddq]: [&mut [f64]; 3]) {
+        for joint in 0..self.joints {
+            [q[joint], dq[joint], ddq[joint]] = self.leg.commanded().at(joint, time_s);
         }
     }
 

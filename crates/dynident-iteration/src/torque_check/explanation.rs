@@ -10,14 +10,21 @@ use crate::leg::IterationTask;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 use serde::{Deserialize, Serialize};
 
-/// Share of the squared difference that a named candidate explains at least.
-const LEAST_EXPLAINED: f64 = 0.85;
-/// What the runner-up leaves of the squared difference, at least, in units of what the named candidate leaves.
-const CLEARLY_BETTER: f64 = 2.0;
+/// Rows per independent one: neighbouring rows share most of what the candidates leave.
+const CORRELATED_ROWS: f64 = 3.0;
+/// Independent rows that a candidate has beyond its unknowns, at least. In a run of a few strokes everything looks like
+/// everything; only a torque that stays at its limit is known sooner.
+const LEAST_FREEDOM: f64 = 16.0;
+/// Share of the torque that the position error makes in drives whose logged torque has the wrong sign.
+const PUSHES: f64 = 0.3;
+/// Gravity is constant where it varies by less than this share.
+const CONSTANT: f64 = 0.05;
 /// Time blocks of the jackknife of a scale.
 const BLOCKS: usize = 10;
 /// Widths of the steps of friction that are tried, as shares of the joint's highest speed.
 const STEP_WIDTHS: [f64; 3] = [0.02, 0.08, 0.3];
+/// Rows with torque below this share of the largest are not at a limit.
+const BELOW_LIMIT: f64 = 0.85;
 /// Limits of torque that are tried, as shares of the largest commanded torque.
 const CLIP_SHARES: usize = 40;
 
@@ -40,6 +47,12 @@ pub enum TorqueCandidate {
     Clipped,
 }
 
+impl TorqueCandidate {
+    /// All of them.
+    pub(super) const ALL: [Self; 6] =
+        [Self::Scale, Self::Sign, Self::Exchanged, Self::Gravity, Self::Friction, Self::Clipped];
+}
+
 /// A candidate with its numbers for one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
@@ -60,18 +73,12 @@ pub(super) struct Explanation {
     pub(super) commanded: Vec<f64>,
     /// Whether the difference matters.
     pub(super) matters: bool,
+    /// Square of the difference as a share of the square of the torque.
+    pub(super) difference_share: f64,
+    /// Whether a difference without a cause is reported: one from a completely known control law.
+    pub(super) is_certain: bool,
     /// All candidates, the best first; empty where the difference does not matter.
     pub(super) candidates: Vec<Fitted>,
-}
-
-impl Explanation {
-    /// The candidate that is named.
-    pub(super) fn named(&self) -> Option<Fitted> {
-        let best = *self.candidates.first().filter(|best| best.explained >= LEAST_EXPLAINED)?;
-        let left = |of: &Fitted| 1.0 - of.explained;
-        let is_clear = self.candidates[1..].iter().all(|other| left(other) >= CLEARLY_BETTER * left(&best));
-        is_clear.then_some(best)
-    }
 }
 
 /// The torques and motions of all joints, row by row.
@@ -89,94 +96,132 @@ pub(super) struct JointData<'a> {
 pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheckSettings) -> Explanation {
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let size = rms(y).max(f64::MIN_POSITIVE);
+    let (first, own_loop) = columns.split_first().map_or((&[][..], &[][..]), |(first, rest)| (&first[..], rest));
+    // As it should be: the scale one, the drives' own loop as it fits.
+    let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
+    let difference = residual_of(own_loop, &beside, &coefficients(own_loop, &beside));
+    let total = square(&difference).max(f64::MIN_POSITIVE);
     let free = coefficients(columns, y);
     let std = jackknife(columns, y);
-    // As it should be: the scale one, the drives' own loop as it fits.
-    let (first, own_loop) = columns.split_first().map_or((&[][..], &[][..]), |(first, rest)| (&first[..], rest));
-    let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
-    let of_loop = coefficients(own_loop, &beside);
-    let difference = residual_of(own_loop, &beside, &of_loop);
-    let commanded: Vec<f64> = y.iter().zip(&difference).map(|(y, r)| y - r).collect();
+    let (scale, scale_std) = (free[0], std[0]);
+    let is_scaled = (scale - 1.0).abs() > (0.01 * settings.scale_percent).max(settings.sigmas * scale_std);
+    // Drives that push away from the path would not follow it.
+    let by_error = own_loop.first().map_or(0.0, |error| free[1] * rms(error));
+    let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
     let difference_percent = 100.0 * rms(&difference) / size;
-    let scale = free[0];
-    let off = 100.0 * (scale - 1.0).abs();
-    let is_scaled = off > settings.scale_percent && (scale - 1.0).abs() > settings.sigmas * std;
-    let matters = is_scaled || difference_percent > settings.difference_percent;
+    let lacks_weight = difference_percent <= settings.difference_percent
+        && lacks_constant_gravity(data, joint, (&beside, settings.difference_percent));
+    let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.difference_percent;
     let mut out = Explanation {
-        scale: std.is_finite().then_some(scale),
-        scale_std: std.is_finite().then_some(std),
+        scale: scale_std.is_finite().then_some(scale),
+        scale_std: scale_std.is_finite().then_some(scale_std),
         difference_percent,
-        commanded,
+        commanded: y.iter().zip(&difference).map(|(y, r)| y - r).collect(),
         matters,
+        difference_share: total / (size * size * y.len().max(1) as f64),
+        is_certain: own_loop.is_empty(),
         candidates: Vec::new(),
     };
     if !matters {
         return out;
     }
-    let total = square(&difference).max(f64::MIN_POSITIVE);
-    let explained = |left: &[f64]| 1.0 - square(left) / total;
-    let add = |candidate, value, explained| Fitted { candidate, value, explained };
-    let with_loop = |extra: Vec<Vec<f64>>, from: &[f64]| {
-        let all: Vec<Vec<f64>> = extra.into_iter().chain(own_loop.iter().cloned()).collect();
-        let found = coefficients(&all, from);
-        let left = residual_of(&all, from, &found);
-        (found, left)
+    // Per independent row, so that many unknowns explain nothing by their number.
+    let independent = y.len() as f64 / CORRELATED_ROWS;
+    let fitted = |candidate, value, left: &[f64], unknowns: usize| {
+        let free = independent - unknowns as f64;
+        let explained = 1.0 - square(left) / total * independent / free;
+        (free >= LEAST_FREEDOM).then_some(Fitted { candidate, value, explained })
     };
+    if lacks_weight {
+        out.candidates = vec![Fitted { candidate: TorqueCandidate::Gravity, value: 1.0, explained: 1.0 }];
+        return out;
+    }
     let mut candidates = Vec::new();
-    // Another scale, or sign.
     let left = residual_of(columns, y, &free);
-    let of_scale = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
-    candidates.push(add(of_scale, scale, explained(&left)));
-    // Another joint's torque.
-    for other in (0..data.torque.len()).filter(|&other| other != joint) {
-        let Some(theirs) = data.columns[other].first() else { continue };
-        let own: Vec<Vec<f64>> = data.columns[other][1..].to_vec();
-        let beside: Vec<f64> = y.iter().zip(theirs).map(|(y, u)| y - u).collect();
-        let left = residual_of(&own, &beside, &coefficients(&own, &beside));
-        candidates.push(add(TorqueCandidate::Exchanged, other as f64, explained(&left)));
+    if pushes_away {
+        candidates.push(Fitted { candidate: TorqueCandidate::Sign, value: -1.0, explained: 1.0 });
+    } else if scale_std.is_finite() {
+        let candidate = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
+        candidates.extend(fitted(candidate, scale, &left, 1));
     }
-    // Gravity is missing.
+    candidates.extend(exchanged(data, joint, total).into_iter().filter(|_| independent >= LEAST_FREEDOM));
+    // What is missing, beside the drives' own loop as it then fits.
+    let missing = |extra: &[Vec<f64>]| {
+        let all: Vec<Vec<f64>> = extra.iter().chain(own_loop).cloned().collect();
+        let found = coefficients(&all, &beside);
+        let left = residual_of(&all, &beside, &found);
+        let sum = |row: usize| -extra.iter().zip(&found).map(|(column, value)| column[row] * value).sum::<f64>();
+        ((0..y.len()).map(sum).collect::<Vec<f64>>(), left)
+    };
     if let Some(gravity) = gravity_columns(data, joint) {
-        let (found, left) = with_loop(gravity.clone(), &beside);
-        let missing: Vec<f64> = (0..y.len())
-            .map(|row| -gravity.iter().zip(&found).map(|(column, value)| column[row] * value).sum::<f64>())
-            .collect();
-        if is_of_nominal_size(data, joint, &missing) {
-            candidates.push(add(TorqueCandidate::Gravity, 1.0, explained(&left)));
+        let columns = gravity.len();
+        let (gravity, left) = missing(&gravity);
+        if is_of_nominal_size(data, joint, &gravity) {
+            candidates.extend(fitted(TorqueCandidate::Gravity, 1.0, &left, columns.min(2 * data.torque.len())));
         }
     }
-    // Friction is missing: what is missing takes energy out.
-    let fastest = data.dq[joint].iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
-    if fastest > 0.0 {
-        let steps = STEP_WIDTHS.map(|width| data.dq[joint].iter().map(|dq| (dq / (width * fastest)).tanh()).collect());
-        let friction: Vec<Vec<f64>> = core::iter::once(data.dq[joint].clone()).chain(steps).collect();
-        let (found, left) = with_loop(friction.clone(), &beside);
-        let power: f64 = friction.iter().zip(&found).map(|(column, value)| value * dot(column, &data.dq[joint])).sum();
-        if power < 0.0 {
-            candidates.push(add(TorqueCandidate::Friction, 1.0, explained(&left)));
-        }
+    let friction = friction_columns(data, joint);
+    let columns_of_friction = friction.len();
+    let (friction, left) = missing(&friction);
+    // Friction takes energy out.
+    if dot(&friction, &data.dq[joint]) > 0.0 {
+        candidates.extend(fitted(TorqueCandidate::Friction, 1.0, &left, columns_of_friction));
     }
-    if own_loop.is_empty() {
-        candidates.extend(clipped(y, first, total));
-    }
+    candidates.extend(clipped(y, columns, total));
     candidates.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    // Another joint that is explained alike is no rival of the nearest one.
-    let mut kept: Vec<Fitted> = Vec::new();
+    // Another joint that explains the torque alike is no rival of the best one.
     for one in candidates {
-        if !kept.iter().any(|other| other.candidate == one.candidate) {
-            kept.push(one);
+        if !out.candidates.iter().any(|other| other.candidate == one.candidate) {
+            out.candidates.push(one);
         }
     }
-    out.candidates = kept;
     out
 }
 
-/// A limit of the torque.
-fn clipped(y: &[f64], commanded: &[f64], total: f64) -> Option<Fitted> {
+/// What may be missing in the torque of each joint: its gravity, and its friction.
+pub(super) fn may_be_missing(data: &JointData<'_>) -> [Vec<Vec<Vec<f64>>>; 2] {
+    let joints = 0..data.torque.len();
+    let gravity = joints.clone().map(|joint| gravity_columns(data, joint).unwrap_or_default()).collect();
+    [gravity, joints.map(|joint| friction_columns(data, joint)).collect()]
+}
+
+/// Viscous friction, and steps of several widths.
+fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f64>> {
+    let dq = &data.dq[joint];
+    let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
+    if fastest == 0.0 {
+        return Vec::new();
+    }
+    let steps = STEP_WIDTHS.map(|width| dq.iter().map(|dq| (dq / (width * fastest)).tanh()).collect());
+    core::iter::once(dq.clone()).chain(steps).collect()
+}
+
+/// The torque of each other joint.
+fn exchanged(data: &JointData<'_>, joint: usize, total: f64) -> Vec<Fitted> {
+    let y = &data.torque[joint];
+    let of = |other: usize| {
+        let (theirs, own_loop) = data.columns[other].split_first()?;
+        let beside: Vec<f64> = y.iter().zip(theirs).map(|(y, u)| y - u).collect();
+        let left = residual_of(own_loop, &beside, &coefficients(own_loop, &beside));
+        let explained = 1.0 - square(&left) / total;
+        Some(Fitted { candidate: TorqueCandidate::Exchanged, value: other as f64, explained })
+    };
+    (0..data.torque.len()).filter(|&other| other != joint).filter_map(of).collect()
+}
+
+/// A limit of the torque. The gains of drives with their own loop follow from the rows below it.
+fn clipped(y: &[f64], columns: &[Vec<f64>], total: f64) -> Option<Fitted> {
+    let (first, own_loop) = columns.split_first()?;
+    let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    let below: Vec<usize> = (0..y.len()).filter(|&row| y[row].abs() < BELOW_LIMIT * highest).collect();
+    let kept = |values: &[f64]| -> Vec<f64> { below.iter().map(|&row| values[row]).collect() };
+    let beside: Vec<f64> = y.iter().zip(first).map(|(y, u)| y - u).collect();
+    let of_loop = coefficients(&own_loop.iter().map(|column| kept(column)).collect::<Vec<_>>(), &kept(&beside));
+    let commanded: Vec<f64> = residual_of(own_loop, &beside, &of_loop).iter().zip(y).map(|(r, y)| y - r).collect();
     let most = commanded.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     let at = |share: usize| {
         let limit = most * share as f64 / CLIP_SHARES as f64;
-        let left = centred(&y.iter().zip(commanded).map(|(y, u)| y - u.clamp(-limit, limit)).collect::<Vec<_>>());
+        let left = centred(&y.iter().zip(&commanded).map(|(y, u)| y - u.clamp(-limit, limit)).collect::<Vec<_>>());
         Fitted { candidate: TorqueCandidate::Clipped, value: limit, explained: 1.0 - square(&left) / total }
     };
     (1..CLIP_SHARES).map(at).max_by(|a, b| a.explained.total_cmp(&b.explained))
@@ -200,43 +245,62 @@ fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> 
     (!columns.is_empty()).then_some(columns)
 }
 
-/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
-/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
-fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
-    let robot = &data.task.robot;
-    let model = robot.model();
+/// Whether the constant that the log lacks is a gravity torque that does not change with the posture, as that of a
+/// vertical slide: half to twice that of the description, and more than the smallest share of the torque that matters.
+fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, (beside, percent): (&[f64], f64)) -> bool {
+    let nominal = nominal_gravity(data, joint);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let (weight, missing) = (mean(&nominal), -mean(beside));
+    let is_constant = rms(&centred(&nominal)) < CONSTANT * weight.abs();
+    is_constant
+        && 100.0 * missing.abs() > percent * rms(&data.torque[joint])
+        && (0.5..=2.0).contains(&(missing / weight))
+}
+
+/// The gravity torque of the description along the rows.
+fn nominal_gravity(data: &JointData<'_>, joint: usize) -> Vec<f64> {
+    let model = data.task.robot.model();
     let mut workspace = Workspace::new(model);
     let mut q = vec![0.0; model.dof()];
-    let nominal: Vec<f64> = (0..missing.len())
+    (0..data.torque[joint].len())
         .map(|row| {
             q.iter_mut().zip(data.q).for_each(|(to, from)| *to = from[row]);
             gravity_torque(model, &mut workspace, &q)[joint]
         })
-        .collect();
-    let (nominal, missing) = (centred(&nominal), centred(missing));
+        .collect()
+}
+
+/// Whether a torque is about the gravity torque of the description: what is missing points the same way and is neither
+/// less than half nor more than twice as large. Any size is accepted where the description has no masses.
+fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bool {
+    let (nominal, missing) = (centred(&nominal_gravity(data, joint)), centred(missing));
     let own = square(&nominal);
     own == 0.0 || (0.5..=2.0).contains(&(dot(&nominal, &missing) / own))
 }
 
-/// Standard deviation of the first coefficient, by leaving out one time block after the other; infinite where the rows
-/// do not determine it.
-fn jackknife(columns: &[Vec<f64>], y: &[f64]) -> f64 {
+/// Standard deviation of each coefficient, by leaving out one time block after the other; infinite where the rows do not
+/// determine it.
+fn jackknife(columns: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
     let rows = y.len();
-    let Some(first) = columns.first() else { return f64::INFINITY };
-    if rows < 2 * BLOCKS || rms(&centred(first)) <= 1e-9 * rms(y) {
-        return f64::INFINITY;
+    if rows < 2 * BLOCKS {
+        return vec![f64::INFINITY; columns.len() + 1];
     }
     let without = |values: &[f64], block: usize| -> Vec<f64> {
         let (from, to) = (block * rows / BLOCKS, (block + 1) * rows / BLOCKS);
         values[..from].iter().chain(&values[to..]).copied().collect()
     };
-    let found: Vec<f64> = (0..BLOCKS)
+    let found: Vec<Vec<f64>> = (0..BLOCKS)
         .map(|block| {
             let columns: Vec<Vec<f64>> = columns.iter().map(|column| without(column, block)).collect();
-            coefficients(&columns, &without(y, block))[0]
+            coefficients(&columns, &without(y, block))
         })
         .collect();
     let count = BLOCKS as f64;
-    let mean = found.iter().sum::<f64>() / count;
-    ((count - 1.0) / count * found.iter().map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt()
+    let std = |k: usize| {
+        let is_excited = columns.get(k).is_none_or(|column| rms(&centred(column)) > 1e-9 * rms(y));
+        let mean = found.iter().map(|values| values[k]).sum::<f64>() / count;
+        let square: f64 = found.iter().map(|values| (values[k] - mean).powi(2)).sum();
+        if is_excited { ((count - 1.0) / count * square).sqrt() } else { f64::INFINITY }
+    };
+    (0..=columns.len()).map(std).collect()
 }

@@ -17,8 +17,10 @@
 //! | `separable_fit` | scales and timing by least squares |
 //! | `explanation` | what explains a difference: the candidates, and when one is named |
 //! | `row_scale` | what the parameters that several joints share show about each joint's torque |
+//! | `agreement` | one cause for all joints, where one explains them all |
 //! | `causes` | from single joints to one statement |
 
+mod agreement;
 mod causes;
 mod command;
 mod explanation;
@@ -27,22 +29,26 @@ mod separable_fit;
 
 pub use causes::TorqueCause;
 pub use explanation::TorqueCandidate;
-pub(crate) use row_scale::row_scales;
+pub(crate) use row_scale::{LeastDeviation, RowScale, row_scales};
 
 use crate::leg::{IterationTask, Leg};
 use crate::settings::RunIdentificationSettings;
-use command::{CommandLaw, ObservedLeg};
+use agreement::agreement;
+use command::{CommandLaw, ObservedLeg, shared_parameters};
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Record, SimulationError, require};
-use explanation::{Explanation, JointData, explain};
-use row_scale::RowScale;
-use separable_fit::{SHARED, separable_fit};
+use explanation::{Explanation, JointData, explain, may_be_missing};
+use separable_fit::{SHARED, SeparableFit, separable_fit};
 use serde::{Deserialize, Serialize};
 
 /// Cut-off of the comparison where runs are identified without a filter, Hz of a usual arm.
 const USUAL_CUTOFF_HZ: f64 = 8.0;
 /// Points of each joint that are kept for the picture.
 const MOST_POINTS: usize = 150;
+/// Cycles of the cut-off that a run has at least.
+const CYCLES_PER_RUN: f64 = 12.0;
+/// Another timing is taken where it leaves less than this share of the squared differences.
+const BETTER: f64 = 0.5;
 /// Fewest rows per joint from which anything is concluded.
 const FEWEST_ROWS: usize = 20;
 
@@ -54,8 +60,8 @@ pub struct TorqueCheckSettings {
     /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
     /// have at most 1.5.
     pub scale_percent: f64,
-    /// Largest difference between logged and commanded torque that has no named cause, root mean square as a
-    /// percentage of the joint's torque. Default 15.
+    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
+    /// Default 5: correct logs of the campaign's robots have at most 2.
     pub difference_percent: f64,
     /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
     /// share, percent. Default 5.
@@ -68,7 +74,7 @@ pub struct TorqueCheckSettings {
 
 impl Default for TorqueCheckSettings {
     fn default() -> Self {
-        Self { scale_percent: 3.0, difference_percent: 15.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
+        Self { scale_percent: 3.0, difference_percent: 5.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
     }
 }
 
@@ -100,8 +106,9 @@ pub enum CommandSource {
     Controller,
     /// The torque that is fed forward to drives with their own position loop.
     FeedForward,
-    /// Not known: drives with their own loop that get nothing but a path.
-    Unknown,
+    /// Not known: drives with their own position loop get nothing but a path. A scale that all joints share is not
+    /// checked.
+    PathOnly,
 }
 
 /// What the comparison shows of one joint.
@@ -135,6 +142,9 @@ pub struct TorqueCheck {
     pub feedback_delay_s: [f64; 2],
     /// By how much the logged torque comes after the commanded one, s.
     pub torque_lag_s: f64,
+    /// Standard deviation of how far positions and torques of the log are apart, s; none where it is not known.
+    #[serde(default)]
+    pub torque_lag_std_s: Option<f64>,
     /// By how much the log's clock is slow compared with the controller's, percent.
     pub clock_percent: f64,
     /// Standard deviation of `clock_percent`; none where the commanded torque is not known.
@@ -154,50 +164,54 @@ pub(crate) struct CheckedRun<'a> {
     pub(crate) model: Option<&'a ControllerModel>,
 }
 
+/// What the comparison is made with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CheckWith<'a> {
+    pub(crate) settings: &'a TorqueCheckSettings,
+    pub(crate) identification: &'a RunIdentificationSettings,
+    /// What the estimate of all runs shows of each joint.
+    pub(crate) row_scales: &'a [Option<RowScale>],
+    /// How far positions and torques of a log may be apart, s.
+    pub(crate) most_lag_s: f64,
+    /// Whether drives with their own loop get torque fed forward in later runs, which shows each joint's own scale.
+    pub(crate) feeds_forward_later: bool,
+}
+
 /// Compares logged with commanded torque; none where too little was recorded. `runs` are the runs so far, the newest
 /// last; earlier ones only serve to determine the gains of drives with their own loop. `task` is with the friction in
-/// force, `row_scales` what the estimate of all runs shows, `most_lag_s` how far positions and torques may be apart.
-pub(crate) fn check_torque(
-    task: &IterationTask,
-    runs: &[CheckedRun<'_>],
-    identification: &RunIdentificationSettings,
-    (settings, most_lag_s): (&TorqueCheckSettings, f64),
-    row_scales: &[Option<RowScale>],
-) -> Option<TorqueCheck> {
+/// force.
+pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>) -> Option<TorqueCheck> {
     let newest = runs.last()?;
     let source = source_of(newest);
     let dof = task.robot.dof();
-    let cutoff_hz = cutoff_hz(task, identification);
-    let used = if source == CommandSource::FeedForward { runs } else { &runs[runs.len() - 1..] };
+    let cutoff_hz = cutoff_hz(task, with.identification, newest);
+    // The gains of drives with their own loop are the same in all runs.
+    let used = if source == CommandSource::Controller { &runs[runs.len() - 1..] } else { runs };
     let mut observed = Vec::new();
     for run in used {
-        let Some(law) = law_of(run) else { continue };
+        let law = law_of(run);
         for (leg, record) in run.legs.iter().zip(run.records) {
             observed.extend(ObservedLeg::new(leg, record, cutoff_hz).map(|leg| (law, leg)));
         }
-    }
-    let mut joints = vec![JointTorqueCheck::without_command(); dof];
-    for (joint, scale) in joints.iter_mut().zip(row_scales) {
-        (joint.row_scale, joint.row_scale_std) = (scale.map(|scale| scale.value), scale.map(|scale| scale.std));
     }
     let mut check = TorqueCheck {
         source,
         feedback_delay_s: [0.0; 2],
         torque_lag_s: 0.0,
+        torque_lag_std_s: None,
         clock_percent: 0.0,
         clock_percent_std: None,
-        joints,
+        joints: vec![JointTorqueCheck::without_command(); dof],
         causes: Vec::new(),
     };
+    for (joint, scale) in check.joints.iter_mut().zip(with.row_scales) {
+        joint.row_scale = scale.as_ref().map(|scale| scale.value);
+        joint.row_scale_std = scale.as_ref().map(|scale| scale.std);
+    }
     let rows: usize = observed.iter().map(|(_, leg)| leg.rows()).sum();
-    let Some((law, _)) = observed.first().filter(|_| rows >= FEWEST_ROWS) else {
-        if row_scales.iter().all(Option::is_none) {
-            return None;
-        }
-        check.source = CommandSource::Unknown;
-        check.causes = causes::causes(task, &check, &[], (settings, most_lag_s));
-        return Some(check);
-    };
+    if rows < FEWEST_ROWS {
+        return None;
+    }
     let joined = |of: &dyn Fn(&ObservedLeg<'_>) -> Vec<Vec<f64>>| -> Vec<Vec<f64>> {
         let mut out = vec![Vec::new(); dof];
         for (_, leg) in &observed {
@@ -206,29 +220,52 @@ pub(crate) fn check_torque(
         out
     };
     let torque = joined(&|leg| leg.torque.clone());
-    let mut columns = |timing: &[f64; SHARED]| {
+    let motion = [0, 1].map(|place| joined(&|leg| leg.motion()[place].clone()));
+    let columns = |timing: &[f64; SHARED]| {
         let mut out: Vec<Vec<Vec<f64>>> = vec![Vec::new(); dof];
         for (law, leg) in &observed {
-            for (joint, of_joint) in leg.columns(*law, timing).into_iter().enumerate() {
-                let own = &mut out[joint];
+            for (own, of_joint) in out.iter_mut().zip(leg.columns(*law, timing)) {
                 own.resize(of_joint.len().max(own.len()), Vec::new());
                 own.iter_mut().zip(of_joint).for_each(|(out, values)| out.extend(values));
             }
         }
         out
     };
-    let fit = separable_fit(&torque, &law.parameters(), &mut columns);
+    let (parameters, starts) = (shared_parameters(), observed[0].0.starts());
+    let mut fit = separable_fit(&torque, (&parameters, &starts), &mut |timing| columns(timing));
     if fit.columns.iter().zip(&torque).any(|(columns, y)| columns.iter().any(|column| column.len() != y.len())) {
         return None;
     }
-    let motion = [0, 1].map(|place| joined(&|leg| leg.motion()[place].clone()));
-    let data = JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1] };
-    let explanations: Vec<Explanation> = (0..dof).map(|joint| explain(&data, joint, settings)).collect();
-    let [position_s, velocity_s, lag_s, clock] = fit.shared;
+    let explained = |columns: &[Vec<Vec<f64>>]| -> Vec<Explanation> {
+        let data = JointData { task, torque: &torque, columns, q: &motion[0], dq: &motion[1] };
+        (0..dof).map(|joint| explain(&data, joint, with.settings)).collect()
+    };
+    let mut explanations = explained(&fit.columns);
+    let mut found = agreement(&explanations);
+    if explanations.iter().any(|own| own.matters) {
+        // What is missing in the torque bends the timing: it is found again beside what may be missing.
+        let data = JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1] };
+        for extra in may_be_missing(&data) {
+            let other = separable_fit(&torque, (&parameters, &starts), &mut |timing| {
+                let own = columns(timing).into_iter().zip(&extra);
+                own.map(|(own, extra)| own.into_iter().chain(extra.iter().cloned()).collect()).collect()
+            });
+            let own = other.columns.iter().zip(&fit.columns);
+            let columns: Vec<Vec<Vec<f64>>> = own.map(|(all, base)| all[..base.len()].to_vec()).collect();
+            let then = explained(&columns);
+            let agreed = agreement(&then);
+            if agreed.left < BETTER * found.left {
+                (explanations, found) = (then, agreed);
+                fit = SeparableFit { columns, ..other };
+            }
+        }
+    }
+    let [position_s, velocity_s, lag_s, clock, _] = fit.shared;
     check.feedback_delay_s = [position_s, velocity_s];
     check.torque_lag_s = lag_s;
     check.clock_percent = 100.0 * clock;
-    check.clock_percent_std = Some(100.0 * fit.std[3]);
+    check.clock_percent_std = Some(100.0 * fit.std_of([0.0, 0.0, 0.0, 1.0, 0.0]));
+    check.torque_lag_std_s = Some(fit.std_of([f64::from(position_s < 0.0), 0.0, 1.0, 0.0, 0.0]));
     for (joint, explanation) in explanations.iter().enumerate() {
         let shown = &mut check.joints[joint];
         (shown.scale, shown.scale_std) = (explanation.scale, explanation.scale_std);
@@ -237,7 +274,7 @@ pub(crate) fn check_torque(
         let commanded = explanation.commanded.iter().step_by(step);
         shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
     }
-    check.causes = causes::causes(task, &check, &explanations, (settings, most_lag_s));
+    check.causes = causes::causes(task, &check, (&explanations, &found.named), with);
     Some(check)
 }
 
@@ -257,21 +294,25 @@ impl JointTorqueCheck {
 fn source_of(run: &CheckedRun<'_>) -> CommandSource {
     match (run.controller, run.model) {
         (ControllerSettings::PositionLoop(own), Some(_)) if own.feed_forward => CommandSource::FeedForward,
-        (ControllerSettings::PositionLoop(_), _) => CommandSource::Unknown,
+        (ControllerSettings::PositionLoop(_), _) => CommandSource::PathOnly,
         _ => CommandSource::Controller,
     }
 }
 
-fn law_of<'a>(run: &CheckedRun<'a>) -> Option<CommandLaw<'a>> {
+fn law_of<'a>(run: &CheckedRun<'a>) -> CommandLaw<'a> {
     match source_of(run) {
-        CommandSource::Controller => Some(CommandLaw::Known { controller: run.controller, model: run.model }),
-        CommandSource::FeedForward => run.model.map(|model| CommandLaw::OwnLoop { model }),
-        CommandSource::Unknown => None,
+        CommandSource::Controller => CommandLaw::Known { controller: run.controller, model: run.model },
+        CommandSource::FeedForward => CommandLaw::OwnLoop { model: run.model },
+        CommandSource::PathOnly => CommandLaw::OwnLoop { model: None },
     }
 }
 
-/// The cut-off below which torques are compared: that of the identification, where it states one.
-fn cutoff_hz(task: &IterationTask, identification: &RunIdentificationSettings) -> f64 {
+/// The cut-off below which torques are compared: that of the identification, where it states one. A run that ended
+/// early is compared up to a higher one, so that enough rows are left.
+fn cutoff_hz(task: &IterationTask, identification: &RunIdentificationSettings, run: &CheckedRun<'_>) -> f64 {
     let stated = identification.parallel_filter.as_ref().and_then(|filter| filter.cutoff_hz);
-    stated.unwrap_or_else(|| task.robot.model().own_scale().hertz(USUAL_CUTOFF_HZ))
+    let usual = stated.unwrap_or_else(|| task.robot.model().own_scale().hertz(USUAL_CUTOFF_HZ));
+    let duration = |record: &Record| record.times_s.last().zip(record.times_s.first()).map_or(0.0, |(a, b)| a - b);
+    let longest = run.records.iter().map(duration).fold(0.0, f64::max);
+    if longest > 0.0 { usual.max(CYCLES_PER_RUN / longest) } else { usual }
 }

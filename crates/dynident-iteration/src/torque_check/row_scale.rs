@@ -6,31 +6,48 @@
 //!
 //! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
 //!
-//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that scales are
-//! relative: to the joint with which the others agree best. Parameters that one joint alone determines (its friction
-//! and drive inertia) contribute nothing; a joint whose torque shares too little with the others gets a wide bar.
+//! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
+//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ
+//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Parameters that one joint
+//! alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little with the
+//! others gets a wide bar.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::leg::IterationTask;
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{RunIdentificationSettings, Scheme};
-use dynident_estimation::{WeightedSettings, weighted_least_squares};
+use dynident_estimation::{LinearProblem, WeightedSettings, weighted_least_squares};
 use dynident_identification::estimators::estimate;
 use dynident_identification::payload::with_free_gains;
 use dynident_identification::{Execution, Logs, RegressorModel, training_rows};
-use nalgebra::DMatrix;
 
 /// A wider standard deviation says nothing.
 const WIDEST_STD: f64 = 0.3;
-/// Agreement of two joints is judged in units of the standard deviation of their ratio, at least of this much.
-const LEAST_STD: f64 = 0.02;
+/// Share of a joint's torque that no other parameter may explain, at least: below it errors of the model are magnified.
+const LEAST_OWN_SHARE: f64 = 0.02;
+/// Beyond this deviation the linear equations mean nothing.
+const FURTHEST: f64 = 0.6;
+/// The scale of another joint explains the rows nearly as well if their log-likelihood is lower by less than this: three
+/// and a half standard deviations of independent rows.
+const AS_LIKELY: f64 = 6.0;
 
 /// The scale of one joint's torque relative to the other joints.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowScale {
     pub(crate) value: f64,
     pub(crate) std: f64,
+    /// Whether it is taken as wrong.
+    pub(crate) is_wrong: bool,
+    /// Joints whose scale explains the rows nearly as well, if it is wrong.
+    pub(crate) or: Vec<usize>,
+}
+
+/// The smallest deviation that counts: share of the torque, and number of standard deviations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeastDeviation {
+    pub(crate) share: f64,
+    pub(crate) sigmas: f64,
 }
 
 /// The relative torque scale of each joint by all `runs`; none where it is not determined. `task` is with the friction
@@ -42,7 +59,7 @@ pub(crate) fn row_scales(
     task: &IterationTask,
     runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
-    known: &RunEstimate,
+    (known, least): (&RunEstimate, LeastDeviation),
 ) -> Result<Vec<Option<RowScale>>, IterationError> {
     let dof = task.robot.dof();
     let cannot = settings.scheme != Scheme::AllJoints || !task.known.is_empty() || !settings.payloads.is_empty();
@@ -60,25 +77,12 @@ pub(crate) fn row_scales(
         let logs = Logs::new(task.robot.model(), &motions, identification.filters(), &all, None, execution).ok()?;
         let training = training_rows((&logs, &identification), model, &all, &[], None).ok()?;
         let found = estimate(&training.rows((&logs, &identification), &all), None).ok()?.estimate;
-        // Any joint may be the first reference: ratios follow from all of them.
-        let free: Vec<usize> = (1..training.joints.len()).collect();
-        let columns = training.problem.columns().len();
-        let without_load = vec![vec![0.0; columns]; training.problem.logs().len()];
-        let wider = with_free_gains(training.problem.clone(), &free, (&without_load, &found.values)).ok()?;
-        let scaled = weighted_least_squares(&wider, &WeightedSettings::default()).ok()?;
-        let is_fixed = |column: usize| scaled.rank.fixed.iter().any(|fixed| fixed.column == column);
-        let value = |place: usize| match place {
-            0 => Some(0.0),
-            place => (!is_fixed(columns + place - 1)).then(|| scaled.values[columns + place - 1]),
-        };
-        let values: Vec<Option<f64>> = (0..training.joints.len()).map(value).collect();
-        let covariance = |a: usize, b: usize| match (a, b) {
-            (0, _) | (_, 0) => 0.0,
-            (a, b) => scaled.covariance[(columns + a - 1, columns + b - 1)],
-        };
-        let covariance = DMatrix::from_fn(values.len(), values.len(), covariance);
         let mut out = vec![None; dof];
-        for (&joint, scale) in training.joints.iter().zip(relative(&values, &covariance)) {
+        let scales = tested(&training.problem, &found.values, least);
+        for (&joint, mut scale) in training.joints.iter().zip(scales) {
+            if let Some(scale) = &mut scale {
+                scale.or.iter_mut().for_each(|other| *other = training.joints[*other]);
+            }
             out[joint] = scale;
         }
         Some(out)
@@ -86,48 +90,67 @@ pub(crate) fn row_scales(
     Ok(found().unwrap_or_else(|| vec![None; dof]))
 }
 
-/// Scales `1 + κ` relative to that of the joint with which the others agree best.
-fn relative(kappa: &[Option<f64>], covariance: &DMatrix<f64>) -> Vec<Option<RowScale>> {
-    let std = |a: usize, b: usize| (covariance[(a, a)] + covariance[(b, b)] - 2.0 * covariance[(a, b)]).max(0.0).sqrt();
-    let disagreement = |a: usize| -> Option<f64> {
-        let own = kappa[a]?;
-        // Beyond some deviations a joint is wrong, however far.
-        let with = |(b, other): (usize, &Option<f64>)| {
-            other.map_or(0.0, |other| ((own - other).abs() / std(a, b).max(LEAST_STD)).min(4.0))
+/// Tests one joint after the other, by their places in the problem.
+fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec<Option<RowScale>> {
+    let joints = problem.joints().len();
+    let mut wrong: Vec<(usize, Vec<usize>)> = Vec::new();
+    loop {
+        let chosen: Vec<usize> = wrong.iter().map(|(joint, _)| *joint).collect();
+        let of_joint = |joint: usize| -> Option<Kappa> {
+            let free: Vec<usize> =
+                if chosen.contains(&joint) { chosen.clone() } else { chosen.iter().copied().chain([joint]).collect() };
+            let place = free.iter().position(|&one| one == joint)?;
+            kappa(problem, values, &free, place)
         };
-        let uncertainty: f64 = (0..kappa.len()).filter(|b| kappa[*b].is_some()).map(|b| std(a, b).min(1.0)).sum();
-        Some(kappa.iter().enumerate().map(with).sum::<f64>() + uncertainty)
-    };
-    let places = (0..kappa.len()).filter_map(|a| Some((a, disagreement(a)?)));
-    let Some((reference, _)) = places.min_by(|a, b| a.1.total_cmp(&b.1)) else { return vec![None; kappa.len()] };
-    let of = |a: usize| -> Option<RowScale> {
-        let value = (1.0 + kappa[a]?) / (1.0 + kappa[reference]?);
-        let std = std(a, reference);
-        (a != reference && std > 0.0 && std < WIDEST_STD && value.is_finite()).then_some(RowScale { value, std })
-    };
-    (0..kappa.len()).map(of).collect()
+        let found: Vec<Option<Kappa>> = (0..joints).map(of_joint).collect();
+        let likelihood = |joint: usize| found[joint].map_or(f64::NEG_INFINITY, |kappa| kappa.log_likelihood);
+        let counts = |&joint: &usize| {
+            let is_large = |kappa: Kappa| kappa.value.abs() > least.share.max(least.sigmas * kappa.std);
+            found[joint].is_some_and(is_large)
+        };
+        let open: Vec<usize> = (0..joints).filter(|joint| !chosen.contains(joint)).collect();
+        let worst = open.iter().copied().filter(counts).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
+        // More than half of the joints cannot all be wrong against the rest.
+        if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints) {
+            let is_rival = |&other: &usize| other != worst && likelihood(other) > likelihood(worst) - AS_LIKELY;
+            wrong.push((worst, open.iter().copied().filter(is_rival).collect()));
+            continue;
+        }
+        let scale = |joint: usize| {
+            let Kappa { value, std, .. } = found[joint]?;
+            let or = wrong.iter().find(|(one, _)| *one == joint).map(|(_, or)| or.clone());
+            Some(RowScale { value: 1.0 + value, std, is_wrong: or.is_some(), or: or.unwrap_or_default() })
+        };
+        return (0..joints).map(scale).collect();
+    }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The deviation of a joint's scale.
+#[derive(Clone, Copy, Debug)]
+struct Kappa {
+    value: f64,
+    std: f64,
+    /// Of all rows with it.
+    log_likelihood: f64,
+}
 
-    /// Three joints agree with each other, one does not: whichever was held is not the reference by that alone.
-    #[test]
-    fn scales_are_relative_to_the_joints_that_agree() {
-        let covariance = DMatrix::from_fn(4, 4, |a, b| {
-            if a == 0 || b == 0 {
-                0.0
-            } else if a == b {
-                2e-4
-            } else {
-                1e-4
-            }
-        });
-        let found = relative(&[Some(0.0), Some(0.25), Some(0.251), Some(0.249)], &covariance);
-        let wrong = found[0].unwrap();
-        assert!((wrong.value - 0.8).abs() < 2e-3 && wrong.std < 0.02, "{wrong:?}");
-        assert!(found[1..].iter().flatten().all(|scale| (scale.value - 1.0).abs() < 2e-3), "{found:?}");
-        assert_eq!(relative(&[None, None], &DMatrix::zeros(2, 2)), [None, None]);
-    }
+/// κ of the joint `free[place]`, where the joints `free` have one.
+fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<Kappa> {
+    let columns = problem.columns().len();
+    let without_load = vec![vec![0.0; columns]; problem.logs().len()];
+    let wider = with_free_gains(problem.clone(), free, (&without_load, values)).ok()?;
+    let found = weighted_least_squares(&wider, &WeightedSettings::default()).ok()?;
+    let column = columns + place;
+    let (value, std) = (found.values[column], found.std[column]);
+    let is_fixed = found.rank.fixed.iter().any(|fixed| fixed.column == column);
+    // Of white noise the deviation is σ over the norm of what the other columns leave of the predicted torque.
+    let joint = free[place];
+    let of_joint = problem.equations().iter().filter(|equation| equation.joint == joint);
+    let norm = of_joint.map(|equation| equation.factor.total().torque_norm().powi(2)).sum::<f64>().sqrt();
+    let own_share = found.joint_sigma[joint] / (found.covariance_white[(column, column)].sqrt() * norm);
+    let is_determined = !is_fixed && std > 0.0 && std < WIDEST_STD && own_share > LEAST_OWN_SHARE;
+    let rows = problem.joint_rows();
+    let of_rows = |(sigma, rows): (&f64, &usize)| -(*rows as f64) * sigma.max(f64::MIN_POSITIVE).ln();
+    let log_likelihood = found.joint_sigma.iter().zip(&rows).map(of_rows).sum();
+    (is_determined && value.abs() < FURTHEST).then_some(Kappa { value, std, log_likelihood })
 }

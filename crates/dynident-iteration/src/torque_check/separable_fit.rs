@@ -8,8 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on real logs.
-const MOST_STEPS: usize = 6;
+/// Gauss-Newton steps. The timing is nearly linear: three steps reach rounding on most logs; a clock that is off takes
+/// more.
+const MOST_STEPS: usize = 15;
 /// A step below this share of the finite difference ends the search.
 const SMALL_STEP: f64 = 1e-2;
 /// Smallest residual that a joint is weighted by, as a share of its torque: exact logs would have infinite weights.
@@ -18,7 +19,7 @@ const LEAST_RESIDUAL: f64 = 1e-4;
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Number of shared parameters.
-pub(super) const SHARED: usize = 4;
+pub(super) const SHARED: usize = 5;
 
 /// One joint's columns, each with the same number of rows.
 pub(super) type JointColumns = Vec<Vec<f64>>;
@@ -28,8 +29,6 @@ pub(super) type JointColumns = Vec<Vec<f64>>;
 pub(super) struct SharedParameter {
     pub(super) difference: f64,
     pub(super) expected: f64,
-    /// Whether it is estimated; otherwise it stays zero.
-    pub(super) is_free: bool,
 }
 
 /// The solution.
@@ -37,21 +36,39 @@ pub(super) struct SharedParameter {
 pub(super) struct SeparableFit {
     /// The shared parameters.
     pub(super) shared: [f64; SHARED],
-    /// Their standard deviations, if neighbouring rows had independent residuals.
-    pub(super) std: [f64; SHARED],
+    /// Their covariance, if neighbouring rows had independent residuals; none where it does not exist.
+    pub(super) covariance: Option<DMatrix<f64>>,
     /// Columns of each joint at these.
     pub(super) columns: Vec<JointColumns>,
 }
 
-/// Fits `y[joint]` by `columns(shared)[joint]`.
+impl SeparableFit {
+    /// Standard deviation of a combination of the shared parameters; infinite where it is not determined.
+    pub(super) fn std_of(&self, combination: [f64; SHARED]) -> f64 {
+        let Some(covariance) = &self.covariance else { return f64::INFINITY };
+        let combination = DVector::from_column_slice(&combination);
+        combination.dot(&(covariance * &combination)).max(0.0).sqrt()
+    }
+}
+
+/// Fits `y[joint]` by `columns(shared)[joint]`, from the best of some starts.
 pub(super) fn separable_fit(
     y: &[Vec<f64>],
-    parameters: &[SharedParameter; SHARED],
+    (parameters, starts): (&[SharedParameter; SHARED], &[[f64; SHARED]]),
     columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
 ) -> SeparableFit {
-    let mut shared = [0.0; SHARED];
-    let mut at = columns(&shared);
-    let mut residuals = projected(y, &at);
+    // There may be several minima: the search begins at the best of the starts.
+    let starts = starts.iter().map(|start| {
+        let shared = *start;
+        let at = columns(&shared);
+        let residuals = projected(y, &at);
+        (shared, at, residuals)
+    });
+    let share = |residuals: &[Vec<f64>]| -> f64 {
+        residuals.iter().zip(y).map(|(r, y)| square(r) / square(y).max(f64::MIN_POSITIVE)).sum()
+    };
+    let best = starts.min_by(|a, b| share(&a.2).total_cmp(&share(&b.2)));
+    let (mut shared, mut at, mut residuals) = best.unwrap_or_else(|| ([0.0; SHARED], Vec::new(), Vec::new()));
     let scale = |residuals: &[Vec<f64>]| -> Vec<f64> {
         let of_joint = |(r, y): (&Vec<f64>, &Vec<f64>)| rms(r).max(LEAST_RESIDUAL * rms(y)).max(f64::MIN_POSITIVE);
         residuals.iter().zip(y).map(of_joint).collect()
@@ -60,42 +77,35 @@ pub(super) fn separable_fit(
         let of_rows: f64 = residuals.iter().zip(sigma).map(|(r, sigma)| square(r) / (sigma * sigma)).sum();
         of_rows + shared.iter().zip(parameters).map(|(p, own)| (p / own.expected).powi(2)).sum::<f64>()
     };
-    let mut std = [f64::INFINITY; SHARED];
+    let mut covariance = None;
     for _ in 0..MOST_STEPS {
         let sigma = scale(&residuals);
-        let mut slopes: Vec<Option<Vec<Vec<f64>>>> = Vec::with_capacity(SHARED);
+        let mut slopes: Vec<Vec<Vec<f64>>> = Vec::with_capacity(SHARED);
         for (place, parameter) in parameters.iter().enumerate() {
-            if !parameter.is_free {
-                slopes.push(None);
-                continue;
-            }
             let mut beside = shared;
             beside[place] += parameter.difference;
             let moved = projected(y, &columns(&beside));
             let slope = |(moved, own): (&Vec<f64>, &Vec<f64>)| {
                 moved.iter().zip(own).map(|(a, b)| (a - b) / parameter.difference).collect()
             };
-            slopes.push(Some(moved.iter().zip(&residuals).map(slope).collect()));
+            slopes.push(moved.iter().zip(&residuals).map(slope).collect());
         }
         let mut normal = DMatrix::<f64>::zeros(SHARED, SHARED);
         let mut right = DVector::<f64>::zeros(SHARED);
         for (i, own) in slopes.iter().enumerate() {
             normal[(i, i)] += parameters[i].expected.powi(-2);
-            let Some(own) = own else { continue };
             right[i] -= shared[i] * parameters[i].expected.powi(-2);
             for joint in 0..y.len() {
                 let weight = sigma[joint].powi(-2);
                 right[i] -= weight * dot(&own[joint], &residuals[joint]);
                 for (k, other) in slopes.iter().enumerate() {
-                    let Some(other) = other else { continue };
                     normal[(i, k)] += weight * dot(&own[joint], &other[joint]);
                 }
             }
         }
         let Some(factor) = normal.cholesky() else { break };
         let step = factor.solve(&right);
-        let covariance = factor.inverse();
-        std = core::array::from_fn(|k| covariance[(k, k)].sqrt());
+        covariance = Some(factor.inverse());
         let before = cost(&residuals, &sigma, &shared);
         let mut taken = None;
         for halving in 0..4 {
@@ -115,7 +125,7 @@ pub(super) fn separable_fit(
             break;
         }
     }
-    SeparableFit { shared, std, columns: at }
+    SeparableFit { shared, covariance, columns: at }
 }
 
 fn projected(y: &[Vec<f64>], columns: &[JointColumns]) -> Vec<Vec<f64>> {

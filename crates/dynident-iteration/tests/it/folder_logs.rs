@@ -73,7 +73,7 @@ fn mistakes_of_a_log_are_named_before_the_envelope() {
     // Unix time stamps; a recorder that was started 0.7 s early.
     let run = taken(&|record| record.times_s.iter_mut().for_each(|time| *time += 1_700_000_000.25));
     assert!(run.status.is_done() && run.record.q == right.q, "{}", run.status);
-    assert!(run.ending(&reference).contains("offset was taken off"), "{}", run.ending(&reference));
+    assert!(run.ending(&reference, 5.0).contains("offset was taken off"), "{}", run.ending(&reference, 5.0));
     let run = taken(&|record| {
         let rows = (0.7 * right.rate_hz) as usize;
         let rest = (0..rows).map(|k| k as f64 / right.rate_hz);
@@ -87,7 +87,7 @@ fn mistakes_of_a_log_are_named_before_the_envelope() {
         record.samples += rows;
     });
     assert!(run.status.is_done() && run.record.times_s[0].abs() < 0.1, "{}", run.status);
-    assert!(run.ending(&reference).contains("s before the motion; these rows were left out"));
+    assert!(run.ending(&reference, 5.0).contains("s before the motion; these rows were left out"));
 
     // A robot that leaves its envelope is still reported as such, and a right log is taken as it is.
     let run = taken(&|record| record.q[100] += 0.5);

@@ -38,8 +38,13 @@ fn folding() -> (ParametricModel, Reference) {
 
 fn derived(delay_s: f64) -> DerivedControllers {
     let (robot, reference) = folding();
-    let gains = GainSettings { bandwidth_hz: 4.0.into(), uncertainty_percent: 30.0, delay_s };
-    derived_controllers(&robot, &[&reference], &gains).unwrap()
+    derived_controllers(&robot, &[&reference], &gains_of(delay_s)).unwrap()
+}
+
+/// 4 Hz with drives that are as heavy as typical ones at least.
+fn gains_of(delay_s: f64) -> GainSettings {
+    let (bandwidth_hz, uncertainty_percent, light_delay_s) = (4.0.into(), 30.0, delay_s);
+    GainSettings { bandwidth_hz, uncertainty_percent, delay_s, lightest_drive: 1.0, light_delay_s }
 }
 
 fn joint_pd(derived: &DerivedControllers) -> JointPdSettings {
@@ -123,7 +128,7 @@ fn the_first_model_has_typical_drives() {
     let drives = (0..6)
         .flat_map(|joint| [TorqueTerm::DriveInertia(DriveInertia { joint }), TorqueTerm::Viscous(Viscous { joint })]);
     let robot = ParametricModel::new(bare.model().clone(), drives.collect()).unwrap();
-    let gains = GainSettings { bandwidth_hz: 4.0.into(), uncertainty_percent: 30.0, delay_s: 0.008 };
+    let gains = gains_of(0.008);
     let derived = derived_controllers(&robot, &[&reference], &gains).unwrap();
     assert!(matches!(derived.first, ControllerSettings::ComputedTorque(_)), "{:?}", derived.first);
     let terms = &derived.first_model.unwrap()[robot.model().inertial_count()..];

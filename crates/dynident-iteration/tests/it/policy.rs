@@ -55,10 +55,10 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         reason: None,
         rehearsal: None,
         warm_up: None,
-        torque_check: None,
         estimate: Some(estimate),
         pooled: None,
         evidence: Some(evidence()),
+        torque_check: None,
         held_out: None,
     }
 }
@@ -69,6 +69,7 @@ fn evidence() -> RunEvidence {
         torque_rms: 10.0,
         torque_noise: 0.1,
         row_noise: 0.1,
+        oscillation: None,
         clipping: None,
         prediction: Some(Prediction { rows: 1000, inside: 0.95, rms_error: 0.1, half_width: 0.2 }),
         tracking_floor_rad: None,

@@ -155,7 +155,13 @@ fn what_a_rehearsal_shows_is_kept() {
 fn gains_come_from_inertia_and_bandwidth() {
     let model = model();
     let matrix = mass_matrix(&model, &mut Workspace::new(&model), &[-0.4, 0.3]).to_vec();
-    let gains = |bandwidth_hz: PerJoint| GainSettings { bandwidth_hz, uncertainty_percent: 30.0, delay_s: 0.0 };
+    let gains = |bandwidth_hz: PerJoint| GainSettings {
+        bandwidth_hz,
+        uncertainty_percent: 30.0,
+        delay_s: 0.0,
+        lightest_drive: 0.1,
+        light_delay_s: 0.0,
+    };
     let derived = derived_controllers(&robot(), &[&reference()], &gains(vec![2.0, 3.0].into())).unwrap();
     let ControllerSettings::JointPd(pd) = &derived.model_free else { panic!("{derived:?}") };
     let ControllerSettings::ComputedTorque(computed) = &derived.model_based else { panic!("{derived:?}") };

@@ -42,7 +42,7 @@ fn settings(mode: ProcessMode, fault: &str) -> ProcessSettings {
     if !fault.is_empty() {
         command.extend(["--fault".to_owned(), fault.to_owned()]);
     }
-    let limits = ProcessLimits { hello_s: 20.0, message_s: 20.0, run_s: None, stop_s: 0.5, bye_s: 0.2 };
+    let limits = ProcessLimits { hello_s: 20.0, message_s: 20.0, stop_s: 0.5, bye_s: 0.2, ..ProcessLimits::default() };
     ProcessSettings { command, mode, limits, folder: None }
 }
 

@@ -16,7 +16,7 @@ use dynident_model::load_robot;
 use dynident_simulation::{LoopSettings, Plant, Reference};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const BOTH: [ProcessMode; 2] = [ProcessMode::Run, ProcessMode::Step];
 
@@ -105,6 +105,54 @@ fn a_robot_that_ignores_its_stop_is_killed() {
         assert!(run.status.to_string().contains("look at the robot"));
         assert!(!runs(&marked(folder.path())), "behind a shell: {shell}");
     }
+}
+
+/// A minute of motion, whose program goes as fast as it can or, paced, in real time, and misbehaves after four seconds.
+fn streamed(fault: &str, paced: bool, silence_s: Option<f64>) -> (RobotRun, Duration) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut own = command(fault, folder.path());
+    own.extend(["--at", "2000"].map(str::to_owned));
+    if paced {
+        own.extend(["--paced", "yes"].map(str::to_owned));
+    }
+    let mut settings = settings(ProcessMode::Run, own);
+    settings.limits.silence_s = silence_s;
+    settings.limits.stop_s = if fault == "ignore" { 0.2 } else { 60.0 };
+    let (reference, controller) = (Reference::standing(&[-0.4, 0.3], 500.0, 60.0).unwrap(), pd());
+    let begin = Instant::now();
+    let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    (run, begin.elapsed())
+}
+
+/// A program that streams in real time and falls silent, its robot in the middle of a motion, is stopped after
+/// `silence_s` (one second, for a busy machine pauses programs for longer than the default), and not after `message_s`
+/// and the rest of the motion, two minutes here.
+#[test]
+fn a_stream_that_falls_silent_is_stopped() {
+    for (fault, expected) in [("wait", Stopping::Confirmed), ("ignore", Stopping::Unanswered)] {
+        let (run, took) = streamed(fault, true, Some(1.0));
+        let RobotStatus::Failed { fault: RobotFault::Silent { limit_s }, stopping } = run.status else {
+            panic!("{fault}: {}", run.status)
+        };
+        assert_eq!((limit_s, stopping, run.record.samples), (1.0, Some(expected), 2000), "{fault}");
+        // Four seconds of motion, the silence and the stop; the rest is for a busy machine.
+        assert!(took < Duration::from_secs(30), "{fault}: {took:?}");
+    }
+}
+
+/// What is no stream in real time may pause; so may one whose pauses are stated.
+#[test]
+fn a_pause_of_what_is_no_stream_is_nothing() {
+    let (run, _) = streamed("pause", false, None);
+    assert!(run.status.is_done(), "{}", run.status);
+    let folder = tempfile::tempdir().unwrap();
+    let mut own = command("pause", folder.path());
+    own.extend(["--at", "500", "--paced", "yes"].map(str::to_owned));
+    let mut settings = settings(ProcessMode::Run, own);
+    settings.limits.silence_s = Some(10.0);
+    let (reference, controller) = (Reference::standing(&[-0.4, 0.3], 500.0, 1.5).unwrap(), pd());
+    let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    assert!(run.status.is_done(), "{}", run.status);
 }
 
 /// Who hangs behind a shell is given up with all of its group; a program that dies while a process of its own holds its

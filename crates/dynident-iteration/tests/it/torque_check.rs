@@ -150,7 +150,10 @@ fn a_wrong_torque_is_named_and_never_loaded() {
     assert_eq!(named(&|log| scaled(log, [-1.0, 1.0])), [TorqueCause::Sign { joints: vec![joint(1)] }]);
     assert_eq!(named(&|log| scaled(log, [-1.0, -1.0])), [TorqueCause::Sign { joints: both() }]);
     assert_eq!(named(&without_gravity), [TorqueCause::Gravity { joints: both() }]);
-    assert_eq!(named(&without_friction), [TorqueCause::Friction { joints: both() }]);
+    // With gravity alone in the first controller it is less than a twentieth of the torque.
+    let outcome = iterated(&Simulated::default(), simulated_arm::settings(), &without_friction);
+    assert!(!outcome.status.is_converged() && outcome.runs.len() <= 2, "{}", outcome.status);
+    assert_eq!(causes(&outcome), [TorqueCause::Friction { joints: both() }]);
     let exchange = |joint, of| TorqueCause::Exchanged { joint, of };
     assert_eq!(named(&exchanged), [exchange(joint(1), joint(2)), exchange(joint(2), joint(1))]);
     assert!(matches!(&named(&cut)[..], [TorqueCause::Clipped { joint: name, .. }] if *name == joint(1)));
@@ -180,15 +183,14 @@ fn a_difference_without_a_known_cause_has_none() {
     assert!(matches!(&found[..], [TorqueCause::Undetermined { joint, .. }] if joint == "joint2"), "{found:?}");
 }
 
-/// Drives that deliver less than their log states, and drives with their own loop: the parameters that both joints'
-/// torques share have other values in the rows of one of them.
+/// Drives with their own loop, whose gains nobody stated: the torque that is fed forward shows the scale.
 #[test]
-fn a_drive_that_delivers_less_is_found_by_the_other_joint() {
+fn the_scale_of_drives_with_their_own_loop_is_found() {
     let mut settings = simulated_arm::settings();
     settings.first = None;
     let own = PositionLoopSettings {
-        kp: Some(4000.0.into()),
-        kd: Some(300.0.into()),
+        kp: Some(2000.0.into()),
+        kd: Some(120.0.into()),
         ..PositionLoopSettings::of_robot(true)
     };
     settings.controller = ControllerSettings::PositionLoop(own);
@@ -197,7 +199,8 @@ fn a_drive_that_delivers_less_is_found_by_the_other_joint() {
     let outcome = iterated(&Simulated::default(), settings, &|log| scaled(log, [1.0, 1.12]));
     assert!(!outcome.status.is_converged());
     let found = causes(&outcome);
-    assert!(!found.is_empty(), "{:?}", outcome.shortfalls);
+    let [TorqueCause::Scale { joint, factor, .. }] = &found[..] else { panic!("{found:?}: {:?}", outcome.shortfalls) };
+    assert!(joint == "joint2" && (factor - 1.12).abs() < 0.02, "{joint} {factor}");
 }
 
 /// What the records decide, and nothing else: a run with a wrong log ends the iteration, and says how to go on.

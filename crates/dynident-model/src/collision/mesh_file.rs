@@ -1,6 +1,7 @@
-//! From the name of a mesh in a description to its vertices.
+//! From the name of a mesh in a description to its triangles.
 
-use super::{mesh_text, stl};
+use super::mesh::TriangleMesh;
+use super::{collada, mesh_text, stl};
 use crate::spatial::Vec3;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -15,12 +16,12 @@ const MAX_COORDINATE: f64 = 1e9;
 /// How far above the description's folder a package is looked for.
 const LEVELS: usize = 8;
 
-/// Why a mesh gave no vertices.
+/// Why a collision shape cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum MeshError {
     /// No such file.
-    #[error("mesh `{name}` is not there (looked beside and above {})", folder.display())]
+    #[error("mesh `{name}` is missing (searched next to and above {})", folder.display())]
     Missing {
         /// The name in the description.
         name: String,
@@ -32,17 +33,56 @@ pub enum MeshError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The file is no STL or OBJ.
-    #[error("{}: {fault}; STL (binary or text) and OBJ are read", path.display())]
+    /// The file holds no usable mesh.
+    #[error("{}: {fault}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        fault: &'static str,
+        fault: MeshFault,
     },
+    /// The reader of the description does not support the shape.
+    #[error("{what}")]
+    Unsupported {
+        /// The element and what is wrong with it.
+        what: String,
+    },
+}
+
+/// What is wrong with the content of a mesh file.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum MeshFault {
+    /// None of the formats that are read.
+    #[error("unknown format; STL (binary or text), OBJ and COLLADA (.dae) are read")]
+    Format,
+    /// Git LFS has not fetched the file.
+    #[error("Git LFS pointer in place of the mesh: run `git lfs pull` in the repository of the file")]
+    LfsPointer,
+    /// More bytes than are read.
+    #[error("larger than {} MiB", MAX_MESH_BYTES >> 20)]
+    TooLarge,
+    /// No vertex at all.
+    #[error("no vertices")]
+    Empty,
+    /// A vertex without three numbers.
+    #[error("a vertex without three numbers")]
+    Vertex,
+    /// A coordinate that is not finite or too large.
+    #[error("a vertex that is not finite, or beyond 1e9")]
+    NotFinite,
+    /// A face with an invalid index.
+    #[error("a face names a vertex that does not exist")]
+    Face,
+    /// The XML of a COLLADA file is malformed.
+    #[error("malformed XML: {0}")]
+    Xml(String),
+    /// An element of a COLLADA file that is missing, wrong or not supported.
+    #[error("COLLADA: {0}")]
+    Collada(&'static str),
 }
 
 /// The file of a mesh that a description in `folder` calls `name`: `package://NAME/rest` beside or up to eight levels
@@ -63,42 +103,45 @@ pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
         .or_else(|| above().find_map(|at| there(at.join(rest))))
 }
 
-/// The vertices of a mesh, each once, in the file's unit and frame.
+/// The vertices of a mesh, each once, and its triangles, in the file's frame; in the file's unit, but in metres for
+/// COLLADA, which names its unit.
 ///
 /// # Errors
-/// If the file is not found, cannot be read, or is no STL or OBJ with at least one vertex.
-pub fn mesh_vertices(folder: &Path, name: &str) -> Result<Vec<Vec3>, MeshError> {
+/// If the file is not found, cannot be read, or is no STL, OBJ or COLLADA with at least one vertex.
+pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     let missing = || MeshError::Missing { name: name.to_owned(), folder: folder.to_owned() };
     let path = find_mesh(folder, name).ok_or_else(missing)?;
     let mut bytes = Vec::new();
     dynident_files::open(&path)
         .and_then(|file| file.take(MAX_MESH_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|source| MeshError::File { path: path.clone(), source })?;
-    let faulty = |fault| MeshError::Content { path: path.clone(), fault };
-    if bytes.len() as u64 > MAX_MESH_BYTES {
-        return Err(faulty("larger than 256 MiB"));
-    }
-    let vertices = parse(&bytes).map_err(faulty)?;
-    let mut ordered: Vec<[u64; 3]> = vertices.iter().map(|v| v.0.map(|x| (x + 0.0).to_bits())).collect();
-    ordered.sort_unstable();
-    ordered.dedup();
-    Ok(ordered.into_iter().map(|bits| Vec3(bits.map(f64::from_bits))).collect())
+    let parsed = if bytes.len() as u64 > MAX_MESH_BYTES { Err(MeshFault::TooLarge) } else { parse(&bytes) };
+    parsed.map_err(|fault| MeshError::Content { path, fault })
 }
 
-/// The vertices of an STL or OBJ, told apart by their content.
-fn parse(bytes: &[u8]) -> Result<Vec<Vec3>, &'static str> {
-    let vertices = if stl::is_binary(bytes) {
-        stl::binary(bytes)
+/// The mesh of an STL, OBJ or COLLADA file, distinguished by content.
+fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
+    if bytes.starts_with(b"version https://git-lfs.github.com/spec") {
+        return Err(MeshFault::LfsPointer);
+    }
+    let mesh = if stl::is_binary(bytes) {
+        TriangleMesh::of_corners(&stl::binary(bytes))
     } else {
-        let text = core::str::from_utf8(bytes).map_err(|_| "neither a whole binary STL nor text")?;
-        let word = if text.trim_start().starts_with("solid") { "vertex" } else { "v" };
-        mesh_text::vertices(text, word).ok_or("a vertex without three numbers")?
+        let text = core::str::from_utf8(bytes).map_err(|_| MeshFault::Format)?;
+        let text = text.trim_start_matches('\u{feff}').trim_start();
+        if text.starts_with('<') {
+            collada::read(text)?
+        } else if text.starts_with("solid") {
+            mesh_text::stl(text)?
+        } else {
+            mesh_text::obj(text)?.ok_or(MeshFault::Format)?
+        }
     };
-    if vertices.is_empty() {
-        return Err("no vertices");
+    if mesh.vertices.is_empty() {
+        return Err(MeshFault::Empty);
     }
     let finite = |v: &Vec3| v.0.iter().all(|x| x.abs() <= MAX_COORDINATE);
-    if vertices.iter().all(finite) { Ok(vertices) } else { Err("a vertex that is not finite") }
+    if mesh.vertices.iter().all(finite) { Ok(mesh) } else { Err(MeshFault::NotFinite) }
 }
 
 #[cfg(test)]
@@ -131,14 +174,15 @@ mod tests {
         std::fs::write(folder.join("b.stl"), binary(&head, &corners)).unwrap();
         std::fs::write(folder.join("c.obj"), "o x\nv 0 0 0\nv 1 0 0\nvn 0 0 1\nv 0 1 0\nv 0 0 -2.5\nf 1 2 3\n")
             .unwrap();
-        let [a, b, c] = ["a.stl", "b.stl", "c.obj"].map(|name| mesh_vertices(&folder, name).unwrap());
-        assert_eq!(a.len(), 4);
-        assert_eq!((&a, &a), (&b, &c));
+        let [a, b, c] = ["a.stl", "b.stl", "c.obj"].map(|name| read_mesh(&folder, name).unwrap());
+        assert_eq!((a.vertices.len(), a.triangles.len()), (4, 2));
+        assert_eq!((&a, &a.vertices), (&b, &c.vertices));
+        assert_eq!(c.triangles, a.triangles[..1]);
         std::fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
-    fn faulty_meshes_are_refused_and_never_take_memory_by_their_count() {
+    fn faulty_meshes_are_rejected_and_their_count_takes_no_memory() {
         let folder = tempfile_folder("faulty");
         let mut lying = binary(&[0; 80], &[[0.0; 3]; 3]);
         lying[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
@@ -148,12 +192,16 @@ mod tests {
             ("word.stl", b"solid\nvertex a b c\n".to_vec()),
             ("nan.obj", b"v nan 0 0\n".to_vec()),
             ("collada.dae", b"<COLLADA/>".to_vec()),
+            ("html.dae", b"<html/>".to_vec()),
+            ("face.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n".to_vec()),
+            ("ply.ply", b"ply\nformat ascii 1.0\n".to_vec()),
+            ("pointer.stl", b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n".to_vec()),
         ] {
             std::fs::write(folder.join(name), bytes).unwrap();
-            let error = mesh_vertices(&folder, name).unwrap_err().to_string();
+            let error = read_mesh(&folder, name).unwrap_err().to_string();
             assert!(error.contains(name), "{error}");
         }
-        assert!(matches!(mesh_vertices(&folder, "package://x/absent.stl"), Err(MeshError::Missing { .. })));
+        assert!(matches!(read_mesh(&folder, "package://x/absent.stl"), Err(MeshError::Missing { .. })));
         std::fs::remove_dir_all(folder).unwrap();
     }
 

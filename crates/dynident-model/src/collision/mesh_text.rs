@@ -1,17 +1,52 @@
-//! Vertices of meshes written as text: STL (`vertex x y z`) and Wavefront OBJ (`v x y z`).
+//! Meshes written as text: STL (`vertex x y z`) and Wavefront OBJ (`v x y z`, `f i j k`).
 
+use super::MeshFault;
+use super::mesh::TriangleMesh;
 use crate::spatial::Vec3;
 
-/// The vertices of all lines that begin with `word`; none where one of them is no vertex.
-pub(super) fn vertices(text: &str, word: &str) -> Option<Vec<Vec3>> {
-    let mut found = Vec::new();
+/// The triangles of a text STL: each three `vertex` lines.
+pub(super) fn stl(text: &str) -> Result<TriangleMesh, MeshFault> {
+    let mut corners = Vec::new();
     for line in text.lines() {
         let mut words = line.split_ascii_whitespace();
-        if words.next() != Some(word) {
-            continue;
+        if words.next() == Some("vertex") {
+            corners.push(vertex(&mut words)?);
         }
-        let mut number = || words.next()?.parse::<f64>().ok();
-        found.push(Vec3([number()?, number()?, number()?]));
     }
-    Some(found)
+    Ok(TriangleMesh::of_corners(&corners))
+}
+
+/// The vertices and faces of an OBJ; a face with more than three corners becomes a fan. `None` if no line begins with
+/// `v`.
+pub(super) fn obj(text: &str) -> Result<Option<TriangleMesh>, MeshFault> {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for line in text.lines() {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => vertices.push(vertex(&mut words)?),
+            Some("f") => {
+                let corners = words.map(|word| corner(word, vertices.len())).collect::<Option<Vec<u32>>>();
+                let corners = corners.ok_or(MeshFault::Face)?;
+                for pair in corners.windows(2).skip(1) {
+                    triangles.push([corners[0], pair[0], pair[1]]);
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok((!vertices.is_empty()).then(|| TriangleMesh::merged(&vertices, &triangles)))
+}
+
+fn vertex<'t>(words: &mut impl Iterator<Item = &'t str>) -> Result<Vec3, MeshFault> {
+    let mut number = || words.next().and_then(|word| word.parse::<f64>().ok()).ok_or(MeshFault::Vertex);
+    Ok(Vec3([number()?, number()?, number()?]))
+}
+
+/// Index of a face's corner `i`, `i/t`, `i//n` or `i/t/n`, which counts from 1, or backwards from the last vertex if
+/// negative.
+fn corner(word: &str, count: usize) -> Option<u32> {
+    let index: i64 = word.split('/').next()?.parse().ok()?;
+    let count = i64::try_from(count).ok()?;
+    let place = if index < 0 { count.checked_add(index)? } else { index.checked_sub(1)? };
+    if (0..count).contains(&place) { u32::try_from(place).ok() } else { None }
 }

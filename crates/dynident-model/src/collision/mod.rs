@@ -12,12 +12,15 @@
 //! # Ok::<(), dynident_model::UrdfError>(())
 //! ```
 
+mod collada;
+mod mesh;
 mod mesh_file;
 mod mesh_text;
 mod solid;
 mod stl;
 
-pub use mesh_file::{MeshError, find_mesh, mesh_vertices};
+pub use mesh::TriangleMesh;
+pub use mesh_file::{MeshError, MeshFault, find_mesh, read_mesh};
 pub use solid::Solid;
 
 use crate::spatial::Transform;
@@ -64,5 +67,10 @@ pub enum CollisionGeometry {
         file: String,
         /// Factors along x, y, z.
         scale: [f64; 3],
+    },
+    /// A shape of the description that its reader does not support: an unknown element, or one with invalid sizes.
+    Unsupported {
+        /// The element and what is wrong with it.
+        what: String,
     },
 }

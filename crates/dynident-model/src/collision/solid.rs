@@ -1,6 +1,6 @@
 //! A convex solid that holds a shape: a few corners and a radius about their hull.
 
-use super::{CollisionGeometry, CollisionShape, MeshError, mesh_vertices};
+use super::{CollisionGeometry, CollisionShape, MeshError, TriangleMesh, read_mesh};
 use crate::spatial::{Transform, Vec3};
 use std::path::Path;
 
@@ -11,6 +11,8 @@ pub struct Solid {
     pub corners_m: Vec<Vec3>,
     /// What is laid about the hull, m.
     pub radius_m: f64,
+    /// Of a mesh the triangles of its surface, as places among the corners; else empty.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// Sides of the prism that stands about a cylinder: 2 % wider at its corners.
@@ -22,8 +24,9 @@ impl CollisionShape {
     /// description stands.
     ///
     /// # Errors
-    /// A mesh that cannot be found or read.
+    /// A mesh that cannot be found or read, and a shape that is not supported.
     pub fn solid(&self, folder: &Path) -> Result<Solid, MeshError> {
+        let mut triangles = Vec::new();
         let (mut corners_m, radius_m) = match &self.geometry {
             CollisionGeometry::Box { size_m } => {
                 let corner = |index: usize| {
@@ -46,13 +49,16 @@ impl CollisionShape {
             }
             CollisionGeometry::Mesh { file, scale } => {
                 let scaled = |v: Vec3| Vec3(core::array::from_fn(|axis| scale[axis] * v.0[axis]));
-                (mesh_vertices(folder, file)?.into_iter().map(scaled).collect(), 0.0)
+                let mesh: TriangleMesh = read_mesh(folder, file)?;
+                triangles = mesh.triangles;
+                (mesh.vertices.into_iter().map(scaled).collect(), 0.0)
             }
+            CollisionGeometry::Unsupported { what } => return Err(MeshError::Unsupported { what: what.clone() }),
         };
         for corner in &mut corners_m {
             *corner = self.placement.point(*corner);
         }
-        Ok(Solid { corners_m, radius_m })
+        Ok(Solid { corners_m, radius_m, triangles })
     }
 }
 
@@ -63,6 +69,7 @@ impl Solid {
         Self {
             corners_m: self.corners_m.iter().map(|corner| to_from_here.point(*corner)).collect(),
             radius_m: self.radius_m,
+            triangles: self.triangles.clone(),
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Vertices of an STL file, binary or text.
+//! Triangles of a binary STL file.
 //!
-//! Own code rather than a crate: of the format only the vertices are needed, and a count in the file's head must not
+//! Own code rather than a crate: of the format only the corners are needed, and a count in the file's head must not
 //! decide how much memory is taken.
 
 use crate::spatial::Vec3;

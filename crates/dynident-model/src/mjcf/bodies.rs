@@ -9,7 +9,7 @@ use super::inertials::{corrected, inertial};
 use super::joints::{JointElement, floating, joint};
 use super::notices::{Loss, Notices};
 use super::orientation::place;
-use crate::collision::CollisionShape;
+use crate::collision::{CollisionGeometry, CollisionShape};
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
 use crate::spatial::{Mat3, Transform, Vec3};
@@ -437,7 +437,11 @@ impl<'t> Reader<'t> {
 
 /// The shapes of geoms, in a frame whose origin stands at `origin` in the body.
 fn shapes(geoms: Vec<Result<Geom, MjcfError>>, origin: Vec3) -> Vec<CollisionShape> {
-    let shapes = geoms.into_iter().filter_map(|geom| geom.ok()?.shape);
+    let faulty = |error: MjcfError| {
+        let geometry = CollisionGeometry::Unsupported { what: error.to_string() };
+        Some(CollisionShape { placement: Transform::IDENTITY, geometry })
+    };
+    let shapes = geoms.into_iter().filter_map(|geom| geom.map_or_else(faulty, |geom| geom.shape));
     shapes
         .map(|mut shape| {
             shape.placement.translation = shape.placement.translation - origin;

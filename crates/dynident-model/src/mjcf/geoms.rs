@@ -8,6 +8,7 @@ use super::orientation::{from_z, place};
 use crate::collision::{CollisionGeometry, CollisionShape};
 use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Transform, Vec3};
+use crate::xml::shortened;
 use core::f64::consts::PI;
 use std::collections::HashMap;
 
@@ -83,21 +84,32 @@ pub(super) fn geom(
     let counts = compiler.groups[0] <= group && group <= compiler.groups[1];
     let weighs = counts && mass.unwrap_or(density) != 0.0;
     let unknown = |why, shape| Geom { mass: if weighs { GeomMass::Unknown(why) } else { GeomMass::Nothing }, shape };
+    let unsupported = |what: &str| {
+        let geometry = CollisionGeometry::Unsupported { what: what.to_owned() };
+        collides.then_some(CollisionShape { placement: Transform::IDENTITY, geometry })
+    };
     let solid = match kind {
         "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Nothing, shape: None }),
         "mesh" => {
-            let known = stated.get("mesh").and_then(|mesh| meshes.get(&mesh.value)).filter(|_| collides);
-            let shape = match known {
-                Some((file, scale)) => Some(CollisionShape {
+            let name = stated.get("mesh").map_or("", |mesh| &mesh.value);
+            let shape = match meshes.get(name) {
+                Some((file, scale)) if collides => Some(CollisionShape {
                     placement: body_from_frame.then(&place(stated, compiler)?),
                     geometry: CollisionGeometry::Mesh { file: file.clone(), scale: *scale },
                 }),
-                None => None,
+                _ => unsupported(&format!(
+                    "mesh `{}` without a file, or moved in its own frame (`refpos`, `refquat`)",
+                    shortened(name)
+                )),
             };
             return Ok(unknown("follows from a mesh", shape));
         }
-        "sdf" => return Ok(unknown("follows from a signed distance field", None)),
-        _ if stated.get("mesh").is_some() => return Ok(unknown("follows from a solid fitted to a mesh", None)),
+        "sdf" => {
+            return Ok(unknown("follows from a signed distance field", unsupported("geom of the type `sdf`")));
+        }
+        _ if stated.get("mesh").is_some() => {
+            return Ok(unknown("follows from a solid fitted to a mesh", unsupported("geom fitted to a mesh")));
+        }
         "sphere" => Solid::Sphere,
         "capsule" => Solid::Capsule,
         "cylinder" => Solid::Cylinder,

@@ -6,7 +6,8 @@ use super::scopes::Item;
 use super::values::{child, children, flag, number, numbers, placement, text};
 use crate::collision::{CollisionGeometry, CollisionShape};
 use crate::inertial::InertialParameters;
-use crate::spatial::Mat3;
+use crate::spatial::{Mat3, Transform};
+use crate::xml::shortened;
 use roxmltree::Node;
 
 /// The inertial of a link in the link's frame; `None` where it is not stated.
@@ -50,16 +51,24 @@ pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Opt
     Ok(Some(InertialParameters::from_centre_of_mass(mass, link_from_inertial.translation, &turned)))
 }
 
-/// Shapes of a link in its frame. They play no part in dynamics, so that one without a known geometry is left out.
+/// Shapes of a link in its frame. They play no part in dynamics, so that one without a known geometry is not fatal.
 pub(super) fn shapes(link: Node<'_, '_>) -> Vec<CollisionShape> {
-    children(link, "collision").filter_map(|node| shape(node).ok().flatten()).collect()
+    let unsupported = |what: String| {
+        let geometry = CollisionGeometry::Unsupported { what };
+        Some(CollisionShape { placement: Transform::IDENTITY, geometry })
+    };
+    let of = |node| shape(node).unwrap_or_else(|error| unsupported(error.to_string()));
+    children(link, "collision").filter_map(of).collect()
 }
 
 fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, SdfError> {
     let form = child(node, "geometry").and_then(|node| node.children().find(Node::is_element));
     let Some(form) = form else { return Ok(None) };
     let [radius, length] = [number(form, "radius")?, number(form, "length")?];
-    let geometry = match form.tag_name().name() {
+    let name = form.tag_name().name();
+    let geometry = match name {
+        // The ground, and an empty element: no shape of a link.
+        "plane" | "heightmap" | "empty" => return Ok(None),
         "box" => numbers::<3>(form, "size")?.map(|size| CollisionGeometry::Box { size_m: size.map(f64::abs) }),
         "sphere" => radius.map(|radius| CollisionGeometry::Sphere { radius_m: radius.abs() }),
         "cylinder" => (radius.zip(length))
@@ -74,5 +83,7 @@ fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, SdfError> {
         _ => None,
     };
     let placement = placement(node)?;
-    Ok(geometry.map(|geometry| CollisionShape { placement, geometry }))
+    let what = || format!("`<{}>`: unknown geometry, or its sizes are missing", shortened(name));
+    let geometry = geometry.unwrap_or_else(|| CollisionGeometry::Unsupported { what: what() });
+    Ok(Some(CollisionShape { placement, geometry }))
 }

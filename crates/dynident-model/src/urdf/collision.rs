@@ -4,42 +4,56 @@ use super::UrdfError;
 use super::origin::origin;
 use super::values::{child, numbers, required_number};
 use crate::collision::{CollisionGeometry, CollisionShape};
+use crate::spatial::Transform;
+use crate::xml::shortened;
 use roxmltree::Node;
 
-/// All shapes of a link, in the order of the document, and the elements that give none: without a known geometry, or
-/// with sizes that are no sizes. A shape plays no part in dynamics, so that a faulty one is listed and not fatal.
+/// All shapes of a link, in the order of the document, and the elements without a usable one: empty, of an unknown
+/// geometry, or with invalid sizes. Shapes play no part in dynamics, so that a faulty one is listed and not fatal; it
+/// stays among the shapes as [`CollisionGeometry::Unsupported`].
 pub(super) fn shapes<'a, 'input>(link: Node<'a, 'input>) -> (Vec<CollisionShape>, Vec<Node<'a, 'input>>) {
     let (mut shapes, mut faulty) = (Vec::new(), Vec::new());
     for node in link.children().filter(|child| child.has_tag_name("collision")) {
         match shape(node) {
             Ok(Some(shape)) => shapes.push(shape),
-            Ok(None) | Err(_) => faulty.push(node),
+            Ok(None) => faulty.push(node),
+            Err(what) => {
+                let geometry = CollisionGeometry::Unsupported { what };
+                shapes.push(CollisionShape { placement: Transform::IDENTITY, geometry });
+                faulty.push(node);
+            }
         }
     }
     (shapes, faulty)
 }
 
-fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, UrdfError> {
+/// The shape, `None` of an empty element; else what is wrong.
+fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, String> {
     let Some(form) = child(node, "geometry").and_then(|node| node.children().find(Node::is_element)) else {
         return Ok(None);
     };
-    let size = |attribute: &'static str| required_number(form, attribute).map(f64::abs);
-    let geometry = match form.tag_name().name() {
-        "box" => match numbers::<3>(form, "size")? {
-            Some(size_m) => CollisionGeometry::Box { size_m: size_m.map(f64::abs) },
-            None => return Ok(None),
-        },
-        "cylinder" => CollisionGeometry::Cylinder { radius_m: size("radius")?, length_m: size("length")? },
-        "sphere" => CollisionGeometry::Sphere { radius_m: size("radius")? },
-        "capsule" => CollisionGeometry::Capsule { radius_m: size("radius")?, length_m: size("length")? },
-        "mesh" => match form.attribute("filename") {
-            Some(file) => {
-                let scale = numbers::<3>(form, "scale")?.unwrap_or([1.0; 3]);
-                CollisionGeometry::Mesh { file: file.trim().to_owned(), scale }
-            }
-            None => return Ok(None),
-        },
-        _ => return Ok(None),
+    let name = form.tag_name().name();
+    let geometry = match geometry(form, name) {
+        Ok(Some(geometry)) => geometry,
+        Ok(None) => return Err(format!("`<{}>`: unknown geometry, or an attribute is missing", shortened(name))),
+        Err(error) => return Err(format!("`<{}>`: {error}", shortened(name))),
     };
-    Ok(Some(CollisionShape { placement: origin(node, || "a collision shape".to_owned())?, geometry }))
+    let placement = origin(node, || "a collision shape".to_owned()).map_err(|error| error.to_string())?;
+    Ok(Some(CollisionShape { placement, geometry }))
+}
+
+fn geometry(form: Node<'_, '_>, name: &str) -> Result<Option<CollisionGeometry>, UrdfError> {
+    let size = |attribute: &'static str| required_number(form, attribute).map(f64::abs);
+    Ok(match name {
+        "box" => numbers::<3>(form, "size")?.map(|size_m| CollisionGeometry::Box { size_m: size_m.map(f64::abs) }),
+        "cylinder" => Some(CollisionGeometry::Cylinder { radius_m: size("radius")?, length_m: size("length")? }),
+        "sphere" => Some(CollisionGeometry::Sphere { radius_m: size("radius")? }),
+        "capsule" => Some(CollisionGeometry::Capsule { radius_m: size("radius")?, length_m: size("length")? }),
+        "mesh" => {
+            let scale = numbers::<3>(form, "scale")?.unwrap_or([1.0; 3]);
+            let file = form.attribute("filename").map(str::trim).filter(|file| !file.is_empty());
+            file.map(|file| CollisionGeometry::Mesh { file: file.to_owned(), scale })
+        }
+        _ => None,
+    })
 }

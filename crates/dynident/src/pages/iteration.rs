@@ -101,8 +101,15 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     if !points.is_empty() {
         page.add(Text { paragraphs: Vec::new(), points });
     }
-    if let Some(sentence) = file.lowered_bandwidths_sentence() {
-        page.add(Text { paragraphs: Vec::new(), points: vec![(Tone::Plain, sentence)] });
+    let oscillating = file.oscillation_sentences().into_iter().map(|sentence| (Tone::Warning, sentence));
+    let points: Vec<(Tone, String)> = file
+        .lowered_bandwidths_sentence()
+        .map(|sentence| (Tone::Plain, sentence))
+        .into_iter()
+        .chain(oscillating)
+        .collect();
+    if !points.is_empty() {
+        page.add(Text { paragraphs: Vec::new(), points });
     }
     let forecasts = file.runs.iter().filter_map(|run| Some((run_name(run), run.forecast.as_ref()?)));
     let mut points: Vec<(Tone, String)> =

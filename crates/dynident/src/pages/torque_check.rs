@@ -31,7 +31,7 @@ fn statement(run: &IterationRun, check: &TorqueCheck) -> Text {
         CommandSource::FeedForward => {
             "The drives close their own position loop with unknown gains. The torque that is fed forward to them is known, and their gains are estimated from all good runs."
         }
-        CommandSource::Unknown => {
+        CommandSource::PathOnly => {
             "The commanded torque is not known: the drives close their own loop. NOT checked: a scale that all joints share. The scales of single joints follow from the parameters that several joints share."
         }
     };
@@ -50,7 +50,7 @@ fn statement(run: &IterationRun, check: &TorqueCheck) -> Text {
     let points =
         if points.is_empty() { vec![(Tone::Good, "No difference that counts was found.".to_owned())] } else { points };
     let paragraphs = match check.source {
-        CommandSource::Unknown => vec![source.to_owned()],
+        CommandSource::PathOnly => vec![source.to_owned()],
         CommandSource::Controller | CommandSource::FeedForward => vec![source.to_owned(), timing],
     };
     Text { paragraphs, points }

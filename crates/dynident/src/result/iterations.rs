@@ -6,7 +6,8 @@ use crate::error::Error;
 use crate::inputs::read_result;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{
-    DifferentiatorChoice, HeldOutRun, LoweredBandwidth, RunEvidence, RunOffset, Shortfall, TorqueCheck, WarmUp,
+    DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset, Shortfall, TorqueCheck,
+    WarmUp,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -106,10 +107,32 @@ impl IterationsFile {
         (!each.is_empty()).then(|| {
             format!(
                 "Gains are lower than bandwidth_hz asks for, so that a controller which acts late holds the robot in \
-                 every posture of the motion ({}); if its sensors and drives are faster, state rehearsal.delay_s",
+                 every posture of the motion and joints with light drives do not oscillate ({}); if sensors and drives \
+                 are faster, state rehearsal.delay_s, if drives are heavier, rehearsal.lightest_drive",
                 each.join("; ")
             )
         })
+    }
+
+    /// Joints whose torque oscillates in the log of a run, a sentence for each.
+    pub fn oscillation_sentences(&self) -> Vec<String> {
+        let of_run = |run: &IterationRun| -> Vec<String> {
+            let joints = run.evidence.iter().flat_map(|evidence| self.joints.iter().zip(&evidence.joints));
+            let oscillating = joints.filter_map(|(name, shown)| Some((name, shown.oscillation?)));
+            let sentence = |(name, own): (&String, Oscillation)| {
+                format!(
+                    "Torque of joint {name} oscillates at {:.0} Hz with an amplitude of {:.3} Nm (N) in {:.0} % of the \
+                     samples of run {}: a loop that is too fast for its inertia and its delay, or a drive that \
+                     switches; give this joint a lower bandwidth_hz or lower gains, and look at its torque",
+                    own.frequency_hz,
+                    own.amplitude,
+                    100.0 * own.share,
+                    run.run
+                )
+            };
+            oscillating.map(sentence).collect()
+        };
+        self.runs.iter().flat_map(of_run).collect()
     }
 
     /// The state in one line: how it stands, runs, tracking, what is unmet.

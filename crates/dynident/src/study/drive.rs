@@ -53,6 +53,10 @@ pub struct DriveSection {
     /// Whether the keys above say which friction there is (`"stated"`), or the training logs (`"auto"`). By default
     /// `identify` lets the logs choose where no key above states friction, and the other commands take the keys.
     pub friction: Option<FrictionChoice>,
+    /// Where the logs choose: the largest variance inflation with which Coulomb friction may differ by direction, beside
+    /// gravity, offset and all other columns. By default `iterate` takes 10, so that no parameter is hardly known, and
+    /// the other commands have no limit.
+    pub most_inflation: Option<f64>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
@@ -71,6 +75,7 @@ impl Default for DriveSection {
             gain_std_percent: None,
             terms: Vec::new(),
             friction: None,
+            most_inflation: None,
             joints: BTreeMap::new(),
         }
     }
@@ -155,6 +160,9 @@ impl DriveSection {
             Expected::Positive.check("drive.coulomb_width", width)?;
         }
         Expected::NotNegative.check("drive.coulomb_dead_band", self.coulomb_dead_band)?;
+        if let Some(most) = self.most_inflation {
+            Expected::Positive.check("drive.most_inflation", most)?;
+        }
         if let Some(percent) = self.gain_std_percent {
             Expected::Range(0.0, 100.0).check("drive.gain_std_percent", percent)?;
         }

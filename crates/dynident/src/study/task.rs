@@ -200,6 +200,7 @@ impl Study {
             coulomb: drive_choice(&self.drive, model, joint).coulomb,
             dead_band: self.drive.coulomb_dead_band,
             width: self.drive.coulomb_width,
+            most_inflation: self.drive.most_inflation,
             ..FrictionSearch::of(&description.name)
         };
         model.joints().iter().enumerate().filter(|(_, joint)| is_chosen(&joint.name)).map(search).collect()

@@ -2,6 +2,7 @@
 //!
 //! Every assumption scales with the machine: lengths with the arm's length, accelerations with its speeds.
 
+mod closer;
 mod floor;
 mod shapes;
 mod words;
@@ -31,18 +32,21 @@ pub struct AssumedLimits {
     /// What is kept free before each of the description's position stops, percent of the way from the middle of the
     /// range to the stop. Default 5.
     pub stop_margin_percent: f64,
+    /// Most convex pieces that the mesh of a collision shape is cut into, where its convex hull is too coarse. Default
+    /// 8; 1 keeps the hulls.
+    pub mesh_pieces: usize,
 }
 
 impl Default for AssumedLimits {
     fn default() -> Self {
-        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0 }
+        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0, mesh_pieces: 8 }
     }
 }
 
 impl AssumedLimits {
     /// Nothing is assumed.
     pub fn none() -> Self {
-        Self { floor: false, self_collision: false, acceleration: false, stop_margin_percent: 0.0 }
+        Self { floor: false, self_collision: false, acceleration: false, stop_margin_percent: 0.0, mesh_pieces: 1 }
     }
 }
 
@@ -107,15 +111,20 @@ impl LimitsInForce {
             not_checked.push("floor (defaults.floor is off)".to_owned());
         }
         if settings.self_collision && given.self_collision.is_none() && !shapes.shapes.is_empty() {
+            let (closer, in_pieces) = if settings.mesh_pieces > 1 && clearance_m > 0.0 {
+                shapes.refined(model, clearance_m, settings.mesh_pieces)?
+            } else {
+                (shapes.shapes.clone(), Vec::new())
+            };
             under.self_collision = Some(SelfCollision {
                 clearance_m,
-                shapes: shapes.shapes.clone(),
+                shapes: closer,
                 leave_out_touching: true,
                 ..SelfCollision::default()
             });
             assumed.push(format!(
                 "links that are no neighbours keep {clearance_m:.3} m apart, by {} (defaults.self_collision)",
-                shapes.in_words()
+                shapes.in_words(&in_pieces)
             ));
         }
         let mut limits = under.overlaid(given);
@@ -128,6 +137,7 @@ impl LimitsInForce {
             floor::over_all_shapes(model, shapes, floor)?;
         }
         not_checked.extend(self_collision_gaps(model, shapes, &limits)?);
+        not_checked.extend(shapes.dropped.iter().cloned());
         not_checked.extend(joint_gaps(model, &limits));
         not_checked.push(
             "what the description does not hold: surroundings, cables, a tool or payload, deviation of the controller"
@@ -186,16 +196,19 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
     };
     let mut gaps = vec!["links that are neighbours, against each other".to_owned()];
     let resolved = limit.resolve(model)?;
+    // Complete lists: what is not checked must be known.
+    let pairs = |pairs: &[[String; 2]]| pairs.iter().map(|[a, b]| format!("{a} / {b}")).collect::<Vec<_>>().join(", ");
     if !resolved.left_out.is_empty() {
-        let pairs: Vec<String> = resolved.left_out.iter().map(|[a, b]| format!("{a} / {b}")).collect();
-        gaps.push(format!("pairs whose shapes stand in each other: {}", listed(&pairs)));
+        gaps.push(format!(
+            "pairs whose shapes overlap in the neutral posture and in most others: {}",
+            pairs(&resolved.left_out)
+        ));
     }
     if !resolved.close.is_empty() {
-        let pairs: Vec<String> = resolved.close.iter().map(|[a, b]| format!("{a} / {b}")).collect();
-        gaps.push(format!("pairs that run close by each other in every posture: {}", listed(&pairs)));
+        gaps.push(format!("pairs that run close by each other in every posture: {}", pairs(&resolved.close)));
     }
     if limit.leave_out_touching && !shapes.without.is_empty() {
-        gaps.push(format!("links without a collision shape: {}", listed(&shapes.without)));
+        gaps.push(format!("links without a collision shape: {}", shapes.without.join(", ")));
     }
     Ok(gaps)
 }

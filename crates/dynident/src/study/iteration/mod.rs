@@ -20,8 +20,8 @@ use dynident_identification::estimators::Estimator;
 use dynident_identification::{IdentificationSettings, OffsetChoice};
 use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
 use dynident_iteration::{
-    IterationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings, Scheme,
-    SettledSettings, StartWith, TorqueCheckSettings,
+    IterationSettings, OscillationSettings, RehearsalSettings, RunIdentificationSettings, RunOffsets, SafetySettings,
+    Scheme, SettledSettings, StartWith, TorqueCheckSettings,
 };
 use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
@@ -129,6 +129,8 @@ pub struct IterationSection {
     pub envelope: EnvelopeSettings,
     /// How every motion of a robot outside is rehearsed before it is commanded.
     pub rehearsal: RehearsalSettings,
+    /// Thresholds of oscillations: those that stop a run of a robot outside, and those that are reported for a log.
+    pub oscillation: OscillationSettings,
     /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by
     /// default.
     pub rate_hz: Option<f64>,
@@ -194,6 +196,7 @@ impl Default for IterationSection {
             bandwidth_hz: None,
             envelope: EnvelopeSettings::default(),
             rehearsal: RehearsalSettings::default(),
+            oscillation: OscillationSettings::default(),
             speed_steps: Vec::new(),
             home: None,
             approach_speed: 0.2,

@@ -107,6 +107,9 @@ impl IterationSection {
                 bandwidth_hz: bandwidth.clone(),
                 uncertainty_percent: self.rehearsal.uncertainty_percent,
                 delay_s: self.delay_s(study, robot),
+                lightest_drive: if outside { self.rehearsal.lightest_drive() } else { 1.0 },
+                // A robot that waits for every torque has drives and sensors all the same.
+                light_delay_s: self.rehearsal.delay_s(model),
             };
             let derived = derived_controllers(&robot.parametric, references, &gains)?;
             let names = robot.parametric.joint_names();
@@ -136,8 +139,13 @@ impl IterationSection {
         settings.safety = SafetySettings {
             outside,
             envelope: (outside || stated).then(|| self.envelope.envelope(model)).transpose()?,
-            rehearsal: outside
-                .then(|| RehearsalSettings { delay_s: Some(self.delay_s(study, robot)), ..self.rehearsal.clone() }),
+            oscillation: self.oscillation.clone(),
+            rehearsal: outside.then(|| RehearsalSettings {
+                delay_s: Some(self.delay_s(study, robot)),
+                // Gains that are stated are those that a robot has run under.
+                lightest_drive: self.rehearsal.lightest_drive.or(self.bandwidth_hz.is_none().then_some(1.0)),
+                ..self.rehearsal.clone()
+            }),
             speed_steps: self.speed_steps.clone(),
             warm_up_s: self.warm_up_s,
             home: self.home_settings(robot, limits)?,
@@ -205,10 +213,11 @@ impl IterationSection {
         if let Some(held_out) = &mut own.held_out {
             held_out.every = None;
         }
-        // Gains that are made of a bandwidth bear the delay, and another robot than the description's.
-        let RehearsalSettings { uncertainty_percent, delay_s, .. } = own.rehearsal;
+        own.oscillation = default.oscillation;
+        // Gains that are made of a bandwidth bear the delay, light drives, and another robot than the description's.
+        let RehearsalSettings { uncertainty_percent, delay_s, lightest_drive, .. } = own.rehearsal;
         own.rehearsal = match own.bandwidth_hz {
-            Some(_) => RehearsalSettings { uncertainty_percent, delay_s, ..default.rehearsal },
+            Some(_) => RehearsalSettings { uncertainty_percent, delay_s, lightest_drive, ..default.rehearsal },
             None => default.rehearsal,
         };
         // A robot outside is moved to another place, or at another speed, or warmed up longer; its motion is the same.
