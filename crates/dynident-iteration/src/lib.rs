@@ -121,6 +121,7 @@ mod step_by_step;
 mod store;
 mod supervision;
 mod torque_check;
+mod torque_check_settings;
 mod torque_noise;
 mod torque_of_all;
 mod tracking_floor;
@@ -162,8 +163,7 @@ pub use settings::{IterationSettings, RunIdentificationSettings, RunOffsets, Sch
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
 pub use supervision::{NextMotion, NextWays, Supervisor};
-pub use torque_check::{
-    CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck, TorqueCheckSettings,
-};
+pub use torque_check::{CommandSource, JointTorqueCheck, TorqueCandidate, TorqueCause, TorqueCheck};
+pub use torque_check_settings::TorqueCheckSettings;
 pub use typical_drives::with_typical_drives;
 pub use warm_up::WarmUp;

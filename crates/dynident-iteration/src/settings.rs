@@ -1,7 +1,7 @@
 //! Settings of an iteration.
 
 use crate::safety::SafetySettings;
-use crate::torque_check::TorqueCheckSettings;
+use crate::torque_check_settings::TorqueCheckSettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;

@@ -68,8 +68,8 @@ pub use dynident_model as model;
 pub use dynident_online as online;
 pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
-pub use dynident_text as text;
 pub use dynident_system as system;
+pub use dynident_text as text;
 
 pub use dynident_files::shortened;
 pub use dynident_identification::{Progress, Role, Silent};

@@ -30,7 +30,6 @@ pub(crate) struct Search {
     on_interrupt: OnInterrupt,
 }
 
-
 impl Search {
     /// Shows a line to people who watch. Once Ctrl-C was pressed the search ends.
     pub(crate) fn new(context: &Context, on_interrupt: OnInterrupt) -> Self {

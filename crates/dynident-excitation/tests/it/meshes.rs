@@ -81,7 +81,8 @@ fn in_force(folder: &Path, description: &str, pieces: usize) -> (Model, LimitsIn
     let model = dynident_model::read_urdf(&format!("<robot name=\"arm\">{description}</robot>")).unwrap().model;
     let shapes = ShapesOfLinks::of(&model, folder);
     let settings = AssumedLimits { mesh_pieces: pieces, ..AssumedLimits::default() };
-    let limits = LimitsInForce::new(&model, &shapes, &settings, &Limits::default(), &StartPositions::default()).unwrap();
+    let limits =
+        LimitsInForce::new(&model, &shapes, &settings, &Limits::default(), &StartPositions::default()).unwrap();
     (model, limits)
 }
 

@@ -4,9 +4,9 @@
 //! A candidate explains the share `1 − RSS_c / RSS_0` of the difference's square. One is named only if it explains
 //! nearly all, and clearly more than every other.
 
-use super::TorqueCheckSettings;
 use super::separable_fit::{JointColumns, centred, coefficients, dot, residual_of, rms, square};
 use crate::leg::IterationTask;
+use crate::torque_check_settings::TorqueCheckSettings;
 use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
 use serde::{Deserialize, Serialize};
 

@@ -33,10 +33,11 @@ pub(crate) use row_scale::{LeastDeviation, RowScale, row_scales};
 
 use crate::leg::{IterationTask, Leg};
 use crate::settings::RunIdentificationSettings;
+use crate::torque_check_settings::TorqueCheckSettings;
 use agreement::agreement;
 use command::{CommandLaw, ObservedLeg, shared_parameters};
+use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
-use dynident_simulation::{Record, SimulationError, require};
 use explanation::{Explanation, JointData, explain, may_be_missing};
 use separable_fit::{SHARED, SeparableFit, separable_fit};
 use serde::{Deserialize, Serialize};
@@ -51,51 +52,6 @@ const CYCLES_PER_RUN: f64 = 12.0;
 const BETTER: f64 = 0.5;
 /// Fewest rows per joint from which anything is concluded.
 const FEWEST_ROWS: usize = 20;
-
-/// When a difference between logged and commanded torque counts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct TorqueCheckSettings {
-    /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
-    /// have at most 1.5.
-    pub scale_percent: f64,
-    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
-    /// Default 5: correct logs of the campaign's robots have at most 2.
-    pub difference_percent: f64,
-    /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
-    /// share, percent. Default 5.
-    pub row_scale_percent: f64,
-    /// Largest deviation of the log's clock from the controller's, percent. Default 0.1.
-    pub clock_percent: f64,
-    /// Standard deviations that a deviation must have to count, beside its size. Default 4.
-    pub sigmas: f64,
-}
-
-impl Default for TorqueCheckSettings {
-    fn default() -> Self {
-        Self { scale_percent: 3.0, difference_percent: 5.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
-    }
-}
-
-impl TorqueCheckSettings {
-    /// Checks the numbers.
-    ///
-    /// # Errors
-    /// Numbers that are negative or not finite.
-    pub fn validate(&self) -> Result<(), SimulationError> {
-        let settings = [
-            ("torque_check.scale_percent", self.scale_percent),
-            ("torque_check.difference_percent", self.difference_percent),
-            ("torque_check.row_scale_percent", self.row_scale_percent),
-            ("torque_check.clock_percent", self.clock_percent),
-            ("torque_check.sigmas", self.sigmas),
-        ];
-        settings.into_iter().try_for_each(|(name, value)| {
-            require((0.0..=1e6).contains(&value), name, value, "give zero or a positive number")
-        })
-    }
-}
 
 /// Where the commanded torque is known from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -55,6 +55,7 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         reason: None,
         rehearsal: None,
         warm_up: None,
+        torque_check: None,
         estimate: Some(estimate),
         pooled: None,
         evidence: Some(evidence()),

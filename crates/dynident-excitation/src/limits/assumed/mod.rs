@@ -45,7 +45,14 @@ pub struct AssumedLimits {
 
 impl Default for AssumedLimits {
     fn default() -> Self {
-        Self { floor: true, self_collision: true, acceleration: true, stop_margin_percent: 5.0, continuous_turns: 1.0, mesh_pieces: 8 }
+        Self {
+            floor: true,
+            self_collision: true,
+            acceleration: true,
+            stop_margin_percent: 5.0,
+            continuous_turns: 1.0,
+            mesh_pieces: 8,
+        }
     }
 }
 

@@ -1,0 +1,49 @@
+//! When a difference between logged and commanded torque counts.
+
+use dynident_simulation::{SimulationError, require};
+use serde::{Deserialize, Serialize};
+
+/// When a difference between logged and commanded torque counts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct TorqueCheckSettings {
+    /// Largest deviation of a joint's torque scale from one, percent. Default 3: correct logs of the campaign's robots
+    /// have at most 1.5.
+    pub scale_percent: f64,
+    /// Largest difference between logged and commanded torque, root mean square as a percentage of the joint's torque.
+    /// Default 5: correct logs of the campaign's robots have at most 2.
+    pub difference_percent: f64,
+    /// Largest deviation of a joint's torque scale from that of the other joints, by the parameters that their rows
+    /// share, percent. Default 5.
+    pub row_scale_percent: f64,
+    /// Largest deviation of the log's clock from the controller's, percent. Default 0.1.
+    pub clock_percent: f64,
+    /// Standard deviations that a deviation must have to count, beside its size. Default 4.
+    pub sigmas: f64,
+}
+
+impl Default for TorqueCheckSettings {
+    fn default() -> Self {
+        Self { scale_percent: 3.0, difference_percent: 5.0, row_scale_percent: 5.0, clock_percent: 0.1, sigmas: 4.0 }
+    }
+}
+
+impl TorqueCheckSettings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// Numbers that are negative or not finite.
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        let settings = [
+            ("torque_check.scale_percent", self.scale_percent),
+            ("torque_check.difference_percent", self.difference_percent),
+            ("torque_check.row_scale_percent", self.row_scale_percent),
+            ("torque_check.clock_percent", self.clock_percent),
+            ("torque_check.sigmas", self.sigmas),
+        ];
+        settings.into_iter().try_for_each(|(name, value)| {
+            require((0.0..=1e6).contains(&value), name, value, "give zero or a positive number")
+        })
+    }
+}
