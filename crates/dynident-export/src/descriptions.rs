@@ -264,6 +264,6 @@ pub(crate) fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();
     }
-    let lines: String = notes.iter().map(|note| format!("    {}\n", xml::comment(note))).collect();
-    format!("  <!--\n{lines}  -->\n")
+    let lines: Vec<String> = notes.iter().map(|note| format!("    {}", xml::comment(note))).collect();
+    format!("  <!--\n{}\n  -->\n", lines.join("\n"))
 }

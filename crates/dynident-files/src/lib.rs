@@ -167,13 +167,11 @@ impl SeenFiles {
     pub fn is_unchanged(&self, path: &Path) -> io::Result<bool> {
         let found = FileIdentity::of(path);
         let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
-        match first.get(path) {
-            Some(known) => Ok(found.is_ok_and(|found| found == *known)),
-            None => {
-                first.insert(path.to_owned(), found?);
-                Ok(true)
-            }
+        if let Some(known) = first.get(path) {
+            return Ok(found.is_ok_and(|found| found == *known));
         }
+        first.insert(path.to_owned(), found?);
+        Ok(true)
     }
 
     /// The first path, in alphabetical order, whose file is not the one that was first seen.

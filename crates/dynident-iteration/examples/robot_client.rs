@@ -8,8 +8,8 @@
 //! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
 //! (default 50) of the part (default motion), with a word in the marker file before: die, hang, wait (for a message),
 //! ignore (a stop), pause (a second), orphan (dies while a process that it started holds its output), garbage, nan,
-//! null, joints, backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello: deaf,
-//! protocol, names, modes, homeless (it does not know of ways). `--paced` it runs in real time.
+//! null, joints, backwards, flood, megabyte, stop, short, turn; or it sends all samples `afterwards`; or at its hello:
+//! deaf, protocol, names, modes, homeless (it does not know of ways). `--paced` it runs in real time.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 

@@ -17,7 +17,7 @@ use crate::planner::PlannedMotion;
 use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::robot::{Robot, RobotRun, RunPurpose, RunRequest, StopSignal};
+use crate::robot::{Robot, RobotRun, RunPurpose, RunRequest, StopSignal, read_log_table};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::run_logs::RunLog;
 use crate::run_motion::{RunMotion, legs_along};
@@ -304,7 +304,7 @@ impl Iteration {
         let is_corrected = |robot: &dyn Robot, purpose: RunPurpose, number: usize, leg: &Leg, path: &Path| {
             let (reference, controller) = (leg.reference(), &self.settings().model_free);
             let name = RunRequest { purpose, ..RunRequest::new(number, reference, controller) }.folder_name();
-            let kept = store.kept_log(path, &joints, reference.rate_hz());
+            let kept = read_log_table(path, &joints, reference.rate_hz()).ok();
             kept.is_some_and(|kept| robot.has_corrected_log(&name, reference, &kept))
         };
         let legs = self.legs_of(last)?;

@@ -108,8 +108,8 @@ pub fn lowered_bandwidths(
 /// A drive without a described inertia may be much lighter than a typical one: a gripper of 30 Nm had a tenth of the
 /// typical inertia, and its loop is then ten times as fast. With `lightest_drive` of the typical inertia and a delay of
 /// `light_delay_s` each joint keeps a phase margin of 15 degrees: where it would not, it gets half of the damping, and
-/// `ω` is lowered. It is not lowered so far that typical friction (5 % of the effort limit, and as much at full velocity)
-/// would hold the joint 80 % of the default `envelope.tracking_error` from its path.
+/// `ω` is lowered. It is not lowered so far that typical friction (5 % of the effort limit, and as much at full
+/// velocity) would hold the joint 80 % of the default `envelope.tracking_error` from its path.
 ///
 /// # Errors
 /// A bandwidth that is not positive, a bound that takes all inertia away, a nominal model without inertia, a delay that

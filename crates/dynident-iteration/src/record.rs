@@ -65,8 +65,8 @@ pub struct RunRecord {
     /// What its log shows beside parameters; none where it did not get to its end, and in runs of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
-    /// Whether its logged torque is the torque that the controller commanded; none where too little was recorded, and in
-    /// runs of earlier versions.
+    /// Whether its logged torque is the torque that the controller commanded; none where too little was recorded, and
+    /// in runs of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_check: Option<TorqueCheck>,
     /// The run of the held-out motion that came after it; kept in a folder of its own.

@@ -16,8 +16,8 @@ use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 pub(crate) type Fitted<'a> = (&'a IterationTask, &'a [RunLog<'a>], &'a RunIdentificationSettings);
 
 impl Iteration {
-    /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` is what it was fitted
-    /// with, if it was.
+    /// Compares the logged torque of a run with the torque that its controller commanded; `fitted` is what it was
+    /// fitted with, if it was.
     ///
     /// # Errors
     /// Records of another robot.

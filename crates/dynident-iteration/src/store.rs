@@ -337,11 +337,6 @@ impl IterationStore {
         RunsFolder::look(&self.runs)?.remove_plans_but(run)
     }
 
-    /// The log of a run's leg as it was kept, or that of the held-out run after it; `None` where nothing was recorded.
-    pub(crate) fn kept_log(&self, path: &Path, joints: &[String], rate_hz: f64) -> Option<Record> {
-        read_log_table(path, joints, rate_hz).ok()
-    }
-
     /// The records of a run, leg after leg, at these rates: bit for bit as they were when it was made.
     ///
     /// # Errors

@@ -98,7 +98,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let file = iterate_study(&study, &options.study, &options.out, !options.fresh, &run, &mut watch);
     progress.end();
     search.end();
-    notes.iter().for_each(|note| terminal::remark(note));
+    for note in &notes {
+        terminal::remark(note);
+    }
     let file = match file {
         Err(error @ Error::Interrupted { .. }) => {
             terminal::remark(&error.to_string());

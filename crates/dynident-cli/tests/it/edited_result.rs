@@ -4,6 +4,9 @@ use super::common::{CommandOutcome, broken, run_in};
 use serde_json::{Value, json};
 use std::path::Path;
 
+/// A change of a result.
+type Edit<'a> = &'a dyn Fn(&mut Value);
+
 const STUDY: &str = "[robot]\nfile = \"arm.urdf\"\n[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..2}\" }\n\
     torque = { columns = \"tau{1..2}\" }\n[drive]\nfriction = \"stated\"\n[[log]]\nfile = \"log.csv\"\n";
 
@@ -62,7 +65,7 @@ fn numbers_of_no_robot_are_refused_whoever_wrote_them() {
     let (folder, result) = identified();
     let at = folder.path();
     assert_eq!(result["physical"]["consistent"], json!(true));
-    let changes: [(&dyn Fn(&mut Value), &[&str]); 7] = [
+    let changes: [(Edit<'_>, &[&str]); 7] = [
         (
             &|value| {
                 value["bodies"][0]["mass_kg"] = json!(-5.0);
@@ -87,7 +90,9 @@ fn numbers_of_no_robot_are_refused_whoever_wrote_them() {
         (
             &|value| {
                 let terms = value["joints"][0]["laws"].as_array_mut().unwrap();
-                terms.iter_mut().for_each(|term| term["value"] = json!(-1.0));
+                for term in terms {
+                    term["value"] = json!(-1.0);
+                }
             },
             &["not physically consistent"],
         ),

@@ -236,8 +236,8 @@ impl JointFolds {
 
     /// Variance inflation of a combination `a` of candidate columns, given as (place in [`variable`](Self::variable),
     /// factor): the factor by which the common columns and the combinations `others` increase the variance of its
-    /// coefficient. It is `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that a combination of those columns explains
-    /// over all rows: 1 where they explain nothing, infinite where they explain all of it.
+    /// coefficient. It is `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that a combination of those columns
+    /// explains over all rows: 1 where they explain nothing, infinite where they explain all of it.
     ///
     /// Source: Belsley, Kuh and Welsch, *Regression Diagnostics*, 1980, section 3.1; not centred.
     ///

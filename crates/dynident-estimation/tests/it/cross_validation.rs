@@ -56,8 +56,8 @@ fn errors_on_left_out_blocks_equal_those_of_fits_without_them() {
     assert!(excess > 2.0 * error && with.excess_over(&with) == [0.0, 0.0]);
 }
 
-/// `c` is `0.9 a` and a little of `d`: the oracle is a fit of `c` to the others, row by row. What the others make whole is
-/// infinite, and a column that is orthogonal to them is not inflated.
+/// `c` is `0.9 a` and a little of `d`: the oracle is a fit of `c` to the others, row by row. What the others make whole
+/// is infinite, and a column that is orthogonal to them is not inflated.
 #[test]
 fn variance_inflation_is_that_of_a_fit_of_the_column() {
     let mut rows = rows();

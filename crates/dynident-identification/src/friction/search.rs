@@ -1,7 +1,7 @@
 //! The search for one joint's friction among columns that its factors hold already.
 //!
-//! Coulomb friction that differs by direction is tried where the rows distinguish it from gravity, offsets and the other
-//! columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
+//! Coulomb friction that differs by direction is tried where the rows distinguish it from gravity, offsets and the
+//! other columns: see [`FrictionSearch::most_inflation`](super::FrictionSearch::most_inflation).
 //!
 //! Terms are added one at a time to viscous friction with a Coulomb step, and to that with a sigmoid, the one that
 //! lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one

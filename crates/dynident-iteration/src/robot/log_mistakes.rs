@@ -463,7 +463,9 @@ mod tests {
         let right = recorded(0.0, DURATION_S);
         let scaled = |factor: f64, what: fn(&mut Record) -> &mut Vec<f64>| {
             let mut record = right.clone();
-            what(&mut record).iter_mut().for_each(|value| *value *= factor);
+            for value in what(&mut record) {
+                *value *= factor;
+            }
             record
         };
         let samples = right.samples;

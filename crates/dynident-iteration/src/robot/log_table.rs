@@ -140,7 +140,9 @@ fn parse(text: &str, joints: &[String], rate_hz: f64, constants: Option<&[f64]>)
     let q = columns.by_ref().take(joints.len()).flatten().collect();
     let mut tau: Vec<f64> = columns.flatten().collect();
     for (own, constant) in tau.chunks_exact_mut(samples).zip(constants.unwrap_or_default()) {
-        own.iter_mut().for_each(|value| *value *= constant);
+        for value in own {
+            *value *= constant;
+        }
     }
     Ok(Record { joints: joints.to_vec(), rate_hz, samples, times_s, q, tau })
 }

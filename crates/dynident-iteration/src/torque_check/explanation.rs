@@ -278,8 +278,8 @@ fn is_of_nominal_size(data: &JointData<'_>, joint: usize, missing: &[f64]) -> bo
     own == 0.0 || (0.5..=2.0).contains(&(dot(&nominal, &missing) / own))
 }
 
-/// Standard deviation of each coefficient, by leaving out one time block after the other; infinite where the rows do not
-/// determine it.
+/// Standard deviation of each coefficient, by leaving out one time block after the other; infinite where the rows do
+/// not determine it.
 fn jackknife(columns: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
     let rows = y.len();
     if rows < 2 * BLOCKS {

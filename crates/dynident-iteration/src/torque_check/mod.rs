@@ -7,9 +7,9 @@
 //!
 //! `τ_log,j(t) = s_j τ_cmd,j(t − l; q(t − l − d_q), q̇(t − l − d_v), (1 + ε)(t − l)) + c_j`
 //!
-//! with the scale `s_j` = 1, two delays of the feedback, a lag of the logged torque and a rate ε of the log's clock that
-//! all joints share. Drives that close their own loop have unknown gains `k`: there
-//! `τ_log,j = s_j τ_ff,j + k_p e_j + k_i ∫e_j + k_d ė_j + c_j`, over all good runs together.
+//! with the scale `s_j` = 1, two delays of the feedback, a lag of the logged torque and a rate ε of the log's clock
+//! that all joints share. Drives that close their own loop have unknown gains `k`: there `τ_log,j = s_j τ_ff,j + k_p
+//! e_j + k_i ∫e_j + k_d ė_j + c_j`, over all good runs together.
 //!
 //! | file | holds |
 //! | --- | --- |

@@ -8,9 +8,9 @@
 //!
 //! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
 //! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ
-//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Parameters that one joint
-//! alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little with the
-//! others gets a wide bar.
+//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Parameters that one
+//! joint alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little
+//! with the others gets a wide bar.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
@@ -28,8 +28,8 @@ const WIDEST_STD: f64 = 0.3;
 const LEAST_OWN_SHARE: f64 = 0.02;
 /// Beyond this deviation the linear equations mean nothing.
 const FURTHEST: f64 = 0.6;
-/// The scale of another joint explains the rows nearly as well if their log-likelihood is lower by less than this: three
-/// and a half standard deviations of independent rows.
+/// The scale of another joint explains the rows nearly as well if their log-likelihood is lower by less than this:
+/// three and a half standard deviations of independent rows.
 const AS_LIKELY: f64 = 6.0;
 
 /// The scale of one joint's torque relative to the other joints.

@@ -172,7 +172,9 @@ fn every_form_of_a_motion_is_in_its_folder() {
     let right = recorded();
     let mut currents = right.clone();
     for (own, constant) in currents.tau.chunks_exact_mut(right.samples).zip([50.0, 25.0]) {
-        own.iter_mut().for_each(|value| *value /= constant);
+        for value in own {
+            *value /= constant;
+        }
     }
     std::fs::write(robot.run_folder(1).join("log.csv"), currents.csv().replace("tau", "i")).unwrap();
     let run = robot.run(&request).unwrap();

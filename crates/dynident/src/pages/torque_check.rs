@@ -11,8 +11,8 @@ const MOST_PICTURES: usize = 8;
 
 /// Adds the section, if the torque of some run was checked. The pictures show the newest such run.
 pub(crate) fn torque_section(page: &mut Report, file: &IterationsFile) {
-    let checked = file.runs.iter().filter_map(|run| Some((run, run.torque_check.as_ref()?)));
-    let Some((run, check)) = checked.last() else { return };
+    let mut checked = file.runs.iter().rev().filter_map(|run| Some((run, run.torque_check.as_ref()?)));
+    let Some((run, check)) = checked.next() else { return };
     page.add(Heading::new("Logged and commanded torque"));
     page.add(statement(run, check));
     page.add(scales(file, check));
@@ -58,11 +58,10 @@ fn statement(run: &IterationRun, check: &TorqueCheck) -> Text {
 
 /// The scale of each joint's torque, by the command and by the other joints.
 fn scales(file: &IterationsFile, check: &TorqueCheck) -> BarPlot {
-    let mut plot = BarPlot::new("Scale of the logged torque", "logged per commanded torque");
-    plot.reference_label = "correct scale".to_owned();
-    plot.note =
-        "With 95 % error bars. \"By the other joints\": from the parameters that the torques of several joints share."
-            .to_owned();
+    let mut plot = BarPlot::new("Scale of the logged torque", "logged per commanded torque").note(
+        "With 95 % error bars. \"By the other joints\": from the parameters that the torques of several joints share.",
+    );
+    "correct scale".clone_into(&mut plot.reference_label);
     for (name, joint) in file.joints.iter().zip(&check.joints) {
         let rows =
             [(joint.scale, joint.scale_std, ""), (joint.row_scale, joint.row_scale_std, ", by the other joints")];

@@ -53,9 +53,9 @@ pub struct DriveSection {
     /// Whether the keys above say which friction there is (`"stated"`), or the training logs (`"auto"`). By default
     /// `identify` lets the logs choose where no key above states friction, and the other commands take the keys.
     pub friction: Option<FrictionChoice>,
-    /// Where the logs choose: the largest variance inflation with which Coulomb friction may differ by direction, beside
-    /// gravity, offset and all other columns. By default `iterate` takes 10, so that no parameter is hardly known, and
-    /// the other commands have no limit.
+    /// Where the logs choose: the largest variance inflation with which Coulomb friction may differ by direction,
+    /// beside gravity, offset and all other columns. By default `iterate` takes 10, so that no parameter is hardly
+    /// known, and the other commands have no limit.
     pub most_inflation: Option<f64>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,

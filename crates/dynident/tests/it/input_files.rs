@@ -5,6 +5,9 @@ use dynident::{Error, Progress, ReduceSettings, RunOptions, Study, check, identi
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// A job that is run with some options, and its error.
+type RunJob<'a> = &'a dyn Fn(&RunOptions<'_>) -> Option<Error>;
+
 /// Does something once, when a job has begun to read logs.
 struct Once<'a> {
     done: AtomicBool,
@@ -65,7 +68,7 @@ fn a_file_that_is_replaced_during_a_job_is_an_error() {
         error
     };
     let of_study = (&job.study, &*job.path);
-    let jobs: [(&str, &dyn Fn(&RunOptions<'_>) -> Option<Error>); 4] = [
+    let jobs: [(&str, RunJob<'_>); 4] = [
         ("identify", &|options| identify(&job.study, &job.path, options).err()),
         ("check", &|options| check(&job.study, &job.path, options).err()),
         ("validate", &|options| validate_result(&result, Path::new("result.json"), of_study, options).err()),

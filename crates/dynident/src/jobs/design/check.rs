@@ -1,7 +1,7 @@
 //! The look at a motion that is there already: a trajectory that the user brings, or a log after the run. Nothing is
 //! searched.
 
-use super::limit_check::LimitCheck;
+use super::limit_check::{LimitCheck, SingleChanges};
 use super::outcome::{MotionOrigin, MotionReview};
 use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
@@ -11,7 +11,6 @@ use crate::jobs::provenance::{motion_provenance, seen_from};
 use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
-use dynident_excitation::limits::Relaxation;
 use dynident_excitation::{Family, Motion, grid};
 use dynident_identification::{Execution, IdentificationSettings, Logs};
 use dynident_recording::MotionBlock;
@@ -23,7 +22,7 @@ const SPLINE: &str = "the quintic spline through the samples of the table";
 const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
 
 /// Nothing is searched for, and nobody asks for a stop.
-const NO_SEARCH: (&dyn Fn() -> Result<Vec<Relaxation>, Error>, &dyn Fn() -> bool) = (&|| Ok(Vec::new()), &|| false);
+const NO_SEARCH: SingleChanges<'static> = (&|| Ok(Vec::new()), &|| false);
 
 /// Most samples of a log.
 const MAX_SAMPLES: usize = 2_000_000;

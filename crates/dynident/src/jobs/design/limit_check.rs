@@ -25,6 +25,9 @@ pub(super) struct LimitCheck {
     pub(super) diagnosis: Vec<String>,
 }
 
+/// A search for changes of one limit that would make another motion possible, and whether it has to stop.
+pub(super) type SingleChanges<'a> = (&'a dyn Fn() -> Result<Vec<Relaxation>, Error>, &'a dyn Fn() -> bool);
+
 impl LimitCheck {
     /// Looks at the motion `rate_hz` times a second, ten times more rarely once `stop` says so. If it breaks a limit,
     /// `single` looks for changes of one limit that would make another motion possible.
@@ -37,19 +40,18 @@ impl LimitCheck {
         (duration_s, rate_hz): (f64, f64),
         of: &'static str,
         motion_at: &dyn Fn(&[f64], &mut Motion),
-        (single, stop): (&dyn Fn() -> Result<Vec<Relaxation>, Error>, &dyn Fn() -> bool),
+        (single, stop): SingleChanges<'_>,
     ) -> Result<Self, Error> {
         let model = &setup.loaded;
         let in_limits = |error| Error::section(study_path, "design.limits")(error);
         let rates = (duration_s, rate_hz);
         let whole = check_limits_until(&setup.limits, model, rates, motion_at, stop).map_err(in_limits)?;
-        let (reports, rate_hz) = match whole {
-            Some(reports) => (reports, rate_hz),
-            None => {
-                let rate_hz = rate_hz / COARSER;
-                let reports = check_limits(&setup.limits, model, duration_s, rate_hz, motion_at);
-                (reports.map_err(in_limits)?, rate_hz)
-            }
+        let (reports, rate_hz) = if let Some(reports) = whole {
+            (reports, rate_hz)
+        } else {
+            let rate_hz = rate_hz / COARSER;
+            let reports = check_limits(&setup.limits, model, duration_s, rate_hz, motion_at);
+            (reports.map_err(in_limits)?, rate_hz)
         };
         let broken = reports.iter().any(|report| report.violated);
         let diagnosis =

@@ -112,14 +112,19 @@ impl Draft {
         for table in self.tables.iter().filter(|table| !is_empty(table)) {
             text.push('\n');
             if !table.reason.is_empty() {
-                let _ = writeln!(text, "# {}", comment(&table.reason));
+                let _ = writeln!(text, "# {}", comment(&table.reason.replace('\n', " ")));
             }
             if !table.heading.is_empty() {
                 let _ = writeln!(text, "{}", table.heading);
             }
             for Line { key, value, reason, is_sure } in &table.lines {
                 if !reason.is_empty() {
-                    let _ = writeln!(text, "# {}{}", if *is_sure { "" } else { "UNSURE: " }, comment(reason));
+                    let _ = writeln!(
+                        text,
+                        "# {}{}",
+                        if *is_sure { "" } else { "UNSURE: " },
+                        comment(&reason.replace('\n', " "))
+                    );
                 }
                 let _ = writeln!(text, "{key} = {value}");
             }
