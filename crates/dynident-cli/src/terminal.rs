@@ -46,13 +46,13 @@ pub(crate) fn written(outcome: io::Result<()>) -> Result<(), String> {
 /// An error, on standard error, as clap words its own.
 pub(crate) fn complain(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "error: {}", readable(message));
+    let _ = writeln!(out, "error: {}", readable(&dynident::shortened(message)));
 }
 
 /// A remark, on standard error.
 pub(crate) fn remark(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "note: {}", readable(message));
+    let _ = writeln!(out, "note: {}", readable(&dynident::shortened(message)));
 }
 
 /// A question, on standard error; the answer comes on the same line. It is not shortened: nothing of a command that a
