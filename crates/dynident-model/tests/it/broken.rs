@@ -127,10 +127,10 @@ fn floods_of_nodes_attributes_and_tables_end_soon() {
 #[cfg(unix)]
 #[test]
 fn an_endless_file_is_refused() {
-    // A device that never ends: reading must stop at the size limit.
+    // A device that never ends is no regular file.
     if Path::new("/dev/zero").exists() {
         let message = load_robot("/dev/zero").unwrap_err().to_string();
-        assert!(message.starts_with("/dev/zero: larger than 16 MiB"), "{message}");
+        assert!(message.starts_with("/dev/zero: ") && message.contains("a device, not a regular file"), "{message}");
     }
 }
 
@@ -167,7 +167,8 @@ proptest! {
         if let Ok(robot) = read_urdf(&text) {
             prop_assert!(robot.model.parameter_vector().iter().all(|x| x.is_finite()));
             audit(&robot.model);
-            prop_assert_eq!(&rewrite_urdf(&text, &[], &[]).unwrap(), &text);
+            // Invisible characters become references.
+            prop_assert_eq!(rewrite_urdf(&text, &[], &[]).unwrap(), dynident_text::xml::document(&text));
             // Whatever the markup looks like, what is written is a URDF of the same joints.
             let model = &robot.model;
             let changes = link_changes(model, model.inertials()).unwrap();

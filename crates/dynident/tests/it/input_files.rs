@@ -40,7 +40,7 @@ fn job(folder: &Path) -> Job {
         write_log(&folder.join(name), &truth, &Motion::new(2, seed), (100.0, 12.0), &header(2), plain);
     }
     let study = format!(
-        "[robot]\nfile = \"arm.urdf\"\n{}[[log]]\nfile = \"train.csv\"\n[[log]]\nfile = \"test.csv\"\nrole = \"validate\"\n",
+        "[robot]\nfile = \"arm.urdf\"\n[drive]\nfriction = \"stated\"\ndrive_inertia = false\n{}[[log]]\nfile = \"train.csv\"\n[[log]]\nfile = \"test.csv\"\nrole = \"validate\"\n",
         format(2)
     );
     Job::new(folder, &study)
@@ -60,11 +60,11 @@ fn a_file_that_is_replaced_during_a_job_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let job = job(folder.path());
     let result = job.identify().result;
-    let run = |work: &dyn Fn(&RunOptions<'_>) -> Option<Error>, file: Option<&str>| {
+    let run = |name: &str, work: RunJob<'_>, file: Option<&str>| {
         let what = || file.map_or((), |file| replace(&folder.path().join(file)));
         let progress = Once { done: AtomicBool::new(false), what: &what };
         let error = work(&RunOptions { data: None, threads: 1, progress: &progress });
-        assert!(progress.done.load(Ordering::SeqCst));
+        assert!(progress.done.load(Ordering::SeqCst), "{name}: {error:?}");
         error
     };
     let of_study = (&job.study, &*job.path);
@@ -75,9 +75,9 @@ fn a_file_that_is_replaced_during_a_job_is_an_error() {
         ("reduce", &|options| reduce(&job.study, &job.path, None, &ReduceSettings::default(), options).err()),
     ];
     for (name, work) in jobs {
-        assert!(run(work, None).is_none(), "{name}");
+        assert!(run(name, work, None).is_none(), "{name}");
         for file in ["train.csv", "arm.urdf", "study.toml"] {
-            let error = run(work, Some(file)).unwrap_or_else(|| panic!("{name}: {file}"));
+            let error = run(name, work, Some(file)).unwrap_or_else(|| panic!("{name}: {file}"));
             let Error::Changed { path } = &error else { panic!("{name}, {file}: {error}") };
             assert_eq!(path.file_name().unwrap(), file, "{name}");
             assert!(error.to_string().contains("changed while it was read; wait"), "{error}");
