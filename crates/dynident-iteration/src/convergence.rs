@@ -324,8 +324,9 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
             shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
         {
             let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
-            // Without a stated limit a flat top is a matter of the drive only where the joint does not follow.
-            if stated || beyond {
+            // Without a stated limit a flat top is a matter of the drive only where the joint does not follow, and no
+            // more was commanded.
+            if stated || beyond && !last.has_commanded_torque(place) {
                 found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
             }
         }

@@ -135,6 +135,12 @@ impl RunRecord {
         self.torque_check.as_ref().map_or(&[], |check| &check.causes)
     }
 
+    /// Whether a joint's logged torque is known to be the torque that was commanded.
+    pub(crate) fn has_commanded_torque(&self, joint: usize) -> bool {
+        let Some(check) = &self.torque_check else { return false };
+        check.causes.is_empty() && check.joints.get(joint).is_some_and(|own| own.difference_percent.is_some())
+    }
+
     /// What is known after it: what all good runs say together, or else what it says alone.
     pub fn knowledge(&self) -> Option<&RunEstimate> {
         self.pooled.as_ref().or(self.estimate.as_ref())
