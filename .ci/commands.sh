@@ -84,6 +84,7 @@ run 1 "$dynident" iterate "$out/mujoco_other.toml" --out "$out/outside_other" --
 run 0 "$dynident" validate "$out/outside/result.json" --study "$out/mujoco_test.toml" --max-validation-error 5
 # A sound robot that no description tells, and one whose drives clip.
 run 0 "$venv/bin/python" benchmarks/campaign.py "$dynident" --out "$out/campaign" --only panda --quick
+run 0 "$venv/bin/python" benchmarks/loop_faults.py "$dynident" --out "$out/loop_faults" --only ur10 --integrators mujoco --quick
 run 0 "$dynident" reproduce --out "$out/paper"
 
 # The programs behind the tables of the book, with the least work that they take.

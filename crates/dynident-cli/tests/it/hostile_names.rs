@@ -105,7 +105,7 @@ fn assert_visible(what: &str, text: &str) {
 }
 
 #[allow(clippy::print_stdout, reason = "a test says that it was skipped")]
-/// Whether a program can be run; says so where it cannot.
+
 fn has(program: &str, arguments: &[&str]) -> bool {
     let found = Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success());
     if !found {
