@@ -104,8 +104,8 @@ fn assert_visible(what: &str, text: &str) {
     }
 }
 
+/// Whether a program can be run; prints that it is missing where it cannot.
 #[allow(clippy::print_stdout, reason = "a test says that it was skipped")]
-
 fn has(program: &str, arguments: &[&str]) -> bool {
     let found = Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success());
     if !found {
