@@ -137,6 +137,11 @@ def named_causes(iterations):
         if condition.get("condition") in CAUSAL_CONDITIONS and "cause" not in condition:
             add(condition["condition"], condition)
     search([iterations.get("unmet"), iterations.get("warnings"), [run.get("evidence") for run in iterations.get("runs", [])]])
+    for run in iterations.get("runs", []):
+        shown = (run.get("evidence") or {}).get("joints", [])
+        for joint, of_joint in zip(iterations.get("joints", []), shown):
+            if of_joint.get("oscillation"):
+                add("oscillation", {"joint": joint})
     return found
 
 

@@ -25,7 +25,7 @@ pub(super) struct Agreement {
 
 /// Names a cause for all joints, or for each.
 pub(super) fn agreement(explanations: &[Explanation]) -> Agreement {
-    let named = for_all(explanations).unwrap_or_else(|| explanations.iter().map(alone).collect());
+    let named = for_all(explanations).unwrap_or_else(|| each_alone(explanations));
     let left_of = |(own, named): (&Explanation, &Option<Fitted>)| {
         own.difference_share * (1.0 - named.map_or(0.0, |named| named.explained))
     };
@@ -53,6 +53,14 @@ fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
     let is_clear = kinds.get(1).is_none_or(|(_, left)| *left >= CLEARLY_BETTER * least);
     let of = |own: &Explanation| if own.matters && is_clear { find(own, best) } else { None };
     Some(explanations.iter().map(of).collect())
+}
+
+/// A candidate of each joint whose difference matters; none at all where one of them is open, because what is wrong there
+/// may be wrong everywhere.
+fn each_alone(explanations: &[Explanation]) -> Vec<Option<Fitted>> {
+    let named: Vec<Option<Fitted>> = explanations.iter().map(alone).collect();
+    let is_open = explanations.iter().zip(&named).any(|(own, named)| own.matters && named.is_none());
+    if is_open { vec![None; explanations.len()] } else { named }
 }
 
 /// The candidate of one joint, if it explains nearly all and far more than every other.
