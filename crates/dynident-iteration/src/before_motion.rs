@@ -118,7 +118,8 @@ pub(crate) fn rehearsed<'a>(
         model,
         believed: own.or(shown).or(known.then_some(&typical[..])),
         light: light.as_deref().filter(|_| known && own.or(shown).is_none()),
-        // Drives close their own loop at their own rate, which nobody states: at the rate of the motion it may oscillate.
+        // Drives close their own loop at their own rate, which nobody states: at the rate of the motion it may
+        // oscillate.
         oscillation: match controller {
             ControllerSettings::PositionLoop(_) => None,
             _ => settings.safety.oscillation.limits(robot.model()),

@@ -35,6 +35,8 @@ pub struct GainSettings {
     pub lightest_drive: f64,
     /// How late the controller may be where the inertia of a drive is not known, s.
     pub light_delay_s: f64,
+    /// Largest distance from the path before a run is stopped, rad (m); `None` for the default of the envelope.
+    pub tracking_error: Option<PerJoint>,
 }
 
 /// Controllers whose gains come from the nominal model and a bandwidth.
@@ -109,7 +111,7 @@ pub fn lowered_bandwidths(
 /// typical inertia, and its loop is then ten times as fast. With `lightest_drive` of the typical inertia and a delay of
 /// `light_delay_s` each joint keeps a phase margin of 15 degrees: where it would not, it gets half of the damping, and
 /// `ω` is lowered. It is not lowered so far that typical friction (5 % of the effort limit, and as much at full
-/// velocity) would hold the joint 80 % of the default `envelope.tracking_error` from its path.
+/// velocity) would hold the joint 80 % of `tracking_error` from its path.
 ///
 /// # Errors
 /// A bandwidth that is not positive, a bound that takes all inertia away, a nominal model without inertia, a delay that
@@ -126,6 +128,11 @@ pub fn derived_controllers(
     require((0.0..=1e3).contains(&delay_s), "delay_s", delay_s, "give 0 to 1000 s")?;
     let bandwidth =
         bandwidth_hz.values("bandwidth_hz", dof, "give more than 0 and at most 100000 Hz", |f| f > 0.0 && f <= 1e5)?;
+    let tracking_error = &settings.tracking_error;
+    let tracking_error = tracking_error
+        .as_ref()
+        .map(|stated| stated.values("envelope.tracking_error", dof, "give a positive distance", |error| error > 0.0))
+        .transpose()?;
     let typical = with_typical_drives(robot);
     let parameters = typical.as_deref().unwrap_or(robot.nominal());
     let matrices = mass_matrices(robot, references, parameters)?;
@@ -149,7 +156,7 @@ pub fn derived_controllers(
     // With drives that are as light as they may be each joint is only to be stable.
     let light = with_light_drives(robot, *lightest_drive).map(|light| mass_matrices(robot, references, &light));
     let light = light.transpose()?;
-    let stiff = stiff_enough(robot, &matrices, left);
+    let stiff = stiff_enough(robot, &matrices, (left, tracking_error.as_deref()));
     // Natural frequencies and dampings.
     let stable = |omega: Vec<f64>, ratios: &dyn Fn(&[DMatrix<f64>]) -> Vec<f64>| -> (Vec<f64>, Vec<f64>) {
         let Some(light) = &light else { return (omega, vec![1.0; dof]) };
@@ -199,13 +206,18 @@ pub fn derived_controllers(
     })
 }
 
-/// Natural frequency of each joint at which typical friction would hold it 80 % of the default tracking error from its
+/// Natural frequency of each joint at which typical friction would hold it 80 % of the largest tracking error from its
 /// path, rad/s: `√(F / (left · M_jj · e))`; 0 of a joint whose effort is not known.
-fn stiff_enough(robot: &ParametricModel, matrices: &[DMatrix<f64>], left: f64) -> Vec<f64> {
+fn stiff_enough(
+    robot: &ParametricModel,
+    matrices: &[DMatrix<f64>],
+    (left, tracking_error): (f64, Option<&[f64]>),
+) -> Vec<f64> {
     let own = robot.model().own_scale();
     let of_joint = |(joint, description): (usize, &dynident_model::Joint)| {
         let Some(effort) = description.limits.effort else { return 0.0 };
-        let error = 0.8 * if description.turns() { TRACKING_RAD } else { own.metres(TRACKING_M) };
+        let default = if description.turns() { TRACKING_RAD } else { own.metres(TRACKING_M) };
+        let error = 0.8 * tracking_error.map_or(default, |stated| stated[joint]);
         let least = matrices.iter().fold(f64::INFINITY, |least, matrix| least.min(matrix[(joint, joint)]));
         (2.0 * FRICTION * effort / (left * least * error)).sqrt()
     };

@@ -55,8 +55,8 @@ fn for_all(explanations: &[Explanation]) -> Option<Vec<Option<Fitted>>> {
     Some(explanations.iter().map(of).collect())
 }
 
-/// A candidate of each joint whose difference matters; none at all where one of them is open, because what is wrong there
-/// may be wrong everywhere.
+/// A candidate of each joint whose difference matters; none at all where one of them is open, because what is wrong
+/// there may be wrong everywhere.
 fn each_alone(explanations: &[Explanation]) -> Vec<Option<Fitted>> {
     let named: Vec<Option<Fitted>> = explanations.iter().map(alone).collect();
     let is_open = explanations.iter().zip(&named).any(|(own, named)| own.matters && named.is_none());

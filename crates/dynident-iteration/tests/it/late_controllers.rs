@@ -44,7 +44,14 @@ fn derived(delay_s: f64) -> DerivedControllers {
 /// 4 Hz with drives that are as heavy as typical ones at least.
 fn gains_of(delay_s: f64) -> GainSettings {
     let (bandwidth_hz, uncertainty_percent, light_delay_s) = (4.0.into(), 30.0, delay_s);
-    GainSettings { bandwidth_hz, uncertainty_percent, delay_s, lightest_drive: 1.0, light_delay_s }
+    GainSettings {
+        bandwidth_hz,
+        uncertainty_percent,
+        delay_s,
+        lightest_drive: 1.0,
+        light_delay_s,
+        tracking_error: None,
+    }
 }
 
 fn joint_pd(derived: &DerivedControllers) -> JointPdSettings {

@@ -70,6 +70,7 @@ fn derived(lightest_drive: f64) -> DerivedControllers {
         delay_s: 0.0,
         lightest_drive,
         light_delay_s: 0.008,
+        tracking_error: None,
     };
     derived_controllers(&arm(), &[&reference()], &gains).unwrap()
 }

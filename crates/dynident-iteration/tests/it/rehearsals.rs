@@ -161,6 +161,7 @@ fn gains_come_from_inertia_and_bandwidth() {
         delay_s: 0.0,
         lightest_drive: 0.1,
         light_delay_s: 0.0,
+        tracking_error: None,
     };
     let derived = derived_controllers(&robot(), &[&reference()], &gains(vec![2.0, 3.0].into())).unwrap();
     let ControllerSettings::JointPd(pd) = &derived.model_free else { panic!("{derived:?}") };

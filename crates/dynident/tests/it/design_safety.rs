@@ -211,7 +211,12 @@ fn a_design_ends_in_every_part_of_it() {
         let whole_hz = outcome.robot.model().own_scale().round_hertz(10_000.0);
         let rate_hz = if round == "changes of limits" { whole_hz } else { 0.1 * whole_hz };
         assert!((outcome.file.check_rate_hz - rate_hz).abs() < 1e-6, "{round}: {}", outcome.file.check_rate_hz);
-        assert!(!outcome.file.feasible && !outcome.file.diagnosis.is_empty(), "{round}: {} {:?}", outcome.file.feasible, outcome.file.diagnosis);
+        assert!(
+            !outcome.file.feasible && !outcome.file.diagnosis.is_empty(),
+            "{round}: {} {:?}",
+            outcome.file.feasible,
+            outcome.file.diagnosis
+        );
         assert!(!outcome.file.diagnosis.iter().any(|line| line.contains("not finite")), "{:?}", outcome.file.diagnosis);
     }
 }

@@ -80,8 +80,8 @@ fn every_run_and_joint_is_drawn_and_no_name_becomes_markup() {
         assert!(page.contains(&format!(">{heading}</h2>")), "{heading}");
     }
     assert!(!page.contains(NAME) && !page.contains("</script><b>") && !page.contains("joints </title>"));
-    // Largest errors, one plot a joint, logged against commanded torque of each joint, two of the parameters' errors, and
-    // one for each unit (kg m, kg m²).
+    // Largest errors, one plot a joint, logged against commanded torque of each joint, two of the parameters' errors,
+    // and one for each unit (kg m, kg m²).
     let plots = page.matches("data-plot=\"plot-").count();
     assert_eq!(plots, 1 + 2 + 2 + 2 + 2);
     for text in ["of run 1", "the truth", "converged", "Cramér-Rao", "run 2"] {

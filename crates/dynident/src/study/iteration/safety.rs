@@ -115,6 +115,7 @@ impl IterationSection {
                 lightest_drive: if outside { self.rehearsal.lightest_drive() } else { 1.0 },
                 // A robot that waits for every torque has drives and sensors all the same.
                 light_delay_s: self.rehearsal.delay_s(model),
+                tracking_error: self.envelope.tracking_error.clone(),
             };
             let derived = derived_controllers(&robot.parametric, references, &gains)?;
             let names = robot.parametric.joint_names();
