@@ -5,7 +5,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// The first second that RFC 3339 has no text for: the year 10000, s since 1970.
 pub(crate) const LAST_SECOND: f64 = 253_402_300_800.0;
 
-/// What stands in the place of the time where the computer's clock is not set.
+/// Text in place of the time if the computer's clock is not set.
 const UNKNOWN: &str = "unknown (the clock of the computer is not set)";
 
 /// Now, by the computer's clock; a clock before 1970 or after the year 9999 is not set.

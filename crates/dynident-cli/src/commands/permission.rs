@@ -1,4 +1,4 @@
-//! What a person is asked before a program is started or a robot moves.
+//! Questions to the user before a program starts or a robot moves.
 
 use super::{answer, interruption, known_in, message_of};
 use crate::terminal;

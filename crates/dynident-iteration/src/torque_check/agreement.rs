@@ -8,7 +8,7 @@ use super::explanation::{Explanation, Fitted, TorqueCandidate};
 
 /// Share of the squared difference that a cause explains at least.
 const LEAST_EXPLAINED: f64 = 0.85;
-/// What the runner-up leaves of the squared difference, at least, in units of what the named candidate leaves.
+/// Minimum ratio of the squared residuals of the second-best and of the named candidate.
 const CLEARLY_BETTER: f64 = 2.0;
 /// The same two for a cause of a single joint beside joints with another one.
 const LEAST_EXPLAINED_ALONE: f64 = 0.95;
