@@ -72,13 +72,14 @@ FAULTS = {
     "friction-subtracted": Fault(lambda arm, own: {"log-without": "friction"}, "friction|reduced"),
     "clips-log-delivered": clipping(), "clips-log-command": clipping(**{"log-command": True}),
     "drive-gain": Fault(lambda arm, own: {"drive-gain": on(0.9)(arm, own)}, "scale|gain|factor|drive", 1),
+    "reversed-drive": Fault(lambda arm, own: {"drive-gain": on(-1.0)(arm, own)}, "sign|revers", 1),
     "clock-fast": Fault(lambda arm, own: {"log-clock": 1.003}, "clock|drift|time"),
     "log-late": Fault(lambda arm, own: {"log-delay": 0.02}, "lag|delay|late"),
     "torque-late": Fault(lambda arm, own: {"log-torque-delay": 0.02}, "lag|delay|late"),
     "chatter": Fault(lambda arm, own: {"chatter": campaign.numbers(3.0 * dry if joint in own else 0.0 for joint, dry in enumerate(arm["friction"]))},
                      "chatter|alternat|oscillat", 1, may_converge=True),
 }
-QUICK = ["honest", "scale-two-15", "gravity-subtracted"]
+QUICK = ["honest", "scale-two-15", "gravity-subtracted", "swapped-command", "clips-log-command"]
 
 
 def faulty_joints(fault, joints, seed):
@@ -222,7 +223,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="iterations at a time")
-    parser.add_argument("--quick", action="store_true", help="the first arm with each integrator, and three faults")
+    parser.add_argument("--quick", action="store_true", help="the first arm with each integrator, and five faults")
     options = parser.parse_args()
     names, clients, faults = (text.split(",") for text in (options.only, options.integrators, options.faults))
     for given, known in ((names, ARMS), (clients, campaign.CLIENTS), (faults, FAULTS)):

@@ -55,6 +55,7 @@ impl Iteration {
             row_scales: &scales,
             most_lag_s: self.settings.settled.most_lag_s(self.task.robot.model()),
             feeds_forward_later,
+            ended_early: !record.done,
         };
         Ok(check_torque(&self.task, &runs, &with))
     }

@@ -1,17 +1,21 @@
 //! Whether a program streams its samples in real time, and how long it may then be silent.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Sample periods that a streaming program may be silent for.
 const PERIODS: f64 = 10.0;
 /// It may always be silent for this long, s: schedulers and networks pause for some hundredths of a second.
 const LEAST_S: f64 = 0.2;
-/// Samples come in real time as long as the motion's time and the clock differ by at most this, s, and this share:
-/// buffers and networks hold samples back, and clocks differ.
+/// A known stream is one as long as the motion's time and the clock differ by at most this, s, and this share: buffers
+/// and networks hold samples back, and clocks differ.
 const LAG_S: f64 = 0.1;
 const DRIFT: f64 = 0.02;
-/// Times the allowed silence for which a program has streamed before it is known to.
-const KNOWN_AFTER: f64 = 2.0;
+/// A program is known to stream after this many times the usual silence in which its pace was that of real time. A
+/// simulator on a busy machine has that pace for some tenths of a second by chance.
+const KNOWN_AFTER: f64 = 5.0;
+/// The smallest delays of consecutive windows, each half the usual silence long, differ by at most this, s, and
+/// `DRIFT`. Some sample of each window meets no busy scheduler.
+const JITTER_S: f64 = 0.005;
 
 /// A sample that has arrived.
 #[derive(Clone, Copy, Debug)]
@@ -36,8 +40,20 @@ struct Stream {
     first: Arrival,
     last: Arrival,
     samples: usize,
-    /// When the first sample arrived after the last silence longer than the limit.
-    since: Instant,
+    pace: Pace,
+    is_known: bool,
+}
+
+/// How far samples arrive behind the motion's time, from window to window.
+#[derive(Clone, Copy, Debug)]
+struct Pace {
+    /// When the motion has been in real time since, s of the motion.
+    since_s: f64,
+    window_s: f64,
+    /// Smallest delay of the window, s.
+    delay_s: f64,
+    /// Least and largest of the smallest delays of whole windows, s.
+    delays_s: Option<(f64, f64)>,
 }
 
 impl StreamWatch {
@@ -48,38 +64,71 @@ impl StreamWatch {
     /// A sample of the motion's time `motion_s` has arrived.
     pub(super) fn arrived(&mut self, at: Instant, motion_s: f64) {
         let new = Arrival { at, motion_s };
-        let allowed = self.allowed();
-        self.stream = Some(match self.stream {
-            None => Stream { first: new, last: new, samples: 1, since: at },
-            Some(Stream { first, last, samples, since }) => {
-                let since = if at.duration_since(last.at) > allowed { at } else { since };
-                Stream { first, last: new, samples: samples + 1, since }
-            }
+        let usual_s = self.usual_s();
+        let stream = self.stream.get_or_insert(Stream {
+            first: new,
+            last: new,
+            samples: 0,
+            pace: Pace { since_s: motion_s, window_s: motion_s, delay_s: f64::INFINITY, delays_s: None },
+            is_known: false,
         });
+        stream.last = new;
+        stream.samples += 1;
+        stream.pace.follow(stream.behind_s(), motion_s, usual_s);
+        stream.is_known |= motion_s - stream.pace.since_s >= KNOWN_AFTER * usual_s;
     }
 
     /// The longest silence that is allowed, s; none where the program does not stream in real time.
     pub(super) fn limit_s(&self) -> Option<f64> {
-        let Stream { first, last, since, .. } = self.stream?;
-        let allowed = self.allowed();
-        let elapsed_s = last.at.duration_since(first.at).as_secs_f64();
-        let apart_s = (last.motion_s - first.motion_s - elapsed_s).abs();
-        let is_known = last.at.duration_since(since) >= allowed.mul_f64(KNOWN_AFTER);
-        (is_known && apart_s <= LAG_S + DRIFT * elapsed_s).then_some(allowed.as_secs_f64())
+        let stream = self.stream.filter(|stream| stream.is_known)?;
+        let elapsed_s = stream.last.at.duration_since(stream.first.at).as_secs_f64();
+        (stream.behind_s().abs() <= LAG_S + DRIFT * elapsed_s).then(|| self.allowed_s())
     }
 
-    fn allowed(&self) -> Duration {
+    fn allowed_s(&self) -> f64 {
+        self.silence_s.unwrap_or_else(|| self.usual_s())
+    }
+
+    /// The limit where none is stated, s; it also sets the time after which a stream is known.
+    fn usual_s(&self) -> f64 {
         let period_s = self.stream.map_or(0.0, |Stream { first, last, samples, .. }| {
             (last.motion_s - first.motion_s).max(0.0) / samples.saturating_sub(1).max(1) as f64
         });
         // At most a day: periods are numbers from outside.
-        Duration::from_secs_f64(self.silence_s.unwrap_or((PERIODS * period_s).clamp(LEAST_S, 86400.0)))
+        (PERIODS * period_s).clamp(LEAST_S, 86400.0)
+    }
+}
+
+impl Stream {
+    /// Time that the last sample arrived after the motion's own, both from the first sample, s.
+    fn behind_s(&self) -> f64 {
+        self.last.at.duration_since(self.first.at).as_secs_f64() - (self.last.motion_s - self.first.motion_s)
+    }
+}
+
+impl Pace {
+    /// A sample arrived `delay_s` behind the motion's time `motion_s`.
+    fn follow(&mut self, delay_s: f64, motion_s: f64, usual_s: f64) {
+        self.delay_s = self.delay_s.min(delay_s);
+        if motion_s - self.window_s < 0.5 * usual_s {
+            return;
+        }
+        let (least, largest) = self.delays_s.unwrap_or((self.delay_s, self.delay_s));
+        let (least, largest) = (least.min(self.delay_s), largest.max(self.delay_s));
+        if largest - least <= JITTER_S + DRIFT * (motion_s - self.since_s) {
+            self.delays_s = Some((least, largest));
+        } else {
+            self.delays_s = Some((self.delay_s, self.delay_s));
+            self.since_s = motion_s;
+        }
+        (self.window_s, self.delay_s) = (motion_s, f64::INFINITY);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     /// `samples` at `rate_hz` of the motion, which arrive `pace` times as fast.
     fn watched(silence_s: Option<f64>, (samples, rate_hz, pace): (u32, f64, f64)) -> StreamWatch {
@@ -96,12 +145,12 @@ mod tests {
     fn only_a_stream_in_real_time_has_a_limit() {
         let limit = |watch: StreamWatch| watch.limit_s();
         let is = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
-        // Half a second at 500 Hz; a second and a half at 20 Hz.
-        assert!(is(limit(watched(None, (250, 500.0, 1.0))), 0.2));
-        assert!(is(limit(watched(None, (31, 20.0, 1.01))), 0.5));
-        assert!(is(limit(watched(Some(0.1), (250, 500.0, 1.0))), 0.1));
+        // 1.1 s at 500 Hz; 3 s at 20 Hz.
+        assert!(is(limit(watched(None, (550, 500.0, 1.0))), 0.2));
+        assert!(is(limit(watched(None, (61, 20.0, 1.01))), 0.5));
+        assert!(is(limit(watched(Some(0.1), (550, 500.0, 1.0))), 0.1));
         // Too few yet; afterwards; a simulator in a hurry, a slow one.
-        for (samples, pace) in [(100, 1.0), (5000, 50.0), (5000, 1.1), (5000, 0.9), (1, 1.0)] {
+        for (samples, pace) in [(450, 1.0), (5000, 50.0), (5000, 1.05), (5000, 0.95), (1, 1.0)] {
             assert_eq!(limit(watched(None, (samples, 500.0, pace))), None, "{samples} {pace}");
         }
         assert_eq!(StreamWatch::new(None).limit_s(), None);
@@ -111,12 +160,36 @@ mod tests {
     #[test]
     fn a_stream_that_catches_up_goes_on() {
         let (begin, mut watch) = (Instant::now(), StreamWatch::new(None));
-        for sample in 0..1000 {
+        for sample in 0..1500 {
             let motion_s = f64::from(sample) / 500.0;
             let held_up_s = if (0.5..1.0).contains(&motion_s) { 1.0 } else { motion_s };
             watch.arrived(begin + Duration::from_secs_f64(held_up_s), motion_s);
         }
         assert!((watch.limit_s().unwrap() - 0.2).abs() < 1e-9);
+    }
+
+    /// A simulator on a busy machine: real time on average, but slower and faster every quarter of a second.
+    #[test]
+    fn a_simulator_whose_pace_varies_does_not_stream() {
+        let (begin, mut watch, mut at_s) = (Instant::now(), StreamWatch::new(None), 0.0);
+        for sample in 0..5000 {
+            at_s += if sample / 125 % 2 == 0 { 1.3 } else { 0.7 } / 500.0;
+            watch.arrived(begin + Duration::from_secs_f64(at_s), f64::from(sample) / 500.0);
+            assert_eq!(watch.limit_s(), None, "{sample}");
+        }
+    }
+
+    /// A known stream remains one through jitter of 50 ms.
+    #[test]
+    fn jitter_ends_no_stream() {
+        let (begin, mut watch) = (Instant::now(), StreamWatch::new(None));
+        for sample in 0..2500 {
+            let motion_s = f64::from(sample) / 500.0;
+            // Samples come in batches of 25.
+            let at_s = f64::from(sample / 25 * 25 + 24) / 500.0;
+            watch.arrived(begin + Duration::from_secs_f64(at_s), motion_s);
+            assert_eq!(watch.limit_s().is_some(), motion_s >= 1.0, "{sample}");
+        }
     }
 
     /// A program that writes what it has once a second does not stream.

@@ -32,18 +32,24 @@ pub enum TorqueCause {
         factor: f64,
     },
     /// The logged torque has the opposite sign.
-    #[error("the logged torque of {} has the opposite sign of the commanded torque", listed(.joints))]
+    #[error("{}", sign_words(.joints, *.is_commanded))]
     Sign {
         /// The joints.
         joints: Vec<String>,
+        /// Whether the log holds the commanded torque, so that the motion shows it.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        is_commanded: bool,
     },
     /// Two joints have each other's torque.
-    #[error("the logged torque of joint {joint} is the commanded torque of joint {of}: their columns are exchanged")]
+    #[error("{}", exchanged_words(joint, of, *.is_commanded))]
     Exchanged {
         /// The joint.
         joint: String,
         /// The joint whose torque it has.
         of: String,
+        /// Whether the log holds the commanded torque, so that the motion shows it.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        is_commanded: bool,
     },
     /// Gravity was subtracted.
     #[error("gravity is missing in the logged torque of {}", listed(.joints))]
@@ -58,14 +64,15 @@ pub enum TorqueCause {
         joints: Vec<String>,
     },
     /// The drive gives less than was commanded.
-    #[error(
-        "the logged torque of joint {joint} stays at {torque:.3} Nm where more is commanded: the drive is at its limit"
-    )]
+    #[error("{} where more is commanded: the drive is at its limit", clipped_words(joint, *torque, *.is_commanded))]
     Clipped {
         /// The joint.
         joint: String,
         /// The limit, Nm (N).
         torque: f64,
+        /// Whether the log holds the commanded torque, so that the motion shows it.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        is_commanded: bool,
     },
     /// Positions and torques of the log belong to different instants.
     #[error("positions and torques of the log are {:.1} ms apart", 1e3 * .lag_s)]
@@ -113,8 +120,10 @@ impl TorqueCause {
             Self::Scale { .. } | Self::CommonScale { .. } => {
                 "correct the scale of the logged torque (torque constant, gear ratio, unit), or the drive's torque gain"
             }
+            Self::Sign { is_commanded: true, .. } => "reverse the sign of the commanded torque of these joints",
             Self::Sign { .. } => "reverse the sign of the logged torque",
-            Self::Exchanged { .. } => "correct the order of the logged torques",
+            Self::Exchanged { is_commanded: true, .. } => "correct the order of the commanded torques",
+            Self::Exchanged { .. } => "correct the order of the logged or of the commanded torques",
             Self::Gravity { .. } | Self::Friction { .. } => {
                 "log the complete torque of the drives, including what the robot compensates itself"
             }
@@ -143,6 +152,33 @@ fn listed(joints: &[String]) -> String {
     match joints {
         [one] => format!("joint {one}"),
         several => format!("joints {}", several.join(", ")),
+    }
+}
+
+fn sign_words(joints: &[String], is_commanded: bool) -> String {
+    let joints = listed(joints);
+    if is_commanded {
+        format!("the motion of {joints} is opposite to the torque, although the log holds the commanded torque")
+    } else {
+        format!("the logged torque of {joints} has the opposite sign of the commanded torque")
+    }
+}
+
+fn exchanged_words(joint: &str, of: &str, is_commanded: bool) -> String {
+    if is_commanded {
+        format!("joint {joint} moves by the torque that is commanded to joint {of}: their commands are exchanged")
+    } else {
+        format!("the logged torque of joint {joint} is the commanded torque of joint {of}: their columns are exchanged")
+    }
+}
+
+fn clipped_words(joint: &str, torque: f64, is_commanded: bool) -> String {
+    if is_commanded {
+        format!(
+            "joint {joint} moves as if its torque stayed at {torque:.3} Nm, although the log holds the commanded torque,"
+        )
+    } else {
+        format!("the logged torque of joint {joint} stays at {torque:.3} Nm")
     }
 }
 
@@ -206,7 +242,10 @@ pub(super) fn causes(
         }));
     }
     for (candidate, cause) in [
-        (TorqueCandidate::Sign, (|joints| TorqueCause::Sign { joints }) as fn(Vec<String>) -> TorqueCause),
+        (
+            TorqueCandidate::Sign,
+            (|joints| TorqueCause::Sign { joints, is_commanded: false }) as fn(Vec<String>) -> TorqueCause,
+        ),
         (TorqueCandidate::Gravity, |joints| TorqueCause::Gravity { joints }),
         (TorqueCandidate::Friction, |joints| TorqueCause::Friction { joints }),
     ] {
@@ -217,11 +256,12 @@ pub(super) fn causes(
     }
     for joint in of(TorqueCandidate::Exchanged) {
         let of = named[joint].map_or(joint, |found| found.value as usize);
-        found.push(TorqueCause::Exchanged { joint: names[joint].clone(), of: names[of].clone() });
+        let (joint, of) = (names[joint].clone(), names[of].clone());
+        found.push(TorqueCause::Exchanged { joint, of, is_commanded: false });
     }
     for joint in of(TorqueCandidate::Clipped) {
         let torque = named[joint].map_or(0.0, |found| found.value);
-        found.push(TorqueCause::Clipped { joint: names[joint].clone(), torque });
+        found.push(TorqueCause::Clipped { joint: names[joint].clone(), torque, is_commanded: false });
     }
     // Timing means nothing beside torque that is another one.
     let has_timing = !explanations.iter().any(|own| own.matters);

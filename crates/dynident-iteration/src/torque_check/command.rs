@@ -54,52 +54,72 @@ impl CommandLaw<'_> {
     }
 }
 
-/// One log along one leg, smoothed.
+/// The motion of one log along one leg.
 #[derive(Debug)]
-pub(super) struct ObservedLeg<'a> {
+pub(super) struct LoggedMotion<'a> {
     leg: &'a Leg,
     joints: usize,
     rate_hz: f64,
     first_time_s: f64,
     samples: usize,
-    /// Joint-major.
-    q: Vec<f64>,
-    dq: Vec<f64>,
-    ddq: Vec<f64>,
+    /// Positions, velocities and accelerations, joint-major.
+    pub(super) q: Vec<f64>,
+    pub(super) dq: Vec<f64>,
+    pub(super) ddq: Vec<f64>,
+}
+
+/// The motion of one log with the torque, filtered and decimated.
+#[derive(Debug)]
+pub(super) struct ObservedLeg<'a> {
+    pub(super) motion: LoggedMotion<'a>,
     decimator: Decimator,
     /// The logged torque of each joint, filtered and decimated.
     pub(super) torque: Vec<Vec<f64>>,
 }
 
-impl<'a> ObservedLeg<'a> {
-    /// The log, compared below `cutoff_hz`; none where it is too short for the filter or not finite.
-    pub(super) fn new(leg: &'a Leg, record: &Record, cutoff_hz: f64) -> Option<Self> {
+impl<'a> LoggedMotion<'a> {
+    /// The motion, smoothed below `smoothing_hz`, or by differences of neighbouring samples; none where it is too short
+    /// or not finite.
+    pub(super) fn new(leg: &'a Leg, record: &Record, smoothing_hz: Option<f64>) -> Option<Self> {
         let (joints, samples) = (record.joints.len(), record.samples);
         if samples < 4 || joints != leg.reference().joints() {
             return None;
         }
         let first_time_s = record.times_s[0];
         let rate_hz = (samples - 1) as f64 / (record.times_s[samples - 1] - first_time_s);
-        let is_usable = rate_hz.is_finite() && rate_hz > 2.5 * cutoff_hz;
-        if !is_usable || record.q.iter().chain(&record.tau).any(|value| !value.is_finite()) {
+        if !rate_hz.is_finite() || record.q.iter().chain(&record.tau).any(|value| !value.is_finite()) {
             return None;
         }
-        let smoothing_hz = (SMOOTHING_RATIO * cutoff_hz).min(0.4 * rate_hz);
-        let butterworth = DifferentiatorSettings::Butterworth { order: 2, cutoff_hz: Some(smoothing_hz) };
-        let butterworth = butterworth.build_following(smoothing_hz, None).ok()?;
+        let smoothing_hz = smoothing_hz.map(|hertz| hertz.min(0.4 * rate_hz));
+        let way = match smoothing_hz {
+            Some(_) => DifferentiatorSettings::Butterworth { order: 2, cutoff_hz: smoothing_hz },
+            None => DifferentiatorSettings::CentralDifferences { order: 2 },
+        };
+        let way = way.build_following(smoothing_hz.unwrap_or(rate_hz), None).ok()?;
         let raw = on_uniform_clock(record, &record.q);
         let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; joints * samples]);
         for joint in 0..joints {
             let own = joint * samples..(joint + 1) * samples;
             let out = Derivatives { q: &mut q[own.clone()], dq: &mut dq[own.clone()], ddq: &mut ddq[own.clone()] };
-            butterworth.differentiate_at(Place { rate_hz, joint, first_time_s }, &raw[own], out).ok()?;
+            way.differentiate_at(Place { rate_hz, joint, first_time_s }, &raw[own], out).ok()?;
+        }
+        Some(Self { leg, joints, rate_hz, first_time_s, samples, q, dq, ddq })
+    }
+}
+
+impl<'a> ObservedLeg<'a> {
+    /// The log, compared below `cutoff_hz`; none where it is too short for the filter or not finite.
+    pub(super) fn new(leg: &'a Leg, record: &Record, cutoff_hz: f64) -> Option<Self> {
+        let motion = LoggedMotion::new(leg, record, Some(SMOOTHING_RATIO * cutoff_hz))?;
+        let (rate_hz, joints) = (motion.rate_hz, motion.joints);
+        if rate_hz <= 2.5 * cutoff_hz {
+            return None;
         }
         let factor = ((rate_hz / (ROWS_PER_CUTOFF * cutoff_hz)).floor() as usize).clamp(1, 1000);
         let settings = DecimationSettings { factor, cutoff_hz: Some(cutoff_hz), ..DecimationSettings::default() };
         let decimator = Decimator::new(&settings, rate_hz, joints).ok()?;
-        let mut observed =
-            Self { leg, joints, rate_hz, first_time_s, samples, q, dq, ddq, decimator, torque: Vec::new() };
-        observed.torque = observed.decimated(&on_uniform_clock(record, &record.tau), joints);
+        let mut observed = Self { motion, decimator, torque: Vec::new() };
+        observed.torque = observed.decimated(&on_uniform_clock(record, &record.tau));
         (observed.rows() > 0).then_some(observed)
     }
 
@@ -108,43 +128,47 @@ impl<'a> ObservedLeg<'a> {
         self.torque.first().map_or(0, Vec::len)
     }
 
-    /// Columns of `count` series of samples each, filtered and decimated.
-    fn decimated(&self, panel: &[f64], count: usize) -> Vec<Vec<f64>> {
+    /// One column for each joint, filtered and decimated.
+    fn decimated(&self, panel: &[f64]) -> Vec<Vec<f64>> {
+        let count = self.motion.joints;
         let mut decimator = self.decimator.with_columns(count);
         let mut out = Vec::new();
-        let rows = decimator.push(panel, self.samples, &mut out);
+        let rows = decimator.push(panel, self.motion.samples, &mut out);
         if rows == 0 { vec![Vec::new(); count] } else { out.chunks_exact(rows).map(<[f64]>::to_vec).collect() }
     }
 
     /// The measured positions, velocities and accelerations, filtered and decimated like the torque.
-    pub(super) fn motion(&self) -> [Vec<Vec<f64>>; 3] {
-        [&self.q, &self.dq, &self.ddq].map(|values| self.decimated(values, self.joints))
+    pub(super) fn filtered_motion(&self) -> [Vec<Vec<f64>>; 3] {
+        [&self.motion.q, &self.motion.dq, &self.motion.ddq].map(|values| self.decimated(values))
     }
 
     /// The columns of each joint at some timing: delays of positions and velocities in the controller, lag of the
     /// torque, and relative rate of the log's clock.
     pub(super) fn columns(&self, law: CommandLaw<'_>, timing: &[f64; SHARED]) -> Vec<JointColumns> {
         let series = match law {
-            CommandLaw::Known { controller, model } => self.commanded(controller, model, timing),
-            CommandLaw::OwnLoop { model } => Some(self.own_loop(model, timing)),
+            CommandLaw::Known { controller, model } => {
+                self.motion.commanded(controller, model, timing).map(|commanded| vec![commanded])
+            }
+            CommandLaw::OwnLoop { model } => Some(self.motion.own_loop(model, timing)),
         };
-        let Some(series) = series else { return vec![Vec::new(); self.joints] };
-        let mut columns: Vec<JointColumns> = vec![Vec::new(); self.joints];
-        for of_all in &series {
-            for (joint, column) in self.decimated(of_all, self.joints).into_iter().enumerate() {
+        let mut columns: Vec<JointColumns> = vec![Vec::new(); self.motion.joints];
+        for of_all in series.iter().flatten() {
+            for (joint, column) in self.decimated(of_all).into_iter().enumerate() {
                 columns[joint].push(column);
             }
         }
         columns
     }
+}
 
+impl LoggedMotion<'_> {
     /// The commanded torque, joint-major.
-    fn commanded(
+    pub(super) fn commanded(
         &self,
         controller: &ControllerSettings,
         model: Option<&ControllerModel>,
         timing: &[f64; SHARED],
-    ) -> Option<Vec<Vec<f64>>> {
+    ) -> Option<Vec<f64>> {
         let mut controller = controller.build(self.joints, model).ok()?;
         let mut out = vec![0.0; self.joints * self.samples];
         let mut tau = vec![0.0; self.joints];
@@ -154,7 +178,7 @@ impl<'a> ObservedLeg<'a> {
                 out[joint * self.samples + sample] = *tau;
             }
         });
-        out.iter().all(|value| value.is_finite()).then(|| vec![out])
+        out.iter().all(|value| value.is_finite()).then_some(out)
     }
 
     /// What drives with their own loop get and see, joint-major: torque fed forward, position error, its rate, and its

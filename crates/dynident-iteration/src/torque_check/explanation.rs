@@ -90,6 +90,7 @@ pub(super) struct JointData<'a> {
     pub(super) columns: &'a [JointColumns],
     pub(super) q: &'a [Vec<f64>],
     pub(super) dq: &'a [Vec<f64>],
+    pub(super) ddq: &'a [Vec<f64>],
 }
 
 /// Compares one joint, and finds what explains a difference.
@@ -186,7 +187,7 @@ pub(super) fn may_be_missing(data: &JointData<'_>) -> [Vec<Vec<Vec<f64>>>; 2] {
 }
 
 /// Viscous friction, and steps of several widths.
-fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f64>> {
+pub(super) fn friction_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f64>> {
     let dq = &data.dq[joint];
     let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
     if fastest == 0.0 {

@@ -17,6 +17,7 @@
 //! | `separable_fit` | scales and timing by least squares |
 //! | `explanation` | what explains a difference: the candidates, and when one is named |
 //! | `row_scale` | what the parameters that several joints share show about each joint's torque |
+//! | `response` | whether the robot moves as its torque says |
 //! | `agreement` | one cause for all joints, where one explains them all |
 //! | `causes` | from single joints to one statement |
 
@@ -24,6 +25,7 @@ mod agreement;
 mod causes;
 mod command;
 mod explanation;
+mod response;
 mod row_scale;
 mod separable_fit;
 
@@ -39,6 +41,7 @@ use command::{CommandLaw, ObservedLeg, shared_parameters};
 use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use explanation::{Explanation, JointData, explain, may_be_missing};
+use response::{early_causes, limit_causes};
 use separable_fit::{SHARED, SeparableFit, separable_fit};
 use serde::{Deserialize, Serialize};
 
@@ -131,12 +134,30 @@ pub(crate) struct CheckWith<'a> {
     pub(crate) most_lag_s: f64,
     /// Whether drives with their own loop get torque fed forward in later runs, which shows each joint's own scale.
     pub(crate) feeds_forward_later: bool,
+    /// Whether the newest run ended before its motion did.
+    pub(crate) ended_early: bool,
 }
 
 /// Compares logged with commanded torque; none where too little was recorded. `runs` are the runs so far, the newest
 /// last; earlier ones only serve to determine the gains of drives with their own loop. `task` is with the friction in
 /// force.
 pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>) -> Option<TorqueCheck> {
+    let check = compared(task, runs, with);
+    let is_explained = check.as_ref().is_some_and(|check| check.causes.iter().any(TorqueCause::is_determined));
+    let newest = runs
+        .last()
+        .filter(|newest| with.ended_early && !is_explained && source_of(newest) == CommandSource::Controller);
+    let Some(newest) = newest else { return check };
+    let causes = early_causes(task, newest);
+    if causes.is_empty() {
+        return check;
+    }
+    let check = check.unwrap_or_else(|| TorqueCheck::without_command(CommandSource::Controller, with.row_scales));
+    Some(TorqueCheck { causes, ..check })
+}
+
+/// Compares the torques where enough was recorded.
+fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>) -> Option<TorqueCheck> {
     let newest = runs.last()?;
     let source = source_of(newest);
     let dof = task.robot.dof();
@@ -150,20 +171,7 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
             observed.extend(ObservedLeg::new(leg, record, cutoff_hz).map(|leg| (law, leg)));
         }
     }
-    let mut check = TorqueCheck {
-        source,
-        feedback_delay_s: [0.0; 2],
-        torque_lag_s: 0.0,
-        torque_lag_std_s: None,
-        clock_percent: 0.0,
-        clock_percent_std: None,
-        joints: vec![JointTorqueCheck::without_command(); dof],
-        causes: Vec::new(),
-    };
-    for (joint, scale) in check.joints.iter_mut().zip(with.row_scales) {
-        joint.row_scale = scale.as_ref().map(|scale| scale.value);
-        joint.row_scale_std = scale.as_ref().map(|scale| scale.std);
-    }
+    let mut check = TorqueCheck::without_command(source, with.row_scales);
     let rows: usize = observed.iter().map(|(_, leg)| leg.rows()).sum();
     if rows < FEWEST_ROWS {
         return None;
@@ -176,7 +184,7 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         out
     };
     let torque = joined(&|leg| leg.torque.clone());
-    let motion = [0, 1].map(|place| joined(&|leg| leg.motion()[place].clone()));
+    let motion = [0, 1, 2].map(|place| joined(&|leg| leg.filtered_motion()[place].clone()));
     let columns = |timing: &[f64; SHARED]| {
         let mut out: Vec<Vec<Vec<f64>>> = vec![Vec::new(); dof];
         for (law, leg) in &observed {
@@ -193,14 +201,15 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         return None;
     }
     let explained = |columns: &[Vec<Vec<f64>>]| -> Vec<Explanation> {
-        let data = JointData { task, torque: &torque, columns, q: &motion[0], dq: &motion[1] };
+        let data = JointData { task, torque: &torque, columns, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
         (0..dof).map(|joint| explain(&data, joint, with.settings)).collect()
     };
     let mut explanations = explained(&fit.columns);
     let mut found = agreement(&explanations);
     if explanations.iter().any(|own| own.matters) {
         // What is missing in the torque bends the timing: it is found again beside what may be missing.
-        let data = JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1] };
+        let data =
+            JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
         for extra in may_be_missing(&data) {
             let other = separable_fit(&torque, (&parameters, &starts), &mut |timing| {
                 let own = columns(timing).into_iter().zip(&extra);
@@ -231,7 +240,38 @@ pub(crate) fn check_torque(task: &IterationTask, runs: &[CheckedRun<'_>], with: 
         shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
     }
     check.causes = causes::causes(task, &check, (&explanations, &found.named), with);
+    // A drive at its limit also changes the scale of its joint's rows.
+    let is_open = |cause: &TorqueCause| matches!(cause, TorqueCause::JointScale { .. });
+    if source == CommandSource::Controller && check.causes.iter().all(is_open) {
+        let data =
+            JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
+        let limits = limit_causes(&data);
+        if !limits.is_empty() {
+            check.causes = limits;
+        }
+    }
     Some(check)
+}
+
+impl TorqueCheck {
+    /// What the rows alone show.
+    fn without_command(source: CommandSource, row_scales: &[Option<RowScale>]) -> Self {
+        let joint = |scale: &Option<RowScale>| JointTorqueCheck {
+            row_scale: scale.as_ref().map(|scale| scale.value),
+            row_scale_std: scale.as_ref().map(|scale| scale.std),
+            ..JointTorqueCheck::without_command()
+        };
+        Self {
+            source,
+            feedback_delay_s: [0.0; 2],
+            torque_lag_s: 0.0,
+            torque_lag_std_s: None,
+            clock_percent: 0.0,
+            clock_percent_std: None,
+            joints: row_scales.iter().map(joint).collect(),
+            causes: Vec::new(),
+        }
+    }
 }
 
 impl JointTorqueCheck {

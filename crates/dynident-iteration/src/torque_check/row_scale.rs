@@ -8,7 +8,8 @@
 //!
 //! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
 //! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ
-//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Parameters that one
+//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Errors of the model
+//! (stiction, backlash) move the scales of all joints, so that a deviation also has to exceed theirs. Parameters that one
 //! joint alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little
 //! with the others gets a wide bar.
 
@@ -31,6 +32,11 @@ const FURTHEST: f64 = 0.6;
 /// The scale of another joint explains the rows nearly as well if their log-likelihood is lower by less than this:
 /// three and a half standard deviations of independent rows.
 const AS_LIKELY: f64 = 6.0;
+
+/// Ratio of the median absolute deviation of a normal distribution to its standard deviation.
+const MEDIAN_TO_STD: f64 = 0.6745;
+/// Fewest other joints whose deviations show the error of the model.
+const FEWEST_OTHERS: usize = 3;
 
 /// The scale of one joint's torque relative to the other joints.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,13 +102,7 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
     let mut wrong: Vec<(usize, Vec<usize>)> = Vec::new();
     loop {
         let chosen: Vec<usize> = wrong.iter().map(|(joint, _)| *joint).collect();
-        let of_joint = |joint: usize| -> Option<Kappa> {
-            let free: Vec<usize> =
-                if chosen.contains(&joint) { chosen.clone() } else { chosen.iter().copied().chain([joint]).collect() };
-            let place = free.iter().position(|&one| one == joint)?;
-            kappa(problem, values, &free, place)
-        };
-        let found: Vec<Option<Kappa>> = (0..joints).map(of_joint).collect();
+        let found = deviations(problem, values, &chosen);
         let likelihood = |joint: usize| found[joint].map_or(f64::NEG_INFINITY, |kappa| kappa.log_likelihood);
         let counts = |&joint: &usize| {
             let is_large = |kappa: Kappa| kappa.value.abs() > least.share.max(least.sigmas * kappa.std);
@@ -111,7 +111,12 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
         let open: Vec<usize> = (0..joints).filter(|joint| !chosen.contains(joint)).collect();
         let worst = open.iter().copied().filter(counts).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
         // More than half of the joints cannot all be wrong against the rest.
-        if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints) {
+        let stands_out = |&worst: &usize| {
+            let with_it: Vec<usize> = chosen.iter().copied().chain([worst]).collect();
+            let spread = spread(&deviations(problem, values, &with_it), &with_it);
+            found[worst].is_some_and(|kappa| kappa.value.abs() > least.sigmas * kappa.std * spread)
+        };
+        if let Some(worst) = worst.filter(|_| 2 * (chosen.len() + 1) <= joints).filter(stands_out) {
             let is_rival = |&other: &usize| other != worst && likelihood(other) > likelihood(worst) - AS_LIKELY;
             wrong.push((worst, open.iter().copied().filter(is_rival).collect()));
             continue;
@@ -123,6 +128,25 @@ fn tested(problem: &LinearProblem, values: &[f64], least: LeastDeviation) -> Vec
         };
         return (0..joints).map(scale).collect();
     }
+}
+
+/// The deviation of each joint where those of the joints `chosen` are free.
+fn deviations(problem: &LinearProblem, values: &[f64], chosen: &[usize]) -> Vec<Option<Kappa>> {
+    let of_joint = |joint: usize| -> Option<Kappa> {
+        let others = chosen.iter().copied().filter(|&one| one != joint);
+        let free: Vec<usize> = others.chain([joint]).collect();
+        kappa(problem, values, &free, free.len() - 1)
+    };
+    (0..problem.joints().len()).map(of_joint).collect()
+}
+
+/// Standard deviation of the deviations of the joints that are not `chosen`, in units of their own; at least one. Its
+/// median does not feel another wrong joint.
+fn spread(found: &[Option<Kappa>], chosen: &[usize]) -> f64 {
+    let others = found.iter().enumerate().filter(|(joint, _)| !chosen.contains(joint));
+    let mut sizes: Vec<f64> = others.filter_map(|(_, kappa)| kappa.map(|own| (own.value / own.std).abs())).collect();
+    sizes.sort_by(f64::total_cmp);
+    if sizes.len() < FEWEST_OTHERS { 1.0 } else { (sizes[sizes.len() / 2] / MEDIAN_TO_STD).max(1.0) }
 }
 
 /// The deviation of a joint's scale.

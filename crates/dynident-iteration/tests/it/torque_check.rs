@@ -147,14 +147,17 @@ fn a_wrong_torque_is_named_and_never_loaded() {
         };
         assert!((found - factor).abs() < 0.01, "{found}");
     }
-    assert_eq!(named(&|log| scaled(log, [-1.0, 1.0])), [TorqueCause::Sign { joints: vec![joint(1)] }]);
-    assert_eq!(named(&|log| scaled(log, [-1.0, -1.0])), [TorqueCause::Sign { joints: both() }]);
+    assert_eq!(
+        named(&|log| scaled(log, [-1.0, 1.0])),
+        [TorqueCause::Sign { joints: vec![joint(1)], is_commanded: false }]
+    );
+    assert_eq!(named(&|log| scaled(log, [-1.0, -1.0])), [TorqueCause::Sign { joints: both(), is_commanded: false }]);
     assert_eq!(named(&without_gravity), [TorqueCause::Gravity { joints: both() }]);
     // With gravity alone in the first controller it is less than a twentieth of the torque.
     let outcome = iterated(&Simulated::default(), simulated_arm::settings(), &without_friction);
     assert!(!outcome.status.is_converged() && outcome.runs.len() <= 2, "{}", outcome.status);
     assert_eq!(causes(&outcome), [TorqueCause::Friction { joints: both() }]);
-    let exchange = |joint, of| TorqueCause::Exchanged { joint, of };
+    let exchange = |joint, of| TorqueCause::Exchanged { joint, of, is_commanded: false };
     assert_eq!(named(&exchanged), [exchange(joint(1), joint(2)), exchange(joint(2), joint(1))]);
     assert!(matches!(&named(&cut)[..], [TorqueCause::Clipped { joint: name, .. }] if *name == joint(1)));
     let drift = |log: &mut Record| log.times_s.iter_mut().for_each(|time| *time /= 1.003);

@@ -1,0 +1,268 @@
+//! Whether the robot moves as its torque says. A log that holds the commanded torque hides drives that deliver another
+//! one, and a robot that runs away is stopped before the log is long enough for a fit.
+//!
+//! * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
+//!   command of joint j, or its own with the opposite sign. In the motion, where the log holds the commanded torque: the
+//!   acceleration of joint i follows the torque of joint j less gravity, or falls as its own rises. Constants are free,
+//!   so that a wrong mass does not matter.
+//! * A drive at its limit: the rows of the joint fit a model much better with its torque limited,
+//!   `clamp(τ_j, ±L) = W_j θ_j + friction`, than as logged. θ_j is free, so that no description is needed.
+
+use super::command::LoggedMotion;
+use super::explanation::{JointData, friction_columns};
+use super::separable_fit::{centred, coefficients, dot, residual_of, rms, square};
+use super::{CheckedRun, TorqueCause};
+use crate::leg::IterationTask;
+use dynident_dynamics::{Workspace, gravity_torque, torque_regressor};
+
+/// Cut-off of the smoothed motion of a run that ended early, as a share of the sampling rate, and the number of samples
+/// from which it is used.
+const SMOOTHING_SHARE: f64 = 0.2;
+const FEWEST_SMOOTHED: usize = 30;
+/// Time before the stop that is compared, s: earlier the robot still followed.
+const BEFORE_STOP_S: f64 = 1.0;
+/// Fewest samples of a run that ended early.
+const FEWEST_SAMPLES: usize = 5;
+/// Delays of the feedback that are tried, s.
+const DELAYS_S: [f64; 4] = [0.0, 0.002, 0.005, 0.01];
+/// Share of the squared torque by which the same torques differ at most, and others at least.
+const SAME: f64 = 0.1;
+const OTHER: f64 = 0.5;
+/// Of two explanations the better one leaves at most this share of what the other leaves.
+const CLEARLY_BETTER: f64 = 0.25;
+/// Correlation between torque and acceleration: of a joint that moves against this torque, negative, at least; of one
+/// that moves by it, at least; of one that moves by another torque, at most.
+const OPPOSITE: f64 = 0.8;
+const FOLLOWS: f64 = 0.9;
+const UNRELATED: f64 = 0.3;
+/// A joint runs away if its mean velocity is at least this share of its mean speed. In an oscillation the torque of a
+/// late drive is opposite to the acceleration.
+const ONE_WAY: f64 = 0.8;
+
+/// Limits that are tried, as shares of the largest logged torque.
+const LIMIT_SHARES: core::ops::Range<usize> = 4..40;
+const ALL_SHARES: f64 = 40.0;
+/// Share of the squared relative residual that a limit has to explain.
+const LEAST_EXPLAINED: f64 = 0.65;
+/// Relative residual without a limit, from which a limit is looked for.
+const LEAST_UNEXPLAINED: f64 = 0.01;
+/// Rows for each unknown of the model.
+const ROWS_PER_UNKNOWN: usize = 3;
+/// Fewest rows at the limit, and their largest share.
+const FEWEST_AT_LIMIT: usize = 4;
+const MOST_AT_LIMIT: f64 = 0.5;
+
+/// Exchanged joints and reversed signs in a run that ended early; empty where nothing is clear.
+pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<TorqueCause> {
+    let Some((leg, record)) = run.legs.iter().zip(run.records).rfind(|(_, record)| record.samples >= FEWEST_SAMPLES)
+    else {
+        return Vec::new();
+    };
+    let smoothing_hz = (record.samples >= FEWEST_SMOOTHED).then_some(SMOOTHING_SHARE * record.rate_hz);
+    let Some(observed) = LoggedMotion::new(leg, record, smoothing_hz) else { return Vec::new() };
+    let first = record.samples.saturating_sub((BEFORE_STOP_S * record.rate_hz).ceil() as usize);
+    let rows =
+        |all: &[f64]| -> Vec<Vec<f64>> { all.chunks_exact(record.samples).map(|own| own[first..].to_vec()).collect() };
+    let logged = rows(&record.tau);
+    let commanded = DELAYS_S.iter().filter_map(|&delay_s| {
+        let commanded = observed.commanded(run.controller, run.model, &[delay_s, delay_s, 0.0, 0.0, 0.0])?;
+        Some(by_command(&logged, &rows(&commanded)))
+    });
+    let mut whole = commanded.filter(|found: &Vec<Assignment>| found.iter().all(|own| *own != Assignment::Open));
+    let Some(found) = whole.next() else { return Vec::new() };
+    if found.iter().any(|own| *own != Assignment::Own) {
+        return named(task, &found, false);
+    }
+    let weight = rows(&gravity_along(task, &observed));
+    let less_gravity =
+        logged.iter().zip(&weight).map(|(tau, weight)| tau.iter().zip(weight).map(|(a, b)| a - b).collect());
+    named(task, &by_motion(&[rows(&observed.dq), rows(&observed.ddq)], &less_gravity.collect::<Vec<_>>()), true)
+}
+
+/// Whose torque a joint has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Assignment {
+    Own,
+    Reversed,
+    Other(usize),
+    Open,
+}
+
+/// Whose commanded torque each joint has in the log. Joints are only exchanged in pairs.
+fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
+    let joints = logged.len();
+    let share = |to: usize, from: usize, sign: f64| {
+        let apart: Vec<f64> = logged[to].iter().zip(&commanded[from]).map(|(a, b)| a - sign * b).collect();
+        square(&apart) / square(&logged[to]).max(f64::MIN_POSITIVE)
+    };
+    let is_other = |joint: usize| share(joint, joint, 1.0) > OTHER;
+    let of_joint = |joint: usize| {
+        if !is_other(joint) {
+            return Assignment::Own;
+        }
+        let pair = |other: usize| share(joint, other, 1.0).max(share(other, joint, 1.0));
+        let pairs = (0..joints).filter(|&other| other != joint && is_other(other));
+        let mut found: Vec<(f64, Assignment)> = pairs.map(|other| (pair(other), Assignment::Other(other))).collect();
+        found.push((share(joint, joint, -1.0), Assignment::Reversed));
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let is_clear = found[0].0 < SAME && found.get(1).is_none_or(|next| found[0].0 < CLEARLY_BETTER * next.0);
+        if is_clear { found[0].1 } else { Assignment::Open }
+    };
+    (0..joints).map(of_joint).collect()
+}
+
+/// Whose torque each joint's acceleration follows.
+fn by_motion([velocities, accelerations]: &[Vec<Vec<f64>>; 2], torques: &[Vec<f64>]) -> Vec<Assignment> {
+    let joints = torques.len();
+    let runs_away = |joint: usize| {
+        let speeds: f64 = velocities[joint].iter().map(|dq| dq.abs()).sum();
+        velocities[joint].iter().sum::<f64>().abs() >= ONE_WAY * speeds
+    };
+    let follows = |to: usize, from: usize| {
+        let (a, b) = (centred(&accelerations[to]), centred(&torques[from]));
+        dot(&a, &b) / (square(&a) * square(&b)).sqrt().max(f64::MIN_POSITIVE)
+    };
+    let is_pair = |a: usize, b: usize| {
+        [a, b].iter().all(|&joint| follows(joint, joint) < UNRELATED && runs_away(joint))
+            && follows(a, b).min(follows(b, a)) > FOLLOWS
+    };
+    let of_joint = |joint: usize| {
+        if follows(joint, joint) < -OPPOSITE && runs_away(joint) {
+            return Assignment::Reversed;
+        }
+        let partner = (0..joints).find(|&other| other != joint && is_pair(joint, other));
+        partner.map_or(Assignment::Own, Assignment::Other)
+    };
+    (0..joints).map(of_joint).collect()
+}
+
+fn named(task: &IterationTask, found: &[Assignment], is_commanded: bool) -> Vec<TorqueCause> {
+    let names = task.robot.joint_names();
+    let reversed = (0..found.len()).filter(|&joint| found[joint] == Assignment::Reversed);
+    let reversed: Vec<String> = reversed.map(|joint| names[joint].clone()).collect();
+    let sign = (!reversed.is_empty()).then_some(TorqueCause::Sign { joints: reversed, is_commanded });
+    let exchanged = found.iter().enumerate().filter_map(|(joint, own)| match own {
+        Assignment::Other(of) => {
+            Some(TorqueCause::Exchanged { joint: names[joint].clone(), of: names[*of].clone(), is_commanded })
+        }
+        _ => None,
+    });
+    sign.into_iter().chain(exchanged).collect()
+}
+
+/// The gravity torque of the description along the motion, joint-major, Nm (N).
+fn gravity_along(task: &IterationTask, observed: &LoggedMotion<'_>) -> Vec<f64> {
+    let model = task.robot.model();
+    let mut workspace = Workspace::new(model);
+    let joints = model.dof();
+    let samples = observed.q.len() / joints;
+    let mut out = vec![0.0; joints * samples];
+    for sample in 0..samples {
+        let q: Vec<f64> = (0..joints).map(|joint| observed.q[joint * samples + sample]).collect();
+        let weight = gravity_torque(model, &mut workspace, &q);
+        (0..joints).for_each(|joint| out[joint * samples + sample] = weight[joint]);
+    }
+    out
+}
+
+/// Joints whose drive is at its limit although the log holds a larger torque.
+pub(super) fn limit_causes(data: &JointData<'_>) -> Vec<TorqueCause> {
+    let names = data.task.robot.joint_names();
+    let of_joint = |joint: usize| {
+        let torque = limit_in_motion(data, joint)?;
+        Some(TorqueCause::Clipped { joint: names[joint].clone(), torque, is_commanded: true })
+    };
+    (0..data.torque.len()).filter_map(of_joint).collect()
+}
+
+/// The limit of a joint's torque that its motion shows, Nm (N), although the log holds a larger one; none where no limit
+/// explains the motion clearly better.
+fn limit_in_motion(data: &JointData<'_>, joint: usize) -> Option<f64> {
+    let y = &data.torque[joint];
+    let columns: Vec<Vec<f64>> = model_columns(data, joint).into_iter().chain(friction_columns(data, joint)).collect();
+    if y.len() < ROWS_PER_UNKNOWN * (columns.len() + 1) {
+        return None;
+    }
+    let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    let left_at = |limit: f64| {
+        let delivered: Vec<f64> = y.iter().map(|y| y.clamp(-limit, limit)).collect();
+        let left = square(&residual_of(&columns, &delivered, &coefficients(&columns, &delivered)));
+        left / square(&centred(&delivered)).max(f64::MIN_POSITIVE)
+    };
+    let as_logged = left_at(highest);
+    if as_logged <= LEAST_UNEXPLAINED.powi(2) {
+        return None;
+    }
+    let at_limit = |limit: f64| y.iter().filter(|y| y.abs() > limit).count();
+    let is_possible =
+        |limit: &f64| (FEWEST_AT_LIMIT as f64..=MOST_AT_LIMIT * y.len() as f64).contains(&(at_limit(*limit) as f64));
+    let limits = LIMIT_SHARES.map(|share| highest * share as f64 / ALL_SHARES).filter(is_possible);
+    let (limit, left) = limits.map(|limit| (limit, left_at(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (left < (1.0 - LEAST_EXPLAINED) * as_logged).then_some(limit)
+}
+
+/// The columns of the joint's torque for the inertial parameters of all bodies.
+fn model_columns(data: &JointData<'_>, joint: usize) -> Vec<Vec<f64>> {
+    let model = data.task.robot.model();
+    let (dof, count) = (model.dof(), model.inertial_count());
+    let mut workspace = Workspace::new(model);
+    let rows = data.torque[joint].len();
+    let mut columns = vec![vec![0.0; rows]; count];
+    let [mut q, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; dof]);
+    for row in 0..rows {
+        for (to, from) in [(&mut q, data.q), (&mut dq, data.dq), (&mut ddq, data.ddq)] {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = from[row]);
+        }
+        let y = torque_regressor(model, &mut workspace, &q, &dq, &ddq);
+        columns.iter_mut().enumerate().for_each(|(column, to)| to[row] = y[joint * count + column]);
+    }
+    columns.retain(|column| rms(column) > 1e-9);
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(of: impl Fn(f64) -> f64) -> Vec<f64> {
+        (0..12).map(|k| of(f64::from(k) / 12.0)).collect()
+    }
+
+    #[test]
+    fn exchanged_and_reversed_torques_are_found_in_a_dozen_samples() {
+        let commanded = [series(|t| 3.0 * t + 1.0), series(|t| 5.0 * t * t - 2.0), series(|t| 0.3 - t)];
+        let [a, b, c] = commanded.clone();
+        let own = Assignment::Own;
+        assert_eq!(by_command(&commanded, &commanded), [own; 3]);
+        let found = by_command(&[b.clone(), a.clone(), c.clone()], &commanded);
+        assert_eq!(found, [Assignment::Other(1), Assignment::Other(0), own]);
+        let reversed = c.iter().map(|tau| -tau).collect();
+        assert_eq!(by_command(&[a.clone(), b.clone(), reversed], &commanded), [own, own, Assignment::Reversed]);
+        // Torque of nothing known.
+        let other = series(|t| (9.0 * t).sin());
+        assert_eq!(by_command(&[other, b, c], &commanded), [Assignment::Open, own, own]);
+    }
+
+    #[test]
+    fn a_joint_that_runs_away_against_its_torque_is_found() {
+        let grows = series(|t| (3.0 * t).exp());
+        let falls: Vec<f64> = grows.iter().map(|value| 4.0 - 2.0 * value).collect();
+        let still = series(|t| 0.1 * (20.0 * t).sin());
+        let motion = |joint: &[f64]| [vec![joint.to_vec(), still.clone()], vec![joint.to_vec(), still.clone()]];
+        let own = Assignment::Own;
+        assert_eq!(by_motion(&motion(&grows), &[falls.clone(), still.clone()]), [Assignment::Reversed, own]);
+        assert_eq!(by_motion(&motion(&grows), &[grows.clone(), still.clone()]), [own, own]);
+        // The torque of a late drive in an oscillation.
+        let swings = series(|t| (12.0 * t).sin());
+        let late = swings.iter().map(|value| -value).collect();
+        assert_eq!(by_motion(&motion(&swings), &[late, still.clone()]), [own, own]);
+    }
+
+    #[test]
+    fn joints_that_run_away_by_each_other_s_torque_are_found() {
+        let (first, second) = (series(|t| (4.0 * t).exp()), series(|t| 1.0 - 4.0 * (t - 0.5).powi(2)));
+        let motion = [vec![first.clone(), second.clone()], vec![first.clone(), second.clone()]];
+        let found = by_motion(&motion, &[second, first]);
+        assert_eq!(found, [Assignment::Other(1), Assignment::Other(0)]);
+    }
+}
