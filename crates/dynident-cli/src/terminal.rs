@@ -46,13 +46,13 @@ pub(crate) fn written(outcome: io::Result<()>) -> Result<(), String> {
 /// An error, on standard error, as clap words its own.
 pub(crate) fn complain(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "error: {}", readable(&dynident::shortened(message)));
+    let _ = writeln!(out, "error: {}", readable(&dynident::shortened_message(message)));
 }
 
 /// A remark, on standard error.
 pub(crate) fn remark(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "note: {}", readable(&dynident::shortened(message)));
+    let _ = writeln!(out, "note: {}", readable(&dynident::shortened_message(message)));
 }
 
 /// A question, on standard error; the answer comes on the same line. It is not shortened: nothing of a command that a

@@ -1,5 +1,5 @@
 //! **May this input file be read, and is it still the same?** Opens regular files only, reads at most a stated number
-//! of bytes, detects files that change while they are read, and shortens what messages quote of them.
+//! of bytes, detects files that change while they are read, and quotes their text in messages.
 //!
 //! ```
 //! use dynident_files::{SeenFiles, read};
@@ -98,27 +98,6 @@ pub fn quoted(text: &str) -> String {
         all if all > MOST_QUOTED => format!("{shown}.. ({all} characters)"),
         _ => shown,
     }
-}
-
-/// Characters that a message may have between two backquotes, and as a whole.
-const MOST_BETWEEN_QUOTES: usize = 200;
-const MOST_IN_MESSAGE: usize = 20_000;
-
-/// A message with every text between backquotes shortened to 200 characters, and with 20,000 characters at most. Names,
-/// expressions and lines from files stand between backquotes, and a file may hold a name of megabytes.
-pub fn shortened(message: &str) -> String {
-    let cut = |text: &str, most: usize| {
-        let count = text.chars().count();
-        if count <= most {
-            return text.to_owned();
-        }
-        let shown: String = text.chars().take(most).collect();
-        format!("{shown}.. ({count} characters)")
-    };
-    let parts = message.split('`').enumerate();
-    let parts: Vec<String> =
-        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MOST_BETWEEN_QUOTES } else { usize::MAX })).collect();
-    cut(&parts.join("`"), MOST_IN_MESSAGE)
 }
 
 /// What distinguishes a file from the one that takes its place: length, time of the last change and, on Unix, device
@@ -229,17 +208,6 @@ mod tests {
         assert_eq!(quoted("q1\n"), "q1\\n");
         assert_eq!(quoted(&"é".repeat(60)), "é".repeat(60));
         assert_eq!(quoted(&"(".repeat(200_000)), format!("{}.. (200000 characters)", "(".repeat(60)));
-    }
-
-    #[test]
-    fn a_message_is_shortened_where_it_quotes() {
-        let long = "x".repeat(1000);
-        assert_eq!(shortened("joint `a` is not `b`"), "joint `a` is not `b`");
-        let path = format!("/data/{long}: cannot be read");
-        assert_eq!(shortened(&path), path);
-        let message = shortened(&format!("no joint `{long}`: give `a`"));
-        assert_eq!(message, format!("no joint `{}.. (1000 characters)`: give `a`", "x".repeat(200)));
-        assert!(shortened(&"a ".repeat(100_000)).ends_with("a .. (200000 characters)"));
     }
 
     #[cfg(unix)]

@@ -41,7 +41,7 @@ pub(crate) fn factors(error: impl core::fmt::Display) -> PyErr {
 /// The exception that a job's error is, with its place.
 pub(crate) fn job(py: Python<'_>, error: &dynident::Error) -> PyErr {
     use dynident::Error as Job;
-    let message = dynident::shortened(&error.to_string());
+    let message = dynident::shortened_message(&error.to_string());
     let (exception, path, line, column): (PyErr, Option<&Path>, Option<u64>, Option<u32>) = match error {
         Job::StudyAt { path, line, column, .. } => {
             (StudyError::new_err(message), Some(path), Some(u64::from(*line)), Some(*column))

@@ -32,7 +32,7 @@ pub use field::{csv_field, markdown};
 pub use identifier::{IDENTIFIER_LENGTH, identifier};
 pub use invisible::{is_invisible, one_line, visible};
 pub use quoted::quoted;
-pub use shortened::{LINE_LENGTH, shortened, shortened_lines};
+pub use shortened::{LINE_LENGTH, shortened, shortened_lines, shortened_message};
 pub use toml_document::toml_document;
 
 #[cfg(doctest)]

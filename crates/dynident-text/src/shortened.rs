@@ -31,6 +31,27 @@ pub fn shortened_lines(text: &str) -> Cow<'_, str> {
     Cow::Owned(lines.join("\n"))
 }
 
+/// Characters that a message may have between two backquotes, and as a whole.
+const MOST_BETWEEN_QUOTES: usize = 200;
+const MOST_IN_MESSAGE: usize = 20_000;
+
+/// A message with every text between backquotes shortened to 200 characters, and with 20,000 characters at most. Names,
+/// expressions and lines from files stand between backquotes, and a file may hold a name of megabytes.
+pub fn shortened_message(message: &str) -> String {
+    let cut = |text: &str, most: usize| {
+        let count = text.chars().count();
+        if count <= most {
+            return text.to_owned();
+        }
+        let shown: String = text.chars().take(most).collect();
+        format!("{shown}.. ({count} characters)")
+    };
+    let parts = message.split('`').enumerate();
+    let parts: Vec<String> =
+        parts.map(|(k, part)| cut(part, if k % 2 == 1 { MOST_BETWEEN_QUOTES } else { usize::MAX })).collect();
+    cut(&parts.join("`"), MOST_IN_MESSAGE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -44,5 +65,16 @@ mod tests {
         let short = shortened_lines(&lines);
         assert!(short.len() < LINE_LENGTH + 50 && short.starts_with("a\nxxx") && short.ends_with("xxx\nb"), "{short}");
         assert!(matches!(shortened_lines("a\nb"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn a_message_is_shortened_where_it_quotes() {
+        let long = "x".repeat(1000);
+        assert_eq!(shortened_message("joint `a` is not `b`"), "joint `a` is not `b`");
+        let path = format!("/data/{long}: cannot be read");
+        assert_eq!(shortened_message(&path), path);
+        let message = shortened_message(&format!("no joint `{long}`: give `a`"));
+        assert_eq!(message, format!("no joint `{}.. (1000 characters)`: give `a`", "x".repeat(200)));
+        assert!(shortened_message(&"a ".repeat(100_000)).ends_with("a .. (200000 characters)"));
     }
 }

@@ -71,9 +71,9 @@ pub use dynident_simulation as simulation;
 pub use dynident_system as system;
 pub use dynident_text as text;
 
-pub use dynident_files::shortened;
 pub use dynident_identification::{Progress, Role, Silent};
 pub use dynident_system::{ProgramPermission, ProgramPurpose, ProgramRefused, ProgramRequest};
+pub use dynident_text::shortened_message;
 pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};

@@ -67,6 +67,9 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     {
         text += &wrapped(&format!("NOTE: {sentence}."), 4);
     }
+    if let Some(what) = file.unchecked_torque() {
+        text += &wrapped(&format!("NOT checked: {what}."), 4);
+    }
     for unmet in &file.unmet {
         text += &wrapped(&format!("UNMET: {}. What would help: {}.", unmet.message, unmet.remedy), 4);
     }

@@ -23,8 +23,17 @@ const FEWEST_SMOOTHED: usize = 30;
 const BEFORE_STOP_S: f64 = 1.0;
 /// Fewest samples of a run that ended early.
 const FEWEST_SAMPLES: usize = 5;
-/// Delays of the feedback that are tried, s.
-const DELAYS_S: [f64; 4] = [0.0, 0.002, 0.005, 0.01];
+/// Delays of positions and velocities in the controller that are tried, s. A filter makes velocities later.
+const DELAYS_S: [[f64; 2]; 8] = [
+    [0.0, 0.0],
+    [0.0, 0.002],
+    [0.002, 0.002],
+    [0.002, 0.005],
+    [0.005, 0.005],
+    [0.005, 0.01],
+    [0.01, 0.01],
+    [0.01, 0.015],
+];
 /// Share of the squared torque by which the same torques differ at most, and others at least.
 const SAME: f64 = 0.1;
 const OTHER: f64 = 0.5;
@@ -38,6 +47,8 @@ const UNRELATED: f64 = 0.3;
 /// A joint runs away if its mean velocity is at least this share of its mean speed. In an oscillation the torque of a
 /// late drive is opposite to the acceleration.
 const ONE_WAY: f64 = 0.8;
+/// Joints that move with less than this share of the fastest joint's speed are moved by other joints.
+const LEAST_SPEED: f64 = 0.5;
 
 /// Limits that are tried, as shares of the largest logged torque.
 const LIMIT_SHARES: core::ops::Range<usize> = 4..40;
@@ -64,8 +75,8 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
     let rows =
         |all: &[f64]| -> Vec<Vec<f64>> { all.chunks_exact(record.samples).map(|own| own[first..].to_vec()).collect() };
     let logged = rows(&record.tau);
-    let commanded = DELAYS_S.iter().filter_map(|&delay_s| {
-        let commanded = observed.commanded(run.controller, run.model, &[delay_s, delay_s, 0.0, 0.0, 0.0])?;
+    let commanded = DELAYS_S.iter().filter_map(|&[position_s, velocity_s]| {
+        let commanded = observed.commanded(run.controller, run.model, &[position_s, velocity_s, 0.0, 0.0, 0.0])?;
         Some(by_command(&logged, &rows(&commanded)))
     });
     let mut whole = commanded.filter(|found: &Vec<Assignment>| found.iter().all(|own| *own != Assignment::Open));
@@ -114,9 +125,11 @@ fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
 /// Whose torque each joint's acceleration follows.
 fn by_motion([velocities, accelerations]: &[Vec<Vec<f64>>; 2], torques: &[Vec<f64>]) -> Vec<Assignment> {
     let joints = torques.len();
+    let speed = |joint: usize| velocities[joint].iter().map(|dq| dq.abs()).sum::<f64>();
+    let fastest = (0..joints).map(speed).fold(0.0, f64::max);
     let runs_away = |joint: usize| {
-        let speeds: f64 = velocities[joint].iter().map(|dq| dq.abs()).sum();
-        velocities[joint].iter().sum::<f64>().abs() >= ONE_WAY * speeds
+        let is_one_way = velocities[joint].iter().sum::<f64>().abs() >= ONE_WAY * speed(joint);
+        is_one_way && speed(joint) >= LEAST_SPEED * fastest
     };
     let follows = |to: usize, from: usize| {
         let (a, b) = (centred(&accelerations[to]), centred(&torques[from]));

@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::inputs::read_result;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{
-    DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset, Shortfall, TorqueCheck,
-    WarmUp,
+    CommandSource, DifferentiatorChoice, HeldOutRun, LoweredBandwidth, Oscillation, RunEvidence, RunOffset, Shortfall,
+    TorqueCheck, WarmUp,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -112,6 +112,18 @@ impl IterationsFile {
                 each.join("; ")
             )
         })
+    }
+
+    /// What the torque check of the last good run could not check; none where it checked everything.
+    pub fn unchecked_torque(&self) -> Option<&'static str> {
+        let last = self.runs.iter().rfind(|run| run.accepted)?;
+        match last.torque_check.as_ref().map(|check| check.source) {
+            None => Some("the logged against the commanded torque"),
+            Some(CommandSource::PathOnly) => {
+                Some("a torque scale that all joints share, because the drives close their own loop")
+            }
+            Some(CommandSource::Controller | CommandSource::FeedForward) => None,
+        }
     }
 
     /// Joints whose torque oscillates in the log of a run, a sentence for each.
