@@ -41,7 +41,7 @@ const OTHER: f64 = 0.5;
 const CLEARLY_BETTER: f64 = 0.25;
 /// Correlation between torque and acceleration: of a joint that moves against this torque, negative, at least; of one
 /// that moves by it, at least; of one that moves by another torque, at most.
-const OPPOSITE: f64 = 0.8;
+const OPPOSITE: f64 = 0.7;
 const FOLLOWS: f64 = 0.9;
 const UNRELATED: f64 = 0.3;
 /// A joint runs away if its mean velocity is at least this share of its mean speed. In an oscillation the torque of a
@@ -79,15 +79,23 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
         let commanded = observed.commanded(run.controller, run.model, &[position_s, velocity_s, 0.0, 0.0, 0.0])?;
         Some(by_command(&logged, &rows(&commanded)))
     });
-    let mut whole = commanded.filter(|found: &Vec<Assignment>| found.iter().all(|own| *own != Assignment::Open));
-    let Some(found) = whole.next() else { return Vec::new() };
-    if found.iter().any(|own| *own != Assignment::Own) {
-        return named(task, &found, false);
+    // The delays that leave the fewest joints open: light joints hold little but noise.
+    let is_open = |own: &Assignment| *own == Assignment::Open;
+    let Some(found) = commanded.min_by_key(|found| found.iter().filter(|own| is_open(own)).count()) else {
+        return Vec::new();
+    };
+    let in_log = named(task, &found, false);
+    if !in_log.is_empty() {
+        return in_log;
     }
     let weight = rows(&gravity_along(task, &observed));
     let less_gravity =
         logged.iter().zip(&weight).map(|(tau, weight)| tau.iter().zip(weight).map(|(a, b)| a - b).collect());
-    named(task, &by_motion(&[rows(&observed.dq), rows(&observed.ddq)], &less_gravity.collect::<Vec<_>>()), true)
+    let by_motion = by_motion(&[rows(&observed.dq), rows(&observed.ddq)], &less_gravity.collect::<Vec<_>>());
+    let is_commanded =
+        |(in_log, moved): (&Assignment, &Assignment)| if is_open(in_log) { Assignment::Open } else { *moved };
+    let moved: Vec<Assignment> = found.iter().zip(&by_motion).map(is_commanded).collect();
+    named(task, &moved, true)
 }
 
 /// Whose torque a joint has.
