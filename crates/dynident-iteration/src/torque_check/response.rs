@@ -2,9 +2,9 @@
 //! one, and a robot that runs away is stopped before the log is long enough for a fit.
 //!
 //! * Exchanged joints and a reversed sign show within tenths of a second. In the log: the torque of joint i is the
-//!   command of joint j, or its own with the opposite sign. In the motion, where the log holds the commanded torque: the
-//!   acceleration of joint i follows the torque of joint j less gravity, or falls as its own rises. Constants are free,
-//!   so that a wrong mass does not matter.
+//!   command of joint j, its own with the opposite sign, or its own up to a limit. In the motion, where the log holds
+//!   the commanded torque: the acceleration of joint i follows the torque of joint j less gravity, or falls as its own
+//!   rises. Constants are free, so that a wrong mass does not matter.
 //! * A drive at its limit: the rows of the joint fit a model much better with its torque limited,
 //!   `clamp(τ_j, ±L) = W_j θ_j + friction`, than as logged. θ_j is free, so that no description is needed.
 
@@ -50,7 +50,11 @@ const ONE_WAY: f64 = 0.8;
 /// Joints that move with less than this share of the fastest joint's speed are moved by other joints.
 const LEAST_SPEED: f64 = 0.5;
 
-/// Limits that are tried, as shares of the largest logged torque.
+/// Limits of a logged torque that are tried, as shares of its largest value: noise lifts that above the limit.
+const NEAR_HIGHEST: [f64; 5] = [0.92, 0.94, 0.96, 0.98, 1.0];
+/// A command beyond a limit exceeds it by this factor.
+const BEYOND: f64 = 1.05;
+/// Limits that are tried in a motion, as shares of the largest logged torque.
 const LIMIT_SHARES: core::ops::Range<usize> = 4..40;
 const ALL_SHARES: f64 = 40.0;
 /// Share of the squared relative residual that a limit has to explain.
@@ -77,14 +81,15 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
     let logged = rows(&record.tau);
     let commanded = DELAYS_S.iter().filter_map(|&[position_s, velocity_s]| {
         let commanded = observed.commanded(run.controller, run.model, &[position_s, velocity_s, 0.0, 0.0, 0.0])?;
-        Some(by_command(&logged, &rows(&commanded)))
+        let commanded = rows(&commanded);
+        Some((by_command(&logged, &commanded), commanded))
     });
     // The delays that leave the fewest joints open: light joints hold little but noise.
     let is_open = |own: &Assignment| *own == Assignment::Open;
-    let Some(found) = commanded.min_by_key(|found| found.iter().filter(|own| is_open(own)).count()) else {
-        return Vec::new();
-    };
-    let in_log = named(task, &found, false);
+    let open = |found: &[Assignment]| found.iter().filter(|own| is_open(own)).count();
+    let Some((found, commanded)) = commanded.min_by_key(|(found, _)| open(found)) else { return Vec::new() };
+    let exchanged = named(task, &found, false);
+    let in_log = if exchanged.is_empty() { limits_in_log(task, &logged, &commanded) } else { exchanged };
     if !in_log.is_empty() {
         return in_log;
     }
@@ -96,6 +101,22 @@ pub(super) fn early_causes(task: &IterationTask, run: &CheckedRun<'_>) -> Vec<To
         |(in_log, moved): (&Assignment, &Assignment)| if is_open(in_log) { Assignment::Open } else { *moved };
     let moved: Vec<Assignment> = found.iter().zip(&by_motion).map(is_commanded).collect();
     named(task, &moved, true)
+}
+
+/// Joints whose logged torque stays at a limit that the command exceeds.
+fn limits_in_log(task: &IterationTask, logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<TorqueCause> {
+    let of_joint = |joint: usize| {
+        let (y, u) = (&logged[joint], &commanded[joint]);
+        let highest = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+        let left = |limit: f64| y.iter().zip(u).map(|(y, u)| (y - u.clamp(-limit, limit)).powi(2)).sum::<f64>();
+        let limits = NEAR_HIGHEST.map(|share| share * highest).into_iter();
+        let (torque, least) = limits.map(|limit| (limit, left(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let beyond = u.iter().filter(|u| u.abs() > BEYOND * torque).count();
+        let is_limited = beyond >= FEWEST_AT_LIMIT && least < CLEARLY_BETTER * left(f64::INFINITY);
+        let joint = task.robot.joint_names()[joint].clone();
+        is_limited.then_some(TorqueCause::Clipped { joint, torque, is_commanded: false })
+    };
+    (0..logged.len()).filter_map(of_joint).collect()
 }
 
 /// Whose torque a joint has.
@@ -196,8 +217,8 @@ pub(super) fn limit_causes(data: &JointData<'_>) -> Vec<TorqueCause> {
     (0..data.torque.len()).filter_map(of_joint).collect()
 }
 
-/// The limit of a joint's torque that its motion shows, Nm (N), although the log holds a larger one; none where no limit
-/// explains the motion clearly better.
+/// The limit of a joint's torque that its motion shows, Nm (N), although the log holds a larger one; none where no
+/// limit explains the motion clearly better.
 fn limit_in_motion(data: &JointData<'_>, joint: usize) -> Option<f64> {
     let y = &data.torque[joint];
     let columns: Vec<Vec<f64>> = model_columns(data, joint).into_iter().chain(friction_columns(data, joint)).collect();

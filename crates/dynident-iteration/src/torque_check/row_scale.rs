@@ -7,11 +7,11 @@
 //! `τ_j = (1 + κ_j) W_j θ ≈ W_j θ + κ_j W_j θ̂`
 //!
 //! which is linear in θ and κ ([`with_free_gains`]). A scale that all joints share only changes θ, so that it cannot be
-//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ
-//! makes the rows most likely is taken as wrong, and the others are tested again with its κ free. Errors of the model
-//! (stiction, backlash) move the scales of all joints, so that a deviation also has to exceed theirs. Parameters that one
-//! joint alone determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little
-//! with the others gets a wide bar.
+//! seen. Each joint is tested against all others: its κ is free, theirs are zero. The joint whose κ makes the rows most
+//! likely is taken as wrong, and the others are tested again with its κ free. Errors of the model (stiction, backlash)
+//! move the scales of all joints, so that a deviation also has to exceed theirs. Parameters that one joint alone
+//! determines (its friction and drive inertia) contribute nothing; a joint whose torque shares too little with the
+//! others gets a wide bar.
 
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
