@@ -67,7 +67,7 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     {
         text += &wrapped(&format!("NOTE: {sentence}."), 4);
     }
-    if let Some(what) = file.unchecked_torque() {
+    for what in file.unchecked_torque() {
         text += &wrapped(&format!("NOT checked: {what}."), 4);
     }
     for unmet in &file.unmet {

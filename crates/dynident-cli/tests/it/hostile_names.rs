@@ -252,8 +252,8 @@ fn code_in_names_is_not_code_in_exports() {
         run(at, &rustc, &["--edition=2021", "--crate-type=lib", "--emit=metadata", "-Dwarnings", "all.rs"]);
     }
     if has("octave-cli", &["--version"]) {
-        std::fs::write(at.join("all.m"), octave).unwrap();
-        run(at, "octave-cli", &["--norc", "--quiet", "all.m"]);
+        std::fs::write(at.join("every_export.m"), octave).unwrap();
+        run(at, "octave-cli", &["--norc", "--quiet", "every_export.m"]);
     }
     if has("python3", &["--version"]) {
         std::fs::write(at.join("look.py"), LOOK).unwrap();

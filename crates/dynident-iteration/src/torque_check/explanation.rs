@@ -75,7 +75,7 @@ pub(super) struct Explanation {
     pub(super) matters: bool,
     /// Square of the difference as a share of the square of the torque.
     pub(super) difference_share: f64,
-    /// Whether a difference without a cause is reported: one from a completely known control law.
+    /// Whether a difference without a cause is reported: one from a completely known control law, or a scale.
     pub(super) is_certain: bool,
     /// All candidates, the best first; empty where the difference does not matter.
     pub(super) candidates: Vec<Fitted>,
@@ -120,7 +120,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
         commanded: y.iter().zip(&difference).map(|(y, r)| y - r).collect(),
         matters,
         difference_share: total / (size * size * y.len().max(1) as f64),
-        is_certain: own_loop.is_empty(),
+        is_certain: own_loop.is_empty() || is_scaled,
         candidates: Vec::new(),
     };
     if !matters {

@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn joints_that_run_away_by_each_other_s_torque_are_found() {
-        let (first, second) = (series(|t| (4.0 * t).exp()), series(|t| 1.0 - 4.0 * (t - 0.5).powi(2)));
+        let (first, second) = (series(|t| (4.0 * t).exp()), series(|t| 20.0 - 80.0 * (t - 0.5).powi(2)));
         let motion = [vec![first.clone(), second.clone()], vec![first.clone(), second.clone()]];
         let found = by_motion(&motion, &[second, first]);
         assert_eq!(found, [Assignment::Other(1), Assignment::Other(0)]);

@@ -35,8 +35,10 @@ const AS_LIKELY: f64 = 6.0;
 
 /// Ratio of the median absolute deviation of a normal distribution to its standard deviation.
 const MEDIAN_TO_STD: f64 = 0.6745;
-/// Fewest other joints whose deviations show the error of the model.
+/// Fewest other joints whose deviations show the error of the model, and the spread that is assumed of fewer. Of an
+/// honest SCARA, whose first two joints alone share parameters, five standard deviations were seen.
 const FEWEST_OTHERS: usize = 3;
+const SPREAD_OF_FEW: f64 = 2.0;
 
 /// The scale of one joint's torque relative to the other joints.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,7 +148,7 @@ fn spread(found: &[Option<Kappa>], chosen: &[usize]) -> f64 {
     let others = found.iter().enumerate().filter(|(joint, _)| !chosen.contains(joint));
     let mut sizes: Vec<f64> = others.filter_map(|(_, kappa)| kappa.map(|own| (own.value / own.std).abs())).collect();
     sizes.sort_by(f64::total_cmp);
-    if sizes.len() < FEWEST_OTHERS { 1.0 } else { (sizes[sizes.len() / 2] / MEDIAN_TO_STD).max(1.0) }
+    if sizes.len() < FEWEST_OTHERS { SPREAD_OF_FEW } else { (sizes[sizes.len() / 2] / MEDIAN_TO_STD).max(1.0) }
 }
 
 /// The deviation of a joint's scale.

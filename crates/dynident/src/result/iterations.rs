@@ -114,16 +114,20 @@ impl IterationsFile {
         })
     }
 
-    /// What the torque check of the last good run could not check; none where it checked everything.
-    pub fn unchecked_torque(&self) -> Option<&'static str> {
-        let last = self.runs.iter().rfind(|run| run.accepted)?;
-        match last.torque_check.as_ref().map(|check| check.source) {
-            None => Some("the logged against the commanded torque"),
-            Some(CommandSource::PathOnly) => {
-                Some("a torque scale that all joints share, because the drives close their own loop")
-            }
-            Some(CommandSource::Controller | CommandSource::FeedForward) => None,
-        }
+    /// What the torque check of the last good run could not check; empty where it checked everything.
+    pub fn unchecked_torque(&self) -> Vec<String> {
+        let Some(last) = self.runs.iter().rfind(|run| run.accepted) else { return Vec::new() };
+        let Some(check) = &last.torque_check else { return vec!["the logged against the commanded torque".to_owned()] };
+        let alone = self.joints.iter().zip(&check.joints).filter(|(_, joint)| joint.row_scale.is_none());
+        let alone: Vec<&str> = alone.map(|(name, _)| &**name).collect();
+        let common = "a torque scale that all joints share, because the drives close their own loop";
+        let gains = format!(
+            "whether the drives of {} deliver the logged torque: their masses and inertias enter no other joint's torque \
+             clearly enough",
+            alone.join(", ")
+        );
+        let is_path_only = check.source == CommandSource::PathOnly;
+        is_path_only.then(|| common.to_owned()).into_iter().chain((!alone.is_empty()).then_some(gains)).collect()
     }
 
     /// Joints whose torque oscillates in the log of a run, a sentence for each.
