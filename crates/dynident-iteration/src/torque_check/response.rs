@@ -54,6 +54,8 @@ const LEAST_SPEED: f64 = 0.5;
 const NEAR_HIGHEST: [f64; 5] = [0.92, 0.94, 0.96, 0.98, 1.0];
 /// A command beyond a limit exceeds it by this factor.
 const BEYOND: f64 = 1.05;
+/// Share of the squared torque that a limited command leaves at most.
+const AT_LIMIT: f64 = 0.02;
 /// Limits that are tried in a motion, as shares of the largest logged torque.
 const LIMIT_SHARES: core::ops::Range<usize> = 4..40;
 const ALL_SHARES: f64 = 40.0;
@@ -112,7 +114,8 @@ fn limits_in_log(task: &IterationTask, logged: &[Vec<f64>], commanded: &[Vec<f64
         let limits = NEAR_HIGHEST.map(|share| share * highest).into_iter();
         let (torque, least) = limits.map(|limit| (limit, left(limit))).min_by(|a, b| a.1.total_cmp(&b.1))?;
         let beyond = u.iter().filter(|u| u.abs() > BEYOND * torque).count();
-        let is_limited = beyond >= FEWEST_AT_LIMIT && least < CLEARLY_BETTER * left(f64::INFINITY);
+        let explains = least < AT_LIMIT * square(y) && least < CLEARLY_BETTER * left(f64::INFINITY);
+        let is_limited = beyond >= FEWEST_AT_LIMIT && explains;
         let joint = task.robot.joint_names()[joint].clone();
         is_limited.then_some(TorqueCause::Clipped { joint, torque, is_commanded: false })
     };
