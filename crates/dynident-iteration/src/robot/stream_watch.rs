@@ -54,7 +54,7 @@ struct Pace {
     /// Smallest delay of the window, s.
     delay_s: f64,
     /// Least and largest of the smallest delays of whole windows, s.
-    delays_s: Option<(f64, f64)>,
+    extremes: Option<(f64, f64)>,
 }
 
 impl StreamWatch {
@@ -70,7 +70,7 @@ impl StreamWatch {
             first: new,
             last: new,
             samples: 0,
-            pace: Pace { since_s: motion_s, window_s: motion_s, delay_s: f64::INFINITY, delays_s: None },
+            pace: Pace { since_s: motion_s, window_s: motion_s, delay_s: f64::INFINITY, extremes: None },
             is_known: false,
         });
         stream.last = new;
@@ -114,12 +114,12 @@ impl Pace {
         if motion_s - self.window_s < 0.5 * usual_s {
             return;
         }
-        let (least, largest) = self.delays_s.unwrap_or((self.delay_s, self.delay_s));
+        let (least, largest) = self.extremes.unwrap_or((self.delay_s, self.delay_s));
         let (least, largest) = (least.min(self.delay_s), largest.max(self.delay_s));
         if largest - least <= JITTER_S + CLOCK_DRIFT * (motion_s - self.since_s) {
-            self.delays_s = Some((least, largest));
+            self.extremes = Some((least, largest));
         } else {
-            self.delays_s = Some((self.delay_s, self.delay_s));
+            self.extremes = Some((self.delay_s, self.delay_s));
             self.since_s = motion_s;
         }
         (self.window_s, self.delay_s) = (motion_s, f64::INFINITY);
