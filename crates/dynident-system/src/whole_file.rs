@@ -17,12 +17,17 @@ const MAX_NAME_BYTES: usize = 200;
 const ATTEMPTS: usize = 100;
 
 /// Writes a file through a temporary file in the same folder. A reader finds the old file or the new one, never a part,
-/// and an error changes nothing. Temporary files of this file that writers left when they were killed are removed;
-/// those of running writers are locked and stay.
+/// and an error changes nothing. A symbolic link is replaced by the file. Temporary files of this file that writers
+/// left when they were killed are removed; those of running writers are locked and stay.
 ///
 /// # Errors
-/// The system's reason.
+/// The system's reason, and [`io::ErrorKind::InvalidInput`] for a device, a pipe or a socket, which the file would
+/// replace: a superuser would lose `/dev/null` or `/dev/stdout`.
 pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
+    if is_special(path) {
+        let problem = "it is a device, a pipe or a socket, which would be replaced: give the name of a regular file";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;
     let prefix = temporary_prefix(path.file_name().unwrap_or_default());
@@ -37,6 +42,13 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
         file.as_file().set_permissions(fs::Permissions::from_mode(0o644))?;
     }
     file.persist(path).map(drop).map_err(|error| error.error)
+}
+
+/// Whether a path leads to a device, a pipe or a socket, or through a link to an open file of this process:
+/// `/dev/stdout` is a link into `/proc`, also where standard output is a regular file.
+fn is_special(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+        || fs::read_link(path).is_ok_and(|target| target.starts_with("/proc"))
 }
 
 /// Tests whether a file can be created in `folder`, or in the nearest folder above it that exists. Leaves nothing.
@@ -133,6 +145,31 @@ mod tests {
         let written = fs::read(&path).unwrap();
         assert!(written.len() == 1000 && written.iter().all(|byte| *byte == written[0]));
         assert_eq!(names(folder.path()).unwrap(), ["model.json"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn only_regular_files_and_links_are_replaced() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let refused =
+            |path: &Path| assert_eq!(write_whole(path, b"text").unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
+        symlink("/dev/null", at("device")).unwrap();
+        symlink("/proc/self/fd/1", at("stdout")).unwrap();
+        for name in ["pipe", "device", "stdout"] {
+            refused(&at(name));
+        }
+        assert!(!fs::metadata(at("pipe")).unwrap().is_file() && at("device").is_symlink());
+        fs::write(at("other"), "old").unwrap();
+        symlink(at("other"), at("link")).unwrap();
+        write_whole(&at("link"), b"text").unwrap();
+        assert_eq!(
+            (fs::read(at("link")).unwrap(), fs::read(at("other")).unwrap()),
+            (b"text".to_vec(), b"old".to_vec())
+        );
+        assert_eq!(names(folder.path()).unwrap(), ["device", "link", "other", "pipe", "stdout"]);
     }
 
     #[test]

@@ -24,6 +24,10 @@ const NAMES: &str = "names";
 /// Where there are no links: the old files on their way out, and that all of them are, so that the new ones follow.
 const MOVED: &str = "moved";
 const DECIDED: &str = "decided";
+/// Folders of a stage that hold files under the names of the set.
+const PARTS: [&str; 6] = [NEW, OLD, PLACE_NEW, PLACE_OLD, LINKS, MOVED];
+/// Largest list of names that is read, bytes.
+const MAX_NAMES_BYTES: u64 = 1 << 20;
 
 /// How long another program may take with its own set in the same folder.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -306,11 +310,9 @@ impl Stage {
 /// Clears up after a program that was killed: links give way to the files of the set that is in force.
 fn settle_interrupted(folder: &Path) {
     let stages = names(folder).unwrap_or_default().into_iter().filter(|name| name.to_string_lossy().starts_with(STAGE));
-    for path in stages.map(|name| folder.join(name)) {
-        let names = fs::read_to_string(path.join(NAMES)).unwrap_or_default();
-        let inside = |name: &&str| Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-        let names = names.lines().filter(inside).map(str::to_owned).collect();
-        let stage = Stage { folder: folder.to_owned(), path, names };
+    for stage in stages {
+        let Some(names) = names_of_stage(folder, Path::new(&stage)) else { continue };
+        let stage = Stage { folder: folder.to_owned(), path: folder.join(stage), names };
         if stage.path.join(DECIDED).exists() {
             let _ = stage.put_rest();
         } else if stage.path.join(MOVED).exists() {
@@ -319,6 +321,27 @@ fn settle_interrupted(folder: &Path) {
             stage.settle();
         }
     }
+}
+
+/// Names of the set in a stage that was found in `folder`. The folder may come from a stranger, so a stage is left as
+/// it is (`None`) if a name or a symbolic link leads out of it or out of `folder`: moving its files would overwrite or
+/// remove files elsewhere.
+fn names_of_stage(folder: &Path, stage: &Path) -> Option<Vec<String>> {
+    let is_through_link = |way: &Path| {
+        let mut above = way.ancestors().skip(1).filter(|above| !above.as_os_str().is_empty());
+        above.any(|above| fs::symlink_metadata(folder.join(above)).is_ok_and(|found| found.is_symlink()))
+    };
+    let is_inside = |name: &String| {
+        Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
+            && !is_through_link(Path::new(name))
+            && PARTS.iter().all(|part| !is_through_link(&stage.join(part).join(name)))
+    };
+    if is_through_link(&stage.join(NAMES)) {
+        return None;
+    }
+    let text = dynident_files::read_text(&folder.join(stage).join(NAMES), MAX_NAMES_BYTES).unwrap_or_default();
+    let names: Vec<String> = text.lines().map(str::to_owned).collect();
+    names.iter().all(is_inside).then_some(names)
 }
 
 /// Keeps what stands at a place under two names: one to be read, one to be put back. A link of the user's own leads

@@ -5,7 +5,7 @@
 
 use dynident::model::sample::Random;
 use dynident::{Error, OutputSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -85,6 +85,71 @@ fn killed_at_any_moment_one_whole_set_is_there() {
     assert!(NAMES.iter().all(|name| !folder.path().join(name).is_symlink()));
     assert_eq!(std::fs::read_to_string(folder.path().join("notes.txt")).unwrap(), "the user's own");
     println!("{last} sets written, {interrupted} kills in the middle of one");
+}
+
+/// A stage that a stranger prepared in `folder`: it moves `name` from its new files to its place.
+fn prepared_stage(folder: &Path, name: &str) -> PathBuf {
+    let stage = folder.join(".dynident-set-abcdef");
+    std::fs::create_dir_all(stage.join("new")).unwrap();
+    std::fs::write(stage.join("names"), name).unwrap();
+    std::fs::write(stage.join("decided"), "").unwrap();
+    stage
+}
+
+/// Checks that the next set is written and that the file outside of the folder is still there.
+fn assert_next_set_keeps_outside(folder: &Path, outside: &Path) {
+    set(folder, 1, 10).write().unwrap();
+    assert_eq!(found(folder), Some(1));
+    assert_eq!(std::fs::read_to_string(outside.join("key")).unwrap(), "own");
+}
+
+#[test]
+fn a_prepared_stage_moves_no_files_outside_of_its_folder() {
+    use std::os::unix::fs::symlink;
+    let root = tempfile::tempdir().unwrap();
+    let outside = root.path().join("outside");
+    std::fs::create_dir(&outside).unwrap();
+    std::fs::write(outside.join("key"), "own").unwrap();
+    let output = |name: &str| {
+        let folder = root.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        folder
+    };
+    // A folder above the file's place is a link: the file would be overwritten.
+    let folder = output("place");
+    symlink(&outside, folder.join("link")).unwrap();
+    let stage = prepared_stage(&folder, "link/key");
+    std::fs::create_dir(stage.join("new/link")).unwrap();
+    std::fs::write(stage.join("new/link/key"), "foreign").unwrap();
+    assert_next_set_keeps_outside(&folder, &outside);
+    // The folder of the new files is a link, or one below it: the file would be moved away.
+    let folder = output("new");
+    let stage = prepared_stage(&folder, "key");
+    std::fs::remove_dir(stage.join("new")).unwrap();
+    symlink(&outside, stage.join("new")).unwrap();
+    assert_next_set_keeps_outside(&folder, &outside);
+    let folder = output("below");
+    let stage = prepared_stage(&folder, "link/key");
+    std::fs::create_dir(folder.join("link")).unwrap();
+    symlink(&outside, stage.join("new/link")).unwrap();
+    assert_next_set_keeps_outside(&folder, &outside);
+    // The stage itself is a link.
+    let folder = output("stage");
+    let stage = prepared_stage(root.path(), "new/key");
+    std::fs::create_dir(stage.join("new/new")).unwrap();
+    std::fs::write(stage.join("new/new/key"), "own").unwrap();
+    symlink(&stage, folder.join(".dynident-set-abcdef")).unwrap();
+    assert_next_set_keeps_outside(&folder, &stage.join("new/new"));
+}
+
+#[test]
+fn a_stage_with_a_pipe_for_its_names_does_not_block() {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = prepared_stage(folder.path(), "");
+    std::fs::remove_file(stage.join("names")).unwrap();
+    assert!(Command::new("mkfifo").arg(stage.join("names")).status().unwrap().success());
+    set(folder.path(), 1, 10).write().unwrap();
+    assert_eq!((found(folder.path()), stages(folder.path())), (Some(1), 0));
 }
 
 /// Stages of sets on their way.

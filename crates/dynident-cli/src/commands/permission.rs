@@ -6,6 +6,7 @@ use dynident::iteration::{NextMotion, RunPurpose};
 use dynident::model::Robot;
 use dynident::study::{RobotChoice, Study};
 use dynident::{Error, LoadSettings, ProgramPermission, ProgramRequest, XacroSettings, load_robot};
+use dynident_text::one_line;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::io::IsTerminal;
@@ -100,7 +101,7 @@ impl Decisions {
             return decision;
         }
         let command = request.command_line();
-        let question = format!("{}:\n  {command}\nStart it?", request.purpose);
+        let question = permission_question(request);
         let decision = self.is_allowed || agreed(&question).unwrap_or(false);
         if decision {
             terminal::remark(&format!("starting {}: {command}", request.purpose));
@@ -108,6 +109,24 @@ impl Decisions {
         self.made.borrow_mut().insert(request.command.clone(), decision);
         decision
     }
+}
+
+/// Length from which a command may fill a screen, so that its beginning is out of sight, characters.
+const LONG_COMMAND: usize = 500;
+
+/// The question whether a program may be started. The command is on one line, and the last line names a long one's
+/// program and length: a hostile command cannot scroll its beginning away and end with a question of its own.
+fn permission_question(request: &ProgramRequest) -> String {
+    let command = request.command_line();
+    let command = one_line(&command);
+    let length = command.chars().count();
+    let program = request.command.first().map_or("", String::as_str);
+    let which = if length > LONG_COMMAND {
+        format!("The command has {length} characters; its program is {}. ", one_line(program))
+    } else {
+        String::new()
+    };
+    format!("{}:\n  {command}\n{which}Start it?", request.purpose)
 }
 
 /// Asks before a motion.
@@ -173,4 +192,25 @@ pub(crate) fn agreed(question: &str) -> Option<bool> {
     }
     let answer = text_asked(&format!("{question} [y/N]")).unwrap_or_default();
     Some(matches!(answer.to_lowercase().as_str(), "y" | "yes"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::permission_question;
+    use dynident::{ProgramPurpose, ProgramRequest};
+
+    #[test]
+    fn a_command_cannot_hide_its_beginning() {
+        let question = |command: &[&str]| {
+            permission_question(&ProgramRequest::new(
+                ProgramPurpose::Robot,
+                command.iter().map(|word| (*word).to_owned()),
+            ))
+        };
+        assert_eq!(question(&["python3", "robot.py"]), "the program of the robot:\n  python3 robot.py\nStart it?");
+        let lines = question(&["sh", "-c", &format!("evil{}python3 robot.py\nStart it?", "\n".repeat(50))]);
+        assert_eq!(lines.lines().count(), 3, "{lines}");
+        let blanks = question(&["sh", "-c", &format!("evil{}python3 robot.py", " ".repeat(5000))]);
+        assert!(blanks.ends_with("\nThe command has 5028 characters; its program is sh. Start it?"), "{blanks}");
+    }
 }

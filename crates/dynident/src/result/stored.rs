@@ -74,7 +74,7 @@ impl ResultFile {
     /// # Errors
     /// As [`read`](Self::read), but for the hash.
     pub fn read_edited(path: &Path) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let bytes = read_result(path)?;
         Self::checked(&bytes, path, Edits::Accepted)
     }
 
@@ -276,5 +276,22 @@ impl StoredPayloads {
     pub(crate) fn base_values(&self, carried: Option<&String>, theta: &[f64]) -> Vec<f64> {
         let added = self.added.iter().find(|(name, _)| Some(name) == carried);
         theta.iter().enumerate().map(|(k, value)| value + added.map_or(0.0, |(_, added)| added[k])).collect()
+    }
+}
+
+#[cfg(unix)]
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edited_result_is_a_regular_file_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("r.json");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [&*pipe, Path::new("/dev/zero")] {
+            let error = ResultFile::read_edited(path).unwrap_err().to_string();
+            assert!(error.contains("not a regular file"), "{error}");
+        }
     }
 }
