@@ -103,7 +103,8 @@ pub enum Shortfall {
         /// Half the width of its 95 % interval.
         half_width_95_s: f64,
     },
-    /// A lag that was taken off the rows, but so long that the robot is not where its log says.
+    /// A compensated lag that is longer than allowed by more than its 95 % interval: the robot is not where the log
+    /// shows it.
     #[error("torque and motion of the log are {:.1} ms apart, {:.1} ms are allowed", 1e3 * .lag_s, 1e3 * .allowed_s)]
     LongLag {
         /// The longest lag of a joint, s.
@@ -311,8 +312,8 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
     if let Some(lag) = own.and_then(|own| unexplained_lag(&own.lag, &evidence.log_rates_hz)) {
         found.push(Shortfall::Lag { lag_s: lag.lag_s, half_width_95_s: lag.half_width_95_s });
     }
-    if let Some(lag_s) = last.knowledge().map(|known| known.lag.longest_s()).filter(|lag_s| *lag_s > names.most_lag_s) {
-        found.push(Shortfall::LongLag { lag_s, allowed_s: names.most_lag_s });
+    if let Some(lag) = last.knowledge().map(|known| &known.lag).filter(|lag| lag.certain_s() > names.most_lag_s) {
+        found.push(Shortfall::LongLag { lag_s: lag.longest_s(), allowed_s: names.most_lag_s });
     }
     for (place, shown) in evidence.joints.iter().enumerate() {
         if let Some((now, then)) = changed_lag(&good, place) {

@@ -63,7 +63,8 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
         text += &wrapped(&format!("note: {note}"), 2);
     }
     if d.given.is_none() {
-        let _ = writeln!(text, "\n{} evaluations in {:.2} s, seed {}", d.evaluations, d.seconds, d.seed);
+        let stopped = if d.stopped { "; stopped before its end" } else { "" };
+        let _ = writeln!(text, "\n{} evaluations in {:.2} s, seed {}{stopped}", d.evaluations, d.seconds, d.seed);
     }
     text += &wrapped(&format!("wrote {}, {}", out.join("design.json").display(), files.join(", ")), 2);
     text

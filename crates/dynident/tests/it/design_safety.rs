@@ -173,7 +173,7 @@ fn a_joint_without_stops_stays_within_a_turn_of_its_start() {
         assert!((first[0] - about).abs() <= PI, "{}", first[0]);
         assert!(first.iter().all(|q| (q - first[0]).abs() <= 2.0 * PI + 1e-6));
         assert!(outcome.file.feasible && outcome.file.assumed.iter().any(|line| line.contains("continuous_turns")));
-        assert!(start.is_empty() || first[0] == 20.0);
+        assert!(!outcome.file.stopped && (start.is_empty() || first[0] == 20.0));
     }
     // The key switches it off, and that is listed.
     let design = "duration_s = 6.0\ntorque_std_nm = 1.0\ndefaults.continuous_turns = 0.0";
@@ -207,6 +207,7 @@ fn a_design_ends_in_every_part_of_it() {
         })
         .unwrap();
         assert!(ended.load(Ordering::SeqCst), "{round} was never come to");
+        assert!(outcome.file.stopped, "{round}: design.json does not record that it was stopped");
         assert!(asked.load(Ordering::SeqCst) <= 20, "{round}: {asked:?}");
         let whole_hz = outcome.robot.model().own_scale().round_hertz(10_000.0);
         let rate_hz = if round == "changes of limits" { whole_hz } else { 0.1 * whole_hz };

@@ -25,6 +25,7 @@ use crate::jobs::provenance::motion_provenance;
 use crate::result::WindowedFile;
 use crate::study::{CriterionChoice, DesignSection, Study};
 use core::ops::ControlFlow;
+use core::sync::atomic::{AtomicBool, Ordering};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::{DesignProgress, Motion, grid};
 use limit_check::LimitCheck;
@@ -55,6 +56,12 @@ pub fn design_study(
     // A search takes long: the files may change once they have been read and hashed.
     let provenance =
         setup.inputs.while_unchanged(|| motion_provenance(study, study_path, options.data.as_deref(), &[]))?;
+    let is_stopped = AtomicBool::new(false);
+    let watch = |progress: &DesignProgress| {
+        let answer = watch(progress);
+        is_stopped.fetch_or(answer.is_break(), Ordering::Relaxed);
+        answer
+    };
 
     // The best motion of the family.
     let found = match &setup.section.criterion {
@@ -84,7 +91,9 @@ pub fn design_study(
     let information = setup.information(&times, &motion_at);
     let review = MotionReview { duration_s, rate_hz, information, check };
     let origin = MotionOrigin::search(&setup, found);
-    Ok(DesignOutcome::new(setup, origin, review).with_provenance(provenance))
+    let mut outcome = DesignOutcome::new(setup, origin, review).with_provenance(provenance);
+    outcome.file.stopped = is_stopped.into_inner();
+    Ok(outcome)
 }
 
 /// What a windowed design leaves to the check.

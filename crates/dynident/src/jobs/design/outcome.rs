@@ -166,6 +166,7 @@ impl DesignOutcome {
             evaluations: origin.evaluations,
             cpu_s: setup.stopwatch.cpu_s(),
             seconds: origin.seconds,
+            stopped: false,
             seed: setup.section.search.seed,
             diagnosis: review.check.diagnosis,
             assumed: setup.assumed,
