@@ -1,9 +1,9 @@
 //! How the benchmark calls each estimator.
 
-use super::estimators::{Answer, Trial};
 use super::pipeline;
 use super::rows::Rows;
 use super::scenario::{RATE_HZ, Record, SERIES};
+use super::trial::{Answer, Trial};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimateStatus, EstimationError, InstrumentalSettings, RobustSettings, RowWeight,
     SimultaneousProblem, SimultaneousSettings, SplineMotionProblem, SplineMotionSettings, SplineRecord,

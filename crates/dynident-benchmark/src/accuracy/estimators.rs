@@ -3,47 +3,10 @@
 use super::answers::{
     estimated, instrumental, physical, robust, simultaneous, spline_motion, true_motion, weighted, wide,
 };
-use super::rows::Rows;
-use super::scenario::{Record, Scenario};
-use super::shared::TrialData;
+use super::trial::{Answer, Trial};
 use dynident_estimation::{CovarianceMethod, RowWeight};
 use dynident_identification::IdentificationError;
 use dynident_identification::estimators::{Estimator, NoiseLevels};
-use dynident_recording::MotionBlock;
-
-/// One simulated experiment, as estimators see it.
-#[derive(Debug)]
-pub struct Trial<'a> {
-    /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true
-    /// parameters are for the judge.
-    pub scenario: &'a Scenario,
-    /// What encoders and torque sensors said.
-    pub record: &'a Record,
-    /// The record after the pipeline's own choice of cut-off and differentiator.
-    pub motion: &'a MotionBlock,
-    /// The cut-off chosen from the record.
-    pub cutoff_hz: f64,
-    /// The pipeline's filtered rows.
-    pub rows: &'a Rows<'a>,
-    /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
-    pub start: &'a [f64],
-    /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian
-    /// error, no friction and no drives.
-    pub prior: &'a [f64],
-    /// What several estimators need, made once.
-    pub(super) shared: &'a TrialData<'a>,
-}
-
-/// What an estimator says.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Answer {
-    /// The base parameters.
-    pub values: Vec<f64>,
-    /// Half the width of each value's 95 % interval; none if the estimator gives no error bars.
-    pub half_width_95: Option<Vec<f64>>,
-    /// False when the iterations stopped before they had settled: counts as a failure.
-    pub converged: bool,
-}
 
 /// An entry of the registry.
 #[derive(Clone, Copy, Debug)]

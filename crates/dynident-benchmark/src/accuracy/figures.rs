@@ -1,6 +1,6 @@
 //! From the answers of many runs to the figures of a cell.
 
-use super::estimators::Answer;
+use super::trial::Answer;
 use serde::Serialize;
 
 /// One parameter in one cell.

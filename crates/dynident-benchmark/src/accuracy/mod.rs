@@ -12,19 +12,20 @@ mod pipeline;
 mod robots;
 mod rows;
 mod scenario;
-mod shared;
 mod thread_time;
+mod trial;
 
-pub use estimators::{Answer, BenchmarkEstimator, ESTIMATORS, Trial};
+pub use estimators::{BenchmarkEstimator, ESTIMATORS};
 pub use figures::{CellFigures, ParameterFigures, cells_csv};
 pub use noise::{NOISE_LEVELS, NoiseLevel};
 pub use robots::{BenchmarkRobot, ROBOTS};
 pub use rows::Rows;
 pub use scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
+pub use trial::{Answer, Trial};
 
 use bound_with_motion::BoundWithMotion;
-use shared::TrialData;
 use thread_time::thread_seconds;
+use trial::TrialData;
 
 use dynident_identification::{IdentificationError, Progress};
 use dynident_model::UrdfError;

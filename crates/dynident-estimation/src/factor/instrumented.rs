@@ -1,9 +1,9 @@
 //! Rows that carry instruments: `[Z | W | τ]`, where Z are the same columns from a motion that is free of the noise in
 //! W.
 
-use super::excitation::Unexcited;
 use super::problem::LinearProblem;
 use super::segmented::SegmentedFactor;
+use super::unexcited::Unexcited;
 use crate::error::EstimationError;
 use nalgebra::DMatrix;
 

@@ -18,8 +18,9 @@ mod segmented;
 mod sparse_map;
 mod stored;
 mod triangular;
+mod unexcited;
 
-pub use excitation::{Unexcited, unexcited_columns};
+pub use excitation::unexcited_columns;
 pub use instrumented::InstrumentedProblem;
 pub(crate) use problem::StackedProblem;
 pub use problem::{JointRows, LinearProblem, Prior};
@@ -32,3 +33,4 @@ pub use segmented::{SegmentSettings, SegmentedFactor};
 pub use stored::{FactorShape, SegmentShape};
 pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
 pub(crate) use triangular::{check_columns, check_weight};
+pub use unexcited::Unexcited;

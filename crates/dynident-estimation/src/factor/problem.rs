@@ -1,9 +1,9 @@
 //! The linear problem that all estimators start from: which joint's rows see which columns, and what they hold.
 
-use super::excitation::{Unexcited, answer_of_free};
 use super::rank::{RankSettings, split};
 use super::segmented::SegmentedFactor;
 use super::triangular::{FactorWorkspace, TriangularFactor, check_columns, check_weight};
+use super::unexcited::{Unexcited, answer_of_free};
 use crate::error::{EstimationError, expect};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

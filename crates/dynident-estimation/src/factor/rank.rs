@@ -1,7 +1,7 @@
 //! Which columns the data excite, decided on scaled columns with a stated tolerance; and the solution on those.
 
-use super::excitation::{Unexcited, answer_of_free};
 use super::triangular::{FactorWorkspace, TriangularFactor};
+use super::unexcited::{Unexcited, answer_of_free};
 use crate::error::{EstimationError, within};
 use dynident_dynamics::independent_columns;
 use dynident_lanes::{Kernel, Lane, Level, dispatch};

@@ -1,6 +1,6 @@
 //! Where no single change would do: the smallest changes that do together.
 
-use super::diagnose::{BrokenLimit, LARGEST_STRETCH, Relaxation, broken_limits, change, stretched};
+use super::relaxation::{BrokenLimit, LARGEST_STRETCH, Relaxation, broken_limits, change, stretched};
 use super::set::LimitSet;
 use crate::motion::Motion;
 

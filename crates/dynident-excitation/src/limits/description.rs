@@ -1,6 +1,7 @@
 //! What a user says about limits: plain numbers by joint and link name.
 
 use super::known_torque::KnownTorque;
+use super::link_points::LinkPoint;
 use super::self_collision_shapes::{LinkShape, SelfCollision};
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
@@ -72,21 +73,6 @@ pub struct JointLimit {
     /// Highest mechanical power `|τ q̇|`, W.
     #[serde(default)]
     pub power_w: Option<f64>,
-}
-
-/// A sphere fixed to a link, in most cases of radius zero: the point whose place is limited.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct LinkPoint {
-    /// Name of the link.
-    pub link: String,
-    /// Place in the link's frame, m.
-    #[serde(default)]
-    pub at_m: [f64; 3],
-    /// Radius, m.
-    #[serde(default)]
-    pub radius_m: f64,
 }
 
 /// A box in the base frame that points (with their radius) must not leave.

@@ -2,8 +2,8 @@
 
 use super::description::Limits;
 use super::error::LimitError;
+use super::numbers::{finite, positive};
 use super::set::LimitSet;
-use super::validate::{finite, positive};
 use crate::motion::Motion;
 use dynident_model::Model;
 

@@ -1,8 +1,23 @@
 //! Points of the description, found on the model's bodies.
 
-use super::description::LinkPoint;
 use super::error::LimitError;
 use dynident_model::{Model, Transform, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// A sphere fixed to a link, in most cases of radius zero: the point whose place is limited.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LinkPoint {
+    /// Name of the link.
+    pub link: String,
+    /// Place in the link's frame, m.
+    #[serde(default)]
+    pub at_m: [f64; 3],
+    /// Radius, m.
+    #[serde(default)]
+    pub radius_m: f64,
+}
 
 /// A point fixed to a body (`None`: the base).
 #[derive(Clone, Debug)]

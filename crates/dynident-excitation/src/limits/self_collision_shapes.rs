@@ -2,7 +2,7 @@
 
 use super::error::LimitError;
 use super::link_points::link_place;
-use super::validate::{finite, not_negative, positive};
+use super::numbers::{finite, not_negative, positive};
 use dynident_model::{Model, Vec3};
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,10 @@
 //! Contradictions in limits, found before anything moves.
 
-use super::description::{BoxLimit, JointLimit, Limits, LinkPoint};
+use super::description::{BoxLimit, JointLimit, Limits};
 use super::error::LimitError;
 use super::kind::LimitKind;
-use super::link_points::link_place;
+use super::link_points::{LinkPoint, link_place};
+use super::numbers::{finite, not_negative, positive};
 use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
 
@@ -64,26 +65,6 @@ impl Limits {
         }
         self.self_collision.as_ref().map_or(Ok(()), |limit| limit.validate(model))
     }
-}
-
-/// Below this a limit is zero for every purpose, and its reciprocal may overflow.
-const SMALLEST: f64 = 1e-100;
-
-pub(super) fn finite(what: &str, value: f64) -> Result<(), LimitError> {
-    if value.is_finite() { Ok(()) } else { Err(LimitError::NotFinite { what: what.to_owned(), value }) }
-}
-
-pub(super) fn positive(what: &str, value: f64) -> Result<(), LimitError> {
-    finite(what, value)?;
-    if value > SMALLEST { Ok(()) } else { Err(LimitError::NotPositive { what: what.to_owned(), value }) }
-}
-
-pub(super) fn not_negative(what: &str, value: f64) -> Result<(), LimitError> {
-    finite(what, value)?;
-    if value >= 0.0 {
-        return Ok(());
-    }
-    Err(LimitError::OutOfRange { what: what.to_owned(), value, at_least: 0.0, below: f64::INFINITY })
 }
 
 fn range(what: &str, [lower, upper]: [f64; 2]) -> Result<(), LimitError> {

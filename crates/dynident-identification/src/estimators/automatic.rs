@@ -1,7 +1,8 @@
 //! Weighted least squares where nothing speaks against it, instruments where noise in the regressor biases it.
 
-use super::exogeneity::{NoiseInRegressor, NoiseVerdict, examined, harmless};
+use super::exogeneity::{examined, harmless};
 use super::instrumental::InstrumentSettings;
+use super::noise_in_regressor::{NoiseInRegressor, NoiseVerdict};
 use super::{Estimation, EstimatorError, TrainingRows};
 use dynident_estimation::{Estimate, EstimateStatus, InstrumentalEstimate};
 

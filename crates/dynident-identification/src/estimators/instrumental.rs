@@ -1,9 +1,9 @@
 //! Instrumental variables: settings, and the estimate with instruments from one source.
 
 use super::band_motion::BandMotion;
-use super::exogeneity::NoiseInRegressor;
 use super::instrument_rows::{fast_motion_factors, instrumented_factors};
 use super::instruments::{InstrumentSource, SmoothedMotion};
+use super::noise_in_regressor::NoiseInRegressor;
 use super::{EstimationSettings, EstimatorError, TrainingRows};
 use crate::recording::Samples;
 use dynident_estimation::{

@@ -16,6 +16,7 @@ mod instrument_rows;
 mod instrumental;
 mod instruments;
 mod maximum_likelihood;
+mod noise_in_regressor;
 mod noise_weighted;
 mod periodic_model;
 mod robust;
@@ -28,11 +29,11 @@ mod spline_motion;
 mod spline_torque;
 
 pub use error::EstimatorError;
-pub use exogeneity::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 pub use function::{EstimatorFunction, EstimatorRule};
 pub use instrumental::InstrumentSettings;
 pub use instruments::{InstrumentSource, SmoothedMotion};
 pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
+pub use noise_in_regressor::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
 pub use noise_weighted::NoiseLevels;
 pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;
@@ -48,7 +49,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
     Estimate, LinearProblem, RowWeight, SplineMotionSettings, ordinary_least_squares, weighted_least_squares,
 };
-use simulated::ComparedSignal;
+use simulated_loop::ComparedSignal;
 
 /// How base parameters are estimated, with the settings that belong to the estimator alone.
 #[derive(Clone, Debug, Default)]

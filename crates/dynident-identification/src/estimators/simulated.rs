@@ -1,12 +1,12 @@
 //! DIDIM, CLIE and CLOE: from a controller and the commanded motion to an estimate.
 
-use super::simulated_loop::{LoopLog, SimulatedLoop};
+use super::simulated_loop::{ComparedSignal, LoopLog, SimulatedLoop};
 use super::{EstimatorError, TrainingRows};
 use crate::consistent::{ConsistencyError, ConsistencySettings, consistent_parameters};
 use dynident_dynamics::Column;
 use dynident_estimation::{
-    Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedCriterion, SimulatedEstimate,
-    SimulatedMotion, SimulatedProblem, SimulatedSettings, simulated_least_squares, weighted_least_squares,
+    Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedEstimate, SimulatedMotion,
+    SimulatedProblem, SimulatedSettings, simulated_least_squares, weighted_least_squares,
 };
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, RunLimits, SensorSettings};
 use nalgebra::DVector;
@@ -53,34 +53,6 @@ pub struct SimulatedLoopSettings {
     pub max_iterations: usize,
     /// Step of the differences of CLIE and CLOE, relative to each parameter's size; 1e-4 is usual.
     pub difference: f64,
-}
-
-/// What is compared with the record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ComparedSignal {
-    /// Torque, with the regressor of the simulated motion beside it: DIDIM.
-    TorqueRows,
-    /// Torque: CLIE.
-    Torque,
-    /// Positions: CLOE.
-    Position,
-}
-
-impl ComparedSignal {
-    fn method(self) -> &'static str {
-        match self {
-            Self::TorqueRows => "didim",
-            Self::Torque => "clie",
-            Self::Position => "cloe",
-        }
-    }
-
-    fn criterion(self) -> SimulatedCriterion {
-        match self {
-            Self::TorqueRows => SimulatedCriterion::Didim,
-            Self::Torque | Self::Position => SimulatedCriterion::Output,
-        }
-    }
 }
 
 /// How a fit to the simulated closed loop went.

@@ -2,12 +2,11 @@
 //! as the logs, other parameters.
 
 use super::row_pass::Stop;
-use super::simulated::ComparedSignal;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, RowBuilder, RowConsumer, motion_band_hz};
-use dynident_estimation::{SimulatedMotion, SimulatedRows};
+use dynident_estimation::{SimulatedCriterion, SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
 use dynident_model::terms::TorqueTerm;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
@@ -15,6 +14,34 @@ use dynident_simulation::{
     ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, SimulationError, closed_loop,
 };
 use nalgebra::{DMatrix, DVector};
+
+/// What is compared with the record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ComparedSignal {
+    /// Torque, with the regressor of the simulated motion beside it: DIDIM.
+    TorqueRows,
+    /// Torque: CLIE.
+    Torque,
+    /// Positions: CLOE.
+    Position,
+}
+
+impl ComparedSignal {
+    pub(super) fn method(self) -> &'static str {
+        match self {
+            Self::TorqueRows => "didim",
+            Self::Torque => "clie",
+            Self::Position => "cloe",
+        }
+    }
+
+    pub(super) fn criterion(self) -> SimulatedCriterion {
+        match self {
+            Self::TorqueRows => SimulatedCriterion::Didim,
+            Self::Torque | Self::Position => SimulatedCriterion::Output,
+        }
+    }
+}
 
 /// Samples of a log without a gap.
 #[derive(Clone, Copy, Debug)]

@@ -25,9 +25,6 @@ const UNLIKE: f64 = 4.0;
 const OWN_SHARE: f64 = 0.5;
 /// Halvings of the interval that holds the spread between joints: to a millionth of what they differ by.
 const BISECTIONS: usize = 20;
-/// Standard deviation of a lag of which nothing is known but that it is one of a drive or a bus, seconds of a usual arm
-/// ([`OwnScale`](dynident_model::OwnScale)): drives and buses are made as fast as their machine needs them.
-pub(super) const USUAL_LAG_S: f64 = 5.0e-3;
 
 /// Whose lag was taken off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

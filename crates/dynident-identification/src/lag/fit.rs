@@ -6,7 +6,6 @@
 //! is the lag `δ` itself. The last step's covariance, from time segments, is the lag's. What the model cannot say
 //! (backlash, elasticity) is in it as far as it differs from segment to segment.
 
-use super::choice::USUAL_LAG_S;
 use super::measured::TorqueLag;
 use super::rows::{DelayRows, NODES, lagrange};
 use super::samples::DelayCheck;
@@ -21,6 +20,9 @@ use dynident_estimation::{
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+/// Standard deviation of a lag of which nothing is known but that it is one of a drive or a bus, seconds of a usual arm
+/// ([`OwnScale`](dynident_model::OwnScale)): drives and buses are made as fast as their machine needs them.
+const USUAL_LAG_S: f64 = 5.0e-3;
 /// Longest lag looked for, seconds of a usual arm: drives and buses stay below.
 pub(crate) const LONGEST_DELAY_S: f64 = 0.1;
 /// Steps at most; two to four are usual.

@@ -6,7 +6,7 @@
 //! payload.
 
 use super::error::PayloadError;
-use super::known_arm::Refit;
+use super::refit::Refit;
 use crate::logs::of_role;
 use crate::recording::{Recording, Role};
 use crate::regressor_model::RegressorModel;

@@ -2,27 +2,13 @@
 
 use super::columns::LoadColumns;
 use super::error::PayloadError;
+use super::refit::Refit;
 use crate::estimators::EstimationSettings;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, KnownColumns, LinearProblem, weighted_least_squares_with_known};
 use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
-
-/// What of a known arm is fitted again, beside the payload.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Refit {
-    /// Nothing.
-    #[default]
-    Nothing,
-    /// The joints' offsets.
-    Offset,
-    /// Offsets and friction: both change with the temperature from run to run.
-    Friction,
-}
 
 /// Base parameters of an arm, and how well they are known.
 #[derive(Clone, Debug)]

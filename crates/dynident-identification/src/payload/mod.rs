@@ -7,13 +7,15 @@ mod free_gains;
 mod gain_error;
 mod gains;
 mod known_arm;
+mod refit;
 mod result;
 
 pub use columns::{LoadColumns, Payload, known_payloads};
 pub use error::PayloadError;
 pub use free_gains::with_free_gains;
 pub use gains::DriveGain;
-pub use known_arm::{KnownArm, Refit};
+pub use known_arm::KnownArm;
+pub use refit::Refit;
 pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
 
 pub(crate) use columns::SeenColumns;

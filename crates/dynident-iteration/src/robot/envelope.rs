@@ -218,22 +218,6 @@ impl Broken {
     }
 }
 
-/// What leaves an envelope, by its own name.
-#[derive(Debug)]
-pub(super) struct SampleBreach {
-    pub(super) name: String,
-    pub(super) quantity: EnvelopeQuantity,
-    pub(super) value: f64,
-    pub(super) limit: f64,
-}
-
-impl SampleBreach {
-    fn breach(self, time_s: f64) -> Breach {
-        let Self { name, quantity, value, limit } = self;
-        Breach { joint: name, quantity, value, limit, time_s, part: RunPart::Motion }
-    }
-}
-
 /// Where the reference is at a time, rad (m), between its samples by straight lines, at its ends outside.
 pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64 {
     let samples = reference.samples();

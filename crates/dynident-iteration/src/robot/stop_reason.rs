@@ -30,6 +30,22 @@ impl core::fmt::Display for Breach {
     }
 }
 
+/// What leaves an envelope, by its own name.
+#[derive(Debug)]
+pub(super) struct SampleBreach {
+    pub(super) name: String,
+    pub(super) quantity: EnvelopeQuantity,
+    pub(super) value: f64,
+    pub(super) limit: f64,
+}
+
+impl SampleBreach {
+    pub(super) fn breach(self, time_s: f64) -> Breach {
+        let Self { name, quantity, value, limit } = self;
+        Breach { joint: name, quantity, value, limit, time_s, part: RunPart::Motion }
+    }
+}
+
 /// A joint that oscillates about its trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -1,7 +1,6 @@
 //! Where in the cell the robot may be: a box of the base frame that no watched point may leave.
 
-use super::envelope::SampleBreach;
-use super::stop_reason::EnvelopeQuantity;
+use super::stop_reason::{EnvelopeQuantity, SampleBreach};
 use dynident_dynamics::{Workspace as Arrays, body_placements};
 use dynident_model::{Model, Vec3};
 use dynident_simulation::{Reference, SimulationError, require};

@@ -1,6 +1,6 @@
 //! The columns of one table that a log's description asks for, found by name or index.
 
-use super::format::ColumnRef;
+use super::channels::ColumnRef;
 use super::row_count::RowCount;
 use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;

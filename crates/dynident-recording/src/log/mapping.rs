@@ -1,6 +1,6 @@
 //! From columns to joints: unit, sign, scale, matrix, offset.
 
-use super::format::ChannelGroup;
+use super::channels::ChannelGroup;
 use super::units::{Quantity, si_factor};
 use crate::error::FormatError;
 

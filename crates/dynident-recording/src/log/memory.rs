@@ -1,7 +1,8 @@
 //! Samples in memory as a log: joint values in SI, or any table of numbers.
 
 use super::Log;
-use super::format::{ChannelGroup, ColumnRef, Columns, LogFormat, TimeColumn};
+use super::channels::{ChannelGroup, ColumnRef, Columns};
+use super::format::{LogFormat, TimeColumn};
 use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
 use crate::place::LogPlace;

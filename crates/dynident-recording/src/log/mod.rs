@@ -8,10 +8,12 @@
 //! What a file holds is the business of dynident-formats, where a further format goes; text becomes a table here.
 
 mod blocks;
+mod channels;
 mod column_pattern;
 mod columns;
 mod file;
 mod format;
+mod found_rules;
 mod lines;
 mod mapping;
 mod memo;
@@ -26,10 +28,9 @@ mod text;
 mod units;
 
 pub(crate) use blocks::RawBlocks;
+pub use channels::{ChannelGroup, ColumnRef, Columns, OneOrMany};
 pub use file::FileLog;
-pub use format::{
-    ChannelGroup, ClockRule, ColumnRef, Columns, Header, LogFormat, Missing, OneOrMany, TimeColumn, TimeUnit,
-};
+pub use format::{ClockRule, Header, LogFormat, Missing, TimeColumn, TimeUnit};
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
 pub use row_rules::RowRule;

@@ -2,8 +2,8 @@
 
 use super::columns::ColumnSelection;
 use super::format::Missing;
+use super::found_rules::FoundRules;
 use super::mapping::Mapping;
-use super::row_rules::FoundRules;
 use super::source::LogSource;
 use super::units::Quantity;
 use super::{FileLog, Log};

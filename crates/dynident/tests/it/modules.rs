@@ -1,5 +1,5 @@
-//! Arrows between modules run one way: no top-level module of a crate uses one that uses it, directly or by way of
-//! others.
+//! Arrows between modules run one way: no top-level module of a crate, and no file, uses one that uses it, directly or
+//! by way of others.
 
 use super::common::repository;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,10 +18,66 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// The code of a file without its tests and comments.
+fn code(file: &Path) -> String {
+    let text = std::fs::read_to_string(file).unwrap();
+    let code = text.split("#[cfg(test)]\nmod ").next().unwrap();
+    code.lines().map(|line| line.split("//").next().unwrap()).collect::<Vec<_>>().join("\n")
+}
+
+/// The module of a file, as a path from the root of its crate; empty for the root.
+fn module(src: &Path, file: &Path) -> String {
+    let parts = file.strip_prefix(src).unwrap().with_extension("");
+    let parts: Vec<&str> = parts.iter().map(|part| part.to_str().unwrap()).collect();
+    let names =
+        if ["mod", "lib", "main"].contains(&parts[parts.len() - 1]) { &parts[..parts.len() - 1] } else { &parts };
+    names.join("::")
+}
+
+/// Every path of `code` that starts with `crate::` or `super::`, from the root of the crate.
+fn paths(own: &str, code: &str) -> Vec<String> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let starts = code.match_indices("crate::").chain(code.match_indices("super::"));
+    for (at, start) in starts.filter(|(at, _)| !code[..*at].ends_with("super::") && !code[..*at].ends_with(is_name)) {
+        let mut rest = &code[at..];
+        let mut base: Vec<&str> = if start == "crate::" { Vec::new() } else { own.split("::").collect() };
+        while let Some(after) = rest.strip_prefix("super::") {
+            (rest, _) = (after, base.pop());
+        }
+        rest = rest.strip_prefix("crate::").unwrap_or(rest);
+        let end = rest.find(|c: char| !is_name(c) && c != ':').unwrap_or(rest.len());
+        let path = [base.as_slice(), &rest[..end].split("::").collect::<Vec<_>>()].concat().join("::");
+        let group =
+            rest[end..].strip_prefix('{').filter(|_| path.ends_with("::")).and_then(|group| group.split('}').next());
+        for name in group.unwrap_or("").split(',') {
+            found.push(format!("{path}{}", name.trim()));
+        }
+    }
+    found
+}
+
+/// Which files each file of the crate uses. Roots of modules are left out: they gather and re-export.
+fn uses_of_files(src: &Path) -> Uses {
+    let mut files = Vec::new();
+    sources(src, &mut files);
+    files.retain(|file| !["mod", "lib", "main"].contains(&file.file_stem().unwrap().to_str().unwrap()));
+    let modules: BTreeSet<String> = files.iter().map(|file| module(src, file)).collect();
+    let resolved = |path: String| {
+        let ends = [path.len()].into_iter().chain(path.rmatch_indices("::").map(|(at, _)| at));
+        ends.map(|end| path[..end].to_owned()).find(|prefix| modules.contains(prefix))
+    };
+    let uses = |file: &PathBuf| {
+        let own = module(src, file);
+        let used = paths(&own, &code(file)).into_iter().filter_map(resolved).filter(|used| *used != own).collect();
+        (own, used)
+    };
+    files.iter().map(uses).collect()
+}
+
 /// The first part of every `crate::` path on a line of code.
 fn used(line: &str) -> impl Iterator<Item = &str> {
-    let code = if line.trim_start().starts_with("//") { "" } else { line };
-    code.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap())
+    line.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap())
 }
 
 /// Which top-level modules each top-level module of the crate uses, tests inside of files left out.
@@ -40,8 +96,7 @@ fn uses(src: &Path) -> Uses {
     for file in &files {
         let own = top(file);
         let Some(uses) = uses.get_mut(&own) else { continue };
-        let text = std::fs::read_to_string(file).unwrap();
-        let code = text.split("#[cfg(test)]\nmod ").next().unwrap();
+        let code = code(file);
         let others = code.lines().flat_map(used).filter(|name| *name != own && modules.contains(*name));
         uses.extend(others.map(str::to_owned));
     }
@@ -68,9 +123,10 @@ fn no_module_is_above_and_below_another() {
     assert!(crates.len() > 10);
     for folder in crates.iter().filter(|folder| folder.join("src").is_dir()) {
         let name = folder.file_name().unwrap().to_str().unwrap();
-        let uses = uses(&folder.join("src"));
-        let cycle = cycle(&uses);
-        assert!(cycle.is_empty(), "{name}: {cycle:?} use each other: {uses:#?}");
+        for uses in [uses(&folder.join("src")), uses_of_files(&folder.join("src"))] {
+            let cycle = cycle(&uses);
+            assert!(cycle.is_empty(), "{name}: {cycle:?} use each other: {uses:#?}");
+        }
     }
 }
 
@@ -96,5 +152,6 @@ fn a_circle_is_found() {
     assert_eq!(cycle(&uses(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])), ["b", "c"]);
     assert!(cycle(&uses(&[("a", &["b", "c"]), ("b", &["c"]), ("c", &[])])).is_empty());
     assert_eq!(used("    crate::study::Study, crate::error").collect::<Vec<_>>(), ["study", "error"]);
-    assert_eq!(used("/// [`crate::study`]").count(), 0);
+    let code = "use super::super::b::{C, d::E};\nuse crate::f::G; let x = super::h::i();";
+    assert_eq!(paths("a::own", code), ["f::G", "b::C", "b::d::E", "a::h::i"]);
 }

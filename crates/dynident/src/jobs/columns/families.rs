@@ -1,6 +1,7 @@
 //! Columns of one quantity, one for each joint.
 
-use super::meaning::{JointKey, Meaning, Quantity, Source, meaning, of_file};
+use super::meaning::{JointKey, Meaning, Source, meaning, of_file};
+use super::quantity::Quantity;
 use crate::result::LogContents;
 use std::path::Path;
 

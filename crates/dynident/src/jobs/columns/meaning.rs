@@ -1,17 +1,7 @@
 //! What the name of a column says: which quantity of which joint, in which unit, and whether it was measured.
 
+use super::quantity::Quantity;
 use super::units::ended;
-
-/// What a column holds of a joint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::jobs) enum Quantity {
-    Position,
-    Velocity,
-    Acceleration,
-    Torque,
-    /// A motor's current: a torque once its constant and gear ratio are known.
-    Current,
-}
 
 /// Which joint a name means.
 #[derive(Clone, Debug, PartialEq, Eq)]

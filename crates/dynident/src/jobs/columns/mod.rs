@@ -2,10 +2,12 @@
 
 mod families;
 mod meaning;
+mod quantity;
 mod spelling;
 mod units;
 
 pub(in crate::jobs) use families::{Family, best, families};
-pub(in crate::jobs) use meaning::{JointKey, Quantity, Source};
+pub(in crate::jobs) use meaning::{JointKey, Source};
+pub(in crate::jobs) use quantity::Quantity;
 pub(in crate::jobs) use spelling::column_list;
 pub(in crate::jobs) use units::{time_as_toml, time_unit_s, unit};

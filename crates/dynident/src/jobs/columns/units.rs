@@ -1,6 +1,6 @@
 //! Units that names of columns end with.
 
-use super::meaning::Quantity;
+use super::quantity::Quantity;
 
 /// Endings of names, the unit that they say as studies write it, and the quantity of a joint that has it; the longest
 /// first.

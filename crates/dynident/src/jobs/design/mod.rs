@@ -11,6 +11,7 @@ mod prior;
 mod search;
 mod setup;
 mod step_wise;
+mod stopwatch;
 mod table;
 
 pub use check::{check_log, check_trajectory};

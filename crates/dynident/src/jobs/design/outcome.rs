@@ -5,7 +5,6 @@ use super::limit_check::LimitCheck;
 use super::limits_in_force::not_included;
 use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
-use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
 use crate::pages::design as pictures;
 use crate::result::{DESIGN_SCHEMA, DesignFile, Provenance, WindowedFile};
@@ -18,26 +17,9 @@ use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
 use dynident_model::Model;
 use nalgebra::DMatrix;
-use std::time::Instant;
 
 /// Rate of the pictures, Hz of a usual arm.
 const PICTURES_HZ: f64 = 100.0;
-
-/// What a job has cost so far.
-pub(super) struct Stopwatch {
-    pub(super) started: Instant,
-    cpu_s: Option<f64>,
-}
-
-impl Stopwatch {
-    pub(super) fn start() -> Self {
-        Self { started: Instant::now(), cpu_s: cpu_seconds() }
-    }
-
-    fn cpu_s(&self) -> Option<f64> {
-        self.cpu_s.zip(cpu_seconds()).map(|(start, end)| end - start)
-    }
-}
 
 /// A motion and where it comes from: a search, or somebody who brings it.
 pub(super) struct MotionOrigin {

@@ -1,7 +1,7 @@
 //! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
 
 use super::limits_in_force::{LimitsFor, in_force, included, loaded};
-use super::outcome::Stopwatch;
+use super::stopwatch::Stopwatch;
 use super::{prior, table};
 use crate::error::{Error, StudyError};
 use crate::inputs::InputFiles;

@@ -1,12 +1,47 @@
-//! What several estimators of one trial need: made when the first one asks, and not counted as its time.
+//! One simulated experiment, the answer of an estimator, and work that several estimators of a trial share: done for the
+//! first one that needs it, and not part of its time.
 
-use super::estimators::Trial;
 use super::pipeline;
 use super::rows::Rows;
+use super::scenario::{Record, Scenario};
 use super::thread_time::thread_seconds;
 use core::cell::{Cell, OnceCell};
 use dynident_estimation::EstimationError;
 use dynident_recording::MotionBlock;
+
+/// One simulated experiment, as estimators see it.
+#[derive(Debug)]
+pub struct Trial<'a> {
+    /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true
+    /// parameters are for the judge.
+    pub scenario: &'a Scenario,
+    /// What encoders and torque sensors said.
+    pub record: &'a Record,
+    /// The record after the pipeline's own choice of cut-off and differentiator.
+    pub motion: &'a MotionBlock,
+    /// The cut-off chosen from the record.
+    pub cutoff_hz: f64,
+    /// The pipeline's filtered rows.
+    pub rows: &'a Rows<'a>,
+    /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
+    pub start: &'a [f64],
+    /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian
+    /// error, no friction and no drives.
+    pub prior: &'a [f64],
+    /// What several estimators need, made once.
+    pub(super) shared: &'a TrialData<'a>,
+}
+
+/// What an estimator says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// The base parameters.
+    pub values: Vec<f64>,
+    /// Half the width of each value's 95 % interval; none if the estimator gives no error bars.
+    pub half_width_95: Option<Vec<f64>>,
+    /// False when the iterations stopped before they had settled: counts as a failure.
+    pub converged: bool,
+}
 
 /// One trial's shared work.
 #[derive(Debug, Default)]

@@ -1,0 +1,46 @@
+//! Columns that the data do not excite, and the effect of the values at which they are held.
+
+use crate::error::EstimationError;
+use nalgebra::DMatrix;
+
+/// Columns that the data do not excite.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Unexcited {
+    /// All of them, ascending: nothing but noise and other columns.
+    pub columns: Vec<usize>,
+    /// Those among them that are nothing but noise: not even a sum of other columns stands out. Ascending.
+    pub silent: Vec<usize>,
+}
+
+impl Unexcited {
+    /// The same columns under other numbers, without those that have none.
+    pub fn renumbered(&self, number: impl Fn(usize) -> Option<usize>) -> Self {
+        let of = |columns: &[usize]| columns.iter().filter_map(|&column| number(column)).collect();
+        Self { columns: of(&self.columns), silent: of(&self.silent) }
+    }
+}
+
+/// How the estimated columns answer to those that are held: `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹ W_FᵀW_H`, shape (free, held).
+///
+/// # Errors
+/// [`EstimationError::Overflow`] when the free columns are not independent.
+pub(crate) fn answer_of_free(
+    triangle: &DMatrix<f64>,
+    free: &[usize],
+    held: &[usize],
+) -> Result<DMatrix<f64>, EstimationError> {
+    let mut own = triangle.select_columns(free);
+    let norms: Vec<f64> = own.column_iter().map(|column| column.norm()).collect();
+    for (mut column, norm) in own.column_iter_mut().zip(&norms) {
+        column /= if *norm > 0.0 { *norm } else { 1.0 };
+    }
+    let factor = own.qr();
+    let mut solved = factor.q().tr_mul(&triangle.select_columns(held));
+    if !factor.r().solve_upper_triangular_mut(&mut solved) {
+        return Err(EstimationError::Overflow { name: "an estimated column".into() });
+    }
+    for (row, norm) in norms.iter().enumerate() {
+        solved.row_mut(row).scale_mut(-1.0 / if *norm > 0.0 { *norm } else { 1.0 });
+    }
+    Ok(solved)
+}

@@ -1,0 +1,231 @@
+//! The columns of one quantity of all joints, with unit, sign, scale and matrix.
+
+use super::column_pattern::expanded;
+use super::units::{Quantity, si_factor, unit_names};
+use crate::error::FormatError;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// One column: by name, or by 0-based index.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(untagged, expecting = "a column is a name in quotes or a 0-based index")]
+pub enum ColumnRef {
+    /// 0-based index.
+    Index(usize),
+    /// Name in the header; a range such as `q{1..7}_rad` stands for several.
+    Name(String),
+}
+
+/// Columns in joint order: a list, or one text with a range such as `"q{1..7}_rad"`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(
+    untagged,
+    expecting = "columns must be a list of names or 0-based indices, or one pattern such as \"q{1..7}_rad\""
+)]
+pub enum Columns {
+    /// One name or pattern.
+    Pattern(String),
+    /// A list of names, patterns and indices.
+    List(Vec<ColumnRef>),
+}
+
+/// One value for all columns, or one for each.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", schemars(rename = "OneOrMany_{T}"))]
+#[serde(untagged, expecting = "give one value for all columns, or a list with one for each")]
+pub enum OneOrMany<T> {
+    /// The same for all.
+    One(T),
+    /// One for each.
+    Many(Vec<T>),
+}
+
+impl<T: Clone> OneOrMany<T> {
+    /// The value of number `index`; none where a list is shorter.
+    pub fn at(&self, index: usize) -> Option<T> {
+        match self {
+            Self::One(value) => Some(value.clone()),
+            Self::Many(values) => values.get(index).cloned(),
+        }
+    }
+
+    fn fits(&self, count: usize) -> bool {
+        matches!(self, Self::One(_)) || matches!(self, Self::Many(values) if values.len() == count)
+    }
+
+    pub(crate) fn values(&self) -> &[T] {
+        match self {
+            Self::One(value) => core::slice::from_ref(value),
+            Self::Many(values) => values,
+        }
+    }
+}
+
+/// The columns of one quantity and how they become joint values in SI:
+///
+/// `joint = M · (scale · sign · unit · column) + offset`
+///
+/// where `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are per
+/// column; `offset` is per joint and in SI (rad, m, N m, N).
+///
+/// ```
+/// let coupled_wrist: dynident_recording::log::ChannelGroup = toml::from_str(
+///     r#"
+///     file = "motor_angles.csv"
+///     columns = "Joint_{1..2}"
+///     unit = "deg"
+///     inverse_matrix = [[45.0, 0.0], [32.0, 32.0]]
+///     offset = [0.0, 1.5707963267948966]
+///     "#,
+/// )
+/// .unwrap();
+/// assert!(coupled_wrist.scale.is_none());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct ChannelGroup {
+    /// Another file of the same log, relative to the main file's folder; its rows pair with the main file's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// One column for each joint of the study, in the study's joint order (any number if a matrix follows).
+    pub columns: Columns,
+    /// Unit of the columns: `rad` `deg` `rev` `m` `mm`; `rad/s` `deg/s` `rpm` ..; `N m` `N` `A` `mA` ..
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<OneOrMany<String>>,
+    /// Factor on top of the unit: current gain, gear ratio.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<OneOrMany<f64>>,
+    /// +1 or -1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sign: Option<OneOrMany<f64>>,
+    /// Added last, per joint, in SI.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<OneOrMany<f64>>,
+    /// `joint = matrix · columns`: one row for each joint, one entry for each column.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<Vec<Vec<f64>>>,
+    /// `columns = inverse_matrix · joint`: the joint-to-motor matrix as makers give it; square.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inverse_matrix: Option<Vec<Vec<f64>>>,
+}
+
+impl ChannelGroup {
+    /// Columns that are joint values in SI already, in the main file.
+    pub fn new(columns: Columns) -> Self {
+        Self {
+            file: None,
+            columns,
+            unit: None,
+            scale: None,
+            sign: None,
+            offset: None,
+            matrix: None,
+            inverse_matrix: None,
+        }
+    }
+
+    /// The columns one by one, ranges expanded.
+    ///
+    /// # Errors
+    /// If a range is malformed or absurdly long.
+    pub fn column_list(&self, key: &str) -> Result<Vec<ColumnRef>, FormatError> {
+        let key = format!("{key}.columns");
+        let mut list = Vec::new();
+        match &self.columns {
+            Columns::Pattern(pattern) => list.extend(expanded(&key, pattern)?.into_iter().map(ColumnRef::Name)),
+            Columns::List(columns) => {
+                for column in columns {
+                    match column {
+                        ColumnRef::Index(index) => list.push(ColumnRef::Index(*index)),
+                        ColumnRef::Name(name) => list.extend(expanded(&key, name)?.into_iter().map(ColumnRef::Name)),
+                    }
+                }
+            }
+        }
+        Ok(list)
+    }
+
+    pub(super) fn validate(&self, quantity: Quantity, joints: &[String]) -> Result<(), FormatError> {
+        let key = quantity.key();
+        let columns = self.column_list(key)?.len();
+        let at = |name: &str| format!("{key}.{name}");
+        let wrong = |name: &str, found: usize, expected: usize, what: &str| {
+            FormatError::new(
+                at(name),
+                format!("{found} entries for {expected} {what}"),
+                format!("give one value, or one for each of the {expected} {what}"),
+            )
+        };
+        if self.matrix.is_some() && self.inverse_matrix.is_some() {
+            return Err(FormatError::new(at("matrix"), "matrix and inverse_matrix are both given", "keep one of them"));
+        }
+        let count_matters = self.matrix.is_none();
+        if columns == 0 || (count_matters && columns != joints.len()) {
+            return Err(FormatError::new(
+                at("columns"),
+                format!("{columns} columns for {} joints", joints.len()),
+                format!("give one column for each of: {}", joints.join(", ")),
+            ));
+        }
+        if let Some(unit) = &self.unit {
+            if !unit.fits(columns) {
+                return Err(wrong("unit", unit.values().len(), columns, "columns"));
+            }
+            if let Some(unknown) = unit.values().iter().find(|unit| si_factor(unit, quantity).is_none()) {
+                return Err(FormatError::new(
+                    at("unit"),
+                    format!("`{unknown}` is no unit of {key}"),
+                    format!("use one of: {}", unit_names(quantity).join(", ")),
+                ));
+            }
+        }
+        for (name, values, expected, what) in [
+            ("scale", &self.scale, columns, "columns"),
+            ("sign", &self.sign, columns, "columns"),
+            ("offset", &self.offset, joints.len(), "joints"),
+        ] {
+            let Some(values) = values else { continue };
+            if !values.fits(expected) {
+                return Err(wrong(name, values.values().len(), expected, what));
+            }
+            let bad = values.values().iter().find(|value| match name {
+                "sign" => value.abs() != 1.0,
+                "scale" => !(1e-15..=1e15).contains(&value.abs()),
+                _ => value.is_nan() || value.abs() > 1e15,
+            });
+            if let Some(value) = bad {
+                let fix = match name {
+                    "sign" => "write 1 or -1",
+                    "scale" => "give a factor of 1e-15 to 1e15 in size",
+                    _ => "give a number of at most 1e15 in size",
+                };
+                return Err(FormatError::new(at(name), format!("{value:?} is not allowed"), fix));
+            }
+        }
+        if let Some(matrix) = &self.matrix {
+            check_matrix(&at("matrix"), matrix, joints.len(), columns)?;
+        }
+        if let Some(matrix) = &self.inverse_matrix {
+            check_matrix(&at("inverse_matrix"), matrix, joints.len(), columns)?;
+        }
+        Ok(())
+    }
+}
+
+fn check_matrix(key: &str, matrix: &[Vec<f64>], rows: usize, columns: usize) -> Result<(), FormatError> {
+    if matrix.len() != rows || matrix.iter().any(|row| row.len() != columns) {
+        return Err(FormatError::new(
+            key,
+            format!("not a {rows} x {columns} matrix"),
+            "give one row for each joint and one entry in it for each column",
+        ));
+    }
+    if matrix.iter().flatten().any(|value| !value.is_finite()) {
+        return Err(FormatError::new(key, "an entry is not finite", "give finite numbers"));
+    }
+    Ok(())
+}
