@@ -27,28 +27,30 @@ pub struct CutoffCell {
 
 const fn cell(
     robot: SimulatedRobot,
-    (harmonics, duration_s): (usize, f64),
+    harmonics: usize,
+    duration_s: f64,
     rate_hz: f64,
-    (position_noise_rad, torque_noise): (f64, f64),
+    position_noise_rad: f64,
+    torque_noise: f64,
 ) -> CutoffCell {
     CutoffCell { robot, log: SimulatedLog { harmonics, duration_s, rate_hz, position_noise_rad, torque_noise } }
 }
 
 /// The registry: one line for each cell.
 pub const CUTOFF_CELLS: &[CutoffCell] = &[
-    cell(UR10, (5, 10.0), 500.0, (1e-5, 0.01)),
-    cell(UR10, (5, 10.0), 500.0, (1e-4, 0.01)),
-    cell(UR10, (5, 10.0), 500.0, (1e-3, 0.01)),
-    cell(UR10, (20, 10.0), 500.0, (1e-5, 0.01)),
-    cell(UR10, (20, 10.0), 500.0, (1e-4, 0.01)),
-    cell(UR10, (20, 10.0), 500.0, (1e-3, 0.01)),
-    cell(UR10, (5, 10.0), 125.0, (1e-4, 0.01)),
-    cell(UR10, (5, 60.0), 250.0, (3e-4, 0.03)),
-    cell(UR10, (20, 60.0), 250.0, (1e-4, 0.01)),
-    cell(PANDA, (5, 10.0), 1000.0, (1e-5, 0.01)),
-    cell(PANDA, (5, 10.0), 1000.0, (1e-4, 0.01)),
-    cell(PANDA, (5, 10.0), 1000.0, (1e-3, 0.01)),
-    cell(PANDA, (20, 30.0), 500.0, (1e-4, 0.03)),
+    cell(UR10, 5, 10.0, 500.0, 1e-5, 0.01),
+    cell(UR10, 5, 10.0, 500.0, 1e-4, 0.01),
+    cell(UR10, 5, 10.0, 500.0, 1e-3, 0.01),
+    cell(UR10, 20, 10.0, 500.0, 1e-5, 0.01),
+    cell(UR10, 20, 10.0, 500.0, 1e-4, 0.01),
+    cell(UR10, 20, 10.0, 500.0, 1e-3, 0.01),
+    cell(UR10, 5, 10.0, 125.0, 1e-4, 0.01),
+    cell(UR10, 5, 60.0, 250.0, 3e-4, 0.03),
+    cell(UR10, 20, 60.0, 250.0, 1e-4, 0.01),
+    cell(PANDA, 5, 10.0, 1000.0, 1e-5, 0.01),
+    cell(PANDA, 5, 10.0, 1000.0, 1e-4, 0.01),
+    cell(PANDA, 5, 10.0, 1000.0, 1e-3, 0.01),
+    cell(PANDA, 20, 30.0, 500.0, 1e-4, 0.03),
 ];
 
 /// Candidates, in units of what the spectrum asks for.
@@ -103,11 +105,11 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64, simultaneous: bool) -> Resul
     let (mut squares, mut spectrum_hz, mut of_default) = ([0.0; MULTIPLES.len()], 0.0, 0.0);
     let (mut of_simultaneous, mut unsettled) = (0.0, 0);
     for run in 0..runs {
-        let motion = excitation(&model, made.harmonics, (made.duration_s, made.rate_hz), 10 + run).map_err(failed)?;
-        let other = excitation(&model, made.harmonics, (PERIOD_S, 100.0), 1000 + run).map_err(failed)?;
+        let motion = excitation(&model, made.harmonics, made.duration_s, made.rate_hz, 10 + run).map_err(failed)?;
+        let other = excitation(&model, made.harmonics, PERIOD_S, 100.0, 1000 + run).map_err(failed)?;
         let theta = truth(&regressor, &motion, |_| 1.0);
         let exact = torque(&regressor, &motion, &theta);
-        let (log, asked_hz) = recording(made, &model, (&motion, &exact), 77 + run).map_err(failed)?;
+        let (log, asked_hz) = recording(made, &model, &motion, &exact, 77 + run).map_err(failed)?;
         let other_exact = torque(&regressor, &other, &theta);
         spectrum_hz += asked_hz / runs as f64;
         let fitted = |cutoff_hz: Option<f64>, estimator: Estimator| -> Result<(f64, bool), IdentificationError> {

@@ -131,9 +131,9 @@ pub struct FrictionCell {
 }
 
 const MOTIONS: [(SimulatedRobot, SimulatedLog); 3] =
-    [(UR10, log((5, 10.0), 500.0, 1e-5)), (UR10, log((5, 30.0), 500.0, 1e-4)), (PANDA, log((5, 30.0), 1000.0, 1e-5))];
+    [(UR10, log(5, 10.0, 500.0, 1e-5)), (UR10, log(5, 30.0, 500.0, 1e-4)), (PANDA, log(5, 30.0, 1000.0, 1e-5))];
 
-const fn log((harmonics, duration_s): (usize, f64), rate_hz: f64, position_noise_rad: f64) -> SimulatedLog {
+const fn log(harmonics: usize, duration_s: f64, rate_hz: f64, position_noise_rad: f64) -> SimulatedLog {
     SimulatedLog { harmonics, duration_s, rate_hz, position_noise_rad, torque_noise: 0.01 }
 }
 
@@ -233,15 +233,15 @@ struct Made {
 impl Made {
     fn new(cell: &FrictionCell, model: &Model, robot: &ParametricModel, run: u64) -> Result<Self, String> {
         let made = &cell.log;
-        let motion = excitation(model, made.harmonics, (made.duration_s, made.rate_hz), 10 + run)?;
-        let other = excitation(model, made.harmonics, (PERIOD_S, 100.0), 1000 + run)?;
+        let motion = excitation(model, made.harmonics, made.duration_s, made.rate_hz, 10 + run)?;
+        let other = excitation(model, made.harmonics, PERIOD_S, 100.0, 1000 + run)?;
         let regressor = RegressorModel::from(robot.clone());
         let mut bodies = model.parameter_vector();
         bodies.resize(bodies.len() + robot.terms().len(), 0.0);
         let regressor = regressor.clone().with_load_of(&regressor, &robot.base().values(&bodies));
         let theta = truth(&regressor, &motion, share);
         let exact = torque(&regressor, &motion, &theta);
-        let (log, _) = recording(made, model, (&motion, &exact), 77 + run)?;
+        let (log, _) = recording(made, model, &motion, &exact, 77 + run)?;
         let other_exact = torque(&regressor, &other, &theta);
         Ok(Self { log, motion, exact, torque_noise: made.torque_noise, other, other_exact })
     }

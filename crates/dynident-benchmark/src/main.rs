@@ -88,8 +88,8 @@ fn main() -> ExitCode {
     let model = |name: &str| load_robot(options.robots.join(format!("{name}.urdf"))).map(|robot| robot.model);
     if options.limits && !options.count {
         let measured = model(RECORDED).map_err(|error| error.to_string()).and_then(|model| {
-            let text = (options.csv.as_path(), options.csv_rows as usize);
-            speed::time_machine((RECORDED, &model), &levels, text, &options.only)
+            let (csv, rows) = (options.csv.as_path(), options.csv_rows as usize);
+            speed::time_machine(RECORDED, &model, &levels, csv, rows, &options.only)
         });
         if let Err(error) = measured {
             eprintln!("{error}");

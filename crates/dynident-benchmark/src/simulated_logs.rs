@@ -66,11 +66,12 @@ pub struct SimulatedLog {
 pub(crate) fn excitation(
     model: &Model,
     harmonics: usize,
-    (duration_s, rate_hz): (f64, f64),
+    duration_s: f64,
+    rate_hz: f64,
     seed: u64,
 ) -> Result<Motion, String> {
     let (family, parameters) = random_series(model, harmonics, &mut Random::new(seed))?;
-    Ok(sampled(&family, &parameters, (duration_s, rate_hz), 0.0))
+    Ok(sampled(&family, &parameters, duration_s, rate_hz, 0.0))
 }
 
 /// A Fourier series of that many harmonics, and random parameters of it within the robot's ranges and speeds.
@@ -91,7 +92,7 @@ pub(crate) fn random_series(
 }
 
 /// A motion at an even rate, everything `late_s` later than the series says, which repeats before and after its period.
-pub(crate) fn sampled(family: &Fourier, parameters: &[f64], (duration_s, rate_hz): (f64, f64), late_s: f64) -> Motion {
+pub(crate) fn sampled(family: &Fourier, parameters: &[f64], duration_s: f64, rate_hz: f64, late_s: f64) -> Motion {
     let samples = 0..=(duration_s * rate_hz) as usize;
     // A family stands still outside of its duration.
     let phase_s = |sample: usize| (sample as f64 / rate_hz - late_s).rem_euclid(family.duration_s());
@@ -130,7 +131,8 @@ pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(
 pub(crate) fn recording(
     made: &SimulatedLog,
     model: &Model,
-    (motion, exact): (&Motion, &[f64]),
+    motion: &Motion,
+    exact: &[f64],
     seed: u64,
 ) -> Result<(Log, f64), String> {
     let mut random = Random::new(seed);
@@ -217,8 +219,8 @@ mod tests {
         let model = PLANAR.model().unwrap();
         let (family, parameters) = random_series(&model, 5, &mut Random::new(1)).unwrap();
         let (rate_hz, late_s) = (100.0, 0.008);
-        let long = sampled(&family, &parameters, (3.0 * PERIOD_S, rate_hz), 0.0);
-        let late = sampled(&family, &parameters, (PERIOD_S, rate_hz), late_s);
+        let long = sampled(&family, &parameters, 3.0 * PERIOD_S, rate_hz, 0.0);
+        let late = sampled(&family, &parameters, PERIOD_S, rate_hz, late_s);
         let period = (PERIOD_S * rate_hz) as usize;
         for joint in 0..model.dof() {
             let (dq, late) = (&long.dq[long.of(joint)], &late.dq[late.of(joint)]);

@@ -131,7 +131,7 @@ fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
         let step = &steps[index];
         let (inner, outer) = varied.split_at_mut(index);
         let parent = step.parent.map_or(&base, |parent| &inner[parent]);
-        outer[0].follow(parent, (step, index), &hinges);
+        outer[0].follow(parent, step, index, &hinges);
         outer[0].move_along(parent, dq[index]);
     }
 }

@@ -190,7 +190,7 @@ fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
         let (inner, outer) = varied.split_at_mut(index);
         let parent = step.parent.map_or(&base, |parent| &inner[parent]);
         let body = &mut outer[0];
-        body.follow(parent, (step, index), &hinges);
+        body.follow(parent, step, index, &hinges);
         let rate = body.move_along(parent, dq[index]);
         body.acceleration = body.axis.scale_add(ddq[index], &rate.scale_add(dq[index], &parent.acceleration));
         body.second_rate = parent.acceleration.cross_add(&body.axis, &parent.velocity.cross(&rate));

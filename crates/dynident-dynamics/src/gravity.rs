@@ -79,7 +79,7 @@ fn stiffness<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     for index in 0..dof {
         let (inner, outer) = varied.split_at_mut(index);
         let parent = steps[index].parent.map_or(&base, |parent| &inner[parent]);
-        outer[0].follow(parent, (&steps[index], index), &hinges);
+        outer[0].follow(parent, &steps[index], index, &hinges);
     }
     let against_gravity = Spatial { angular: Vec3::ZERO, linear: (-model.gravity()).splat() };
     let matrix = &mut scratch.matrix[..dof * dof];

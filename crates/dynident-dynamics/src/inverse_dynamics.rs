@@ -121,13 +121,15 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let base = (-model.gravity()).splat();
-    newton_euler_of((model.steps(), model.steps(), base), scratch);
+    newton_euler_of(model.steps(), model.steps(), base, scratch);
 }
 
 /// The same of a tree with bodies of its own, and the base's acceleration: minus gravity.
 #[inline(always)]
 pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
-    (steps, bodies, base): (&[JointStep], B, Vec3<T>),
+    steps: &[JointStep],
+    bodies: B,
+    base: Vec3<T>,
     scratch: &mut CoreScratch<T>,
 ) {
     let joints = steps.len();

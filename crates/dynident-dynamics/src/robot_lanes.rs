@@ -149,7 +149,7 @@ impl<T: Lane> RobotLanes<T> {
         scratch.q.copy_from_slice(q);
         scratch.dq.copy_from_slice(dq);
         scratch.hinges.place(steps, &scratch.q);
-        newton_euler_of((steps, &**bodies, *base), scratch);
+        newton_euler_of(steps, &**bodies, *base, scratch);
         // Joints on different branches do not couple: what stands there is zero from the beginning.
         let out = &mut MatrixRows { out: rows.as_mut_slice(), stride: T::LANES };
         composite_rigid_bodies(steps, &**bodies, scratch, out, 0);

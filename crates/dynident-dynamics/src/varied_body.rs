@@ -41,7 +41,7 @@ impl<T: Scalar> VariedBody<T> {
     /// Takes a place behind `parent` by the joint of `step`, at number `index` of the hinges, and its axis and own
     /// inertia there.
     #[inline(always)]
-    pub(crate) fn follow(&mut self, parent: &Self, (step, index): (&JointStep, usize), hinges: &PlacedHinges<'_, T>) {
+    pub(crate) fn follow(&mut self, parent: &Self, step: &JointStep, index: usize, hinges: &PlacedHinges<'_, T>) {
         let above = &parent.placement;
         self.placement.translation = above.point(hinges.translation(step, index));
         self.placement.rotation = with_hinge!(hinges, *step, index, |hinge| hinge.after(&above.rotation));

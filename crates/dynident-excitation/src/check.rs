@@ -93,7 +93,7 @@ pub fn check_limits(
     rate_hz: f64,
     motion: impl FnMut(&[f64], &mut Motion),
 ) -> Result<Vec<LimitReport>, LimitError> {
-    Ok(check_limits_until(limits, model, (duration_s, rate_hz), motion, &|| false)?.unwrap_or_default())
+    Ok(check_limits_until(limits, model, duration_s, rate_hz, motion, &|| false)?.unwrap_or_default())
 }
 
 /// [`check_limits()`] at duration (s) and rate (Hz), which ends without a report once `stop` says so. It is asked every
@@ -104,7 +104,8 @@ pub fn check_limits(
 pub fn check_limits_until(
     limits: &Limits,
     model: &Model,
-    (duration_s, rate_hz): (f64, f64),
+    duration_s: f64,
+    rate_hz: f64,
     mut motion: impl FnMut(&[f64], &mut Motion),
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<LimitReport>>, LimitError> {

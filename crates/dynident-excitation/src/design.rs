@@ -219,7 +219,7 @@ fn timed(
     for round in 0..=effort.rounds {
         let criterion = task.criteria[round.min(task.criteria.len() - 1)];
         let around =
-            neighbourhood.starts((round.saturating_sub(1), task.family.joints(), effort.restarts()), &mut random);
+            neighbourhood.starts(round.saturating_sub(1), task.family.joints(), effort.restarts(), &mut random);
         let name = if around.is_some() { "restart" } else { "search" };
         let watch = watch(name);
         let stop = |value, violation| watch(value, violation) || late();
@@ -304,7 +304,7 @@ fn timed(
         }
         // A hair outside is made smaller by as much, if that costs next to nothing.
         if let Some((ended, worst)) = outside.as_ref().filter(|(ended, _)| ended.violation < HAIR_OUTSIDE)
-            && let Some(smaller) = shrunk(task, criterion, (ended, worst), [&fine, &logged], &overdue)
+            && let Some(smaller) = shrunk(task, criterion, ended, worst, [&fine, &logged], &overdue)
             && loss(criterion, ended, &smaller) < LEAST_LOSS * criterion.scale(task.layout.columns().len())
         {
             outside = None;
@@ -323,7 +323,7 @@ fn timed(
     // time allows.
     let broken = (kept.violation > 0.0).then(|| (kept.clone(), values));
     for (outside, worst) in outside.iter().chain(&broken) {
-        if let Some(smaller) = shrunk(task, criterion, (outside, worst), [&fine, &logged], &overdue)
+        if let Some(smaller) = shrunk(task, criterion, outside, worst, [&fine, &logged], &overdue)
             && smaller.better_than(&kept)
         {
             kept = smaller;

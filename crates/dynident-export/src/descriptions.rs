@@ -32,7 +32,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
         comment(&notes)
     );
     for joint in (0..bodies).filter(|&joint| model.tree_joints()[joint].parent.is_none()) {
-        write_body(&mut text, robot, joint, (&friction, &rotors), 2)?;
+        write_body(&mut text, robot, joint, &friction, &rotors, 2)?;
     }
     text += "  </worldbody>\n  <actuator>\n";
     for joint in model.joints() {
@@ -161,7 +161,8 @@ fn write_body(
     text: &mut String,
     robot: &RobotModel,
     index: usize,
-    (friction, rotors): (&[NearestFriction], &[f64]),
+    friction: &[NearestFriction],
+    rotors: &[f64],
     depth: usize,
 ) -> Result<(), ExportError> {
     let model = robot.model();
@@ -190,7 +191,7 @@ fn write_body(
         let _ = writeln!(text, "{pad}  <body name=\"{}\"{}/>", body_name(&link.name), placement(&link.placement));
     }
     for child in (index + 1..model.body_count()).filter(|&child| model.tree_joints()[child].parent == Some(index)) {
-        write_body(text, robot, child, (friction, rotors), depth + 1)?;
+        write_body(text, robot, child, friction, rotors, depth + 1)?;
     }
     let _ = writeln!(text, "{pad}</body>");
     Ok(())

@@ -236,7 +236,7 @@ impl ModelTerm {
                     joints: felt.iter().map(|joint| joint.name.clone()).collect(),
                     value,
                     unit: unit(term.unit(), turns),
-                    constants: term.constants().into_iter().flat_map(|one| constants(one, turns)).collect(),
+                    constants: term.constants().into_iter().flat_map(|one| constants(one.0, one.1, turns)).collect(),
                 }
             })
             .collect()
@@ -252,7 +252,7 @@ fn unit(revolute: &str, turns: bool) -> String {
 }
 
 /// A constant with its unit in its name; a step is its shape and its width.
-fn constants((name, value): (&'static str, TermConstant), turns: bool) -> Vec<(String, ModelConstant)> {
+fn constants(name: &'static str, value: TermConstant, turns: bool) -> Vec<(String, ModelConstant)> {
     let with_unit = |name: &str, at_revolute: &str| {
         let unit = if turns { at_revolute.to_owned() } else { at_revolute.replace("rad", "m") };
         format!("{name}{unit}")

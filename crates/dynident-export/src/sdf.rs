@@ -53,7 +53,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
             joints[index], i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]
         );
         let friction = model.joint_of(index).map_or(NearestFriction::NONE, |joint| friction[joint]);
-        write_joint(&mut text, joint, (&friction, spring(robot, index)), [&joints[index], parent, link]);
+        write_joint(&mut text, joint, &friction, spring(robot, index), [&joints[index], parent, link]);
         write_frames(&mut text, body, link, &mut names);
     }
     notes.extend(names.notes());
@@ -64,7 +64,8 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
 fn write_joint(
     text: &mut String,
     joint: &Joint,
-    (friction, spring): (&NearestFriction, Option<(f64, f64)>),
+    friction: &NearestFriction,
+    spring: Option<(f64, f64)>,
     [name, parent, child]: [&String; 3],
 ) {
     let limits = &joint.limits;

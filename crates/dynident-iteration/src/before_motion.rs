@@ -132,8 +132,10 @@ pub(crate) fn rehearsed<'a>(
 /// What somebody who is asked hears of a motion.
 pub(crate) fn next_motion(
     task: &IterationTask,
-    (plan, controller): (&RunPlan, &ControllerSettings),
-    (motion, reference): (&Commanded<'_>, &Reference),
+    plan: &RunPlan,
+    controller: &ControllerSettings,
+    motion: &Commanded<'_>,
+    reference: &Reference,
     ways: Option<(&Ways, &FoundWays)>,
 ) -> NextMotion {
     let largest = |of: &[&Reference]| -> Vec<(String, f64)> {

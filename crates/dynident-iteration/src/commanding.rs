@@ -98,7 +98,7 @@ impl Iteration {
         if stop_requested() {
             return Ok(Came::CutShort(None, CutShort::Interrupted("between two runs".to_owned())));
         }
-        let mut shown = next_motion(task, (plan, controller), (motion, reference), own.as_ref().zip(found));
+        let mut shown = next_motion(task, plan, controller, motion, reference, own.as_ref().zip(found));
         shown.rehearsal.clone_from(rehearsal);
         if !supervisor.allows(&shown) {
             if stop_requested() {

@@ -306,7 +306,7 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
         }
     }
     if let (Some(old), Some(new)) = (before.knowledge(), last.knowledge()) {
-        parameters(&mut found, (old, new), settings, names);
+        parameters(&mut found, old, new, settings, names);
     }
     let own = last.estimate.as_ref();
     if let Some(lag) = own.and_then(|own| unexplained_lag(&own.lag, &evidence.log_rates_hz)) {
@@ -409,7 +409,8 @@ fn changed_lag(good: &[&RunRecord], joint: usize) -> Option<(TorqueLag, TorqueLa
 /// The parameter that moved most, if one moved too far, and the one that is least known, if it is hardly known.
 fn parameters(
     found: &mut Vec<Shortfall>,
-    (old, new): (&RunEstimate, &RunEstimate),
+    old: &RunEstimate,
+    new: &RunEstimate,
     settings: &IterationSettings,
     names: &Names,
 ) {
@@ -445,7 +446,7 @@ pub(crate) fn stands_still(records: &[RunRecord], settings: &IterationSettings, 
     }
     let (Some(old), Some(new)) = (before.knowledge(), last.knowledge()) else { return false };
     let mut moving = Vec::new();
-    parameters(&mut moving, (old, new), settings, names);
+    parameters(&mut moving, old, new, settings, names);
     let limits = &settings.settled;
     let (now, then) = (last.tracking_error(), before.tracking_error());
     moving.is_empty() && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)

@@ -85,7 +85,7 @@ impl Iteration {
             kept
         } else {
             let (task, _) = self.in_force(records)?;
-            let planned = planned_motion(&**planner, &task, (records, self.settings.pool), stop)?;
+            let planned = planned_motion(&**planner, &task, records, self.settings.pool, stop)?;
             // A search that was cut short is not this run's motion.
             if let Some(store) = store.filter(|_| !stop.is_some_and(StopSignal::is_requested)) {
                 store.keep_planned(run, &planned)?;
@@ -119,7 +119,7 @@ impl Iteration {
             Err(status) => return Ok(PlannedRun::Stopped(status)),
         };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        let passes = passes(&self.settings.safety, (legs, &prepared.ways), *last_motion);
+        let passes = passes(&self.settings.safety, legs, &prepared.ways, *last_motion);
         let mut warm_up = WarmUpWatch::new(legs, &prepared.ways);
         for motion in motions(task, &self.settings, before, passes) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[motion.place] };
@@ -153,16 +153,16 @@ impl Iteration {
                 break;
             }
         }
-        let mut record = self.recorded((plan, next), prepared.controller.name(), legs, &runs);
+        let mut record = self.recorded(plan, next, prepared.controller.name(), legs, &runs);
         record.rehearsal.clone_from(&prepared.rehearsal);
         record.warm_up = warm_up.shown();
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
-            self.examine(&mut record, &records, before, (earlier, &prepared))?;
+            self.examine(&mut record, &records, before, earlier, &prepared)?;
         } else {
             self.judge(&mut record, before)?;
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
-            record.torque_check = self.torque_check(&record, &records, before, (&[], &prepared), None)?;
+            record.torque_check = self.torque_check(&record, &records, before, &[], &prepared, None)?;
         }
         Ok(PlannedRun::Run(Box::new(record), runs))
     }
@@ -173,7 +173,8 @@ impl Iteration {
         record: &mut RunRecord,
         records: &[Record],
         before: &[RunRecord],
-        (earlier, prepared): (&[GoodLog], &Prepared),
+        earlier: &[GoodLog],
+        prepared: &Prepared,
     ) -> Result<(), IterationError> {
         let fatal = |error: &IterationError| {
             matches!(
@@ -194,14 +195,14 @@ impl Iteration {
         let of_run =
             chosen.map_or(Cow::Borrowed(&*settings), |way| Cow::Owned(settings.with_differentiator(&way.taken)));
         let rest_margins = record.estimate.as_ref().map(RunEstimate::rest_margins).unwrap_or_default();
-        match examined(&task, records, (&of_run, &self.settings.safety.oscillation), (known, &rest_margins)) {
+        match examined(&task, records, &of_run, &self.settings.safety.oscillation, known, &rest_margins) {
             Ok(evidence) => record.evidence = Some(evidence),
             Err(error) if fatal(&error) => return Err(error),
             Err(error) => record.reason = record.reason.take().or_else(|| Some(error.to_string())),
         }
         self.judge(record, before)?;
         let Some(own) = record.estimate.clone().filter(|_| record.accepted) else {
-            record.torque_check = self.torque_check(record, records, before, (earlier, prepared), None)?;
+            record.torque_check = self.torque_check(record, records, before, earlier, prepared, None)?;
             return Ok(());
         };
         let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
@@ -227,12 +228,11 @@ impl Iteration {
         // The first good run is not judged, whatever it was under.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
-            let known = (after, &in_force.friction_before[..]);
-            add_tracking_floors(evidence, &task, records, &self.settings, known, errors);
+            add_tracking_floors(evidence, &task, records, &self.settings, after, &in_force.friction_before, errors);
             evidence.other_length = other_length(&task, &runs, &settings, after)?;
         }
         let fitted = Some((&task, &runs[..], &*settings));
-        record.torque_check = self.torque_check(record, records, before, (earlier, prepared), fitted)?;
+        record.torque_check = self.torque_check(record, records, before, earlier, prepared, fitted)?;
         Ok(())
     }
 
@@ -240,20 +240,14 @@ impl Iteration {
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
         let names = self.names(&*self.robot(before)?, before)?;
         let following = following_limits(&self.legs_of(record)?, self.task.robot.dof());
-        match policy::verdict(record, before, &self.settings, (&following, &names)) {
+        match policy::verdict(record, before, &self.settings, &following, &names) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),
         }
         Ok(())
     }
 
-    fn recorded(
-        &self,
-        (plan, next): (&RunPlan, NextRunMotion),
-        name: &str,
-        legs: &[Leg],
-        runs: &[RobotRun],
-    ) -> RunRecord {
+    fn recorded(&self, plan: &RunPlan, next: NextRunMotion, name: &str, legs: &[Leg], runs: &[RobotRun]) -> RunRecord {
         let joints = self.task.robot.dof();
         let mut worst = vec![0.0_f64; joints];
         for (run, leg) in runs.iter().zip(legs) {

@@ -23,8 +23,10 @@ pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<Torqu
 /// name. One joint has one friction, and of a step that smoothing hides its terms tell widths of their own. `None`
 /// where no joint sticks with more than by [`with_dry_steps`].
 pub(crate) fn with_sticking_joints(
-    (terms, parameters): (&[TorqueTerm], &[f64]),
-    (names, chose): (&[String], &[JointFriction]),
+    terms: &[TorqueTerm],
+    parameters: &[f64],
+    names: &[String],
+    chose: &[JointFriction],
     fastest: &[f64],
 ) -> Option<(Vec<TorqueTerm>, Vec<f64>)> {
     let sticks = |joint: usize| {
@@ -95,7 +97,7 @@ mod tests {
         let terms = [coulomb(0, smooth(0.005)), stribeck(smooth(0.02)), sigmoid.clone()];
         let parameters = [1.0, 0.5, 3.0];
         let fastest = [0.5, 0.5];
-        let sticking = |chose: &[JointFriction]| with_sticking_joints((&terms, &parameters), (&names, chose), &fastest);
+        let sticking = |chose: &[JointFriction]| with_sticking_joints(&terms, &parameters, &names, chose, &fastest);
 
         // The first joint's Coulomb friction is dry by its width, and so is the rest of its friction then.
         let of_width = (vec![coulomb(0, SIGN), stribeck(SIGN), sigmoid], parameters.to_vec());
@@ -118,6 +120,6 @@ mod tests {
 
         // Wide steps are no dry friction, and one that is dry in any case is nothing more.
         let plain = [coulomb(0, smooth(0.02)), coulomb(1, smooth(0.005))];
-        assert_eq!(with_sticking_joints((&plain, &[1.0, 1.0]), (&names, &[]), &fastest), None);
+        assert_eq!(with_sticking_joints(&plain, &[1.0, 1.0], &names, &[], &fastest), None);
     }
 }

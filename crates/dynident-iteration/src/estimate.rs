@@ -187,7 +187,7 @@ impl RunsFit<'_> {
                 return Err(IterationError::Record { joints: robot.joint_names(), problem });
             }
             if settings.scheme == Scheme::StepByStep {
-                let estimate = joint_by_joint(task, &logs, &training, (settings, &run_weights(task, runs)))?;
+                let estimate = joint_by_joint(task, &logs, &training, settings, &run_weights(task, runs))?;
                 return Ok(RunsEstimate { estimate, schwarz: 0.0 });
             }
             let mut found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
@@ -196,8 +196,7 @@ impl RunsFit<'_> {
             if !rounds.again(fit.as_ref(), &mut found) {
                 let schwarz = schwarz(&training.problem, &found);
                 let found = chosen.with_error_of_constants(training.problem.columns(), found);
-                let with = (&all[..], found, rounds.choice());
-                let estimate = all_joints((&logs, &identification), training, with, runs)?;
+                let estimate = all_joints(&logs, &identification, training, &all[..], found, rounds.choice(), runs)?;
                 return Ok(RunsEstimate { estimate, schwarz });
             }
         }
@@ -216,9 +215,12 @@ fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
 
 /// All joints at once.
 fn all_joints(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     training: Training,
-    (all, estimate, lag): (&[usize], Estimate, LagChoice),
+    all: &[usize],
+    estimate: Estimate,
+    lag: LagChoice,
     runs: &[RunLog<'_>],
 ) -> Result<RunEstimate, IterationError> {
     let consistent = consistent_stage((logs, settings), &training, &estimate)?;
@@ -252,12 +254,13 @@ fn joint_by_joint(
     task: &IterationTask,
     logs: &Logs<'_>,
     training: &Training,
-    (settings, weights): (&RunIdentificationSettings, &[Vec<f64>]),
+    settings: &RunIdentificationSettings,
+    weights: &[Vec<f64>],
 ) -> Result<RunEstimate, IterationError> {
     let robot = &task.robot;
     let (names, joints) = (robot.base().expressions(), robot.joint_names());
     let fallback = robot.base().values(robot.nominal());
-    let steps = step_by_step(task, (logs, &settings.estimation, weights), &names, &joints, &fallback)?;
+    let steps = step_by_step(task, logs, &settings.estimation, weights, &names, &joints, &fallback)?;
     let given = task.known_values();
     let fixed = (0..names.len()).filter(|&k| !steps.found[k] && given[k].is_none()).collect();
     let sigma: Vec<f64> = training.joints.iter().map(|&joint| steps.joint_sigma[joint]).collect();

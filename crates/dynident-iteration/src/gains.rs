@@ -156,7 +156,7 @@ pub fn derived_controllers(
     // With drives that are as light as they may be each joint is only to be stable.
     let light = with_light_drives(robot, *lightest_drive).map(|light| mass_matrices(robot, references, &light));
     let light = light.transpose()?;
-    let stiff = stiff_enough(robot, &matrices, (left, tracking_error.as_deref()));
+    let stiff = stiff_enough(robot, &matrices, left, tracking_error.as_deref());
     // Natural frequencies and dampings.
     let stable = |omega: Vec<f64>, ratios: &dyn Fn(&[DMatrix<f64>]) -> Vec<f64>| -> (Vec<f64>, Vec<f64>) {
         let Some(light) = &light else { return (omega, vec![1.0; dof]) };
@@ -211,7 +211,8 @@ pub fn derived_controllers(
 fn stiff_enough(
     robot: &ParametricModel,
     matrices: &[DMatrix<f64>],
-    (left, tracking_error): (f64, Option<&[f64]>),
+    left: f64,
+    tracking_error: Option<&[f64]>,
 ) -> Vec<f64> {
     let own = robot.model().own_scale();
     let of_joint = |(joint, description): (usize, &dynident_model::Joint)| {

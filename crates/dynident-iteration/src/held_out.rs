@@ -123,8 +123,8 @@ impl Iteration {
         let settings = held_out_settings(&settings, records);
         let own = records.last().and_then(|record| record.estimate.as_ref());
         let rest_margins = own.map(RunEstimate::rest_margins).unwrap_or_default();
-        let how = (&*settings, &self.settings().safety.oscillation);
-        examined(&task, core::slice::from_ref(&came.record), how, (Some(known), &rest_margins))
+        let oscillation = &self.settings().safety.oscillation;
+        examined(&task, core::slice::from_ref(&came.record), &settings, oscillation, Some(known), &rest_margins)
     }
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn other_length(
     let mut identification = identification_settings(task, settings, runs.len());
     identification.friction.clear();
     identification.motion.torque_lag_s = known.lag.taken_off();
-    let fitted = |joint: Option<usize>, change: f64| left_with(task, &motions, &identification, (joint, change));
+    let fitted = |joint: Option<usize>, change: f64| left_with(task, &motions, &identification, joint, change);
     let Some(described) = fitted(None, 0.0) else { return Ok(None) };
     let misfit = |left: &Left| -> f64 {
         let of_joint = |((sigma, rows), own): ((&f64, &usize), &f64)| *rows as f64 * (sigma / own).powi(2);
@@ -124,7 +124,8 @@ fn left_with(
     task: &IterationTask,
     motions: &[Recording],
     identification: &IdentificationSettings,
-    (joint, change): (Option<usize>, f64),
+    joint: Option<usize>,
+    change: f64,
 ) -> Option<Left> {
     let model = task.robot.model();
     // The first joint's distance from the base moves no torque.

@@ -12,17 +12,17 @@ const MARGIN: f64 = core::f64::consts::FRAC_PI_6;
 
 /// The highest natural frequency with that margin, rad/s; infinite without a delay.
 pub(crate) fn highest_omega(ratio: f64, delay_s: f64) -> f64 {
-    omega_with_margin(ratio, delay_s, (MARGIN, 1.0))
+    omega_with_margin(ratio, delay_s, MARGIN, 1.0)
 }
 
 /// The natural frequency at which a joint that is lighter than expected keeps half of that margin, rad/s, with
 /// `K_d = 2 ζ ω m̂` for a damping `ζ`; infinite without a delay.
 pub(crate) fn highest_omega_if_light(ratio: f64, delay_s: f64, damping: f64) -> f64 {
-    omega_with_margin(ratio, delay_s, (0.5 * MARGIN, damping))
+    omega_with_margin(ratio, delay_s, 0.5 * MARGIN, damping)
 }
 
 /// With a damping `ζ` the crossover is at `x² = 2 ζ² r² + r √(4 ζ⁴ r² + 1)`, and the margin `atan 2 ζ x - ω_c τ`.
-fn omega_with_margin(ratio: f64, delay_s: f64, (margin, damping): (f64, f64)) -> f64 {
+fn omega_with_margin(ratio: f64, delay_s: f64, margin: f64, damping: f64) -> f64 {
     let damped = damping * damping * ratio;
     let crossover = (2.0 * damped * ratio + ratio * (4.0 * damped * damped + 1.0).sqrt()).sqrt();
     ((2.0 * damping * crossover).atan() - margin) / (crossover * delay_s)

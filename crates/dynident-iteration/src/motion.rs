@@ -112,7 +112,7 @@ pub fn measured_motion(
     if [&motion.q, &motion.dq, &motion.ddq, &motion.tau].into_iter().any(|values| !finite(values)) {
         return Err(wrong("it holds numbers that are not finite".to_owned()));
     }
-    let raw = (!settings.estimation.estimator.is_plain()).then(|| raw_samples(record, (rate_hz, first_time_s), q, tau));
+    let raw = (!settings.estimation.estimator.is_plain()).then(|| raw_samples(record, rate_hz, first_time_s, q, tau));
     Ok(MotionRecord {
         label: format!("record of joints {}", record.joints.join(", ")),
         motion: Arc::new(motion),
@@ -125,7 +125,8 @@ pub fn measured_motion(
 /// The record's samples on its uniform clock, for estimators that smooth or simulate anew.
 fn raw_samples(
     record: &Record,
-    (rate_hz, first_time_s): (f64, f64),
+    rate_hz: f64,
+    first_time_s: f64,
     q: Vec<f64>,
     tau: Vec<f64>,
 ) -> Result<Log, IterationError> {

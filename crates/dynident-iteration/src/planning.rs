@@ -16,7 +16,8 @@ use crate::run_motion::legs_along;
 pub(crate) fn planned_motion(
     planner: &dyn MotionPlanner,
     task: &IterationTask,
-    (records, pool): (&[RunRecord], bool),
+    records: &[RunRecord],
+    pool: bool,
     stop: Option<&StopSignal>,
 ) -> Result<PlannedMotion, IterationError> {
     let run = records.len() + 1;

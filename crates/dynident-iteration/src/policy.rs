@@ -190,7 +190,8 @@ pub(crate) fn verdict(
     record: &RunRecord,
     before: &[RunRecord],
     settings: &IterationSettings,
-    (following, names): (&[f64], &Names),
+    following: &[f64],
+    names: &Names,
 ) -> Result<(), Rejection> {
     if !record.done {
         return Err(Rejection::NotDone { outcome: record.outcome.clone() });

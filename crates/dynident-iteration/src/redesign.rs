@@ -149,7 +149,8 @@ impl Redesign {
     fn search(
         &self,
         before: &BeforeRun<'_>,
-        (information, noise): (&KnownInformation, &RunNoise),
+        information: &KnownInformation,
+        noise: &RunNoise,
         repeated: &LargestTorque,
     ) -> Result<(Reference, LargestTorque), NotRedesigned> {
         let model = found_bodies(before.robot, before.known)?;
@@ -161,9 +162,9 @@ impl Redesign {
         let mut taken_off = repeated.beyond_search.clone();
         let mut last = None;
         for _ in 0..SEARCHES {
-            let limits = self.with_torque(&names, (&torque_limits, &known), &taken_off);
+            let limits = self.with_torque(&names, &torque_limits, &known, &taken_off);
             let set = LimitSet::new(&limits, &model)?;
-            let found = self.designed(before, (information, noise), &set)?;
+            let found = self.designed(before, information, noise, &set)?;
             if stopped() {
                 return Err(NotRedesigned::Interrupted);
             }
@@ -201,12 +202,7 @@ impl Redesign {
     }
 
     /// The limits with what is left of each joint's torque for the model that the search has.
-    fn with_torque(
-        &self,
-        names: &[String],
-        (torque_limits, known): (&[f64], &KnownTorque),
-        taken_off: &[f64],
-    ) -> Limits {
+    fn with_torque(&self, names: &[String], torque_limits: &[f64], known: &KnownTorque, taken_off: &[f64]) -> Limits {
         let mut limits = Limits { known_torque: known.clone(), ..self.limits.clone() };
         for ((name, limit), taken_off) in names.iter().zip(torque_limits).zip(taken_off) {
             if limit.is_finite() && limits.of(name).is_none() {
@@ -222,7 +218,8 @@ impl Redesign {
     fn designed(
         &self,
         before: &BeforeRun<'_>,
-        (information, noise): (&KnownInformation, &RunNoise),
+        information: &KnownInformation,
+        noise: &RunNoise,
         set: &LimitSet,
     ) -> Result<Design, NotRedesigned> {
         let criterion = WorstDirections::new(information.units.clone(), ORDER);
@@ -334,7 +331,7 @@ impl MotionPlanner for Redesign {
         let model = found_bodies(before.robot, before.known)?;
         let searched = |motion: &Motion| searched_torque(&model, &self.known_torque(before), motion);
         let torque = largest_torque(before.robot, before.known, repeated, &searched);
-        let found = self.search(before, (&information, &noise), &torque).and_then(|(reference, torque)| {
+        let found = self.search(before, &information, &noise, &torque).and_then(|(reference, torque)| {
             let other = expected(&reference);
             let percent = other.gain_percent();
             if percent > repeat_gain_percent {

@@ -280,14 +280,14 @@ impl Rehearsed<'_> {
                 if stop() {
                     return Ok(Err(RehearsalFailure::Interrupted));
                 }
-                if let Err(failure) = self.simulate(believed, (one, settings), &mut random, &mut shown)? {
+                if let Err(failure) = self.simulate(believed, one, settings, &mut random, &mut shown)? {
                     return Ok(Err(failure));
                 }
             }
             // Without a delay: the gains allow for it already, and no joint may be too fast for the controller's rate.
             if let Some(light) = self.light {
                 let one = Rehearsing { is_light: true, ..itself };
-                if let Err(failure) = self.simulate(light, (one, settings), &mut random, &mut shown)? {
+                if let Err(failure) = self.simulate(light, one, settings, &mut random, &mut shown)? {
                     return Ok(Err(failure));
                 }
             }
@@ -299,7 +299,8 @@ impl Rehearsed<'_> {
     fn simulate(
         &self,
         believed: &[f64],
-        (one, settings): (Rehearsing, &RehearsalSettings),
+        one: Rehearsing,
+        settings: &RehearsalSettings,
         random: &mut Random,
         shown: &mut Rehearsal,
     ) -> Result<Result<(), RehearsalFailure>, SimulationError> {
@@ -331,7 +332,7 @@ impl Rehearsed<'_> {
             largest.for_each(|(most, error)| *most = most.max(*error));
             let outside = self.envelope.and_then(|envelope| envelope.outside(&run.q, run.samples, run.rate_hz));
             let names = &run.joints;
-            let found = RunOscillations::first(self.oscillation, reference, (&run.q, run.samples), names);
+            let found = RunOscillations::first(self.oscillation, reference, &run.q, run.samples, names);
             if let Some(oscillation) = found {
                 return Ok(Err(RehearsalFailure::Oscillates { robot: one.words(settings), oscillation }));
             }

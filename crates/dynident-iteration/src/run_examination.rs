@@ -45,8 +45,10 @@ pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
 pub(crate) fn examined(
     task: &IterationTask,
     records: &[Record],
-    (settings, oscillation): (&RunIdentificationSettings, &OscillationSettings),
-    (known, rest_margins): (Option<&RunEstimate>, &[RestMargin]),
+    settings: &RunIdentificationSettings,
+    oscillation: &OscillationSettings,
+    known: Option<&RunEstimate>,
+    rest_margins: &[RestMargin],
 ) -> Result<RunEvidence, IterationError> {
     let dof = task.robot.dof();
     let noise = torque_noises(records, dof);
@@ -79,7 +81,7 @@ pub(crate) fn examined(
         });
     }
     if let Some(known) = known.filter(|known| known.values.len() == task.robot.layout().columns().len()) {
-        predict(&mut joints, task, records, (settings, known, rest_margins))?;
+        predict(&mut joints, task, records, settings, known, rest_margins)?;
     }
     Ok(RunEvidence {
         log_rates_hz: records.iter().map(|record| record.rate_hz).collect(),
@@ -116,7 +118,9 @@ fn predict(
     joints: &mut [JointEvidence],
     task: &IterationTask,
     records: &[Record],
-    (settings, known, rest_margins): (&RunIdentificationSettings, &RunEstimate, &[RestMargin]),
+    settings: &RunIdentificationSettings,
+    known: &RunEstimate,
+    rest_margins: &[RestMargin],
 ) -> Result<(), IterationError> {
     let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None, rest_margins };
     let recordings = recordings(task, &[log], settings)?;
@@ -162,7 +166,8 @@ pub(crate) fn add_tracking_floors(
     task: &IterationTask,
     records: &[Record],
     settings: &IterationSettings,
-    (known, friction): (&RunEstimate, &[JointFriction]),
+    known: &RunEstimate,
+    friction: &[JointFriction],
     errors_rad: &[f64],
 ) {
     let Some(parameters) = &known.possible else { return };

@@ -26,13 +26,14 @@ impl Iteration {
         record: &RunRecord,
         records: &[Record],
         before: &[RunRecord],
-        (earlier, prepared): (&[GoodLog], &Prepared),
+        earlier: &[GoodLog],
+        prepared: &Prepared,
         fitted: Option<Fitted<'_>>,
     ) -> Result<Option<TorqueCheck>, IterationError> {
         let Some(settings) = &self.settings.torque_check else { return Ok(None) };
         let least = LeastDeviation { share: 0.01 * settings.row_scale_percent, sigmas: settings.sigmas };
         let scales = match (fitted, record.knowledge()) {
-            (Some((task, runs, of_fit)), Some(known)) => row_scales(task, runs, of_fit, (known, least))?,
+            (Some((task, runs, of_fit)), Some(known)) => row_scales(task, runs, of_fit, known, least)?,
             _ => vec![None; self.task.robot.dof()],
         };
         let models: Vec<Option<(ControllerSettings, Option<ControllerModel>)>> =

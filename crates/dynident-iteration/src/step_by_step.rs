@@ -27,7 +27,9 @@ pub(crate) struct Steps {
 /// by `weights[ℓ][k]`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
-    (logs, settings, weights): (&Logs<'_>, &EstimationSettings, &[Vec<f64>]),
+    logs: &Logs<'_>,
+    settings: &EstimationSettings,
+    weights: &[Vec<f64>],
     names: &[String],
     joints: &[String],
     fallback: &[f64],

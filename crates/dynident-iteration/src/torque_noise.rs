@@ -58,7 +58,7 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
     let mut from_hz = motion_hz.min(0.5 * nyquist_hz);
     while from_hz < 0.9 * nyquist_hz {
         let to_hz = if 2.2 * from_hz > nyquist_hz { nyquist_hz } else { 2.0 * from_hz };
-        let Some(density) = octave_density((&third, q), rate_hz, [from_hz, to_hz]) else { break };
+        let Some(density) = octave_density(&third, q, rate_hz, [from_hz, to_hz]) else { break };
         octaves.push(([from_hz, to_hz], density));
         from_hz = to_hz;
     }
@@ -75,7 +75,7 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
 }
 
 /// One-sided density of the noise within an octave, Nm²/Hz, from third differences; none where no window fits.
-fn octave_density((third, q): (&[f64], &[f64]), rate_hz: f64, [from_hz, to_hz]: [f64; 2]) -> Option<f64> {
+fn octave_density(third: &[f64], q: &[f64], rate_hz: f64, [from_hz, to_hz]: [f64; 2]) -> Option<f64> {
     let length = (PERIODS as f64 * rate_hz / from_hz).round() as usize;
     if length < 2 * PERIODS || third.len() < length {
         return None;

@@ -55,10 +55,10 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
     let terms = known.robot.terms();
     let parameters = &known.parameters[known.robot.model().inertial_count()..];
     let names = known.robot.joint_names();
-    let sticking = with_sticking_joints((terms, parameters), (&names, known.friction), &fastest);
-    let found = floor_with((&with_dry_steps(terms, &fastest), parameters), (reference, record), known, &fastest)?;
-    let sticking = sticking
-        .and_then(|(terms, parameters)| floor_with((&terms, &parameters), (reference, record), known, &fastest));
+    let sticking = with_sticking_joints(terms, parameters, &names, known.friction, &fastest);
+    let found = floor_with((&with_dry_steps(terms, &fastest), parameters), reference, record, known, &fastest)?;
+    let sticking =
+        sticking.and_then(|(terms, parameters)| floor_with((&terms, &parameters), reference, record, known, &fastest));
     Some(match sticking {
         None => found,
         Some(sticking) => TrackingFloor {
@@ -71,7 +71,8 @@ pub(crate) fn tracking_floor(reference: &Reference, record: &Record, known: &Kno
 /// The floor of a robot that has these terms with their parameters.
 fn floor_with(
     friction: (&[TorqueTerm], &[f64]),
-    (reference, record): (&Reference, &Record),
+    reference: &Reference,
+    record: &Record,
     known: &KnownLoop<'_>,
     fastest: &[f64],
 ) -> Option<TrackingFloor> {
@@ -83,19 +84,19 @@ fn floor_with(
     // What the log shows late the controller may see late, too. Drives that close their own loop do not: where it could
     // not bear that delay, the run that was made did not have it.
     let late_by_log = samples(known.delay_s);
-    let (of_log, plain) = match simulated(reference, known, friction, late_by_log) {
+    let (of_log, plain) = match simulated(reference, known, friction.0, friction.1, late_by_log) {
         Some(run) => (late_by_log, run),
-        None if late_by_log > 0 => (0, simulated(reference, known, friction, 0)?),
+        None if late_by_log > 0 => (0, simulated(reference, known, friction.0, friction.1, 0)?),
         None => return None,
     };
-    let one_late = || simulated(reference, known, friction, of_log + 1);
+    let one_late = || simulated(reference, known, friction.0, friction.1, of_log + 1);
     let late = has_same_clock(reference, record)
         .then(one_late)
         .flatten()
         .and_then(|one_late| delay_in_samples(record, &plain, &one_late))
         .filter(|late| *late <= samples(known.robot.model().own_scale().seconds(LONGEST_S)));
     if let Some(late) = late
-        && let Some(run) = simulated(reference, known, friction, of_log + late)
+        && let Some(run) = simulated(reference, known, friction.0, friction.1, of_log + late)
         && left(record, &run) <= LEFT * left(record, &plain)
     {
         let feedback_delay_s = Some(late as f64 / reference.rate_hz());
@@ -108,7 +109,8 @@ fn floor_with(
 fn simulated(
     reference: &Reference,
     known: &KnownLoop<'_>,
-    (terms, of_terms): (&[TorqueTerm], &[f64]),
+    terms: &[TorqueTerm],
+    of_terms: &[f64],
     late: usize,
 ) -> Option<Run> {
     let robot = known.robot;

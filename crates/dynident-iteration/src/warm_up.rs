@@ -72,7 +72,8 @@ impl WarmUp {
 /// warm-up takes, and as often as fills that time otherwise.
 pub(crate) fn passes(
     safety: &SafetySettings,
-    (legs, ways): (&[Leg], &[Option<FoundWays>]),
+    legs: &[Leg],
+    ways: &[Option<FoundWays>],
     last_motion: Option<Instant>,
 ) -> usize {
     let wanted_s = safety.warm_up_s;

@@ -145,7 +145,7 @@ impl Watch {
     /// As [`OnlineEstimator::add`]: nothing has changed then.
     pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
         let Self { estimator, reference, residuals, contact, .. } = self;
-        look(estimator, (reference, residuals), contact, [q, dq, ddq, tau])
+        look(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
     /// Takes positions and torques as they were measured; velocities and accelerations are those of
@@ -156,7 +156,7 @@ impl Watch {
     pub fn add_measured(&mut self, q: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
         let Self { derivatives, estimator, reference, residuals, contact, .. } = self;
         let Some(DelayedSample { q, dq, ddq, tau }) = derivatives.add(q, tau)? else { return Ok(None) };
-        look(estimator, (reference, residuals), contact, [q, dq, ddq, tau])
+        look(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
     /// Whether it is time for [`check_drift`](Self::check_drift).
@@ -227,7 +227,8 @@ impl Watch {
 /// A sample for the estimate, and its residual by the reference for the monitor.
 fn look(
     estimator: &mut OnlineEstimator,
-    (reference, residuals): (&[f64], &mut [f64]),
+    reference: &[f64],
+    residuals: &mut [f64],
     contact: &mut ContactMonitor,
     [q, dq, ddq, tau]: [&[f64]; 4],
 ) -> Result<Option<Contact>, OnlineError> {

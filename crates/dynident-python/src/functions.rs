@@ -88,7 +88,7 @@ pub(crate) fn _validate(
 ) -> PyResult<String> {
     let result = model.get().result().clone();
     of_study(study, threads, progress, move |study, path, options, _| {
-        json(&validate_result(&result, Path::new(RESULT), (&study, &path), options)?)
+        json(&validate_result(&result, Path::new(RESULT), &study, &path, options)?)
     })
 }
 
@@ -166,7 +166,7 @@ pub(crate) fn _iterate(
             Some(function) => {
                 let function = Arc::new(function);
                 let mut make = |joints: &[String]| robot_of(&function, joints, &kept);
-                iterate_with_robot(&study, &path, (&out, resume), &options, &mut watch, &mut make)
+                iterate_with_robot(&study, &path, &out, resume, &options, &mut watch, &mut make)
             }
         };
         json(&file?)

@@ -93,7 +93,7 @@ pub(crate) fn run_to_its_stop<T: Send + 'static>(
     stop: &StopSignal,
     work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
-    waited_for(py, threads, (None, Some(stop)), work)
+    waited_for(py, threads, None, Some(stop), work)
 }
 
 /// Runs `work` on a thread of its own, with a pool of `threads` threads, while this one looks for Ctrl-C and tells
@@ -104,13 +104,14 @@ pub(crate) fn run<T: Send + 'static>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
-    waited_for(py, threads, (progress, None), work)
+    waited_for(py, threads, progress, None, work)
 }
 
 fn waited_for<T: Send + 'static>(
     py: Python<'_>,
     threads: usize,
-    (progress, stop): (Option<&Bound<'_, PyAny>>, Option<&StopSignal>),
+    progress: Option<&Bound<'_, PyAny>>,
+    stop: Option<&StopSignal>,
     work: impl FnOnce(&Watch) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
     let mut interrupted = None;

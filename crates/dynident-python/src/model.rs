@@ -207,7 +207,7 @@ impl FittedModel {
             errors::ResultError::new_err(format!("no form `{target}`: give one of {}", known.join(", ")))
         })?;
         let of = (&self.study, &*self.path);
-        let made = || guarded(|| export_result(&self.result, Path::new(RESULT), of, (None, wanted)));
+        let made = || guarded(|| export_result(&self.result, Path::new(RESULT), of.0, of.1, None, wanted));
         let exported = py.detach(made)?.map_err(|error| errors::job(py, &error))?;
         Ok((exported.text, exported.notes))
     }
@@ -215,7 +215,7 @@ impl FittedModel {
     /// Drives as simulators mean them: JSON and a table of Markdown.
     fn simulator(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let of = (&self.study, &*self.path);
-        let made = py.detach(|| guarded(|| export_simulator_of(&self.result, Path::new(RESULT), of, None)))?;
+        let made = py.detach(|| guarded(|| export_simulator_of(&self.result, Path::new(RESULT), of.0, of.1, None)))?;
         let made = made.map_err(|error| errors::job(py, &error))?;
         let json = made.json().map_err(|error| errors::ResultError::new_err(error.to_string()))?;
         Ok((json.text, made.table().text))

@@ -126,7 +126,8 @@ impl Robot {
     fn for_blocks(
         &self,
         [q, dq, ddq]: [&[f64]; 3],
-        (out, size): (&mut [f64], usize),
+        out: &mut [f64],
+        size: usize,
         each: impl Fn(&mut BatchWorkspace, &JointMotion<'_>, &mut [f64]) + Sync,
     ) {
         let dof = self.model.dof();
@@ -342,7 +343,7 @@ impl Robot {
         let dof = self.model.dof();
         let motion = Motion::of(dof, q, dq, ddq)?;
         motion.fill(py, &[dof], |numbers, out| {
-            self.for_blocks(numbers, (out, dof), |workspace, motion, out| {
+            self.for_blocks(numbers, out, dof, |workspace, motion, out| {
                 let mut tau = vec![0.0; out.len()];
                 inverse_dynamics_batch(&self.model, workspace, motion, &mut tau);
                 for (sample, row) in out.chunks_exact_mut(dof.max(1)).enumerate() {
@@ -452,7 +453,7 @@ impl Robot {
             None => PyArrayDyn::<f64>::zeros(py, motion.shape(&[dof, columns]), false),
         };
         motion.fill_into(py, &array, |numbers, out| {
-            self.for_blocks(numbers, (out, dof * columns), |workspace, motion, out| {
+            self.for_blocks(numbers, out, dof * columns, |workspace, motion, out| {
                 lend(&self.panels, Panels::default, |panels| {
                     regressor_panels(&self.model, workspace, layout, motion, panels);
                     if !is_zero {

@@ -82,14 +82,14 @@ impl Simulated {
         let load = regressor.base().values(&bodies);
         let regressor = regressor.clone().with_load_of(&regressor, &load);
 
-        let recorded = (case.motion.duration_s, case.motion.rate_hz);
+        let (duration_s, rate_hz) = (case.motion.duration_s, case.motion.rate_hz);
         let (family, parameters) = designed(described, &robot.described, case.motion.harmonics, &mut random("motion"))?;
-        let motion = sampled(&family, &parameters, recorded, 0.0);
-        let before = sampled(&family, &parameters, recorded, case.lag_s);
+        let motion = sampled(&family, &parameters, duration_s, rate_hz, 0.0);
+        let before = sampled(&family, &parameters, duration_s, rate_hz, case.lag_s);
         let theta = truth(&regressor, &motion, share);
         let exact = torque(&regressor, &before, &theta);
         let (family, parameters) = random_series(described, case.motion.harmonics, &mut random("test"))?;
-        let other = sampled(&family, &parameters, (PERIOD_S, TEST_RATE_HZ), 0.0);
+        let other = sampled(&family, &parameters, PERIOD_S, TEST_RATE_HZ, 0.0);
         let other_exact = torque(&regressor, &other, &theta);
 
         let joints = 0..described.dof();
@@ -171,7 +171,7 @@ fn designed(
     let mut best: Option<(f64, Fourier, Vec<f64>)> = None;
     for _ in 0..CANDIDATES {
         let (family, parameters) = random_series(model, harmonics, random)?;
-        let motion = sampled(&family, &parameters, (PERIOD_S, CANDIDATE_RATE_HZ), 0.0);
+        let motion = sampled(&family, &parameters, PERIOD_S, CANDIDATE_RATE_HZ, 0.0);
         let panels = panels(&regressor, &motion);
         let mut information = DMatrix::<f64>::zeros(count, count);
         for joint in 0..model.dof() {

@@ -29,9 +29,11 @@ const FACTORS_OF: &str = "panda_arm7";
 /// # Errors
 /// In words, if the text cannot be written or read.
 pub(crate) fn time_machine(
-    (name, model): (&str, &Model),
+    name: &str,
+    model: &Model,
     levels: &[Level],
-    (path, rows): (&Path, usize),
+    path: &Path,
+    rows: usize,
     only: &[String],
 ) -> Result<(), String> {
     let words = |problem: &dyn core::fmt::Display| format!("{}: {problem}", path.display());

@@ -121,12 +121,12 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let stored = read(&options.result).map_err(message_of)?;
     let drives = || -> Result<_, String> {
         let (study, path) = with_study()?;
-        export_simulator_of(&stored, &options.result, (study, path), data).map_err(known_in(path))
+        export_simulator_of(&stored, &options.result, study, path, data).map_err(known_in(path))
     };
     let exported = match options.to.kind() {
         Kind::Model(target) => {
             let (study, path) = with_study()?;
-            export_result(&stored, &options.result, (study, path), (data, target)).map_err(known_in(path))?
+            export_result(&stored, &options.result, study, path, data, target).map_err(known_in(path))?
         }
         Kind::SimulatorJson => drives()?.json().map_err(|error| error.to_string())?,
         Kind::SimulatorTable => drives()?.table(),

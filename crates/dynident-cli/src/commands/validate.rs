@@ -33,7 +33,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
     let stored = read(&options.result).map_err(message_of)?;
-    let file = validate_result(&stored, &options.result, (&study, &options.study), &run);
+    let file = validate_result(&stored, &options.result, &study, &options.study, &run);
     let file = file.map_err(known_in(&options.study))?;
     if context.json {
         terminal::print_document(&json(&file)?)?;

@@ -58,9 +58,9 @@ pub(super) fn identifiable_directions<'a>(
     for (j, joint) in model.joints().iter().enumerate() {
         let motion = Harmonics::of(joint, &units);
         let arriving =
-            arriving_twists((model, &units), j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
+            arriving_twists(model, &units, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
         // Conditions on this body's composite by its own joint, with the constants of the terms beside them.
-        let own = arriving.iter().map(|w| (power(model, j, w), term_constants((model, &units), terms, j, w, slots)));
+        let own = arriving.iter().map(|w| (power(model, j, w), term_constants(model, &units, terms, j, w, slots)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.
         let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
@@ -221,7 +221,8 @@ fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
 
 /// A spanning set of the twists that arrive at joint `j`.
 fn arriving_twists(
-    (model, units): (&Model, &OwnUnits),
+    model: &Model,
+    units: &OwnUnits,
     j: usize,
     motion: &Harmonics,
     parent: Option<&[ArrivingTwist]>,
@@ -285,7 +286,8 @@ fn power(model: &Model, j: usize, w: &ArrivingTwist) -> Vector10 {
 
 /// What the terms add to the entry of joint `j` that `w` stands for.
 fn term_constants(
-    (model, units): (&Model, &OwnUnits),
+    model: &Model,
+    units: &OwnUnits,
     terms: &[TorqueTerm],
     j: usize,
     w: &ArrivingTwist,

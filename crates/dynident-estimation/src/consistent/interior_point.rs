@@ -72,7 +72,7 @@ pub(super) fn interior_point(
     tolerance: f64,
     max_iterations: usize,
 ) -> Option<InteriorPointResult> {
-    from_state(program, State::new(program, start)?, (tolerance, max_iterations), &mut |_, _| false)
+    from_state(program, State::new(program, start)?, tolerance, max_iterations, &mut |_, _| false)
 }
 
 /// As [`interior_point`], but what is found may be less exact: the first point that is `enough`, by its variables and
@@ -83,14 +83,15 @@ pub(super) fn interior_point_until(
     limits: (f64, usize),
     enough: impl Fn(&DVector<f64>, &Certificate) -> bool,
 ) -> Option<InteriorPointResult> {
-    from_state(program, State::new(program, start)?, limits, &mut |state, now| enough(&state.x.high, now))
+    from_state(program, State::new(program, start)?, limits.0, limits.1, &mut |state, now| enough(&state.x.high, now))
 }
 
 /// From a state to the optimum, or to where `seen` says that it is enough.
 fn from_state(
     program: &Program,
     mut state: State,
-    (tolerance, max_iterations): (f64, usize),
+    tolerance: f64,
+    max_iterations: usize,
     seen: &mut dyn FnMut(&State, &Certificate) -> bool,
 ) -> Option<InteriorPointResult> {
     let mut best = state.solved(program, 0, Ending::Limit)?;

@@ -281,7 +281,7 @@ impl ConsistentIntervals {
             reached *= ratio.powf(power.min(1.0));
             Next::Stop
         };
-        interior_point_within_limit(&mut program, (on_the_way, least), MOST_ITERATIONS, &mut look);
+        interior_point_within_limit(&mut program, on_the_way, least, MOST_ITERATIONS, &mut look);
         let [lower, upper] = self.own_limits(index);
         // The best set is inside, whatever rounding makes of an end beside it.
         let end = (value + side * reached.max(0.0)).max(lower.min(value)).min(upper.max(value));

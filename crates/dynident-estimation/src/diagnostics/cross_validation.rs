@@ -179,7 +179,7 @@ impl<'a> CrossValidation<'a> {
                 }
                 let mut absorb = |to: &mut TriangularFactor, from: &TriangularFactor, weight: f64, rows: usize| {
                     let local = |column: usize| order.get(column).map_or(Some(from.columns()), |&global| place[global]);
-                    to.absorb_columns(&mut workspace, (from, rows, weight), local);
+                    to.absorb_columns(&mut workspace, from, rows, weight, local);
                     to.count(from.rows());
                 };
                 let weight = weights[equation.joint];

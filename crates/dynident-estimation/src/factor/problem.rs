@@ -322,7 +322,7 @@ impl StackedProblem<'_> {
                 place[column] = Some(local);
             }
             place[columns] = Some(total.columns());
-            combined.absorb_columns(&mut workspace, (total, total.columns() + 1, weight), |column| place[column]);
+            combined.absorb_columns(&mut workspace, total, total.columns() + 1, weight, |column| place[column]);
             combined.count(total.rows());
         }
         if let Some(prior) = &problem.prior {

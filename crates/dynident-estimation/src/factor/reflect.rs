@@ -133,10 +133,10 @@ fn step<T: Lane, const V: usize>(
         let (done, rest) = block.split_at_mut(i * chunks);
         let column = &mut rest[..height];
         match i {
-            0 => reflect_column::<T, V, 0>(triangle, size, first, (done, chunks), column, &mut reflectors),
-            1 => reflect_column::<T, V, 1>(triangle, size, first, (done, chunks), column, &mut reflectors),
-            2 => reflect_column::<T, V, 2>(triangle, size, first, (done, chunks), column, &mut reflectors),
-            _ => reflect_column::<T, V, 3>(triangle, size, first, (done, chunks), column, &mut reflectors),
+            0 => reflect_column::<T, V, 0>(triangle, size, first, done, chunks, column, &mut reflectors),
+            1 => reflect_column::<T, V, 1>(triangle, size, first, done, chunks, column, &mut reflectors),
+            2 => reflect_column::<T, V, 2>(triangle, size, first, done, chunks, column, &mut reflectors),
+            _ => reflect_column::<T, V, 3>(triangle, size, first, done, chunks, column, &mut reflectors),
         }
     }
     let columns = columns::<V>(block, chunks, height);
@@ -193,7 +193,8 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     triangle: &mut [f64],
     size: usize,
     first: usize,
-    (done, chunks): (&[Chunk], usize),
+    done: &[Chunk],
+    chunks: usize,
     column: &mut [Chunk],
     reflectors: &mut Reflectors<V>,
 ) {

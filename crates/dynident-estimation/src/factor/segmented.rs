@@ -121,8 +121,10 @@ impl SegmentedFactor {
 
     /// The factor of these segments.
     pub(super) fn of_segments(
-        (columns, rows): (usize, usize),
-        (max_segments, length_rows): (usize, usize),
+        columns: usize,
+        rows: usize,
+        max_segments: usize,
+        length_rows: usize,
         segments: Vec<Segment>,
     ) -> Self {
         let (total, workspace) = (OnceLock::new(), FactorWorkspace::default());

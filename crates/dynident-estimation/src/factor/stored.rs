@@ -120,7 +120,7 @@ impl SegmentedFactor {
             });
         }
         let rows = segments.iter().fold(0_usize, |sum, segment| sum.saturating_add(segment.rows));
-        Ok(Self::of_segments((columns, rows), (max_segments, segment_length_rows), restored))
+        Ok(Self::of_segments(columns, rows, max_segments, segment_length_rows, restored))
     }
 
     /// The same rows in at most `most` segments: neighbours are merged, two by two, until there are no more. Values

@@ -216,7 +216,9 @@ impl TriangularFactor {
     pub(crate) fn absorb_columns(
         &mut self,
         workspace: &mut FactorWorkspace,
-        (other, rows, weight): (&Self, usize, f64),
+        other: &Self,
+        rows: usize,
+        weight: f64,
         place: impl Fn(usize) -> Option<usize>,
     ) {
         let (chunks, size) = (rows.div_ceil(CHUNK_ROWS), other.columns + 1);
@@ -273,7 +275,7 @@ impl TriangularFactor {
         if self.rows == 0 {
             self.clone_from(other);
         } else if other.rows > 0 {
-            self.absorb_columns(workspace, (other, other.filled_rows(), 1.0), Some);
+            self.absorb_columns(workspace, other, other.filled_rows(), 1.0, Some);
             self.rows += other.rows;
         }
     }
@@ -387,7 +389,7 @@ impl TriangularFactor {
         check_columns(columns, self.columns)?;
         let mut selected = Self::new(columns.len());
         let place = |column: usize| Some(columns.get(column).copied().unwrap_or(self.columns));
-        selected.absorb_columns(&mut FactorWorkspace::default(), (self, self.filled_rows(), 1.0), place);
+        selected.absorb_columns(&mut FactorWorkspace::default(), self, self.filled_rows(), 1.0, place);
         selected.rows = self.rows;
         Ok(selected)
     }

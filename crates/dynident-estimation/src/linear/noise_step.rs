@@ -20,9 +20,11 @@ const FURTHEST: f64 = 1.5;
 /// The weights `1/σ_j` after Newton's step from those that `solution` was found with, where it left `joint_sigma`;
 /// `None` where the step is too far or not defined.
 pub(super) fn newton_weights(
-    (stacked, split): (&StackedProblem<'_>, &Split),
+    stacked: &StackedProblem<'_>,
+    split: &Split,
     solution: &SolvedValues,
-    (weights, joint_sigma): (&[f64], &[f64]),
+    weights: &[f64],
+    joint_sigma: &[f64],
     degrees_of_freedom: &[f64],
 ) -> Option<Vec<f64>> {
     let joints = weights.len();

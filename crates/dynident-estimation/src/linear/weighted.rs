@@ -130,7 +130,7 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
         }
         // Newton's step from weights that are not those of the start; one that does not lead nearer is the last.
         newton_helps &= !is_newton || change <= 0.5 * last_change;
-        let newton = || newton_weights((stacked, &split), &solution, (&weights, &joint_sigma), &degrees_of_freedom);
+        let newton = || newton_weights(stacked, &split, &solution, &weights, &joint_sigma, &degrees_of_freedom);
         let next = if iterations > 1 && newton_helps { newton() } else { None };
         (last_change, is_newton) = (change, next.is_some());
         weights = next.unwrap_or_else(|| joint_sigma.iter().map(|sigma| sigma.recip()).collect());

@@ -50,7 +50,8 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         task: &'a DesignTask<'a>,
         margins: &'a [f64],
-        (criterion, units): (&'a dyn Criterion, &'a ColumnUnits),
+        criterion: &'a dyn Criterion,
+        units: &'a ColumnUnits,
         times: &'a [f64],
         weight: f64,
         shaped: bool,

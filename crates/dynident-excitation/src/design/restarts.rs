@@ -67,7 +67,9 @@ impl Neighbourhood {
     /// Its best motion and `count` others around it, to follow round number `round`; none before its first.
     pub(super) fn starts(
         &self,
-        (round, joints, count): (usize, usize, usize),
+        round: usize,
+        joints: usize,
+        count: usize,
         random: &mut Random,
     ) -> Option<Vec<AugmentedLagrangianState>> {
         let (best, _) = self.best.as_ref()?;

@@ -100,7 +100,7 @@ pub(crate) fn restored(
             if let Some(between) = way_inside(task, criterion, &best, &assessed, [fine, logged], &over) {
                 parameters.clone_from(&between.parameters);
                 best = between;
-            } else if let Some(smaller) = shrunk(task, criterion, (&assessed, &worst), [fine, logged], &over)
+            } else if let Some(smaller) = shrunk(task, criterion, &assessed, &worst, [fine, logged], &over)
                 && smaller.better_than(&best)
             {
                 parameters.clone_from(&smaller.parameters);

@@ -190,7 +190,7 @@ impl Rounds<'_> {
     ) -> Result<Vec<AugmentedLagrangianResult>, OptimiserError> {
         let weight = self.logged as f64 / self.times.len() as f64;
         let result = multi_start(
-            || Problem::new(self.task, margins, (criterion, &self.units), self.times, weight, self.shaped),
+            || Problem::new(self.task, margins, criterion, &self.units, self.times, weight, self.shaped),
             starts,
             settings,
             |progress| {

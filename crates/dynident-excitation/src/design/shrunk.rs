@@ -37,7 +37,8 @@ const STILL: f64 = 1e-6;
 pub(super) fn shrunk(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
-    (outside, worst): (&Assessment, &[f64]),
+    outside: &Assessment,
+    worst: &[f64],
     [fine, logged]: [&[f64]; 2],
     stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
@@ -185,7 +186,7 @@ mod tests {
             let (positions, speeds) = ranges(task.limits);
             let start = family.random(&positions, &speeds, &mut Random::new(3));
             let (first, worst) = judged(start.clone());
-            let inside = shrunk(task, &condition, (&first, &worst), [&fine, &logged], &|| false).unwrap_or(first);
+            let inside = shrunk(task, &condition, &first, &worst, [&fine, &logged], &|| false).unwrap_or(first);
             assert!(inside.violation <= 0.0);
             // As much larger about its posture as breaks a limit by some hundredths.
             let still = standing_still(task, &inside.parameters, &fine);
@@ -200,13 +201,13 @@ mod tests {
             let (outside, worst) = larger(below);
             assert!(outside.violation > 0.009, "{}", outside.violation);
             let smaller =
-                shrunk(task, &condition, (&outside, &worst), [&fine, &logged], &|| false).expect("a hundredth does");
+                shrunk(task, &condition, &outside, &worst, [&fine, &logged], &|| false).expect("a hundredth does");
             assert!(smaller.violation <= 0.0);
             // The regressor goes with the motion, and its smallest singular value with the acceleration's square at
             // most: two hundredths of the figure, and as much for what position takes of a range that is not centred.
             let lost = smaller.figure.unwrap() / outside.figure.unwrap() - 1.0;
             assert!(lost < 0.04, "{lost}");
-            assert!(shrunk(task, &condition, (&smaller, &worst), [&fine, &logged], &|| false).is_none());
+            assert!(shrunk(task, &condition, &smaller, &worst, [&fine, &logged], &|| false).is_none());
         });
     }
 }

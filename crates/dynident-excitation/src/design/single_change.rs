@@ -57,7 +57,7 @@ pub fn single_changes(
         if stop() {
             break;
         }
-        let Some(change) = smallest_of(task, settings, parameters, (&fine, &worst), &rows, stop)? else { continue };
+        let Some(change) = smallest_of(task, settings, parameters, &fine, &worst, &rows, stop)? else { continue };
         let size = change.iter().map(|widened| widened.by).fold(0.0, f64::max);
         // All of a kind say nothing where one of them would do with no more.
         let known = found.iter().any(|(known, of, _)| of.iter().all(|row| rows.contains(row)) && *known <= size);
@@ -95,7 +95,8 @@ fn smallest_of(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
     parameters: &[f64],
-    (fine, worst): (&[f64], &[f64]),
+    fine: &[f64],
+    worst: &[f64],
     rows: &[usize],
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<Vec<Widened>>, OptimiserError> {
@@ -106,7 +107,7 @@ fn smallest_of(
         if stop() {
             break;
         }
-        possible = with_wider(task, settings, (&start, fine), rows, wide, stop)?;
+        possible = with_wider(task, settings, &start, fine, rows, wide, stop)?;
         if possible.is_some() {
             break;
         }
@@ -120,7 +121,7 @@ fn smallest_of(
             break;
         }
         let middle = 0.5 * (little + much);
-        match with_wider(task, settings, (&start, fine), rows, middle, stop)? {
+        match with_wider(task, settings, &start, fine, rows, middle, stop)? {
             Some((used, parameters)) => {
                 much = used.min(middle);
                 kept = parameters;
@@ -138,7 +139,8 @@ fn smallest_of(
 fn with_wider(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
-    (start, fine): (&[f64], &[f64]),
+    start: &[f64],
+    fine: &[f64],
     rows: &[usize],
     wide: f64,
     stop: &(dyn Fn() -> bool + Sync),

@@ -143,7 +143,7 @@ impl SolidPairs {
                     (solid, solid.body.map_or(Transform::IDENTITY, |body| placements[body]))
                 });
                 let beyond = 2.0 * pair.clearance_m;
-                let apart = solid_distance((a.0, &a.1), (b.0, &b.1), beyond, &mut Vec::new()).surface_m;
+                let apart = solid_distance(a.0, &a.1, b.0, &b.1, beyond, &mut Vec::new()).surface_m;
                 let short = if touching { apart <= 0.0 } else { apart < pair.clearance_m };
                 if number == 0 {
                     *neutral = short;

@@ -41,7 +41,7 @@ impl SelfCollisionLimits {
     fn apart(&self, pair: &SolidPair, inputs: &Inputs<'_>, sample: usize, guesses: &mut Vec<Vec3>) -> SolidDistance {
         let [first, second] = pair.of.map(|place| &self.solids[place]);
         let [one, other] = [first, second].map(|solid| inputs.placement(solid.body, sample));
-        solid_distance((first, &one), (second, &other), pair.clearance_m + FAR * pair.size_m, guesses)
+        solid_distance(first, &one, second, &other, pair.clearance_m + FAR * pair.size_m, guesses)
     }
 }
 

@@ -107,13 +107,15 @@ impl LinkSolid {
 /// The distance of two links from surface to surface. What is above `beyond` need not be exact. `guesses`: what
 /// [`hull_distance`] keeps of each two shapes.
 pub(crate) fn solid_distance(
-    (first, first_at): (&LinkSolid, &Transform),
-    (second, second_at): (&LinkSolid, &Transform),
+    first: &LinkSolid,
+    first_at: &Transform,
+    second: &LinkSolid,
+    second_at: &Transform,
     beyond: f64,
     guesses: &mut Vec<Vec3>,
 ) -> SolidDistance {
     let mut nearest =
-        by_balls((first_at.point(first.centre), first.reach_m), (second_at.point(second.centre), second.reach_m));
+        by_balls(first_at.point(first.centre), first.reach_m, second_at.point(second.centre), second.reach_m);
     if nearest.surface_m > beyond {
         return nearest;
     }
@@ -125,7 +127,7 @@ pub(crate) fn solid_distance(
         for b in &second.shapes {
             let Some(guess) = guesses.next() else { continue };
             let centres = [first_at.point(a.centre), second_at.point(b.centre)];
-            let balls = by_balls((centres[0], a.reach_m), (centres[1], b.reach_m));
+            let balls = by_balls(centres[0], a.reach_m, centres[1], b.reach_m);
             let beyond = beyond.min(nearest.surface_m);
             let found = if balls.surface_m > beyond {
                 balls
@@ -160,7 +162,7 @@ pub(crate) fn solid_distance(
 }
 
 /// The distance of two balls.
-fn by_balls((first, first_reach): (Vec3, f64), (second, second_reach): (Vec3, f64)) -> SolidDistance {
+fn by_balls(first: Vec3, first_reach: f64, second: Vec3, second_reach: f64) -> SolidDistance {
     let apart = first - second;
     let length = apart.norm();
     let direction = if length > 0.0 { apart.scale(1.0 / length) } else { Vec3([0.0, 0.0, 1.0]) };

@@ -338,8 +338,8 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
         let (of_equal, of_above) = self.multipliers.split_at(self.equalities);
         let (to_equal, to_above) = self.weights.split_at_mut(self.equalities);
         let mut sums = PushSums::default();
-        sums.take((equal, of_equal, to_equal), self.penalty, |force| force, f64::abs);
-        sums.take((above, of_above, to_above), self.penalty, |force| force.max(0.0), |c| c);
+        sums.take(equal, of_equal, to_equal, self.penalty, |force| force, f64::abs);
+        sums.take(above, of_above, to_above, self.penalty, |force| force.max(0.0), |c| c);
         let (squares, worst) = sums.of_all_lanes();
         (squares / (2.0 * self.penalty), worst)
     }
@@ -393,7 +393,9 @@ impl PushSums {
     /// Makes the weights `push(λ + ρ c)` of constraints `c` with multipliers `λ`.
     fn take(
         &mut self,
-        (c, multipliers, weights): (&[f64], &[f64], &mut [f64]),
+        c: &[f64],
+        multipliers: &[f64],
+        weights: &mut [f64],
         penalty: f64,
         push: impl Fn(f64) -> f64,
         violation: impl Fn(f64) -> f64,

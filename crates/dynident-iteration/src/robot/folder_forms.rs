@@ -54,7 +54,7 @@ pub(super) fn write_forms(
     for (part, reference) in [("trajectory", request.reference)].into_iter().chain(ways.into_iter().flatten()) {
         for form in &settings.forms {
             let path = folder.join(file_name(part, *form));
-            let text = text(*form, (reference, request.model), joints, settings);
+            let text = text(*form, reference, request.model, joints, settings);
             let fault = |error: ExportError| RobotFault::File { path: path.clone(), reason: error.to_string() };
             match text.map_err(fault)? {
                 Some(text) => write_whole(&path, &text)?,
@@ -85,7 +85,8 @@ fn file_name(part: &str, form: FolderForm) -> String {
 
 fn text(
     form: FolderForm,
-    (reference, model): (&Reference, Option<&ControllerModel>),
+    reference: &Reference,
+    model: Option<&ControllerModel>,
     joints: &[String],
     settings: &FormSettings,
 ) -> Result<Option<String>, ExportError> {

@@ -38,7 +38,7 @@ impl core::fmt::Display for HeldTorque {
 
 /// What the record shows of a joint that was too far from the trajectory at a time, s: its torque, where that pushed
 /// the joint back and did not grow. `None` where it did.
-pub(super) fn held_torque(reference: &Reference, record: &Record, (name, time_s): (&str, f64)) -> Option<HeldTorque> {
+pub(super) fn held_torque(reference: &Reference, record: &Record, name: &str, time_s: f64) -> Option<HeldTorque> {
     let joint = record.joints.iter().position(|own| own == name)?;
     let (q, tau) = (&record.q[record.of(joint)], &record.tau[record.of(joint)]);
     let end = record.times_s.partition_point(|own| *own <= time_s);
@@ -83,7 +83,7 @@ mod tests {
         let tau = q.iter().enumerate().map(|(k, q)| torque(*q) * noise(k)).collect();
         let times_s = (0..samples).map(|k| k as f64 / RATE_HZ).collect();
         let record = Record { joints: vec!["elbow".to_owned()], rate_hz: RATE_HZ, samples, times_s, q, tau };
-        held_torque(&Reference::standing(&[0.0], RATE_HZ, 2.0).unwrap(), &record, ("elbow", 0.5))
+        held_torque(&Reference::standing(&[0.0], RATE_HZ, 2.0).unwrap(), &record, "elbow", 0.5)
     }
 
     /// 300 Nm/rad that end at 3.5 Nm, where the drive has no more.

@@ -179,7 +179,7 @@ impl RobotRun {
     /// How it ended, in words, and what its record shows of why it was stopped: a torque that no longer answered, or an
     /// oscillation of at least `lowest_hz`.
     pub fn ending(&self, reference: &Reference, lowest_hz: f64) -> String {
-        let of_joint = |at| held_torque::held_torque(reference, &self.record, at);
+        let of_joint = |(joint, time_s)| held_torque::held_torque(reference, &self.record, joint, time_s);
         let held = self.status.too_far().and_then(of_joint).map(|held| held.to_string());
         let oscillation = || oscillation_watch::oscillation_at_end(reference, &self.record, lowest_hz);
         let shown = held.or_else(|| self.status.is_stopped_by_a_limit().then(oscillation)?.map(|own| own.to_string()));

@@ -76,7 +76,8 @@ impl RunOscillations {
     pub(crate) fn first(
         limits: Option<OscillationLimits>,
         reference: &Reference,
-        (q, samples): (&[f64], usize),
+        q: &[f64],
+        samples: usize,
         names: &[String],
     ) -> Option<JointOscillation> {
         limits?;

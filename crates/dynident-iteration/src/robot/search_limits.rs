@@ -54,7 +54,7 @@ impl EnvelopeSettings {
                 (limit.torque, limit.torque_margin) = (Some(torque), 0.0);
             }
         }
-        limits.boxes.extend(envelope.workspace.iter().filter_map(|own| own.limit(model, (&errors, margin))));
+        limits.boxes.extend(envelope.workspace.iter().filter_map(|own| own.limit(model, &errors, margin)));
         Ok(limits)
     }
 }
@@ -62,7 +62,7 @@ impl EnvelopeSettings {
 impl WorkspaceBox {
     /// The box with the watched points, each kept inside by the room that errors of its joints take; none where nothing
     /// is bounded.
-    fn limit(&self, model: &Model, (errors, margin): (&[f64], f64)) -> Option<BoxLimit> {
+    fn limit(&self, model: &Model, errors: &[f64], margin: f64) -> Option<BoxLimit> {
         let far = model.own_scale().metres(FAR);
         let bounds = (0..3).map(|axis| match (self.lower[axis], self.upper[axis]) {
             (Some(lower), Some(upper)) => Some([lower, upper]),

@@ -215,7 +215,8 @@ const LEAST_LISTED: f64 = 0.5;
 pub(super) fn causes(
     task: &IterationTask,
     check: &TorqueCheck,
-    (explanations, named): (&[Explanation], &[Option<Fitted>]),
+    explanations: &[Explanation],
+    named: &[Option<Fitted>],
     with: &CheckWith<'_>,
 ) -> Vec<TorqueCause> {
     let names = task.robot.joint_names();

@@ -111,7 +111,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     let pushes_away = by_error < -PUSHES * size && free[1] < -settings.sigmas * std[1];
     let difference_percent = 100.0 * rms(&difference) / size;
     let lacks_weight = difference_percent <= settings.difference_percent
-        && lacks_constant_gravity(data, joint, (&beside, settings.difference_percent));
+        && lacks_constant_gravity(data, joint, &beside, settings.difference_percent);
     let matters = lacks_weight || is_scaled || pushes_away || difference_percent > settings.difference_percent;
     let mut out = Explanation {
         scale: scale_std.is_finite().then_some(scale),
@@ -248,7 +248,7 @@ fn gravity_columns(data: &JointData<'_>, joint: usize) -> Option<Vec<Vec<f64>>> 
 
 /// Whether the constant that the log lacks is a gravity torque that does not change with the posture, as that of a
 /// vertical slide: half to twice that of the description, and more than the smallest share of the torque that matters.
-fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, (beside, percent): (&[f64], f64)) -> bool {
+fn lacks_constant_gravity(data: &JointData<'_>, joint: usize, beside: &[f64], percent: f64) -> bool {
     let nominal = nominal_gravity(data, joint);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (weight, missing) = (mean(&nominal), -mean(beside));

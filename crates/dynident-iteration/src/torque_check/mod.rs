@@ -196,7 +196,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
         out
     };
     let (parameters, starts) = (shared_parameters(), observed[0].0.starts());
-    let mut fit = separable_fit(&torque, (&parameters, &starts), &mut |timing| columns(timing));
+    let mut fit = separable_fit(&torque, &parameters, &starts, &mut |timing| columns(timing));
     if fit.columns.iter().zip(&torque).any(|(columns, y)| columns.iter().any(|column| column.len() != y.len())) {
         return None;
     }
@@ -211,7 +211,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
         let data =
             JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
         for extra in may_be_missing(&data) {
-            let other = separable_fit(&torque, (&parameters, &starts), &mut |timing| {
+            let other = separable_fit(&torque, &parameters, &starts, &mut |timing| {
                 let own = columns(timing).into_iter().zip(&extra);
                 own.map(|(own, extra)| own.into_iter().chain(extra.iter().cloned()).collect()).collect()
             });
@@ -239,7 +239,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
         let commanded = explanation.commanded.iter().step_by(step);
         shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
     }
-    check.causes = causes::causes(task, &check, (&explanations, &found.named), with);
+    check.causes = causes::causes(task, &check, &explanations, &found.named, with);
     // A drive at its limit also changes the scale of its joint's rows.
     let is_open = |cause: &TorqueCause| matches!(cause, TorqueCause::JointScale { .. });
     if source == CommandSource::Controller && check.causes.iter().all(is_open) {

@@ -67,7 +67,8 @@ pub(crate) fn row_scales(
     task: &IterationTask,
     runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
-    (known, least): (&RunEstimate, LeastDeviation),
+    known: &RunEstimate,
+    least: LeastDeviation,
 ) -> Result<Vec<Option<RowScale>>, IterationError> {
     let dof = task.robot.dof();
     let cannot = settings.scheme != Scheme::AllJoints || !task.known.is_empty() || !settings.payloads.is_empty();

@@ -54,7 +54,8 @@ impl SeparableFit {
 /// Fits `y[joint]` by `columns(shared)[joint]`, from the best of some starts.
 pub(super) fn separable_fit(
     y: &[Vec<f64>],
-    (parameters, starts): (&[SharedParameter; SHARED], &[[f64; SHARED]]),
+    parameters: &[SharedParameter; SHARED],
+    starts: &[[f64; SHARED]],
     columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
 ) -> SeparableFit {
     // There may be several minima: the search begins at the best of the starts.

@@ -205,7 +205,10 @@ impl Source<'_> {
         };
         let [roll, pitch, yaw] = axes;
         let about_y = Mat3([[pitch.1, 0.0, pitch.0], [0.0, 1.0, 0.0], [-pitch.0, 0.0, pitch.1]]);
-        Ok(Transform { rotation: about_z(yaw).mul_mat(&about_y).mul_mat(&about_x(roll)), translation })
+        Ok(Transform {
+            rotation: about_z(yaw.0, yaw.1).mul_mat(&about_y).mul_mat(&about_x(roll.0, roll.1)),
+            translation,
+        })
     }
 
     fn frames(&self, convention: DhConvention, row: &Row) -> Result<Frames, DhError> {
@@ -213,8 +216,8 @@ impl Source<'_> {
         let theta = self.angle(["theta_rad", "theta_deg"], [&row.theta_rad, &row.theta_deg])?;
         let a = self.number("a_m", &row.a_m)?.unwrap_or(0.0);
         let d = self.number("d_m", &row.d_m)?.unwrap_or(0.0);
-        let turn_x = Transform { rotation: about_x(alpha), translation: Vec3([a, 0.0, 0.0]) };
-        let turn_z = Transform { rotation: about_z(theta), translation: Vec3::ZERO };
+        let turn_x = Transform { rotation: about_x(alpha.0, alpha.1), translation: Vec3([a, 0.0, 0.0]) };
+        let turn_z = Transform { rotation: about_z(theta.0, theta.1), translation: Vec3::ZERO };
         let along_z = Transform { rotation: Mat3::IDENTITY, translation: Vec3([0.0, 0.0, d]) };
         Ok(match convention {
             DhConvention::Modified => {
@@ -293,10 +296,10 @@ fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     }
 }
 
-fn about_x((sin, cos): (f64, f64)) -> Mat3 {
+fn about_x(sin: f64, cos: f64) -> Mat3 {
     Mat3([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
 }
 
-fn about_z((sin, cos): (f64, f64)) -> Mat3 {
+fn about_z(sin: f64, cos: f64) -> Mat3 {
     Mat3([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 }

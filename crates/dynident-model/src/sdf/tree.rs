@@ -60,8 +60,8 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     let root = match (under.contains_key(&Carrier::World), roots.next(), roots.next()) {
         (true, None, _) => None,
         (false, Some(only), None) => Some(only),
-        (true, Some(second), _) => return Err(several(found, (WORLD, second))),
-        (false, Some(first), Some(second)) => return Err(several(found, (&found.items[first].name, second))),
+        (true, Some(second), _) => return Err(several(found, WORLD, second)),
+        (false, Some(first), Some(second)) => return Err(several(found, &found.items[first].name, second)),
         (false, None, _) => {
             let item = &found.items[first];
             return Err(fault_at(item.node, SdfFault::Loop { link: item.name.clone() }));
@@ -144,7 +144,7 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     Ok(tree)
 }
 
-fn several(found: &Scopes<'_, '_>, (first, second): (&str, usize)) -> SdfError {
+fn several(found: &Scopes<'_, '_>, first: &str, second: usize) -> SdfError {
     let item = &found.items[second];
     fault_at(item.node, SdfFault::SeveralRoots { first: first.to_owned(), second: item.name.clone() })
 }

@@ -143,7 +143,7 @@ pub(crate) fn clock(
         return Ok(result);
     }
     let (uniform, stamps) = misfits(time_s, q, mean, max_gap_steps * median);
-    let drift = drift((time_s, row), q, rate_hz, max_gap_steps * median);
+    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median);
     result.misfit_uniform = Some(uniform);
     result.misfit_stamps = Some(stamps);
     result.drift_steps = drift.map(|drift| drift.steps);
@@ -196,7 +196,7 @@ fn repeat_the_one_before(q: &[Vec<f64>], equal: &[usize], all: impl Iterator<Ite
 /// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over
 /// more as long as positions follow from their neighbours clearly worse than at even spacing: jitter that lasts for
 /// several rows (packets that come late together) is none of the rate.
-fn drift((time_s, row): (&[f64], &[u64]), q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
+fn drift(time_s: &[f64], row: &[u64], q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
     let place: Vec<f64> = row.iter().map(|row| *row as f64).collect();
     let stamp: Vec<f64> = time_s.iter().map(|time_s| time_s * rate_hz).collect();
     let is_gap = |i: usize| {

@@ -62,7 +62,7 @@ impl Timeline {
                     let (rows, time) = ((row - last_row) as f64, time_s - last_s);
                     let hole = f64::max(rows, time * rate);
                     let is_gap = rows > self.longest_step_rows
-                        || time > self.longest_step_s && !self.catches_up((last_row, last_s), (block, index), next);
+                        || time > self.longest_step_s && !self.catches_up(last_row, last_s, block, index, next);
                     if time < 0.0 || (is_gap && hole > self.bridged_steps) {
                         places.begins[index] = true;
                     } else if is_gap {
@@ -90,12 +90,7 @@ impl Timeline {
 
     /// Whether a stamp that comes late is followed by ones that make up for it: a packet that was late, not a gap. One
     /// later than all the rows that could make up for it is no packet's, but a gap or a wrong number.
-    fn catches_up(
-        &self,
-        (last_row, last_s): (u64, f64),
-        (block, index): (&RawBlock, usize),
-        next: Option<&RawBlock>,
-    ) -> bool {
+    fn catches_up(&self, last_row: u64, last_s: f64, block: &RawBlock, index: usize, next: Option<&RawBlock>) -> bool {
         let late = (block.time_s[index] - last_s) * self.clock.rate_hz;
         // Rows that are repeated come twice in their time: they would make up for any gap.
         if self.clock.spacing() == Spacing::Stamps || self.clock.repeats_rows || late > LATE_ROWS as f64 {

@@ -14,7 +14,7 @@ pub(super) fn training_summary(
     delays: &[Option<TorqueLag>],
     joints: &[String],
 ) -> LogSummary {
-    summary(recording, (&factors.statistics, factors.nominal_agreement.clone()), delays, joints)
+    summary(recording, &factors.statistics, factors.nominal_agreement.clone(), delays, joints)
 }
 
 /// A log that was tested on.
@@ -24,12 +24,13 @@ pub(super) fn held_out_summary(
     joints: &[String],
 ) -> LogSummary {
     let HeldOutExamination { statistics, nominal_agreement, delays, .. } = examination;
-    summary(recording, (statistics, nominal_agreement.clone()), delays, joints)
+    summary(recording, statistics, nominal_agreement.clone(), delays, joints)
 }
 
 fn summary(
     recording: &Recording,
-    (statistics, prior_agreement): (&LogStatistics, Option<PriorAgreement>),
+    statistics: &LogStatistics,
+    prior_agreement: Option<PriorAgreement>,
     delays: &[Option<TorqueLag>],
     joints: &[String],
 ) -> LogSummary {

@@ -109,7 +109,7 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
     let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
     task.settings = settings;
     let made = Made { timings, provenance: factors_provenance(factors), is_payload: false };
-    written((study, path), &robot, &task, found, made)
+    written(study, path, &robot, &task, found, made)
 }
 
 /// The part of the torque of every log of `factors` that a model leaves unexplained, percent of its root mean square:

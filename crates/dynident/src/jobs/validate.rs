@@ -22,7 +22,7 @@ pub fn validate(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
-    validate_result(&ResultFile::read(result_path)?, result_path, (study, study_path), options)
+    validate_result(&ResultFile::read(result_path)?, result_path, study, study_path, options)
 }
 
 /// As [`validate()`] with a result that is in memory; messages call it `result_path`.
@@ -32,7 +32,8 @@ pub fn validate(
 pub fn validate_result(
     stored: &ResultFile,
     result_path: &Path,
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
     study.require_log(study_path)?;

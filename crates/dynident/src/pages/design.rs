@@ -23,7 +23,8 @@ const MOST_POINTS: usize = 900;
 pub(crate) fn preview(
     file: &DesignFile,
     limits: &Limits,
-    (times_s, motion): (&[f64], &Motion),
+    times_s: &[f64],
+    motion: &Motion,
     torque: Option<&[f64]>,
 ) -> Result<String, Error> {
     let title = format!("{}: {}, {}", file.name, file.family, file.criterion);

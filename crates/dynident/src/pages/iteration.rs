@@ -402,7 +402,7 @@ fn parameters(page: &mut Report, file: &IterationsFile) {
         }
         page.add(bars);
         for (part, some) in places.chunks(CURVES).enumerate() {
-            page.add(by_run(file, of_unit, some, (part, places.len().div_ceil(CURVES)), known));
+            page.add(by_run(file, of_unit, some, part, places.len().div_ceil(CURVES), known));
         }
     }
     page.add(table(file, last, known));
@@ -448,7 +448,8 @@ fn by_run(
     file: &IterationsFile,
     of_unit: &str,
     places: &[usize],
-    (part, parts): (usize, usize),
+    part: usize,
+    parts: usize,
     known: bool,
 ) -> ConvergencePlot {
     let number = if parts > 1 { format!(" ({} of {parts})", part + 1) } else { String::new() };

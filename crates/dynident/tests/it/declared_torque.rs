@@ -115,7 +115,7 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
     let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
     assert!((again.validation[0].model.rmse_nm - with).abs() < 1e-12);
-    let exported = |target| export_model(&path, (&job.study, &job.path), None, target).unwrap();
+    let exported = |target| export_model(&path, &job.study, &job.path, None, target).unwrap();
     assert!(exported(Target::Python).text.contains("def declared(q, dq):"));
     let notes = exported(Target::Mjcf).notes.join("\n");
     let left_out = ["counterbalance of joint elbow_joint, -35.", "Nm times sin(q3 + 0.3), is left out"];

@@ -323,7 +323,7 @@ postures = 50
         Box::new(SimulatedRobot::new(plant, LoopSettings::default()).unwrap())
     };
     let out = folder.path().join("out");
-    let file = iterate_with_robot(&study, &path, (&out, false), &options, &mut watch, &mut robot).unwrap();
+    let file = iterate_with_robot(&study, &path, &out, false, &options, &mut watch, &mut robot).unwrap();
     assert!(file.status != "refused", "{}", file.reason);
     assert_eq!(file.runs.len(), 2, "{}", file.reason);
     let kept: serde_json::Value =

@@ -126,7 +126,7 @@ fn a_result_in_memory_predicts_and_is_tested() {
     let stored = ResultFile::read(&file).unwrap();
     let [by_file, in_memory] = [
         validate(&file, &study, &path, &options()).unwrap(),
-        validate_result(&stored, Path::new("<model>"), (&study, &path), &options()).unwrap(),
+        validate_result(&stored, Path::new("<model>"), &study, &path, &options()).unwrap(),
     ];
     assert_eq!(serde_json::to_value(&by_file).unwrap(), serde_json::to_value(&in_memory).unwrap());
 

@@ -71,7 +71,9 @@ fn a_file_that_is_replaced_during_a_job_is_an_error() {
     let jobs: [(&str, RunJob<'_>); 4] = [
         ("identify", &|options| identify(&job.study, &job.path, options).err()),
         ("check", &|options| check(&job.study, &job.path, options).err()),
-        ("validate", &|options| validate_result(&result, Path::new("result.json"), of_study, options).err()),
+        ("validate", &|options| {
+            validate_result(&result, Path::new("result.json"), of_study.0, of_study.1, options).err()
+        }),
         ("reduce", &|options| reduce(&job.study, &job.path, None, &ReduceSettings::default(), options).err()),
     ];
     for (name, work) in jobs {

@@ -35,13 +35,13 @@ pub(in crate::consistent) fn interior_point_on_the_way(
         stages.push(Stage { state: state.clone(), data_squares: program.data_squares(&state.x) });
         false
     };
-    let solved = from_state(program, State::new(program, start)?, limits, &mut keep)?;
+    let solved = from_state(program, State::new(program, start)?, limits.0, limits.1, &mut keep)?;
     Some((solved, OnTheWay(stages)))
 }
 
 impl OnTheWay {
     /// The first point that leaves room between the least squares and their limit, on a central path that ends there.
-    fn first_within(&self, (least, limit): (f64, f64)) -> Option<&Stage> {
+    fn first_within(&self, least: f64, limit: f64) -> Option<&Stage> {
         let room = limit - least;
         let begins = |stage: &&Stage| {
             limit - stage.data_squares > LEAST_ROOM * room && stage.state.products() < LARGEST_GAP * room
@@ -51,7 +51,7 @@ impl OnTheWay {
 
     /// Where a program with this limit begins.
     pub(in crate::consistent) fn start(&self, limits: (f64, f64)) -> Option<&DVector<f64>> {
-        self.first_within(limits).map(|stage| &stage.state.x.high)
+        self.first_within(limits.0, limits.1).map(|stage| &stage.state.x.high)
     }
 }
 
@@ -97,7 +97,8 @@ pub(in crate::consistent) enum Next {
 /// the way is inside.
 pub(in crate::consistent) fn interior_point_within_limit(
     program: &mut Program,
-    (way, least): (&OnTheWay, f64),
+    way: &OnTheWay,
+    least: f64,
     max_iterations: usize,
     look: &mut dyn FnMut(&Iterate<'_>) -> Next,
 ) {
@@ -135,7 +136,7 @@ impl State {
     /// Where a way begins for a program with a limit, with pairs for it and the rows that have come.
     fn within_limit(program: &Program, way: &OnTheWay, least: f64) -> Option<Self> {
         let limit = program.data_limit?;
-        let Stage { state, data_squares } = way.first_within((least, limit))?;
+        let Stage { state, data_squares } = way.first_within(least, limit)?;
         let (x, mut rows) = (state.x.of_another(), state.rows.clone());
         let mu = state.products() / state.degree() as f64;
         for row in &program.rows[rows.len()..] {

@@ -58,13 +58,7 @@ impl Spline {
 
     /// Position, velocity and acceleration of joint number `joint` at samples `from..from + count`; coefficients stand
     /// function by function, `joints` numbers each.
-    pub(super) fn motion(
-        &self,
-        coefficients: &[f64],
-        (joint, joints): (usize, usize),
-        from: usize,
-        out: [&mut [f64]; 3],
-    ) {
+    pub(super) fn motion(&self, coefficients: &[f64], joint: usize, joints: usize, from: usize, out: [&mut [f64]; 3]) {
         let [q, dq, ddq] = out;
         let end = from + q.len();
         let mut sample = from;
@@ -82,7 +76,7 @@ impl Spline {
     }
 
     /// Positions less the spline's.
-    pub(super) fn residual(&self, coefficients: &[f64], (joint, joints): (usize, usize), q: &[f64]) -> Vec<f64> {
+    pub(super) fn residual(&self, coefficients: &[f64], joint: usize, joints: usize, q: &[f64]) -> Vec<f64> {
         let mut left = Vec::with_capacity(q.len());
         for (interval, q) in q.chunks(self.step).enumerate() {
             let own: [f64; ACTIVE] = core::array::from_fn(|k| coefficients[(interval + k) * joints + joint]);
@@ -121,7 +115,8 @@ impl Spline {
         &self,
         gram: &[[f64; ACTIVE]; ACTIVE],
         coefficients: &[f64],
-        (joint, joints): (usize, usize),
+        joint: usize,
+        joints: usize,
     ) -> (f64, Vec<f64>) {
         let mut product = vec![0.0; self.functions()];
         let mut sum = 0.0;
@@ -164,15 +159,18 @@ impl Spline {
                 }
             }
         }
-        self.add_roughness(matrix, (joint, joints), (penalty, gram, pulled));
+        self.add_roughness(matrix, joint, joints, penalty, gram, pulled);
     }
 
     /// Adds `penalty · P` of one joint to the band of all, and `−penalty · P c` to its right-hand side.
     pub(super) fn add_roughness(
         &self,
         matrix: &mut BandedArrow,
-        (joint, joints): (usize, usize),
-        (penalty, gram, pulled): (f64, &[[f64; ACTIVE]; ACTIVE], &[f64]),
+        joint: usize,
+        joints: usize,
+        penalty: f64,
+        gram: &[[f64; ACTIVE]; ACTIVE],
+        pulled: &[f64],
     ) {
         for interval in 0..self.functions() + 1 - ACTIVE {
             for (a, row) in gram.iter().enumerate() {
@@ -279,14 +277,14 @@ mod tests {
         let coefficients: Vec<f64> = (0..spline.functions()).map(|k| cubic(k as f64 - 2.0)).collect();
         let mut out = [vec![0.0; 41], vec![0.0; 41], vec![0.0; 41]];
         let [q, dq, ddq] = &mut out;
-        spline.motion(&coefficients, (0, 1), 0, [q, dq, ddq]);
+        spline.motion(&coefficients, 0, 1, 0, [q, dq, ddq]);
         for (k, ((q, dq), ddq)) in q.iter().zip(dq.iter()).zip(ddq.iter()).enumerate() {
             let t = k as f64 / 20.0;
             assert!((q - t.powi(3)).abs() < 1e-12 && (dq - 3.0 * t * t).abs() < 1e-11 && (ddq - 6.0 * t).abs() < 1e-10);
         }
         // Ten and a bit intervals of 0.2 s: functions() − 5 of them.
         let length = h * (spline.functions() - 5) as f64;
-        let (penalty, _) = spline.penalty(&spline.roughness(3), &coefficients, (0, 1));
+        let (penalty, _) = spline.penalty(&spline.roughness(3), &coefficients, 0, 1);
         assert!((penalty - 36.0 * length).abs() < 1e-9 * penalty);
         let rows = spline.roughness_rows(3);
         let from_rows: f64 = (0..spline.functions() - 5)

@@ -25,7 +25,7 @@ pub(super) fn estimate_of<M: TorqueModel>(
     let information = pieces
         .iter()
         .zip(coefficients)
-        .map(|(piece, own)| torque_information(piece, model, (own, parameters, free), (&noise[piece.record.log], 0)))
+        .map(|(piece, own)| torque_information(piece, model, own, parameters, free, &noise[piece.record.log], 0))
         .collect::<Result<Vec<_>, _>>()?;
     let system = System::new(pieces, &information, coefficients, noise, free, &problem.names)?;
     drop(information);
@@ -48,8 +48,8 @@ pub(super) fn estimate_of<M: TorqueModel>(
         let of_joint = |joint: usize| {
             let scale = levels.positions[joint].position_std.recip();
             (
-                positions(piece, own, joint, (scale, &shares, &theta)),
-                roughness(piece, own, (joint, levels), (&shares, &theta)),
+                positions(piece, own, joint, scale, &shares, &theta),
+                roughness(piece, own, joint, levels, &shares, &theta),
             )
         };
         let others: Vec<(Panel, Panel)> = (0..piece.joints).into_par_iter().map(of_joint).collect();
@@ -135,10 +135,12 @@ fn positions(
     piece: &Piece<'_>,
     coefficients: &[f64],
     joint: usize,
-    (scale, shares, theta): (f64, &[f64], &[f64]),
+    scale: f64,
+    shares: &[f64],
+    theta: &[f64],
 ) -> Panel {
     let (joints, mean_of, spline) = (piece.joints, piece.mean_of, &piece.spline);
-    let left = spline.residual(coefficients, (joint, joints), piece.q(joint));
+    let left = spline.residual(coefficients, joint, joints, piece.q(joint));
     let mut panel = Panel::new(theta.len());
     let weight = (mean_of as f64).sqrt().recip();
     for row in 0..piece.rows() {
@@ -160,8 +162,10 @@ fn positions(
 fn roughness(
     piece: &Piece<'_>,
     coefficients: &[f64],
-    (joint, levels): (usize, &LogNoise),
-    (shares, theta): (&[f64], &[f64]),
+    joint: usize,
+    levels: &LogNoise,
+    shares: &[f64],
+    theta: &[f64],
 ) -> Panel {
     let (joints, spline, smoothness) = (piece.joints, &piece.spline, levels.positions[joint]);
     let rows = spline.roughness_rows(smoothness.order);

@@ -102,7 +102,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
             .zip(&state.coefficients)
             .map(|(piece, own)| {
                 let log = &noise[piece.record.log];
-                torque_information(piece, model, (own, &state.parameters, &free), (log, settings.most_autoregression))
+                torque_information(piece, model, own, &state.parameters, &free, log, settings.most_autoregression)
             })
             .collect::<Result<_, _>>()?;
         // Levels of positions and smoothness about the linearised optimum, which moves with them.
@@ -152,8 +152,15 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
         }
         if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_STAY) {
             let longest_noise_s = LONGEST_NOISE_S * settings.own_second_s;
-            let most = (settings.most_autoregression, iterations, longest_noise_s);
-            torque_levels(&pieces, &residuals, paid, &mut noise, most);
+            torque_levels(
+                &pieces,
+                &residuals,
+                paid,
+                &mut noise,
+                settings.most_autoregression,
+                iterations,
+                longest_noise_s,
+            );
         }
         let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
         converged = length <= settings.tolerance && change <= SETTLED && iterations > 2;
@@ -272,10 +279,10 @@ fn cost(pieces: &[Piece<'_>], state: &State, residuals: &[Vec<Vec<f64>>], noise:
         for joint in 0..piece.joints {
             let at = (joint, piece.joints);
             let smoothness = own.positions[joint];
-            let left = piece.spline.residual(coefficients, at, piece.q(joint));
+            let left = piece.spline.residual(coefficients, at.0, at.1, piece.q(joint));
             sum += left.iter().map(|x| x * x).sum::<f64>() / smoothness.position_std.powi(2);
             let gram = piece.spline.roughness(smoothness.order);
-            sum += smoothness.penalty * piece.spline.penalty(&gram, coefficients, at).0;
+            sum += smoothness.penalty * piece.spline.penalty(&gram, coefficients, at.0, at.1).0;
             sum += whitened(&torques[joint], &own.colours[joint]).norm_squared() / own.torque_std[joint].powi(2);
         }
     }
@@ -296,7 +303,9 @@ fn torque_levels(
     residuals: &[Vec<Vec<f64>>],
     paid: &Paid,
     noise: &mut [LogNoise],
-    (most, iterations, longest_noise_s): (usize, usize, f64),
+    most: usize,
+    iterations: usize,
+    longest_noise_s: f64,
 ) {
     for (log, own) in noise.iter_mut().enumerate() {
         for joint in 0..own.colours.len() {

@@ -96,7 +96,7 @@ impl Piece<'_> {
         let [q, dq, ddq] = &mut out;
         let each = q.chunks_exact_mut(count).zip(dq.chunks_exact_mut(count)).zip(ddq.chunks_exact_mut(count));
         for (joint, ((q, dq), ddq)) in each.enumerate() {
-            self.spline.motion(coefficients, (joint, self.joints), from, [q, dq, ddq]);
+            self.spline.motion(coefficients, joint, self.joints, from, [q, dq, ddq]);
         }
         out
     }
@@ -153,7 +153,7 @@ impl Piece<'_> {
             self.check(&slopes, count, parameters.len())?;
             let of = |(joint, carried): (usize, &mut JointRows)| {
                 let new = carried.count();
-                carried.append(&self.raw(joint, (from, rows), &slopes, free));
+                carried.append(&self.raw(joint, from, rows, &slopes, free));
                 self.whitened(carried, new, &colours[joint], free.count())
             };
             let whitened: Vec<JointRows> = carried.par_iter_mut().enumerate().map(of).collect();
@@ -183,13 +183,7 @@ impl Piece<'_> {
     }
 
     /// Rows before whitening, windows as wide as one row's functions.
-    fn raw(
-        &self,
-        joint: usize,
-        (from, rows): (usize, usize),
-        slopes: &TorqueSlopes,
-        free: &FreeParameters,
-    ) -> JointRows {
+    fn raw(&self, joint: usize, from: usize, rows: usize, slopes: &TorqueSlopes, free: &FreeParameters) -> JointRows {
         let (joints, mean_of) = (self.joints, self.mean_of);
         let (count, share) = (rows * mean_of, 1.0 / mean_of as f64);
         let width = self.window(0) * joints;

@@ -97,7 +97,7 @@ impl Rough {
         let mut matrix = BandedArrow::new(count, ACTIVE - 1, 0);
         spline.add_to(&mut matrix, (0, 1), (1.0, &moved), (least, &gram, &[]));
         let coefficients = matrix.eliminated().ok()?.band_solution(&[]);
-        let left = spline.residual(&coefficients, (0, 1), &moved);
+        let left = spline.residual(&coefficients, 0, 1, &moved);
         let mut normal = BandedArrow::new(count, ACTIVE - 1, 0);
         spline.add_to(&mut normal, (0, 1), (1.0, &left), (0.0, &gram, &[]));
         let right = normal.right().to_vec();
@@ -123,7 +123,7 @@ fn of_order(pieces: &[Rough], order: usize) -> Smoothed {
     let gram = any.spline.roughness(order);
     let unit = unit(&any.spline, &gram);
     let normal = any.spline.mean_log_roughness(order);
-    let at = |decades: f64| fitted(pieces, (unit * 10.0_f64.powf(decades), &gram, normal), order);
+    let at = |decades: f64| fitted(pieces, unit * 10.0_f64.powf(decades), &gram, normal, order);
     let mut best = (f64::from(DECADES.0), at(f64::from(DECADES.0)));
     for decade in DECADES.0 + 1..=DECADES.1 {
         let next = at(f64::from(decade));
@@ -156,19 +156,19 @@ fn empty(order: usize) -> Smoothed {
 }
 
 /// The spline for one ratio λσ², with twice the negative logarithm of its restricted likelihood.
-fn fitted(pieces: &[Rough], (ratio, gram, normal): (f64, &[[f64; ACTIVE]; ACTIVE], f64), order: usize) -> Smoothed {
+fn fitted(pieces: &[Rough], ratio: f64, gram: &[[f64; ACTIVE]; ACTIVE], normal: f64, order: usize) -> Smoothed {
     let (mut squares, mut rough, mut log_determinant) = (0.0, 0.0, 0.0);
     let (mut samples, mut functions, mut free) = (0, 0, 0);
     let mut coefficients = Vec::with_capacity(pieces.len());
     for piece in pieces {
         let (spline, count) = (&piece.spline, piece.spline.functions());
         let mut matrix = piece.normal.clone();
-        let (_, pulled) = spline.penalty(gram, &piece.coefficients, (0, 1));
-        spline.add_roughness(&mut matrix, (0, 1), (ratio, gram, &pulled));
+        let (_, pulled) = spline.penalty(gram, &piece.coefficients, 0, 1);
+        spline.add_roughness(&mut matrix, 0, 1, ratio, gram, &pulled);
         let Ok(solved) = matrix.eliminated() else { return empty(order) };
         let step = solved.band_solution(&[]);
         let own: Vec<f64> = piece.coefficients.iter().zip(&step).map(|(c, step)| c + step).collect();
-        rough += spline.penalty(gram, &own, (0, 1)).0;
+        rough += spline.penalty(gram, &own, 0, 1).0;
         let curved = dot(&step, &piece.normal.product(&step));
         squares += (piece.squares - 2.0 * dot(&step, &piece.right) + curved).max(0.0);
         // The prior is flat over polynomials as functions, whatever the number of knots.
@@ -191,16 +191,12 @@ fn fitted(pieces: &[Rough], (ratio, gram, normal): (f64, &[[f64; ACTIVE]; ACTIVE
 }
 
 /// `tr(Z BᵀB)` for a joint, by the entries of Z.
-pub(super) fn sample_trace(
-    spline: &Spline,
-    (joint, joints): (usize, usize),
-    entry: &dyn Fn(usize, usize) -> f64,
-) -> f64 {
+pub(super) fn sample_trace(spline: &Spline, joint: usize, joints: usize, entry: &dyn Fn(usize, usize) -> f64) -> f64 {
     let full = spline.products(spline.step);
     let of = |interval: usize| {
         let count = spline.interval_samples(interval);
         let own = if count == spline.step { full } else { spline.products(count) };
-        of_interval(&own, interval, (joint, joints), entry)
+        of_interval(&own, interval, joint, joints, entry)
     };
     (0..spline.functions() + 1 - ACTIVE).map(of).sum()
 }
@@ -209,17 +205,19 @@ pub(super) fn sample_trace(
 pub(super) fn rough_trace(
     spline: &Spline,
     gram: &[[f64; ACTIVE]; ACTIVE],
-    (joint, joints): (usize, usize),
+    joint: usize,
+    joints: usize,
     entry: &dyn Fn(usize, usize) -> f64,
 ) -> f64 {
-    let of = |interval: usize| of_interval(gram, interval, (joint, joints), entry);
+    let of = |interval: usize| of_interval(gram, interval, joint, joints, entry);
     (0..spline.functions() + 1 - ACTIVE).map(of).sum()
 }
 
 fn of_interval(
     own: &[[f64; ACTIVE]; ACTIVE],
     interval: usize,
-    (joint, joints): (usize, usize),
+    joint: usize,
+    joints: usize,
     entry: &dyn Fn(usize, usize) -> f64,
 ) -> f64 {
     let place = |k: usize| (interval + k) * joints + joint;
@@ -254,7 +252,7 @@ mod tests {
         let spline = Spline::new(q.len(), step, 200.0);
         let mut out = [vec![0.0; 1600], vec![0.0; 1600], vec![0.0; 1600]];
         let [q, dq, ddq] = &mut out;
-        spline.motion(&own.coefficients[0], (0, 1), 200, [q, dq, ddq]);
+        spline.motion(&own.coefficients[0], 0, 1, 200, [q, dq, ddq]);
         let error = dq.iter().enumerate().map(|(k, dq)| (dq - rate((200 + k) as f64 / 200.0)).powi(2)).sum::<f64>();
         // A filter that lets 4 Hz through, three and a half times the highest frequency, leaves σ √(2 · 4/200) · 2π
         // 4/√3 = 5.8 mrad/s; differences of samples 400 mrad/s.

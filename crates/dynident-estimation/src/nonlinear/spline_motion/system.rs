@@ -31,8 +31,11 @@ pub(super) struct TorqueInformation {
 pub(super) fn torque_information<M: TorqueModel>(
     piece: &Piece<'_>,
     model: &mut M,
-    (coefficients, parameters, free): (&[f64], &[f64], &FreeParameters),
-    (noise, lags): (&LogNoise, usize),
+    coefficients: &[f64],
+    parameters: &[f64],
+    free: &FreeParameters,
+    noise: &LogNoise,
+    lags: usize,
 ) -> Result<TorqueInformation, M::Error> {
     let count = free.count();
     let bandwidth = piece.bandwidth(noise.most_order().max(lags));
@@ -84,8 +87,8 @@ impl System {
             for (joint, smoothness) in own.positions.iter().enumerate() {
                 let (joints, spline) = ((joint, piece.joints), &piece.spline);
                 let gram = spline.roughness(smoothness.order);
-                let left = spline.residual(coefficients, joints, piece.q(joint));
-                let (_, pulled) = spline.penalty(&gram, coefficients, joints);
+                let left = spline.residual(coefficients, joints.0, joints.1, piece.q(joint));
+                let (_, pulled) = spline.penalty(&gram, coefficients, joints.0, joints.1);
                 let position = smoothness.position_std.powi(-2);
                 spline.add_to(&mut matrix, joints, (position, &left), (smoothness.penalty, &gram, &pulled));
             }
@@ -239,8 +242,8 @@ impl Paid {
                 let smooth = own.positions[joint];
                 let gram = piece.spline.roughness(smooth.order);
                 let at = (joint, piece.joints);
-                let rough = smooth.penalty * rough_trace(&piece.spline, &gram, at, &entry);
-                let near = sample_trace(&piece.spline, at, &entry) / smooth.position_std.powi(2);
+                let rough = smooth.penalty * rough_trace(&piece.spline, &gram, at.0, at.1, &entry);
+                let near = sample_trace(&piece.spline, at.0, at.1, &entry) / smooth.position_std.powi(2);
                 let some = &information.some[joint];
                 let mut sums = vec![0.0; lags + 1];
                 for group in 0..some.count() / (lags + 1) {
@@ -276,11 +279,11 @@ impl Paid {
                 let mut most = f64::INFINITY;
                 let of_log = pieces.iter().zip(coefficients).filter(|(piece, _)| piece.record.log == log);
                 for (piece, coefficients) in of_log {
-                    let left = piece.spline.residual(coefficients, (joint, piece.joints), piece.q(joint));
+                    let left = piece.spline.residual(coefficients, joint, piece.joints, piece.q(joint));
                     squares += left.iter().map(|x| x * x).sum::<f64>();
                     samples += left.len();
                     let gram = piece.spline.roughness(smoothness.order);
-                    rough += piece.spline.penalty(&gram, coefficients, (joint, piece.joints)).0;
+                    rough += piece.spline.penalty(&gram, coefficients, joint, piece.joints).0;
                     rank += piece.spline.functions() - smoothness.order;
                     most = most.min(most_penalty(&piece.spline, &gram, smoothness.position_std));
                 }

@@ -68,7 +68,7 @@ fn links_too_coarse(
             let at =
                 [a, b].map(|place| resolved.solids[place].body.map_or(Transform::IDENTITY, |body| placements[body]));
             let (first, second) = ((&resolved.solids[a], &at[0]), (&resolved.solids[b], &at[1]));
-            if solid_distance(first, second, clearance_m, &mut guesses).surface_m >= clearance_m
+            if solid_distance(first.0, first.1, second.0, second.1, clearance_m, &mut guesses).surface_m >= clearance_m
                 || surfaces[a].is_within(&at[0], &surfaces[b], &at[1], clearance_m)
             {
                 continue;

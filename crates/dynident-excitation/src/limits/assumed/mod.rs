@@ -112,7 +112,7 @@ impl LimitsInForce {
                 settings.stop_margin_percent
             ));
         }
-        assumed.extend(turns::bound_turns(&mut under, given, model, (settings.continuous_turns, starts)));
+        assumed.extend(turns::bound_turns(&mut under, given, model, settings.continuous_turns, starts));
         if settings.acceleration && bound_accelerations(&mut under, given, model) {
             assumed.push(
                 "acceleration: full speed after 0.2 rad from rest, a tenth of the stroke where a joint slides (defaults.acceleration)"

@@ -20,7 +20,8 @@ pub(super) fn bound_turns(
     under: &mut Limits,
     given: &Limits,
     model: &Model,
-    (turns, starts): (f64, &StartPositions),
+    turns: f64,
+    starts: &StartPositions,
 ) -> Option<String> {
     if turns <= 0.0 {
         return None;

@@ -58,7 +58,7 @@ impl<'a> StudyFormat<'a> {
             Mistake::TorqueUnit { joint, factor } => vec![self.one_torque(*joint, *factor)],
             Mistake::Coupled { joint, with, sign, channels } => {
                 let groups = Self::groups(*channels).into_iter();
-                groups.map(|torque| self.coupled(torque, (*joint, *with), *sign)).collect()
+                groups.map(|torque| self.coupled(torque, *joint, *with, *sign)).collect()
             }
             Mistake::TimeUnit { factor } => vec![self.time_unit(*factor)],
             // The key is that of all logs, and positions have none.
@@ -194,7 +194,7 @@ impl<'a> StudyFormat<'a> {
     }
 
     /// The matrix that takes a neighbour's share out of a joint's position, or adds a joint's torque to a neighbour's.
-    fn coupled(&self, torque: bool, (joint, with): (usize, usize), sign: f64) -> StudyChange {
+    fn coupled(&self, torque: bool, joint: usize, with: usize, sign: f64) -> StudyChange {
         let (group, table) = self.group(torque);
         let [joint, with] = [joint, with].map(|joint| self.place(joint));
         if group.matrix.is_some() || group.inverse_matrix.is_some() {

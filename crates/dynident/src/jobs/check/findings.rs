@@ -33,7 +33,8 @@ fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
 
 /// The diagnosis of a study as findings and readings.
 pub(super) fn study_check(
-    (study, robot): (&Study, &StudyRobot),
+    study: &Study,
+    robot: &StudyRobot,
     settings: &IdentificationSettings,
     diagnosis: &Diagnosis,
 ) -> StudyCheck {
@@ -65,7 +66,7 @@ pub(super) fn study_check(
             let mut found = finding(
                 kind(mistake),
                 sentence(mistake, &joints),
-                evidence(mistake, (&search.as_written, best), &joints),
+                evidence(mistake, &search.as_written, best, &joints),
             );
             found.write = format.as_ref().map_or_else(Vec::new, |format| format.changes(mistake));
             if number + 1 == best.mistakes.len() {
@@ -84,14 +85,14 @@ pub(super) fn study_check(
         if let Some(wrong) = &unit.wrong_mass {
             findings.push(wrong_mass(wrong, robot.model()));
         } else if !far.is_empty() {
-            findings.push(torque_unit(unit, &far, robot.model(), (&joints, format.as_ref())));
+            findings.push(torque_unit(unit, &far, robot.model(), &joints, format.as_ref()));
         }
     }
     // The runs of an iteration are no logs of its study: whether the held-out ones are predicted is judged there.
     let loads = diagnosis.unseen_loads.iter().filter(|load| load.log < study.log.len());
     findings.extend(loads.map(|load| unseen_load(study, robot, load)));
     let held_out = diagnosis.held_out.iter().filter(|reading| reading.log < study.log.len());
-    findings.extend(held_out.map(|reading| of_held_out_log((study, robot), reading, &joints)));
+    findings.extend(held_out.map(|reading| of_held_out_log(study, robot, reading, &joints)));
     if findings.is_empty() {
         findings.extend(diagnosis.stray_torques.iter().map(|torque| stray_torque(torque, &joints)));
     }
@@ -136,7 +137,8 @@ fn torque_unit(
     fit: &DescriptionFit,
     far: &[usize],
     model: &Model,
-    (joints, format): (&[String], Option<&StudyFormat<'_>>),
+    joints: &[String],
+    format: Option<&StudyFormat<'_>>,
 ) -> CheckFinding {
     let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
     let factors = factors.collect::<Vec<_>>().join(", ");
@@ -268,7 +270,7 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
 }
 
 /// A mistake that one held-out log has and the training logs have not.
-fn of_held_out_log((study, robot): (&Study, &StudyRobot), reading: &HeldOutReading, joints: &[String]) -> CheckFinding {
+fn of_held_out_log(study: &Study, robot: &StudyRobot, reading: &HeldOutReading, joints: &[String]) -> CheckFinding {
     let format = StudyFormat::of_log(study, robot, reading.log);
     let mut found = finding(
         kind(&reading.mistake),

@@ -152,7 +152,7 @@ const TELLS: f64 = 0.2;
 const SAME_FACTOR: f64 = 1.1;
 
 /// What speaks for a mistake: the joint whose torque it explains most, limits that then hold.
-pub(super) fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
+pub(super) fn evidence(mistake: &Mistake, before: &Reading, after: &Reading, joints: &[String]) -> String {
     let gain_of = |of: fn(&Reading) -> &[f64], joint: usize| {
         let share = |reading| of(reading).get(joint).map_or(1.0, |share: &f64| share.max(1e-6));
         (share(before) / share(after)).ln()

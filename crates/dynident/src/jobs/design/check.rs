@@ -93,7 +93,7 @@ pub fn check_log(
     let mut setup = DesignSetup::for_log(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let source = study.log_source(&folders, index)?;
-    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.robot, &folders), index, &source)?;
+    let (mut pieces, rate_hz) = pieces(study, study_path, &setup.robot, &folders, index, &source)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
@@ -144,7 +144,8 @@ fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
 fn pieces(
     study: &Study,
     study_path: &Path,
-    (robot, folders): (&StudyRobot, &Folders),
+    robot: &StudyRobot,
+    folders: &Folders,
     index: usize,
     source: &StudyLogSource,
 ) -> Result<(Vec<Given>, f64), Error> {

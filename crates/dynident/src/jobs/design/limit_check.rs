@@ -44,8 +44,8 @@ impl LimitCheck {
     ) -> Result<Self, Error> {
         let model = &setup.loaded;
         let in_limits = |error| Error::section(study_path, "design.limits")(error);
-        let rates = (duration_s, rate_hz);
-        let whole = check_limits_until(&setup.limits, model, rates, motion_at, stop).map_err(in_limits)?;
+        let whole =
+            check_limits_until(&setup.limits, model, duration_s, rate_hz, motion_at, stop).map_err(in_limits)?;
         let (reports, rate_hz) = if let Some(reports) = whole {
             (reports, rate_hz)
         } else {
@@ -55,7 +55,7 @@ impl LimitCheck {
         };
         let broken = reports.iter().any(|report| report.violated);
         let diagnosis =
-            if broken { sentences(&setup.set, duration_s, &reports, motion_at, (single()?, stop)) } else { Vec::new() };
+            if broken { sentences(&setup.set, duration_s, &reports, motion_at, single()?, stop) } else { Vec::new() };
         Ok(Self { reports, rate_hz, of, diagnosis })
     }
 
@@ -86,7 +86,8 @@ fn sentences(
     duration_s: f64,
     reports: &[LimitReport],
     motion_at: &dyn Fn(&[f64], &mut Motion),
-    (single, stop): (Vec<Relaxation>, &dyn Fn() -> bool),
+    single: Vec<Relaxation>,
+    stop: &dyn Fn() -> bool,
 ) -> Vec<String> {
     let rate_hz = set.model().own_scale().round_hertz(DIAGNOSIS_RATE_HZ) / if stop() { COARSER } else { 1.0 };
     let times = grid(duration_s, (duration_s * rate_hz).ceil() as usize + 1);

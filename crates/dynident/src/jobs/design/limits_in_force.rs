@@ -32,7 +32,9 @@ pub(super) enum LimitsFor<'a> {
 /// # Errors
 /// Limits, start posture, home or envelope that make no sense for the robot.
 pub(super) fn in_force(
-    (study, study_path, folders): (&Study, &Path, &Folders),
+    study: &Study,
+    study_path: &Path,
+    folders: &Folders,
     robot: &StudyRobot,
     purpose: LimitsFor<'_>,
 ) -> Result<LimitsInForce, Error> {
@@ -115,8 +117,13 @@ pub(super) fn loaded((study, study_path): (&Study, &Path), robot: &StudyRobot) -
 ///
 /// # Errors
 /// As [`in_force`].
-pub(in crate::jobs) fn limits_of(study: (&Study, &Path, &Folders), robot: &StudyRobot) -> Result<Limits, Error> {
-    Ok(in_force(study, robot, LimitsFor::Ways)?.limits)
+pub(in crate::jobs) fn limits_of(
+    study: &Study,
+    study_path: &Path,
+    folders: &Folders,
+    robot: &StudyRobot,
+) -> Result<Limits, Error> {
+    Ok(in_force(study, study_path, folders, robot, LimitsFor::Ways)?.limits)
 }
 
 /// Where the motion starts and the robot waits, as far as that is known.

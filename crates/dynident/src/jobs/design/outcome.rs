@@ -217,7 +217,7 @@ impl DesignOutcome {
     /// A motion that cannot be drawn.
     pub fn preview_svg(&self) -> Result<String, Error> {
         let (times_s, motion) = self.sampled(self.pictures_hz());
-        pictures::preview(&self.file, &self.limits, (&times_s, &motion), self.torque_nm(&motion).as_deref())
+        pictures::preview(&self.file, &self.limits, &times_s, &motion, self.torque_nm(&motion).as_deref())
     }
 
     /// `path.svg`: the tool's path and some poses of the arm in the base frame, from above and from the side, with

@@ -84,7 +84,7 @@ impl DesignSetup {
         let inputs = InputFiles::of(study, study_path, options.data.as_deref());
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let robot = StudyRobot::new(study, study_path, &folders)?;
-        let LimitsInForce { limits, assumed, not_checked } = in_force((study, study_path, &folders), &robot, purpose)?;
+        let LimitsInForce { limits, assumed, not_checked } = in_force(study, study_path, &folders, &robot, purpose)?;
         notes.extend(included(&limits, robot.model()));
         let loaded = loaded((study, study_path), &robot)?;
         let set = LimitSet::new(&limits, &loaded).map_err(Error::section(study_path, "design.limits"))?;

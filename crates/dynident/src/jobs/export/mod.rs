@@ -22,11 +22,12 @@ use std::path::Path;
 /// If the result does not belong to the study's robot; [`Error::Export`] for what the form cannot hold at all.
 pub fn export_model(
     result_path: &Path,
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     data: Option<&Path>,
     target: Target,
 ) -> Result<Exported, Error> {
-    export_result(&ResultFile::read(result_path)?, result_path, (study, study_path), (data, target))
+    export_result(&ResultFile::read(result_path)?, result_path, study, study_path, data, target)
 }
 
 /// As [`export_model()`] with a result that is in memory; messages call it `result_path`.
@@ -36,10 +37,12 @@ pub fn export_model(
 pub fn export_result(
     stored: &ResultFile,
     result_path: &Path,
-    (study, study_path): (&Study, &Path),
-    (data, target): (Option<&Path>, Target),
+    study: &Study,
+    study_path: &Path,
+    data: Option<&Path>,
+    target: Target,
 ) -> Result<Exported, Error> {
-    let robot = robot_model(stored, result_path, (study, study_path), data)?;
+    let robot = robot_model(stored, result_path, study, study_path, data)?;
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
     export(&robot, target, &reservations(stored)).map_err(cannot)
 }
@@ -65,7 +68,8 @@ fn reservations(stored: &ResultFile) -> Vec<String> {
 fn robot_model(
     stored: &ResultFile,
     path: &Path,
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     data: Option<&Path>,
 ) -> Result<RobotModel, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };

@@ -16,10 +16,11 @@ use std::path::Path;
 /// If the result does not belong to the study's robot.
 pub fn export_simulator(
     result_path: &Path,
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     data: Option<&Path>,
 ) -> Result<SimulatorFile, Error> {
-    export_simulator_of(&ResultFile::read(result_path)?, result_path, (study, study_path), data)
+    export_simulator_of(&ResultFile::read(result_path)?, result_path, study, study_path, data)
 }
 
 /// As [`export_simulator()`] with a result that is in memory; messages call it `result_path`.
@@ -29,10 +30,11 @@ pub fn export_simulator(
 pub fn export_simulator_of(
     stored: &ResultFile,
     result_path: &Path,
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     data: Option<&Path>,
 ) -> Result<SimulatorFile, Error> {
-    let robot = robot_model(stored, result_path, (study, study_path), data)?;
+    let robot = robot_model(stored, result_path, study, study_path, data)?;
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
     SimulatorFile::of(&robot, &drive_knowledge(stored, &robot), &reservations(stored)).map_err(cannot)
 }

@@ -163,7 +163,7 @@ fn identified_from_files(
     timings.made_at = now();
 
     let made = Made { timings, provenance, is_payload: arm.is_some() };
-    written((study, study_path), &robot, &task, found, made)
+    written(study, study_path, &robot, &task, found, made)
 }
 
 /// How an identification was made.
@@ -179,7 +179,8 @@ pub(in crate::jobs) struct Made {
 /// # Errors
 /// Rows that the estimate does not belong to.
 pub(in crate::jobs) fn written(
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     robot: &StudyRobot,
     task: &IdentificationTask,
     found: Identification,
@@ -357,7 +358,7 @@ fn result_file(
         validation: held_out.map(|log| log.validation.clone()).collect(),
         physical: parts.verdict,
         logs: log_summaries(task, found),
-        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check((study, robot), &task.settings, diagnosis)),
+        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis)),
         no_urdf: parts.no_urdf,
         no_mjcf: parts.no_mjcf,
         no_sdf: parts.no_sdf,

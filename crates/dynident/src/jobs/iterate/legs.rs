@@ -126,9 +126,11 @@ impl IterationSection {
     /// program of the study); none where the caller brings it.
     pub(super) fn robots(
         &self,
-        (simulation, coupling): (&SimulationSection, &[CouplingSection]),
+        simulation: &SimulationSection,
+        coupling: &[CouplingSection],
         robot: &StudyRobot,
-        (stage, members): (usize, &[usize]),
+        stage: usize,
+        members: &[usize],
         program: Option<&PermittedProgram>,
     ) -> Result<Vec<Box<dyn Robot>>, StudyError> {
         let joints = robot.parametric.joint_names();

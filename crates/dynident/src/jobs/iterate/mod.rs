@@ -100,7 +100,7 @@ pub fn iterate_study(
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
 ) -> Result<IterationsFile, Error> {
-    iterated((study, study_path), (out, resume), options, watch, None)
+    iterated(study, study_path, out, resume, options, watch, None)
 }
 
 /// Makes a robot of the joints with these names.
@@ -114,19 +114,22 @@ pub type RobotMaker<'a> = &'a mut dyn FnMut(&[String]) -> Box<dyn Robot>;
 pub fn iterate_with_robot(
     study: &Study,
     study_path: &Path,
-    (out, resume): (&Path, bool),
+    out: &Path,
+    resume: bool,
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
     robot: RobotMaker<'_>,
 ) -> Result<IterationsFile, Error> {
     let mut study = study.clone();
     study.iteration.get_or_insert_default().robot = RobotChoice::Function;
-    iterated((&study, study_path), (out, resume), options, watch, Some(robot))
+    iterated(&study, study_path, out, resume, options, watch, Some(robot))
 }
 
 fn iterated(
-    (study, study_path): (&Study, &Path),
-    (out, resume): (&Path, bool),
+    study: &Study,
+    study_path: &Path,
+    out: &Path,
+    resume: bool,
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
     mut own_robot: Option<RobotMaker<'_>>,
@@ -222,10 +225,10 @@ fn iterated(
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
     let references: Vec<_> = legs.iter().map(Leg::reference).collect();
     let limits = match section.home {
-        Some(_) => limits_of((study, study_path, &folders), &robot)?,
+        Some(_) => limits_of(study, study_path, &folders, &robot)?,
         None => Limits::default(),
     };
-    let (settings, lowered) = section.guarded(settings, (study, limits), &robot, &references).map_err(in_section)?;
+    let (settings, lowered) = section.guarded(settings, study, limits, &robot, &references).map_err(in_section)?;
     let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {
@@ -240,7 +243,7 @@ fn iterated(
         sensors: &simulation.sensors,
         lowered,
     };
-    let planner = planner((study, study_path), &section, &legs, options)?;
+    let planner = planner(study, study_path, &section, &legs, options)?;
     let held_out = held_out.map(|trajectory| section.held_out_motion(&trajectory)).transpose().map_err(in_section)?;
     let before_runs_s = begin.elapsed().as_secs_f64();
 
@@ -266,7 +269,7 @@ fn iterated(
             None => iteration,
         };
         let mut robots = section
-            .robots((&simulation, &study.coupling), &robot, (number, members), program.as_ref())
+            .robots(&simulation, &study.coupling, &robot, number, members, program.as_ref())
             .map_err(in_section)?;
         robots.extend(own_robot.iter_mut().map(|make| make(&robot.parametric.joint_names())));
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
@@ -286,7 +289,7 @@ fn iterated(
                     let stage = Stage { leg, robot, records, status, shortfalls, declined, known_std: &known_std };
                     let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
-                    joined(all).and_then(|file| write_set((out, robot_is_own), &file, None, RobotFiles::none()).err())
+                    joined(all).and_then(|file| write_set(out, robot_is_own, &file, None, RobotFiles::none()).err())
                 }
                 Err(error) => Some(in_iteration(error)),
             };
@@ -338,19 +341,20 @@ fn iterated(
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
     // Runs are not lost because their robot cannot be written.
-    let found = robot_found((study, study_path), (&robot, &report.provenance), &ended, options, in_iteration)
+    let found = robot_found(study, study_path, &robot, &report.provenance, &ended, options, in_iteration)
         .unwrap_or_else(|why| {
             file.no_result = Some(why.to_string());
             RobotFiles::none()
         });
     file.base_parameters.clone_from(&found.base_parameters);
-    write_set((out, robot_is_own), &file, Some(iteration_report(&file, &traces, &time)?), found)?;
+    write_set(out, robot_is_own, &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
 }
 
 /// Who says what the next motion is, where `[iteration]` asks for that.
 fn planner(
-    (study, study_path): (&Study, &Path),
+    study: &Study,
+    study_path: &Path,
     section: &IterationSection,
     legs: &[Leg],
     options: &RunOptions<'_>,
@@ -365,7 +369,8 @@ fn planner(
 /// The file, its page and the robot that was found; while runs are still being made there is no page and no robot, and
 /// none of an earlier call. A robot that is another command's stays until there is one.
 fn write_set(
-    (out, robot_is_own): (&Path, bool),
+    out: &Path,
+    robot_is_own: bool,
     file: &IterationsFile,
     page: Option<String>,
     found: RobotFiles,

@@ -67,8 +67,10 @@ impl RobotFiles {
 /// # Errors
 /// Logs that are not there any more, rows that carry no estimate.
 pub(super) fn robot_found(
-    (study, study_path): (&Study, &Path),
-    (robot, begun): (&StudyRobot, &Provenance),
+    study: &Study,
+    study_path: &Path,
+    robot: &StudyRobot,
+    begun: &Provenance,
     stages: &[EndedStage<'_>],
     options: &RunOptions<'_>,
     failed: impl Fn(IterationError) -> Error + Copy,
@@ -110,7 +112,7 @@ pub(super) fn robot_found(
     };
     let parameters = found.consistent.parameters.clone();
     let made = Made { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
-    let mut outcome = written((study, study_path), robot, &task, found, made)?;
+    let mut outcome = written(study, study_path, robot, &task, found, made)?;
     let folder = study_path.parent().unwrap_or(Path::new(""));
     for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {
         summary.import.file = seen_from(folder, path);

@@ -95,7 +95,8 @@ impl IterationSection {
     pub(crate) fn guarded(
         &self,
         mut settings: IterationSettings,
-        (study, limits): (&Study, Limits),
+        study: &Study,
+        limits: Limits,
         robot: &StudyRobot,
         references: &[&Reference],
     ) -> Result<(IterationSettings, Vec<LoweredBandwidth>), StudyError> {
