@@ -78,16 +78,6 @@ impl Explanation {
         score(&self.free, &self.torque)
     }
 
-    /// The same by a physically consistent set; that of the torque itself where there is none.
-    pub(super) fn consistent_score(&self) -> f64 {
-        if self.consistent.is_empty() { 0.0 } else { score(&self.consistent, &self.torque) }
-    }
-
-    /// The same by the description's own bodies; zero where it has none.
-    pub(super) fn nominal_score(&self) -> f64 {
-        score(&self.nominal, &self.torque)
-    }
-
     /// What parameters of each joint's own would leave if they did not follow its noise: `√(1 − p/n)` of it is seen.
     pub(super) fn alone_of_noise_free(&self) -> Vec<f64> {
         let seen = |of_own: &f64| (1.0 - of_own.max(1.0).recip()).max(0.1).sqrt();
@@ -104,11 +94,6 @@ impl Explanation {
     pub(super) fn margin(&self) -> f64 {
         let least = self.independent_of_own.iter().copied().fold(f64::INFINITY, f64::min);
         (TELLING / least).clamp(1.0, MOST_MARGIN)
-    }
-
-    /// The same by parameters of each joint's own.
-    pub(super) fn alone_score(&self) -> f64 {
-        score(&self.alone, &self.torque)
     }
 }
 

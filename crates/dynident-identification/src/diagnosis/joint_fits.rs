@@ -86,7 +86,7 @@ impl<'a> JointFits<'a> {
             Ok(factor)
         };
         let factors = (0..robot.dof()).map(&mut of_joint).collect::<Result<_, EstimationError>>()?;
-        Self::of_factors((robot, rows), Arc::new(panels), factors)
+        Self::of_factors(robot, rows, Arc::new(panels), factors)
     }
 
     /// The same for `rows` with the shared motion, where joint `j` has the torque number `chosen[j].0` of those that it
@@ -95,7 +95,8 @@ impl<'a> JointFits<'a> {
     /// # Errors
     /// Torques that are not there.
     pub(super) fn of_shared(
-        (robot, rows): (&'a ParametricModel, &'a MotionRows),
+        robot: &'a ParametricModel,
+        rows: &'a MotionRows,
         motion: &SharedMotion,
         chosen: &[(usize, f64)],
     ) -> Result<Self, EstimationError> {
@@ -106,11 +107,12 @@ impl<'a> JointFits<'a> {
             factor.with_torque(columns, &weights)
         };
         let factors = motion.factors.iter().zip(chosen.iter().enumerate()).map(of_joint).collect::<Result<_, _>>()?;
-        Self::of_factors((robot, rows), Arc::clone(&motion.panels), factors)
+        Self::of_factors(robot, rows, Arc::clone(&motion.panels), factors)
     }
 
     fn of_factors(
-        (robot, rows): (&'a ParametricModel, &'a MotionRows),
+        robot: &'a ParametricModel,
+        rows: &'a MotionRows,
         panels: Arc<Panels>,
         factors: Vec<TriangularFactor>,
     ) -> Result<Self, EstimationError> {

@@ -1,6 +1,6 @@
 //! A recording as a few hundred instants of its motion: small enough to ask what it would be under another reading.
 
-use super::mistake::Channels;
+use super::channels::Channels;
 use crate::logs::Logs;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
@@ -13,7 +13,7 @@ pub(super) const INSTANTS: usize = 300;
 
 /// How many of `most` instants log number `place` of `logs` gives: as many as every other, and where there are more
 /// logs than instants one of every so many logs gives one.
-pub(super) fn share_of_log(most: usize, (place, logs): (usize, usize)) -> usize {
+pub(super) fn share_of_log(most: usize, place: usize, logs: usize) -> usize {
     if logs <= most { most / logs.max(1) } else { (place + 1) * most / logs - place * most / logs }
 }
 
@@ -257,6 +257,12 @@ impl MotionRows {
         }
     }
 
+    /// The columns of these channels: position, velocity and acceleration, or torque, or all.
+    pub(super) fn of_mut(&mut self, channels: Channels) -> impl Iterator<Item = &mut Vec<Vec<f64>>> {
+        let is_of = move |k: usize| channels == Channels::Both || (k == 3) == (channels == Channels::Torque);
+        self.quantities_mut().into_iter().enumerate().filter(move |(k, _)| is_of(*k)).map(|(_, columns)| columns)
+    }
+
     fn quantities_mut(&mut self) -> [&mut Vec<Vec<f64>>; 4] {
         [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau]
     }
@@ -269,10 +275,10 @@ mod tests {
     #[test]
     fn instants_are_shared_by_any_number_of_logs() {
         for logs in [1, 2, 7, 299, 300] {
-            assert!((0..logs).all(|place| share_of_log(300, (place, logs)) == 300 / logs));
+            assert!((0..logs).all(|place| share_of_log(300, place, logs) == 300 / logs));
         }
         for logs in [301, 450, 1000, 12_345] {
-            let shares: Vec<usize> = (0..logs).map(|place| share_of_log(300, (place, logs))).collect();
+            let shares: Vec<usize> = (0..logs).map(|place| share_of_log(300, place, logs)).collect();
             assert_eq!(shares.iter().sum::<usize>(), 300, "{logs}");
             assert!(shares.iter().all(|&share| share <= 1));
         }

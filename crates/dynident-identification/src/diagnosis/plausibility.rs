@@ -51,7 +51,7 @@ pub(super) fn beyond_limits(model: &Model, rows: &MotionRows) -> Vec<BeyondLimit
 }
 
 /// Whether the channels of an import report show a position behind its stop, or a rate that no recorder has.
-pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
+pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport) -> bool {
     let is_behind = |channel: &ChannelReport| {
         let limits = model.joint_index(&channel.joint).map(|joint| model.joints()[joint].limits);
         match limits.and_then(|limits| limits.lower.zip(limits.upper)) {
@@ -67,7 +67,7 @@ pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
 
 /// Whether a log has jumps that no motion makes: readings of it would mean nothing. Lone samples that were set aside
 /// are gone.
-pub(super) fn has_jumps(report: &ImportReport) -> bool {
+pub(crate) fn has_jumps(report: &ImportReport) -> bool {
     let is_measured = |channel: &&ChannelReport| matches!(channel.channel, Quantity::Position | Quantity::Torque);
     report.channels.iter().filter(is_measured).any(|channel| {
         channel.turns > 0 || channel.jumps > 0 || (channel.lone_samples > 0 && !report.sets_aside(channel))

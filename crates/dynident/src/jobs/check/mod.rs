@@ -44,7 +44,7 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
-        |diagnosis| diagnosis_check((study, &robot), &task.settings, diagnosis),
+        |diagnosis| diagnosis_check(study, &robot, &task.settings, diagnosis),
     );
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
@@ -116,11 +116,12 @@ fn is_a_point(body: &InertialParameters, arm_m: f64) -> bool {
 
 /// A diagnosis as findings, with what the study alone says of units.
 pub(super) fn diagnosis_check(
-    (study, robot): (&Study, &StudyRobot),
+    study: &Study,
+    robot: &StudyRobot,
     settings: &IdentificationSettings,
     diagnosis: &Diagnosis,
 ) -> StudyCheck {
-    let mut check = study_check((study, robot), settings, diagnosis);
+    let mut check = study_check(study, robot, settings, diagnosis);
     if let Some(currents) = currents_without_scale(study, settings) {
         check.findings.retain(|finding| finding.kind != "unit" || finding.what.contains("position"));
         check.findings.insert(0, currents);

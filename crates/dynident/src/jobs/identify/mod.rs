@@ -357,7 +357,7 @@ fn result_file(
         validation: held_out.map(|log| log.validation.clone()).collect(),
         physical: parts.verdict,
         logs: log_summaries(task, found),
-        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check((study, robot), &task.settings, diagnosis)),
+        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis)),
         no_urdf: parts.no_urdf,
         no_mjcf: parts.no_mjcf,
         no_sdf: parts.no_sdf,
