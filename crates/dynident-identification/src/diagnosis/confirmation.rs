@@ -17,8 +17,8 @@ use dynident_dynamics::ParametricModel;
 const CLEARLY_ANOTHER_RATE: f64 = 2.0 * CLEARLY_BETTER;
 
 /// Replaces the result of a search by the study as written, with the friction steps that its `rows` need, if the
-/// hypothesis of the search is not confirmed, or if there is none and these steps are not the study's. `None` if the
-/// search stays as it is. `believed` is the study of the search's best hypothesis.
+/// hypothesis of the search is not confirmed, or if the search found no hypothesis and these steps differ from the
+/// study's. `None` if the search stays as it is. `believed` is the study of the search's best hypothesis.
 ///
 /// # Errors
 /// Too few rows.

@@ -2,7 +2,7 @@
 
 use super::explanation::Explanation;
 use super::joint_fits::{JointFits, SharedMotion, score};
-use super::mistakes::Mistake;
+use super::mistakes::{Mistake, Proof};
 use super::motion_rows::MotionRows;
 use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
 use crate::consistent::ConsistencySettings;
@@ -49,7 +49,7 @@ pub struct Hypothesis {
     pub plausible_rate: bool,
     /// `Σ_j ln(share of joint j)` for separate parameters of each joint, with the share of the noise that these follow.
     pub alone_score: f64,
-    /// Base parameters of the best consistent robot; those of `free` where there is none.
+    /// Base parameters of the best consistent robot; those of `free` if no consistent robot was found.
     pub parameters: Vec<f64>,
     /// Least and greatest factor of positions that explain the samples as well as that of the last mistake; none if it
     /// has no such factor, or no numbers between units were tried.
@@ -92,7 +92,7 @@ impl Hypothesis {
 
     /// Whether a mistake is tried only where a joint travels far beyond its range.
     pub(super) fn is_shown_by_travel(&self) -> bool {
-        self.mistakes.iter().any(|mistake| mistake.facts().is_shown_by_travel)
+        self.mistakes.iter().any(|mistake| matches!(mistake.facts().proof, Proof::Travel(_)))
     }
 
     /// Whether far more is unexplained than by separate parameters of each joint, and these are significant: then it is
@@ -116,7 +116,7 @@ impl Hypothesis {
     }
 }
 
-/// The evidence beside the fit of a robot.
+/// The evidence in addition to the fit of a robot.
 fn other_evidence(mistakes: &[Mistake], nominal_score: f64, torque_growth: f64, limit_cost: f64) -> f64 {
     let rarity: f64 = mistakes.iter().map(|mistake| mistake.facts().rarity).sum();
     NOMINAL_WEIGHT * nominal_score + (1.0 + NOMINAL_WEIGHT) * torque_growth + limit_cost + rarity

@@ -91,7 +91,7 @@ pub struct Diagnosis {
     pub unmodelled_payloads: Vec<UnmodelledPayload>,
     /// Mistakes of held-out logs alone.
     pub held_out: Vec<HeldOutHypothesis>,
-    /// Columns that stand for two joints; if there are any, no hypothesis means much.
+    /// Columns that are used for two joints; then no hypothesis means much.
     pub duplicate_channels: Vec<DuplicateChannel>,
     /// Whether the torques are magnitudes, whose signs are lost.
     pub lost_signs: bool,

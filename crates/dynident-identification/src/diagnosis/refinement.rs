@@ -2,7 +2,7 @@
 //! from it.
 
 use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
-use super::mistakes::{Mistake, REACH_OF_UNITS};
+use super::mistakes::{Mistake, Number, REACH_OF_UNITS};
 use super::step_width::{with_steps_of, with_widths};
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
@@ -31,10 +31,10 @@ pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &Cons
     let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
     let found = at.without(&last.between(free)?).explained(consistency).ok()?;
     // Free numbers follow the noise: a round number stays unless the exact one is clearly better.
-    let is_better = if facts.is_inexact {
-        value(&found.hypothesis) < value(&first.hypothesis)
-    } else {
+    let is_better = if facts.number.is_none_or(Number::is_round) {
         found.hypothesis.score() < first.hypothesis.score() - MIN_IMPROVEMENT
+    } else {
+        value(&found.hypothesis) < value(&first.hypothesis)
     };
     is_better.then_some(found)
 }
@@ -57,7 +57,7 @@ fn refined_with_own_steps(
     let valleys = first.valleys(|mistake| free_bound(at, &as_tried.study.robot, first, mistake));
     let found = valleys.into_iter().filter_map(|mistake| explained(&mistake));
     let best = found.min_by(|a, b| a.hypothesis.score().total_cmp(&b.hypothesis.score()));
-    let needed = if first.facts().is_inexact { 0.0 } else { MIN_IMPROVEMENT };
+    let needed = if first.facts().number.is_none_or(Number::is_round) { MIN_IMPROVEMENT } else { 0.0 };
     let limit = as_tried.hypothesis.score() - needed;
     let mut best = best.filter(|best| best.hypothesis.score() < limit).unwrap_or(as_tried);
     let last = best.hypothesis.mistakes.last()?;

@@ -149,14 +149,13 @@ fn is_proved(proof: Proof, hypothesis: &Hypothesis, from: &Hypothesis) -> bool {
         Proof::Torque => hypothesis.torque_score() < from.torque_score() - INDISTINGUISHABLE,
         Proof::BaseParameters => hypothesis.free_score() < from.free_score() - CLEARLY_BETTER,
         Proof::ConsistentRobot => hypothesis.bodies_score() < from.bodies_score() - CLEARLY_BETTER,
-        Proof::Joint { joint, has_to_gain } => {
+        Proof::Joint(joint) | Proof::Travel(joint) => hypothesis.left[joint] < MOSTLY_NOISE,
+        Proof::JointGain(joint) => {
             let left = hypothesis.left[joint];
-            let gains = || {
-                hypothesis.consistent_score() < from.consistent_score() - MUCH_BETTER
+            left < MOSTLY_NOISE
+                && (hypothesis.consistent_score() < from.consistent_score() - MUCH_BETTER
                     || left < MAX_RATIO_OF_UNIT * from.left[joint]
-                    || (0..from.left.len()).any(|joint| becomes_consistent(joint, hypothesis, from))
-            };
-            left < MOSTLY_NOISE && (!has_to_gain || gains())
+                    || (0..from.left.len()).any(|joint| becomes_consistent(joint, hypothesis, from)))
         }
     }
 }

@@ -12,7 +12,7 @@ use super::round::Round;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 
-/// Hypotheses beside the best from which a second mistake is searched, once there is one.
+/// Number of other hypotheses from which a second mistake is searched, once the best one has a second mistake.
 const MAX_RUNNERS_UP: usize = 8;
 /// Mistakes of one study.
 const MAX_MISTAKES: usize = 3;
@@ -24,7 +24,7 @@ const MAX_NAMED: usize = 4;
 pub struct Search {
     /// The study as it is.
     pub as_written: Hypothesis,
-    /// The hypothesis that explains the samples clearly better; none if there is none.
+    /// The hypothesis that explains the samples clearly better, if one was found.
     pub best: Option<Hypothesis>,
     /// Hypotheses that the logs do not distinguish from the best.
     pub alike: Vec<Hypothesis>,

@@ -67,7 +67,7 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let compensated_s: Vec<f64> = (0..robot.dof()).map(compensated_s).collect();
     let as_written = CorrectedStudy::new(robot.clone(), rows, Vec::new()).explained(&consistency)?;
     let clock = TorqueClock::new(&robot, &samples, compensated_s.clone());
-    let found = with_clock(as_written, clock.as_ref(), &consistency);
+    let found = with_clock(&as_written, clock.as_ref(), &consistency);
     let search = likelier(found.searches, &robot, &found.rows);
     let believed = search.corrected(&robot, &found.rows);
     let again = as_written_instead(&robot, &found.written, &believed, &search, &consistency)?;
@@ -89,7 +89,7 @@ struct Found {
 
 /// Searches with the torque at the moment that explains the logs best: a torque of another moment hides every other
 /// mistake, and another mistake may look like one.
-fn with_clock(as_written: Explained, clock: Option<&TorqueClock<'_>>, consistency: &ConsistencySettings) -> Found {
+fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consistency: &ConsistencySettings) -> Found {
     let (robot, written) = (&as_written.study.robot, as_written.study.rows.clone());
     let late = clock.and_then(|clock| clock.late_channel(robot, &as_written.hypothesis, consistency, INSTANTS));
     // A fit compensates such a lag.
@@ -98,7 +98,7 @@ fn with_clock(as_written: Explained, clock: Option<&TorqueClock<'_>>, consistenc
         let searches = searches(&late.explained.hypothesis, &late.explained, consistency);
         return Found { searches, rows: rows.clone(), written: rows };
     }
-    let in_time = searches(&as_written.hypothesis, &as_written, consistency);
+    let in_time = searches(&as_written.hypothesis, as_written, consistency);
     let believed = in_time[1].believed();
     // Half a period of a motion that repeats looks like another sign: the lag has to explain clearly more.
     let gain = as_written.hypothesis.score() - believed.score();
@@ -112,10 +112,10 @@ fn with_clock(as_written: Explained, clock: Option<&TorqueClock<'_>>, consistenc
     }
 }
 
-/// Of the searches for common mistakes and for all, the latter only where its hypothesis explains clearly less torque
-/// than the former: with a joint that is held smaller fewer limits are broken, whatever the description's limits are
-/// worth, unless the joint travels far beyond its range. Where most torques are still in another unit, the unit of one
-/// joint or another rate only compensates for that.
+/// Selects one of the searches for common mistakes and for all. The latter needs clearly less unexplained torque than
+/// the former: a smaller unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far
+/// beyond its range is an exception. Where most torques are still in another unit, the unit of one joint or another
+/// rate only compensates for that.
 fn likelier(searches: [Search; 2], robot: &ParametricModel, rows: &MotionRows) -> Search {
     let [usual, all] = searches;
     let (best, tried) = (all.believed(), all.tried);

@@ -51,7 +51,7 @@ impl MistakeKind for Coupled {
             rarity: 0.15,
             joints: Some(vec![self.joint]),
             adds_torques: true,
-            proof: Proof::Joint { joint: self.joint, has_to_gain: false },
+            proof: Proof::Joint(self.joint),
             ..Facts::of("coupling")
         }
     }

@@ -42,9 +42,13 @@ pub(in crate::diagnosis) enum Proof {
     /// Nothing else.
     #[default]
     Score,
-    /// The torque of this joint must be explained: a dead or noisy channel is as good in any unit. With `has_to_gain`
-    /// clearly better than before, for a gain of one torque may only serve other joints.
-    Joint { joint: usize, has_to_gain: bool },
+    /// The torque of this joint must be explained: a dead or noisy channel is as good in any unit.
+    Joint(usize),
+    /// The same for a mistake that is tried only where the joint travels far beyond its range.
+    Travel(usize),
+    /// The torque of this joint must be explained, and clearly better than before: a gain of one torque may only serve
+    /// other joints.
+    JointGain(usize),
     /// The torque, limits aside: any offset brings a joint back between stops, which may be wrong themselves.
     Torque,
     /// The fit of base parameters: no other length makes bodies possible.
@@ -84,19 +88,14 @@ pub(in crate::diagnosis) struct Facts {
     pub(in crate::diagnosis) position_factor: Option<f64>,
     /// Whether it is another rate of the recorder, and no unit of time.
     pub(in crate::diagnosis) is_other_rate: bool,
-    /// Whether it is tried only where a joint travels far beyond its range.
-    pub(in crate::diagnosis) is_shown_by_travel: bool,
     /// Whether all logs have it, since they have the same robot at the same place.
     pub(in crate::diagnosis) is_of_all_logs: bool,
-    /// Whether logs seldom distinguish it from the same of other channels. That of torques is then named first: no
-    /// description fixes the sign of a torque.
-    pub(in crate::diagnosis) has_mirror_image: bool,
+    /// The channels that are named first, where logs seldom distinguish the same mistake of other channels.
+    pub(in crate::diagnosis) likelier_channels: Option<Channels>,
     /// The evidence that has to improve.
     pub(in crate::diagnosis) proof: Proof,
     /// Its free number; none where it has none, or a unit's.
     pub(in crate::diagnosis) number: Option<Number>,
-    /// Whether its number is not round: another one need not be clearly better.
-    pub(in crate::diagnosis) is_inexact: bool,
     /// Numbers that may be found of other robots, where its own was chosen to gain most.
     pub(in crate::diagnosis) other_numbers: Vec<f64>,
 }
@@ -181,5 +180,7 @@ pub(super) fn joint_list(joints: &[usize], names: &[String]) -> String {
 
 /// Multiplies the values of a column.
 pub(super) fn scale(values: &mut [f64], factor: f64) {
-    values.iter_mut().for_each(|value| *value *= factor);
+    for value in values {
+        *value *= factor;
+    }
 }

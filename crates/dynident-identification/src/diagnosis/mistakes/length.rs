@@ -43,7 +43,7 @@ impl MistakeKind for Length {
             joints: Some(vec![self.joint]),
             is_of_all_logs: true,
             proof: Proof::BaseParameters,
-            number: Some(Number::Factor { at: self.factor, reach: 0.7 }),
+            number: Some(Number::Factor { at: self.factor, reach: 0.7, is_round: true }),
             ..Facts::of("description")
         }
     }

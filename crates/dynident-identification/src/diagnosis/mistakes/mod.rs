@@ -21,7 +21,7 @@ pub mod torque_unit;
 pub use study_keys::{KeyChange, StudyKeys};
 
 pub(super) use kind::{Breadth, Proof, Setup, TorqueSource};
-pub(super) use numbers::least_by_thirds;
+pub(super) use numbers::{Number, least_by_thirds};
 pub(super) use position_unit::REACH as REACH_OF_UNITS;
 
 use super::channels::Channels;
@@ -169,7 +169,7 @@ impl Mistake {
 
     /// The mistake that is named first of those that logs hardly distinguish from it.
     pub(super) fn likelier(&self) -> Option<Self> {
-        if self.facts().has_mirror_image { self.with_channels(Channels::Torque) } else { None }
+        self.with_channels(self.facts().likelier_channels?)
     }
 }
 

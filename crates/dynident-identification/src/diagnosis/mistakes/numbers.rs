@@ -8,16 +8,24 @@ const PLACES: usize = 17;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::diagnosis) enum Number {
     /// An angle, rad.
-    Angle { at: f64, reach: f64 },
+    Angle { at: f64, reach: f64, is_round: bool },
     /// A factor; the reach is that of its logarithm.
-    Factor { at: f64, reach: f64 },
+    Factor { at: f64, reach: f64, is_round: bool },
+}
+
+impl Number {
+    /// Whether it is a number that people write, so that another one has to be clearly better.
+    pub(in crate::diagnosis) fn is_round(self) -> bool {
+        let (Self::Angle { is_round, .. } | Self::Factor { is_round, .. }) = self;
+        is_round
+    }
 }
 
 /// The number whose `value` is least.
 pub(super) fn least_number(number: Number, value: impl Fn(f64) -> f64) -> f64 {
     match number {
-        Number::Angle { at, reach } => least_in(at, reach, value),
-        Number::Factor { at, reach } => at * least_in(0.0, reach, |log| value(at * log.exp())).exp(),
+        Number::Angle { at, reach, .. } => least_in(at, reach, value),
+        Number::Factor { at, reach, .. } => at * least_in(0.0, reach, |log| value(at * log.exp())).exp(),
     }
 }
 

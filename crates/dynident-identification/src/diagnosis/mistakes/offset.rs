@@ -40,13 +40,13 @@ impl MistakeKind for Offset {
     }
 
     fn facts(&self) -> Facts {
+        // People mistake zeros by quarters of a turn, or by any angle.
+        let is_round = (self.offset_rad / FRAC_PI_2).fract() == 0.0;
         Facts {
             rarity: 0.15,
             joints: Some(vec![self.joint]),
             proof: Proof::Torque,
-            number: Some(Number::Angle { at: self.offset_rad, reach: 0.5 }),
-            // People mistake zeros by quarters of a turn, or by any angle.
-            is_inexact: (self.offset_rad / FRAC_PI_2).fract() != 0.0,
+            number: Some(Number::Angle { at: self.offset_rad, reach: 0.5, is_round }),
             other_numbers: OTHER_OFFSETS.map(|times| times * self.offset_rad).to_vec(),
             ..Facts::of("offset")
         }

@@ -36,6 +36,10 @@ pub struct PositionUnit {
 }
 
 impl PositionUnit {
+    fn free_factor(&self) -> Number {
+        Number::Factor { at: self.factor, reach: REACH, is_round: EXACT_UNITS.contains(&self.factor) }
+    }
+
     fn is_shown_by_travel(&self) -> bool {
         self.joints.len() == 1 && self.factor < MAX_TRAVEL.recip()
     }
@@ -77,13 +81,12 @@ impl MistakeKind for PositionUnit {
             rarity: if self.joints.len() == 1 { 0.15 } else { 0.0 },
             joints: Some(self.joints.clone()),
             position_factor: Some(self.factor),
-            is_shown_by_travel: self.is_shown_by_travel(),
             proof: match self.joints[..] {
-                [joint] => Proof::Joint { joint, has_to_gain: !self.is_shown_by_travel() },
+                [joint] if self.is_shown_by_travel() => Proof::Travel(joint),
+                [joint] => Proof::JointGain(joint),
                 _ => Proof::Score,
             },
-            number: Some(Number::Factor { at: self.factor, reach: REACH }),
-            is_inexact: !EXACT_UNITS.contains(&self.factor),
+            number: Some(self.free_factor()),
             ..Facts::of("unit")
         }
     }
@@ -127,14 +130,13 @@ impl MistakeKind for PositionUnit {
 
     /// A gear ratio may be near a unit.
     fn between(&self, value: &dyn Fn(&Self) -> f64) -> Option<Self> {
-        let found =
-            least_number(Number::Factor { at: self.factor, reach: REACH }, |factor| value(&self.with_number(factor)));
-        let is_unit = EXACT_UNITS.contains(&self.factor) && (found / self.factor).ln().abs() < 0.1;
+        let found = least_number(self.free_factor(), |factor| value(&self.with_number(factor)));
+        let is_unit = self.free_factor().is_round() && (found / self.factor).ln().abs() < 0.1;
         (!is_unit).then(|| self.with_number(found))
     }
 
     fn valleys(&self, value: &dyn Fn(&Self) -> f64) -> Vec<Self> {
-        if EXACT_UNITS.contains(&self.factor) {
+        if self.free_factor().is_round() {
             return self.between(value).into_iter().collect();
         }
         let with = |log: f64| self.with_number(self.factor * log.exp());

@@ -39,8 +39,9 @@ impl MistakeKind for Sign {
             channels: Some(self.channels),
             joints: Some(self.joints.clone()),
             torques: self.joints.iter().map(|&joint| TorqueSource { joint, from: joint, factor: -1.0 }).collect(),
-            // Of a negative torque and a negative position one is the mirror image of the other.
-            has_mirror_image: true,
+            // A negative torque and a negative position are one robot and its mirror image. No description fixes the
+            // sign of a torque.
+            likelier_channels: Some(Channels::Torque),
             ..Facts::of("sign")
         }
     }

@@ -69,8 +69,8 @@ impl StudyKeys {
         known.sort_by(f64::total_cmp);
         let usual = known.get(known.len() / 2).copied().unwrap_or(1.0);
         let value = |place: usize| {
-            let own = self.places.iter().zip(factors).filter(|(own, _)| **own == place);
-            let factor = own.filter_map(|(_, factor)| *factor).next();
+            let mut own = self.places.iter().zip(factors).filter(|(own, _)| **own == place);
+            let factor = own.find_map(|(_, factor)| *factor);
             significant(factor.map_or(usual, |factor| factor * at(group.scale.as_ref(), place, 1.0)))
         };
         KeyChange { table, line: format!("scale = {}", list((0..factors.len()).map(value))) }

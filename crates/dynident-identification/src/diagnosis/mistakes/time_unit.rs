@@ -48,7 +48,7 @@ impl MistakeKind for TimeUnit {
         let is_other_rate = !UNITS.contains(&self.factor);
         Facts {
             is_other_rate,
-            number: is_other_rate.then_some(Number::Factor { at: self.factor, reach: 0.4 }),
+            number: is_other_rate.then_some(Number::Factor { at: self.factor, reach: 0.4, is_round: true }),
             ..Facts::of("unit")
         }
     }

@@ -54,9 +54,8 @@ impl MistakeKind for TorqueUnit {
             joints: Some(vec![self.joint]),
             torques: vec![TorqueSource { joint: self.joint, from: self.joint, factor: self.factor }],
             torque_gain: Some(self.joint),
-            proof: Proof::Joint { joint: self.joint, has_to_gain: true },
-            number: Some(Number::Factor { at: self.factor, reach: 1.2 }),
-            is_inexact: !EXACT_UNITS.contains(&self.factor),
+            proof: Proof::JointGain(self.joint),
+            number: Some(Number::Factor { at: self.factor, reach: 1.2, is_round: EXACT_UNITS.contains(&self.factor) }),
             ..Facts::of("unit")
         }
     }

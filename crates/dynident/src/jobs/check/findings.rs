@@ -1,4 +1,4 @@
-//! What a diagnosis says to the person who wrote the study.
+//! The findings of a diagnosis in words.
 
 use super::changes::{changes, keys_of_log, keys_of_study};
 use super::wording::{alternative, evidence};
@@ -14,24 +14,24 @@ use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
 
-/// Share of all torque that a reading may leave to be an explanation; most real sets leave 0.1.
-const MOST_LEFT: f64 = 0.3;
-/// The same as a share of what the study as written leaves, for logs whose noise leaves more.
-const MOST_LEFT_OF_IT: f64 = 0.75;
-/// Share of all torque that is left where even the best reading explains nothing. Of a slow pendulum's noisy log a
-/// right study leaves 0.81 here.
+/// Largest unexplained share of all torque for an explanation; most real sets have 0.1.
+const MAX_LEFT: f64 = 0.3;
+/// The same as a share of that of the study as written, for noisy logs.
+const MAX_LEFT_RATIO: f64 = 0.75;
+/// Unexplained share of all torque from which even the best hypothesis explains nothing. A correct study of a slow
+/// pendulum's noisy log has 0.81.
 const NOTHING_EXPLAINED: f64 = 0.92;
 
 /// Times the least factor of a joint's torque that the largest may be where they are one unit, or the currents of
 /// drives: motor constants times gear ratios of an arm lie within five of each other.
 const MOST_SPREAD: f64 = 10.0;
 
-/// A finding under way: a sentence without its evidence.
+/// A problem without keys to write.
 fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
     CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
 }
 
-/// The diagnosis of a study as findings and readings.
+/// The findings of a diagnosis, with the evidence of the study as written and of the best hypothesis.
 pub(super) fn study_check(
     study: &Study,
     robot: &StudyRobot,
@@ -43,11 +43,11 @@ pub(super) fn study_check(
     let keys = keys.as_ref();
     let search = &diagnosis.search;
     let mut findings = Vec::new();
-    // Another reading, one finding for each of its mistakes; what cannot be told from it stands with the last.
-    // A reading that explains nothing is no advice.
+    // One finding for each mistake of the best hypothesis; the last one names hypotheses that are not distinguishable.
+    // A hypothesis that explains nothing is no advice.
     let spoilt = spoilt_columns(diagnosis, &joints);
     let is_spoilt = !spoilt.is_empty();
-    let most_left = MOST_LEFT.max(MOST_LEFT_OF_IT * search.as_written.left_of_all);
+    let most_left = MAX_LEFT.max(MAX_LEFT_RATIO * search.as_written.left_of_all);
     let explains = |best: &&Hypothesis| !is_spoilt && !best.is_unexplained() && best.left_of_all < most_left;
     let best = search.best.as_ref().filter(explains);
     let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
@@ -241,7 +241,7 @@ pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSet
     Some(found)
 }
 
-/// Columns that cannot be what the study says: no reading of the others means much beside them.
+/// Columns that are not what the study states: with these, no hypothesis about the others means much.
 fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding> {
     let same = |same: &DuplicateChannel| {
         let [a, b] = same.joints.map(|joint| &joints[joint]);
@@ -268,7 +268,7 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
     found
 }
 
-/// A mistake that one held-out log has and the training logs have not.
+/// A mistake of one held-out log that the training logs do not have.
 fn of_held_out_log(
     study: &Study,
     robot: &StudyRobot,
