@@ -1,6 +1,6 @@
 //! Before any fit is believed: do study, robot and recordings fit together?
 
-use crate::diagnosis::{Diagnosis, diagnose};
+use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
 use crate::execution::Execution;
@@ -18,7 +18,7 @@ use dynident_recording::ImportReport;
 pub struct StudyExamination {
     /// For each recording its number and what its import found; none for motions that were made already.
     pub imports: Vec<(usize, Option<ImportReport>)>,
-    /// Readings of the training recordings, units of torque, loads; none where jumps in a log make them meaningless.
+    /// Mistakes, units of torque, payloads; none where jumps in a log make the comparison meaningless.
     pub diagnosis: Option<Diagnosis>,
     /// Rows of all joints that a fit would have.
     pub rows: usize,
@@ -26,8 +26,8 @@ pub struct StudyExamination {
     pub parameters: usize,
 }
 
-/// Reads every recording of a task, compares the readings of those to fit to, and looks for loads in the others. No
-/// friction is chosen and no bodies are looked for.
+/// Reads every recording of a task, and searches mistakes in the training recordings and payloads in the others. No
+/// friction is chosen and no bodies are estimated.
 ///
 /// # Errors
 /// Recordings that cannot be read, too few rows.
@@ -57,8 +57,8 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     for index in of_role(recordings, Role::Validate) {
         imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));
     }
-    let diagnosis =
-        if have_jumps(&training) { None } else { Some(diagnose((&logs, &settings), robot, &chosen, known)?) };
+    let task = DiagnosisTask { logs: &logs, settings: &settings, robot, training: &chosen, theta: known };
+    let diagnosis = if have_jumps(&training) { None } else { Some(diagnose(task)?) };
     let rows = training.problem.joint_rows().iter().sum();
     Ok(StudyExamination { imports, diagnosis, rows, parameters: robot.base().count() })
 }

@@ -6,7 +6,7 @@ use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal, parameter_std,
 };
-use crate::diagnosis::{Diagnosis, diagnose};
+use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::drive_inertia::DriveInertiaChoice;
 use crate::error::IdentificationError;
@@ -266,8 +266,8 @@ fn identified(
         _ if held || have_jumps(&training) => None,
         DiagnosisChoice::WhenDoubtful if !is_doubted() => None,
         DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
-            let of_task = plain.filter(|_| own_terms);
-            Some(diagnose((&logs, settings), &robot, &chosen, of_task)?)
+            let (logs, theta) = (&logs, plain.filter(|_| own_terms));
+            Some(diagnose(DiagnosisTask { logs, settings, robot: &robot, training: &chosen, theta })?)
         }
     };
     times.estimation_s += estimation_s;

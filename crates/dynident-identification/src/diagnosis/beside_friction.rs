@@ -30,6 +30,11 @@ impl BesideFriction {
     pub(super) fn of(&self, joint: usize, torque: &[f64]) -> DVector<f64> {
         self.0[joint].outside(&DVector::from_column_slice(torque))
     }
+
+    /// The same of the torques of all joints.
+    pub(super) fn of_all(&self, torques: &[Vec<f64>]) -> Vec<DVector<f64>> {
+        torques.iter().enumerate().map(|(joint, torque)| self.of(joint, torque)).collect()
+    }
 }
 
 /// The step of the joint's dry friction; that of the sign where its terms have none.

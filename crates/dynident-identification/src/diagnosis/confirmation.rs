@@ -1,65 +1,73 @@
-//! A mistake that was found is looked at once more, for three things that are none look like one: another step of dry
-//! friction, a description with usual errors, and bodies of placeholders, which another rate makes up for.
+//! Confirmation of a hypothesis against three causes that look like a mistake: another step of dry friction, a
+//! description with usual errors, and placeholders for bodies, for which another rate compensates.
 
 use super::error::DiagnosisError;
+use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Hypothesis, INDISTINGUISHABLE, NOMINAL_WEIGHT};
 use super::joint_fits::score;
-use super::mistake::{Mistake, without_mistakes};
+use super::mistakes::{Mistake, without_mistakes};
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, nominal_torque};
-use super::reading::{ALIKE, CLEARLY_BETTER, Corrected, NOMINAL_WEIGHT, Reading};
 use super::search::Search;
 use super::step_width::with_steps_of;
 use super::usual_errors::torques_of_likely_robots;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 
-/// By how much another rate has to be better: those of honest logs gain 1.1, of logs with another rate 2.0 and more.
+/// Improvement that another rate needs: rates of correct logs gain 1.1, other rates 2.0 and more.
 const CLEARLY_ANOTHER_RATE: f64 = 2.0 * CLEARLY_BETTER;
-/// Times an offset that was found that other robots are asked for.
-const OTHER_OFFSETS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
 
-/// The study as written with the steps of dry friction that the rows ask for, where the mistake of `search` is not
-/// confirmed, or there is none and these steps are others than the study's; none where the search stands as it is.
-/// `rows` are those of the study as written, `corrected` robot and rows of the search's best reading.
+/// Replaces the result of a search by the study as written, with the friction steps that its `rows` need, if the
+/// hypothesis of the search is not confirmed, or if the search found no hypothesis and these steps differ from the
+/// study's. `None` if the search stays as it is. `believed` is the study of the search's best hypothesis.
 ///
 /// # Errors
 /// Too few rows.
-pub(super) fn without_mistake(
-    (robot, rows): (&ParametricModel, &MotionRows),
-    corrected: (&ParametricModel, &MotionRows),
+pub(super) fn as_written_instead(
+    robot: &ParametricModel,
+    rows: &MotionRows,
+    believed: &(ParametricModel, MotionRows),
     search: &Search,
     consistency: &ConsistencySettings,
-) -> Result<Option<(ParametricModel, Reading)>, DiagnosisError> {
+) -> Result<Option<(ParametricModel, Search)>, DiagnosisError> {
     let own_steps = with_steps_of(robot, rows)?;
     if search.best.is_none() && own_steps.terms() == robot.terms() {
         return Ok(None);
     }
-    let as_written = Corrected::new(own_steps.clone(), rows.clone(), Vec::new()).reading(Some(consistency))?;
-    let Some(best) = &search.best else { return Ok(Some((own_steps, as_written))) };
-    let corrected = Corrected {
-        torque_growth: best.torque_growth,
-        ..Corrected::new(with_steps_of(corrected.0, corrected.1)?, corrected.1.clone(), best.mistakes.clone())
-    };
-    let best = corrected.reading(Some(consistency))?;
-    let is_confirmed = is_clear(&as_written, &best) && is_beyond_usual_errors((robot, rows), [&as_written, &best]);
-    Ok((!is_confirmed).then_some((own_steps, as_written)))
+    let study = CorrectedStudy::new(own_steps.clone(), rows.clone(), Vec::new());
+    let as_written = study.hypothesis(Some(consistency))?;
+    if let Some(best) = &search.best {
+        let (robot_of_best, rows_of_best) = believed;
+        let robot_of_best = with_steps_of(robot_of_best, rows_of_best)?;
+        let study = CorrectedStudy::new(robot_of_best, rows_of_best.clone(), best.mistakes.clone());
+        let study = CorrectedStudy { torque_growth: best.torque_growth, ..study };
+        let best = study.hypothesis(Some(consistency))?;
+        if is_clear(&as_written, &best) && is_beyond_usual_errors(robot, rows, &as_written, &best) {
+            return Ok(None);
+        }
+    }
+    Ok(Some((own_steps, Search { as_written, best: None, alike: Vec::new(), tried: search.tried })))
 }
 
-/// Whether a reading is better where each has its own steps. What the description's bodies say of a rate, placeholders
-/// say as well: it must be seen in what a robot can be.
-fn is_clear(as_written: &Reading, best: &Reading) -> bool {
+/// Whether a hypothesis is better where each has its own steps. Placeholders support another rate as much as described
+/// bodies do, so the consistent fit has to improve.
+fn is_clear(as_written: &Hypothesis, best: &Hypothesis) -> bool {
     let gain = as_written.score() - best.score();
-    if best.mistakes.iter().all(Mistake::is_other_rate) {
-        gain >= CLEARLY_ANOTHER_RATE && as_written.consistent_score - best.consistent_score >= ALIKE
+    if best.mistakes.iter().all(|mistake| mistake.facts().is_other_rate) {
+        gain >= CLEARLY_ANOTHER_RATE && as_written.consistent_score() - best.consistent_score() >= INDISTINGUISHABLE
     } else {
         gain >= CLEARLY_BETTER
     }
 }
 
-/// Whether a reading that is better by the description's bodies alone is so by clearly more than with any of the robots
-/// that are described with usual errors, moved as in these rows and without any mistake.
-fn is_beyond_usual_errors((robot, rows): (&ParametricModel, &MotionRows), [as_written, best]: [&Reading; 2]) -> bool {
-    let by_bodies = as_written.nominal_score - best.nominal_score;
+/// Whether a hypothesis that only the described bodies support gains clearly more than with any robot that is described
+/// with usual errors, moved as in these rows and without any mistake.
+fn is_beyond_usual_errors(
+    robot: &ParametricModel,
+    rows: &MotionRows,
+    as_written: &Hypothesis,
+    best: &Hypothesis,
+) -> bool {
+    let by_bodies = as_written.nominal_score() - best.nominal_score();
     if as_written.score() - best.score() - NOMINAL_WEIGHT * by_bodies >= CLEARLY_BETTER {
         return true;
     }
@@ -91,13 +99,14 @@ fn is_beyond_usual_errors((robot, rows): (&ParametricModel, &MotionRows), [as_wr
     by_bodies >= torques.map(gain).fold(0.0, f64::max) + CLEARLY_BETTER
 }
 
-/// The same mistakes as they may be found of other robots: what the last one has for a number was chosen to gain most.
+/// The same mistakes with the numbers of the last one that may be found of other robots.
 fn with_other_numbers(mistakes: &[Mistake]) -> Vec<Vec<Mistake>> {
-    let Some((&Mistake::Offset { joint, offset_rad }, before)) = mistakes.split_last() else {
+    let Some((last, before)) = mistakes.split_last() else { return vec![Vec::new()] };
+    let others = last.facts().other_numbers;
+    if others.is_empty() {
         return vec![mistakes.to_vec()];
-    };
-    let with = |times: f64| [before, &[Mistake::Offset { joint, offset_rad: times * offset_rad }]].concat();
-    OTHER_OFFSETS.map(with).to_vec()
+    }
+    others.into_iter().map(|number| [before, &[last.with_number(number)]].concat()).collect()
 }
 
 fn rms(values: &[f64]) -> f64 {

@@ -94,8 +94,7 @@ impl DescriptionFit {
 pub(super) fn description_fit(robot: &ParametricModel, rows: &MotionRows, left: &[f64]) -> Option<DescriptionFit> {
     let nominal = nominal_torque(robot, rows)?;
     let beside = BesideFriction::new(robot, rows)?;
-    let bodies: Vec<DVector<f64>> =
-        nominal.iter().enumerate().map(|(joint, torque)| beside.of(joint, torque)).collect();
+    let bodies = beside.of_all(&nominal);
     let fits: Vec<JointFit> = (0..bodies.len())
         .map(|joint| joint_fit(&rows.tau[joint], &beside.of(joint, &rows.tau[joint]), &bodies[joint], left[joint]))
         .collect();
@@ -105,10 +104,10 @@ pub(super) fn description_fit(robot: &ParametricModel, rows: &MotionRows, left: 
     let mut fit = DescriptionFit { scale, explained, least_of_own: None, wrong_mass: None };
     if fit.is_of_another_robot() {
         let joints: Vec<usize> = (0..fits.len()).filter(|&joint| fits[joint].explained.is_some()).collect();
-        fit.least_of_own = Some(least_of_own(robot, (rows, &beside), &bodies, (&joints, left)));
+        fit.least_of_own = Some(least_of_own(robot, rows, &beside, &bodies, &joints, left));
     }
     if !fit.joints_in_another_unit().is_empty() {
-        fit.wrong_mass = wrong_mass(robot, (rows, &beside), left_by_scales);
+        fit.wrong_mass = wrong_mass(robot, rows, &beside, left_by_scales);
     }
     nominal.iter().flatten().any(|&tau| tau != 0.0).then_some(fit)
 }
@@ -152,9 +151,11 @@ fn share_explained(torque: &DVector<f64>, bodies: &DVector<f64>, noise: f64) -> 
 /// explains them.
 fn least_of_own(
     robot: &ParametricModel,
-    (rows, beside): (&MotionRows, &BesideFriction),
+    rows: &MotionRows,
+    beside: &BesideFriction,
     bodies: &[DVector<f64>],
-    (joints, left): (&[usize], &[f64]),
+    joints: &[usize],
+    left: &[f64],
 ) -> f64 {
     let Some(torques) = torques_of_likely_robots(robot, rows) else { return 0.0 };
     let most = |torque: Vec<Vec<f64>>| {

@@ -1,5 +1,4 @@
-//! How well robots explain the torque of some instants: each joint by itself, one robot for all joints, one that is
-//! physically consistent.
+//! How well robots explain the torque of some instants: each joint alone, one robot for all joints, a consistent one.
 
 use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
@@ -8,21 +7,21 @@ use crate::rows::predicted_torque;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
 
-/// Independent instants to one of a joint's own parameters below which these follow the noise, and whatever friction
-/// and elasticity the model has no term for.
-const TELLING: f64 = 2.0;
-/// Times the usual margin that is asked for at most: of parts of honest logs the best wrong reading gains 0.83, where a
-/// reversed joint of a short log gains 1.3.
-const MOST_MARGIN: f64 = 1.5;
+/// Number of independent instants for each of a joint's own parameters, below which these follow the noise, and
+/// friction and elasticity without a term in the model.
+const MIN_INSTANTS: f64 = 2.0;
+/// Largest factor on the needed improvement: the best wrong hypothesis gains 0.83 in parts of correct logs, and a
+/// reversed joint of a short log 1.3.
+const MAX_MARGIN: f64 = 1.5;
 
-/// Root mean squares of what is left of each joint's torque, Nm (N), with the floor of a hundredth of the torque.
+/// Residuals of each joint's torque, root mean squares, Nm (N), at least a hundredth of the torque.
 #[derive(Clone, Debug)]
 pub(super) struct Explanation {
     /// Of the torque itself.
     pub(super) torque: Vec<f64>,
-    /// By parameters of each joint's own, which no other joint shares.
+    /// By separate parameters of each joint.
     pub(super) alone: Vec<f64>,
-    /// Independent instants to one of each joint's own parameters, `n/p`.
+    /// Number of independent instants for each of a joint's own parameters, `n/p`.
     independent_of_own: Vec<f64>,
     /// By one set of base parameters, consistent or not.
     pub(super) free: Vec<f64>,
@@ -37,7 +36,7 @@ pub(super) struct Explanation {
 }
 
 impl Explanation {
-    /// Explains the torque of `rows` by `robot`; consistent sets are looked for where `consistency` is given.
+    /// Explains the torque of `rows` by `robot`; with a consistent set where `consistency` is given.
     ///
     /// # Errors
     /// Too few rows.
@@ -78,37 +77,22 @@ impl Explanation {
         score(&self.free, &self.torque)
     }
 
-    /// The same by a physically consistent set; that of the torque itself where there is none.
-    pub(super) fn consistent_score(&self) -> f64 {
-        if self.consistent.is_empty() { 0.0 } else { score(&self.consistent, &self.torque) }
-    }
-
-    /// The same by the description's own bodies; zero where it has none.
-    pub(super) fn nominal_score(&self) -> f64 {
-        score(&self.nominal, &self.torque)
-    }
-
-    /// What parameters of each joint's own would leave if they did not follow its noise: `√(1 − p/n)` of it is seen.
+    /// Residuals of separate parameters of each joint if these did not follow its noise, of which `√(1 − p/n)` remains.
     pub(super) fn alone_of_noise_free(&self) -> Vec<f64> {
         let seen = |of_own: &f64| (1.0 - of_own.max(1.0).recip()).max(0.1).sqrt();
         self.alone.iter().zip(&self.independent_of_own).map(|(left, of_own)| left / seen(of_own)).collect()
     }
 
-    /// Whether there are so many instants to one of a joint's own parameters that what these leave says something.
+    /// Whether there are enough instants for separate parameters of each joint.
     pub(super) fn own_parameters_tell(&self) -> Vec<bool> {
-        self.independent_of_own.iter().map(|of_own| *of_own >= TELLING).collect()
+        self.independent_of_own.iter().map(|of_own| *of_own >= MIN_INSTANTS).collect()
     }
 
-    /// Times the usual margin by which another reading has to be better: the logarithm of what is left varies by
-    /// `√(p/2n)` from log to log, more where few independent instants tell the parameters.
+    /// Factor on the needed improvement: the logarithm of a residual varies by `√(p/2n)` from log to log, more with few
+    /// independent instants.
     pub(super) fn margin(&self) -> f64 {
         let least = self.independent_of_own.iter().copied().fold(f64::INFINITY, f64::min);
-        (TELLING / least).clamp(1.0, MOST_MARGIN)
-    }
-
-    /// The same by parameters of each joint's own.
-    pub(super) fn alone_score(&self) -> f64 {
-        score(&self.alone, &self.torque)
+        (MIN_INSTANTS / least).clamp(1.0, MAX_MARGIN)
     }
 }
 

@@ -1,103 +1,87 @@
-//! What held-out logs alone have: a load, or a mistake.
+//! Payloads and mistakes that held-out logs alone have.
 
 use super::error::DiagnosisError;
 use super::explanation::{Explanation, predicted};
-use super::held_out_reading::{HeldOutReading, held_out_reading};
+use super::held_out_hypothesis::{HeldOutHypothesis, KnownRobot, held_out_hypothesis};
+use super::hypothesis::Hypothesis;
 use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
-use super::reading::Reading;
 use super::torque_clock::TorqueClock;
-use super::unseen_load::{UnseenLoad, unseen_load};
+use super::unmodelled_payload::{UnmodelledPayload, unmodelled_payload};
 use crate::consistent::ConsistencySettings;
 use crate::logs::Logs;
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
 
-/// Times what a load or a mistake leaves of a log that one robot for all logs may leave: then there is neither.
-const AS_WELL: f64 = 1.3;
+/// Ratio of the residual of one robot for all logs to that with a payload or a mistake, up to which there is neither.
+const MAX_RATIO_OF_ONE_ROBOT: f64 = 1.3;
 
-/// What was found in held-out logs.
+/// Causes found in held-out logs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HeldOutLogs {
-    /// Loads that they carry and training logs do not, or the other way round.
-    pub(super) unseen_loads: Vec<UnseenLoad>,
-    /// Mistakes that they alone have.
-    pub(super) readings: Vec<HeldOutReading>,
+    pub(super) payloads: Vec<UnmodelledPayload>,
+    pub(super) hypotheses: Vec<HeldOutHypothesis>,
 }
 
-/// What is known of the training logs.
+/// The result of the training logs.
 pub(super) struct Trained<'a> {
+    pub(super) model: &'a RegressorModel,
     /// Their instants.
     pub(super) rows: &'a MotionRows,
     /// The study as written, on these.
-    pub(super) reading: &'a Reading,
+    pub(super) as_written: &'a Hypothesis,
     /// Base parameters by least squares from all their rows; none where the model is not the study's.
-    pub(super) known: Option<&'a [f64]>,
-    /// How consistent robots are looked for.
+    pub(super) theta: Option<&'a [f64]>,
     pub(super) consistency: &'a ConsistencySettings,
+    /// The lag that was compensated in each joint's torque, s.
+    pub(super) compensated_s: &'a [f64],
 }
 
-/// Asks every held-out log whether the parameters of the training logs explain it: those that a robot can have
-/// ([`Reading::parameters`]), for others predict nothing where the training did not move, and those of all rows. Where
-/// they do not, and no robot explains all logs as well, the load or the mistake that does is what the log has.
-/// `taken_off_s` is the lag that each joint's torque was freed of.
+/// The payload or the mistake of each held-out log that explains it clearly better than the training logs' robot does,
+/// and than one robot for all logs. Neither the parameters from all rows may explain it, nor those of a consistent
+/// robot ([`Hypothesis::parameters`]): others predict nothing where the training did not move.
 ///
 /// # Errors
 /// Recordings that cannot be read, too few rows.
-pub(super) fn held_out_logs(
-    (logs, taken_off_s): (&Logs<'_>, &[f64]),
-    model: &RegressorModel,
-    trained: &Trained<'_>,
-) -> Result<HeldOutLogs, DiagnosisError> {
+pub(super) fn held_out_logs(logs: &Logs<'_>, trained: &Trained<'_>) -> Result<HeldOutLogs, DiagnosisError> {
+    let robot = &trained.model.parametric;
     let mut found = HeldOutLogs::default();
     for log in logs.of_role(Role::Validate) {
-        let samples = [MotionSamples::of_recording(logs, model, log)?];
+        let samples = [MotionSamples::of_recording(logs, trained.model, log)?];
         let rows = samples[0].instants(INSTANTS);
-        let clock = TorqueClock::new(&model.parametric, &samples, taken_off_s.to_vec());
-        let mut of_log = (None, None);
-        for theta in trained.known.into_iter().chain([&trained.reading.parameters[..]]) {
-            of_log = of_one(model, (&rows, clock.as_ref()), log, (theta, &trained.reading.left));
-            if of_log == (None, None) {
+        let clock = TorqueClock::new(robot, &samples, trained.compensated_s.to_vec());
+        let (mut payload, mut hypothesis) = (None, None);
+        for theta in trained.theta.into_iter().chain([&trained.as_written.parameters[..]]) {
+            let known = KnownRobot { robot, theta, left: &trained.as_written.left };
+            payload = unmodelled_payload(robot, &rows, log, theta);
+            hypothesis = held_out_hypothesis(known, &rows, clock.as_ref(), log);
+            // A payload has four free numbers, a mistake hardly any: the smaller residual decides.
+            if let (Some(with), Some(without)) = (&payload, &hypothesis) {
+                if with.left_with < without.left_without { hypothesis = None } else { payload = None }
+            }
+            if payload.is_none() && hypothesis.is_none() {
                 break;
             }
         }
-        let left_without = of_log.0.as_ref().map(|load| load.left_with);
-        let left_without = left_without.or(of_log.1.as_ref().map(|reading| reading.left_without));
-        let Some(left_without) = left_without else { continue };
-        if left_of_one_robot(model, &rows, trained)? > AS_WELL * left_without {
-            found.unseen_loads.extend(of_log.0);
-            found.readings.extend(of_log.1);
+        let left = payload.as_ref().map(|payload| payload.left_with);
+        let left = left.or(hypothesis.as_ref().map(|hypothesis| hypothesis.left_without));
+        let Some(left) = left else { continue };
+        if left_of_one_robot(&rows, trained)? > MAX_RATIO_OF_ONE_ROBOT * left {
+            found.payloads.extend(payload);
+            found.hypotheses.extend(hypothesis);
         }
     }
     Ok(found)
 }
 
-/// Root mean square of what the best robot for the training logs and this one leaves of this one's torque, Nm, joints
-/// stacked.
-fn left_of_one_robot(model: &RegressorModel, rows: &MotionRows, trained: &Trained<'_>) -> Result<f64, DiagnosisError> {
+/// Root mean square of this log's torque, joints stacked, that the best robot for the training logs and this one does
+/// not explain, Nm.
+fn left_of_one_robot(rows: &MotionRows, trained: &Trained<'_>) -> Result<f64, DiagnosisError> {
+    let robot = &trained.model.parametric;
     let mut all = trained.rows.clone();
     all.append(rows);
-    let together = Explanation::new(&model.parametric, &all, Some(trained.consistency))?;
-    let explained = predicted(&model.parametric, rows, together.parameters());
+    let together = Explanation::new(robot, &all, Some(trained.consistency))?;
+    let explained = predicted(robot, rows, together.parameters());
     let left = rows.tau.iter().zip(&explained).flat_map(|(tau, by)| tau.iter().zip(by).map(|(tau, by)| tau - by));
     let count = (rows.len() * rows.tau.len()).max(1) as f64;
     Ok((left.map(|left| left * left).sum::<f64>() / count).sqrt())
-}
-
-/// The load or the mistake that explains one log.
-fn of_one(
-    model: &RegressorModel,
-    (rows, clock): (&MotionRows, Option<&TorqueClock<'_>>),
-    log: usize,
-    known: (&[f64], &[f64]),
-) -> (Option<UnseenLoad>, Option<HeldOutReading>) {
-    let robot = &model.parametric;
-    let load = unseen_load(robot, rows, log, known.0);
-    let reading = held_out_reading(robot, (rows, clock), log, known);
-    // What leaves less explains it: a load has four free numbers, a mistake hardly any.
-    let (with, without) = (load.as_ref().map(|load| load.left_with), reading.as_ref().map(|r| r.left_without));
-    match with.zip(without) {
-        Some((with, without)) if with < without => (load, None),
-        Some(_) => (None, reading),
-        None => (load, reading),
-    }
 }

@@ -1,5 +1,5 @@
-//! The rows of a reading as a problem, and what each joint's own parameters leave of its torque: what is known before
-//! one robot for all joints is looked for.
+//! The rows of a hypothesis as a linear problem, the residuals of separate parameters of each joint, and those of one
+//! set of base parameters.
 
 use super::motion_rows::MotionRows;
 use super::nominal::{left_by_nominal, torque_of_bodies};
@@ -11,17 +11,16 @@ use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Rounds of weighting; the third changes scores by less than a hundredth.
+/// Rounds of weighting; the third one changes scores by less than a hundredth.
 const ROUNDS: usize = 3;
-/// Added to columns of unit length: what is not excited stays at zero.
+/// Added to columns of unit length: parameters that are not excited stay at zero.
 const RIDGE: f64 = 1.0e-10;
 
-/// What is left of a joint's torque counts as nothing below this share of it: noise-free simulations would otherwise
-/// be judged by their rounding.
+/// Smallest residual as a share of the torque: otherwise rounding would decide in noise-free simulations.
 const FLOOR: f64 = 1.0e-2;
 
-/// A motion with several torques of each joint, for readings that differ in nothing else: one pass over the rows serves
-/// all of them.
+/// A motion with several torques of each joint, for hypotheses that differ in torque alone: one pass over the rows
+/// serves all of them.
 pub(super) struct SharedMotion {
     panels: Arc<Panels>,
     /// For each joint its columns, then its torques.
@@ -57,8 +56,7 @@ impl SharedMotion {
     }
 }
 
-/// The rows of a reading joint by joint. What is left of a torque is a root mean square, Nm (N), with the floor of a
-/// hundredth of the torque.
+/// The rows of a hypothesis joint by joint. Residuals are root mean squares, Nm (N), at least 1 % of the torque.
 pub(super) struct JointFits<'a> {
     robot: &'a ParametricModel,
     rows: &'a MotionRows,
@@ -86,7 +84,7 @@ impl<'a> JointFits<'a> {
             Ok(factor)
         };
         let factors = (0..robot.dof()).map(&mut of_joint).collect::<Result<_, EstimationError>>()?;
-        Self::of_factors((robot, rows), Arc::new(panels), factors)
+        Self::of_factors(robot, rows, Arc::new(panels), factors)
     }
 
     /// The same for `rows` with the shared motion, where joint `j` has the torque number `chosen[j].0` of those that it
@@ -95,7 +93,8 @@ impl<'a> JointFits<'a> {
     /// # Errors
     /// Torques that are not there.
     pub(super) fn of_shared(
-        (robot, rows): (&'a ParametricModel, &'a MotionRows),
+        robot: &'a ParametricModel,
+        rows: &'a MotionRows,
         motion: &SharedMotion,
         chosen: &[(usize, f64)],
     ) -> Result<Self, EstimationError> {
@@ -106,11 +105,12 @@ impl<'a> JointFits<'a> {
             factor.with_torque(columns, &weights)
         };
         let factors = motion.factors.iter().zip(chosen.iter().enumerate()).map(of_joint).collect::<Result<_, _>>()?;
-        Self::of_factors((robot, rows), Arc::clone(&motion.panels), factors)
+        Self::of_factors(robot, rows, Arc::clone(&motion.panels), factors)
     }
 
     fn of_factors(
-        (robot, rows): (&'a ParametricModel, &'a MotionRows),
+        robot: &'a ParametricModel,
+        rows: &'a MotionRows,
         panels: Arc<Panels>,
         factors: Vec<TriangularFactor>,
     ) -> Result<Self, EstimationError> {
@@ -129,7 +129,7 @@ impl<'a> JointFits<'a> {
 
     /// Base parameters by weighted least squares, joints weighted by what is left of their torque, and what these
     /// leave: what [`weighted_least_squares`](dynident_estimation::weighted_least_squares) finds, without its
-    /// covariance and its account of what is excited, which a comparison of readings does not need.
+    /// covariance and its account of what is excited, which a comparison of hypotheses does not need.
     ///
     /// # Errors
     /// Rows of another robot.

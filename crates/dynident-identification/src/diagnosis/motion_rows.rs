@@ -1,6 +1,6 @@
-//! A recording as a few hundred instants of its motion: small enough to ask what it would be under another reading.
+//! A few hundred instants of a recording, on which hypotheses are compared.
 
-use super::mistake::Channels;
+use super::channels::Channels;
 use crate::logs::Logs;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
@@ -8,12 +8,12 @@ use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 
-/// Instants that readings are compared on; more make it slower and not surer.
+/// Number of instants; more are slower and not more accurate.
 pub(super) const INSTANTS: usize = 300;
 
-/// How many of `most` instants log number `place` of `logs` gives: as many as every other, and where there are more
-/// logs than instants one of every so many logs gives one.
-pub(super) fn share_of_log(most: usize, (place, logs): (usize, usize)) -> usize {
+/// Number of instants, of `most`, from log number `place` of `logs`: the same from every log, or one from evenly chosen
+/// logs if there are more logs than instants.
+pub(super) fn share_of_log(most: usize, place: usize, logs: usize) -> usize {
     if logs <= most { most / logs.max(1) } else { (place + 1) * most / logs - place * most / logs }
 }
 
@@ -30,7 +30,7 @@ pub struct MotionRows {
     pub tau: Vec<Vec<f64>>,
     /// Instants per second, before thinning.
     pub rate_hz: f64,
-    /// Number of instants that say as much: those that stand as far from each other as the rows of a fit.
+    /// Number of independent instants: as far from each other as the rows of a fit.
     pub independent: f64,
 }
 
@@ -45,13 +45,13 @@ pub(super) struct MotionSamples {
     spacing_s: f64,
     /// Rows to one of a fit.
     rows_of_fit: f64,
-    /// For each row the largest share of a joint's torque behind it that does not count (held, saturated, outliers);
-    /// empty where every sample counts.
+    /// For each row the largest share of a joint's torque that is rejected (held, saturated, outliers); empty if no
+    /// sample is rejected.
     invented: Vec<f64>,
 }
 
-/// Share of a row's torque that may be made of its neighbours.
-const INVENTED: f64 = 0.3;
+/// Largest interpolated share of a row's torque.
+const MAX_INVENTED: f64 = 0.3;
 
 impl MotionSamples {
     /// Recording number `index`, of a long one its excerpt.
@@ -66,7 +66,7 @@ impl MotionSamples {
         let mut rows = MotionRows::empty(joints);
         let (mut pieces, mut spacing_s, mut invented) = (vec![0], 0.0, Vec::new());
         let mut rows_of_fit = 1.0;
-        // Of a log at one rate: made with the first block; none where every sample counts.
+        // Made with the first block.
         let mut decimator: Option<Decimator> = None;
         let (mut segment, mut panel, mut out) = (0, Vec::new(), Vec::new());
         let mut take = |block: &MotionBlock| {
@@ -92,7 +92,7 @@ impl MotionSamples {
                     decimator.finish();
                 }
             }
-            // What rests on samples that the filter invented beyond the ends of a piece is no motion.
+            // Rows that depend on extrapolated samples beyond the ends of a piece are left out.
             let [begin, behind] = block.unsettled;
             let settled = begin..block.rows.saturating_sub(behind).max(begin);
             panel.clear();
@@ -101,7 +101,7 @@ impl MotionSamples {
                     panel.extend_from_slice(&block.joint(values, place)[settled.clone()]);
                 }
             }
-            // What does not count of the torque stands on the line between what does, and is marked.
+            // Rejected samples of the torque are interpolated linearly and marked.
             let mut marks = Vec::with_capacity(places.len() * settled.len());
             for &place in &places {
                 let tau = &block.joint(&block.tau, place)[settled.clone()];
@@ -146,8 +146,8 @@ impl MotionSamples {
     }
 
     /// At most `most` of the instants that have samples up to `reach_s` before and after them, each with the torque (or
-    /// the motion, by `channels`) of `lag_s` later, joint by joint (a straight line between rows, which stand four
-    /// times as close as the motion asks); the same instants for all lags.
+    /// the motion, by `channels`) of `lag_s` later, joint by joint, interpolated linearly; the same instants for all
+    /// lags.
     pub(super) fn shifted(&self, channels: Channels, lag_s: &[f64], reach_s: f64, most: usize) -> MotionRows {
         let reach = (reach_s / self.spacing_s).ceil() as usize + 1;
         let inside = |piece: Range<usize>| piece.start + reach..piece.end.saturating_sub(reach);
@@ -183,9 +183,9 @@ impl MotionSamples {
         MotionRows { q: take(q), dq: take(dq), ddq: take(ddq), tau: take(tau), rate_hz: *rate_hz, independent }
     }
 
-    /// Whether a large part of some joint's torque behind a row was not measured.
+    /// Whether a large part of a joint's torque in a row was not measured.
     fn is_invented(&self, row: usize) -> bool {
-        self.invented.get(row).is_some_and(|share| *share > INVENTED)
+        self.invented.get(row).is_some_and(|share| *share > MAX_INVENTED)
     }
 
     fn each_piece(&self) -> impl Iterator<Item = Range<usize>> {
@@ -194,15 +194,14 @@ impl MotionSamples {
     }
 }
 
-/// The parallel filter of instants: it leaves four times as many rows as that of a fit, for short logs would have too
-/// few to tell readings apart.
+/// The parallel filter of instants, with four times as many rows as that of a fit: short logs would have too few.
 pub(super) fn denser(logs: &Logs<'_>, rate_hz: f64) -> ParallelFilterSettings {
     let of_fit = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
     let factor = of_fit.map_or(1, |settings| settings.factor / 4).max(1);
     ParallelFilterSettings { factor: Some(factor), ..logs.filter.clone() }
 }
 
-/// A torque with what is `marked` in it on the straight line between what is not.
+/// A torque with its `marked` samples interpolated linearly.
 fn bridged(tau: &[f64], marked: &[bool]) -> Vec<f64> {
     let mut out = tau.to_vec();
     let is_marked = |row: usize| marked.get(row).copied().unwrap_or(false);
@@ -257,6 +256,12 @@ impl MotionRows {
         }
     }
 
+    /// The columns of these channels: position, velocity and acceleration, or torque, or all.
+    pub(super) fn of_mut(&mut self, channels: Channels) -> impl Iterator<Item = &mut Vec<Vec<f64>>> {
+        let is_of = move |k: usize| channels == Channels::Both || (k == 3) == (channels == Channels::Torque);
+        self.quantities_mut().into_iter().enumerate().filter(move |(k, _)| is_of(*k)).map(|(_, columns)| columns)
+    }
+
     fn quantities_mut(&mut self) -> [&mut Vec<Vec<f64>>; 4] {
         [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau]
     }
@@ -269,17 +274,17 @@ mod tests {
     #[test]
     fn instants_are_shared_by_any_number_of_logs() {
         for logs in [1, 2, 7, 299, 300] {
-            assert!((0..logs).all(|place| share_of_log(300, (place, logs)) == 300 / logs));
+            assert!((0..logs).all(|place| share_of_log(300, place, logs) == 300 / logs));
         }
         for logs in [301, 450, 1000, 12_345] {
-            let shares: Vec<usize> = (0..logs).map(|place| share_of_log(300, (place, logs))).collect();
+            let shares: Vec<usize> = (0..logs).map(|place| share_of_log(300, place, logs)).collect();
             assert_eq!(shares.iter().sum::<usize>(), 300, "{logs}");
             assert!(shares.iter().all(|&share| share <= 1));
         }
     }
 
     #[test]
-    fn what_does_not_count_stands_on_the_line_between_what_does() {
+    fn rejected_samples_are_interpolated() {
         let tau = [9.0, 1.0, 50.0, 50.0, 4.0, 5.0, 80.0];
         let marked = [true, false, true, true, false, false, true];
         assert_eq!(bridged(&tau, &marked), [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 5.0]);

@@ -1,4 +1,4 @@
-//! What the noise of the positions makes of the torque that a robot explains.
+//! Torque from noise of the positions.
 
 use super::motion_rows::denser;
 use crate::logs::Logs;
@@ -7,7 +7,7 @@ use crate::regressor_model::RegressorModel;
 use crate::rows::{LogPass, noise_factors};
 
 /// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to what the base
-/// parameters `theta` predict of each joint at the instants that readings are compared on, Nm (N): `N θ` of
+/// parameters `theta` predict of each joint at the instants of the comparison, Nm (N): `N θ` of
 /// [`noise_factors`]. Zero where no noise is known.
 ///
 /// # Errors

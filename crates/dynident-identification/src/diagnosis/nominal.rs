@@ -60,13 +60,13 @@ fn torque_of(
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
     let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
-        left_by_friction((&rows.dq[joint], step_of(robot, joint)), &rest)
+        left_by_friction(&rows.dq[joint], step_of(robot, joint), &rest)
     };
     nominal.iter().enumerate().map(left).collect()
 }
 
 /// Root mean square of `tau` beside an offset and friction of at least zero.
-fn left_by_friction((dq, step): (&[f64], CoulombShape), tau: &[f64]) -> f64 {
+fn left_by_friction(dq: &[f64], step: CoulombShape, tau: &[f64]) -> f64 {
     let count = tau.len();
     let columns = [vec![1.0; count], dq.to_vec(), dq.iter().map(|&dq| step.step(dq)).collect()];
     let gram = Matrix3::from_fn(|k, l| dot(&columns[k], &columns[l]));

@@ -1,5 +1,4 @@
-//! What a reading of the samples asks of the robot that it cannot do: positions behind stops, velocities beyond limits,
-//! a recorder that is too slow or too fast.
+//! Implausible motion: positions behind stops, velocities beyond limits, a recorder that is too slow or too fast.
 
 use super::motion_rows::MotionRows;
 use dynident_model::Model;
@@ -7,14 +6,14 @@ use dynident_recording::ImportReport;
 use dynident_recording::log::Quantity;
 use dynident_recording::report::ChannelReport;
 
-/// A position counts as behind its stop from this share of the range on: zeros are calibrated to a degree or so.
+/// Share of the range from which a position is behind its stop: zeros are calibrated to about a degree.
 const POSITION_SHARE: f64 = 0.02;
-/// Times its limit that a velocity may be: descriptions state rated velocities.
+/// Largest ratio of a velocity to its limit: descriptions state rated velocities.
 const VELOCITY_TIMES: f64 = 1.5;
 /// Rates that recorders of usual arms have, Hz; those of others have the same in their own seconds.
 const RATES_HZ: [f64; 2] = [4.0, 50_000.0];
 
-/// A joint that would be where, or as fast as, it cannot be.
+/// A joint beyond a limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeyondLimit {
     /// The joint's number.
@@ -37,7 +36,6 @@ pub(super) fn beyond_limits(model: &Model, rows: &MotionRows) -> Vec<BeyondLimit
         let tolerance = POSITION_SHARE * range;
         let over = limits.upper.filter(|&upper| high > upper + tolerance).map(|upper| (high, upper));
         let under = limits.lower.filter(|&lower| low < lower - tolerance).map(|lower| (low, lower));
-        // A joint without a range says nothing.
         if let Some((value, limit)) = over.or(under).filter(|_| range > 0.0) {
             found.push(BeyondLimit { joint, quantity: "position", value, limit });
         }
@@ -51,7 +49,7 @@ pub(super) fn beyond_limits(model: &Model, rows: &MotionRows) -> Vec<BeyondLimit
 }
 
 /// Whether the channels of an import report show a position behind its stop, or a rate that no recorder has.
-pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
+pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport) -> bool {
     let is_behind = |channel: &ChannelReport| {
         let limits = model.joint_index(&channel.joint).map(|joint| model.joints()[joint].limits);
         match limits.and_then(|limits| limits.lower.zip(limits.upper)) {
@@ -65,9 +63,9 @@ pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
     !is_rate_of_a_recorder(model, report.rate_hz) || report.channels.iter().any(is_behind)
 }
 
-/// Whether a log has jumps that no motion makes: readings of it would mean nothing. Lone samples that were set aside
-/// are gone.
-pub(super) fn has_jumps(report: &ImportReport) -> bool {
+/// Whether a log has jumps that no motion makes, so that hypotheses are not comparable. Rejected single samples are no
+/// jumps.
+pub(crate) fn has_jumps(report: &ImportReport) -> bool {
     let is_measured = |channel: &&ChannelReport| matches!(channel.channel, Quantity::Position | Quantity::Torque);
     report.channels.iter().filter(is_measured).any(|channel| {
         channel.turns > 0 || channel.jumps > 0 || (channel.lone_samples > 0 && !report.sets_aside(channel))

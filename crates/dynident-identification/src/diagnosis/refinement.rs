@@ -1,104 +1,87 @@
-//! A reading whose mistake has the number that explains the samples best, and which others they cannot tell from it.
+//! The number of a mistake that explains the samples best, and the range of numbers that the logs do not distinguish
+//! from it.
 
-use super::mistake::Mistake;
-use super::numbers::{REACH_OF_UNITS, between_those_tried, valleys};
-use super::reading::{CLEARLY_BETTER, Corrected, Reading};
+use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
+use super::mistakes::{Mistake, Number, REACH_OF_UNITS};
 use super::step_width::{with_steps_of, with_widths};
-use super::units::{is_unit_of_position, is_unit_of_torque};
 use crate::consistent::ConsistencySettings;
-use core::f64::consts::FRAC_PI_2;
 use dynident_dynamics::ParametricModel;
 
-/// By how much a number between those tried must be better than the nearest of these: as much as a mistake.
-const WORTH_REFINING: f64 = CLEARLY_BETTER;
-/// Steps of a factor's logarithm in which it is followed to where it explains clearly less, and how exactly that is
-/// found.
+/// Improvement from which a number replaces a round one: as much as for a mistake.
+const MIN_IMPROVEMENT: f64 = CLEARLY_BETTER;
+/// Steps of a factor's logarithm in which its range is searched, and the accuracy of the ends.
 const EDGE_STEP: f64 = 0.2;
 const EDGE_WIDTH: f64 = 0.03;
 
-/// A reading whose number lies between those tried.
-pub(super) fn refined(
-    at: &Corrected,
-    first: &(Corrected, Reading),
-    consistency: &ConsistencySettings,
-) -> Option<(Corrected, Reading)> {
-    let last = first.1.mistakes.last()?;
-    // A smaller unit of positions makes a wide step of dry friction narrow: each is read with its own steps.
-    if matches!(last, Mistake::PositionUnit { .. }) {
+/// The hypothesis with another number of its last mistake, if that explains the samples better. `at` is the study
+/// before this mistake.
+pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &ConsistencySettings) -> Option<Explained> {
+    let last = first.hypothesis.mistakes.last()?;
+    // A smaller unit of positions makes a wide friction step narrow: each unit gets its own steps.
+    let facts = last.facts();
+    if facts.position_factor.is_some() {
         return refined_with_own_steps(at, last, consistency);
     }
-    // By the fit without physical limits: smooth, and cheap.
-    // Of a torque's gain the description's masses say as much as these err.
-    let value = |reading: &Reading, mistake: &Mistake| match mistake {
-        Mistake::TorqueUnit { .. } => reading.free_score,
-        _ => reading.lower_bound(),
+    // By the fit without physical limits: smooth, and cheap. The described masses say as much of a torque's gain as
+    // they err.
+    let value = |hypothesis: &Hypothesis| match facts.torque_gain {
+        Some(_) => hypothesis.free_score(),
+        None => hypothesis.lower_bound(),
     };
-    let free =
-        |mistake: &Mistake| at.without(mistake).reading(None).map_or(f64::INFINITY, |reading| value(&reading, mistake));
-    let mistake = between_those_tried(last, free)?;
-    let corrected = at.without(&mistake);
-    let reading = corrected.reading(Some(consistency)).ok()?;
-    // Free numbers follow the noise: the round one stays unless the exact one is clearly better.
-    let is_round = match last {
-        Mistake::TorqueUnit { factor, .. } => is_unit_of_torque(*factor),
-        // Zeros are mistaken by quarters of a turn, or by anything.
-        Mistake::Offset { offset_rad, .. } => (offset_rad / FRAC_PI_2).fract() == 0.0,
-        _ => true,
+    let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
+    let found = at.without(&last.between(free)?).explained(consistency).ok()?;
+    // Free numbers follow the noise: a round number stays unless the exact one is clearly better.
+    let is_better = if facts.number.is_none_or(Number::is_round) {
+        found.hypothesis.score() < first.hypothesis.score() - MIN_IMPROVEMENT
+    } else {
+        value(&found.hypothesis) < value(&first.hypothesis)
     };
-    let is_better = match mistake {
-        _ if is_round => reading.score() < first.1.score() - WORTH_REFINING,
-        _ => value(&reading, &mistake) < value(&first.1, &mistake),
-    };
-    is_better.then_some((corrected, reading))
+    is_better.then_some(found)
 }
 
-/// The reading of positions in the unit that explains most where each unit is read with the steps of dry friction that
-/// its own rows ask for. Gears and counts of encoders have no round number; a unit stays unless another is clearly
-/// better.
+/// The hypothesis with positions in the unit that explains most, where each unit has the friction steps that fit its
+/// own rows. Gears and counts of encoders have no round number; a unit stays unless another is clearly better.
 fn refined_with_own_steps(
-    at: &Corrected,
+    at: &CorrectedStudy,
     first: &Mistake,
     consistency: &ConsistencySettings,
-) -> Option<(Corrected, Reading)> {
-    let read = |mistake: &Mistake| {
-        let corrected = at.without(mistake);
-        let robot = with_steps_of(&corrected.robot, &corrected.rows).ok()?;
-        let corrected = Corrected { robot, ..corrected };
-        corrected.reading(Some(consistency)).ok().map(|reading| (corrected, reading))
+) -> Option<Explained> {
+    let explained = |mistake: &Mistake| {
+        let study = at.without(mistake);
+        let robot = with_steps_of(&study.robot, &study.rows).ok()?;
+        CorrectedStudy { robot, ..study }.explained(consistency).ok()
     };
-    let as_tried = read(first)?;
-    // Bodies that cannot be explain positions in a unit that is too small as well: of several valleys the one counts
-    // that a robot is in.
-    let of_first = |mistake: &Mistake| free_bound(at, (&as_tried.0.robot, first), mistake);
-    let found = valleys(first, of_first).into_iter().filter_map(|mistake| read(&mistake));
-    let best = found.min_by(|a, b| a.1.score().total_cmp(&b.1.score()));
-    let is_round = matches!(first, Mistake::PositionUnit { factor, .. } if is_unit_of_position(*factor));
-    let has_to_gain = if is_round { WORTH_REFINING } else { 0.0 };
-    let is_better = |best: &(Corrected, Reading)| best.1.score() < as_tried.1.score() - has_to_gain;
-    let (corrected, mut reading) = best.filter(is_better).unwrap_or(as_tried);
-    let last = reading.mistakes.last()?;
-    reading.factors_alike = factors_alike(last, |mistake| free_bound(at, (&corrected.robot, last), mistake));
-    Some((corrected, reading))
+    let as_tried = explained(first)?;
+    // Inconsistent bodies explain positions in a unit that is too small as well, so the consistent fit selects the
+    // valley.
+    let valleys = first.valleys(|mistake| free_bound(at, &as_tried.study.robot, first, mistake));
+    let found = valleys.into_iter().filter_map(|mistake| explained(&mistake));
+    let best = found.min_by(|a, b| a.hypothesis.score().total_cmp(&b.hypothesis.score()));
+    let needed = if first.facts().number.is_none_or(Number::is_round) { MIN_IMPROVEMENT } else { 0.0 };
+    let limit = as_tried.hypothesis.score() - needed;
+    let mut best = best.filter(|best| best.hypothesis.score() < limit).unwrap_or(as_tried);
+    let last = best.hypothesis.mistakes.last()?;
+    best.hypothesis.factors_alike = factors_alike(last, |mistake| free_bound(at, &best.study.robot, last, mistake));
+    Some(best)
 }
 
-/// The least score of a reading with positions in another unit, with the steps of dry friction that `robot` has in the
-/// unit of `of`: these lie at the same velocities of the log.
-fn free_bound(at: &Corrected, (robot, of): (&ParametricModel, &Mistake), mistake: &Mistake) -> f64 {
-    let (Mistake::PositionUnit { factor: from, .. }, Mistake::PositionUnit { joints, factor }) = (of, mistake) else {
-        return f64::INFINITY;
-    };
-    let times: Vec<f64> =
-        (0..robot.dof()).map(|joint| if joints.contains(&joint) { factor / from } else { 1.0 }).collect();
+/// Lower bound of the score with positions in another unit. The friction steps are those that `robot` has in the unit
+/// of `of`, at the same velocities of the log.
+fn free_bound(at: &CorrectedStudy, robot: &ParametricModel, of: &Mistake, mistake: &Mistake) -> f64 {
+    let (facts, dof) = (mistake.facts(), robot.dof());
+    let (Some(from), Some(factor)) = (of.facts().position_factor, facts.position_factor) else { return f64::INFINITY };
+    let joints = mistake.joints(dof);
+    let times: Vec<f64> = (0..dof).map(|joint| if joints.contains(&joint) { factor / from } else { 1.0 }).collect();
     let robot = with_widths(robot, &times).unwrap_or_else(|| robot.clone());
-    let reading = Corrected { robot, ..at.without(mistake) }.reading(None);
-    reading.map_or(f64::INFINITY, |reading| reading.lower_bound())
+    let found = CorrectedStudy { robot, ..at.without(mistake) }.hypothesis(None);
+    found.map_or(f64::INFINITY, |found| found.lower_bound())
 }
 
-/// The least and the greatest factor of positions around that of `mistake` that explain not clearly worse. A robot
-/// that rubs otherwise, or is described with usual errors, moves the best one by more than [`CLEARLY_BETTER`] does.
+/// Least and greatest factor of positions around that of `mistake` that explain the samples not clearly worse. Other
+/// friction, or usual errors of the description, move the best factor by more than [`CLEARLY_BETTER`] does.
 fn factors_alike(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
-    let Mistake::PositionUnit { joints, factor } = mistake else { return None };
-    let at = |log: f64| value(&Mistake::PositionUnit { joints: joints.clone(), factor: factor * log.exp() });
+    let factor = mistake.facts().position_factor?;
+    let at = |log: f64| value(&mistake.with_number(factor * log.exp()));
     let limit = at(0.0) + 2.0 * CLEARLY_BETTER;
     let edge = |direction: f64| {
         let [mut inside, mut outside] = [0.0, EDGE_STEP];

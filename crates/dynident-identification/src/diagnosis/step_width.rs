@@ -26,14 +26,14 @@ pub(super) fn with_steps_of(robot: &ParametricModel, rows: &MotionRows) -> Resul
     let mut least: Vec<f64> = left_by_one_set(robot, rows)?.iter().map(|left| CLEARLY_LESS * left).collect();
     let mut times = vec![1.0; robot.dof()];
     let first: Vec<Vec<f64>> = TIMES.iter().map(|factor| vec![*factor; robot.dof()]).collect();
-    narrow_down(robot, rows, &first, (&mut least, &mut times))?;
+    narrow_down(robot, rows, &first, &mut least, &mut times)?;
     if times.iter().all(|times| *times == 1.0) {
         return Ok(robot.clone());
     }
     for factors in NEAR {
         let near = |factor: f64| times.iter().map(|best| if *best == 1.0 { 1.0 } else { factor * best }).collect();
         let near: [Vec<f64>; 2] = factors.map(near);
-        narrow_down(robot, rows, &near, (&mut least, &mut times))?;
+        narrow_down(robot, rows, &near, &mut least, &mut times)?;
     }
     Ok(with_widths(robot, &times).unwrap_or_else(|| robot.clone()))
 }
@@ -48,7 +48,8 @@ fn narrow_down(
     robot: &ParametricModel,
     rows: &MotionRows,
     tried: &[Vec<f64>],
-    (least, times): (&mut [f64], &mut [f64]),
+    least: &mut [f64],
+    times: &mut [f64],
 ) -> Result<(), EstimationError> {
     let left = |times: &Vec<f64>| with_widths(robot, times).map(|other| left_by_one_set(&other, rows)).transpose();
     let all: Vec<Option<Vec<f64>>> = tried.par_iter().map(left).collect::<Result<_, EstimationError>>()?;

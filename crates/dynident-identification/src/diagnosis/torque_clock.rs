@@ -1,12 +1,13 @@
 //! Is the torque of another moment than the motion? Two recorders that were started by hand, a buffer, a network:
 //! shifts of tenths of seconds, which the lag that a fit takes off by itself does not reach.
 
+use super::channels::Channels;
 use super::explanation::Explanation;
+use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
 use super::joint_fits::{JointFits, SharedMotion};
-use super::mistake::{Channels, Mistake};
+use super::mistakes::lag::Lag;
+use super::mistakes::{Mistake, least_by_thirds};
 use super::motion_rows::{MotionRows, MotionSamples, share_of_log};
-use super::numbers::least_by_thirds;
-use super::reading::{CLEARLY_BETTER, Corrected, Reading};
 use crate::consistent::ConsistencySettings;
 use crate::lag::LONGEST_DELAY_S;
 use dynident_dynamics::ParametricModel;
@@ -30,11 +31,10 @@ const EXPLAINED: f64 = 0.02;
 /// Instants for each column of a joint below which shifts are not compared: parameters would follow them.
 const ROWS_PER_COLUMN: usize = 2;
 
-/// A reading with a channel at another moment.
-pub(super) struct LateReading {
-    pub(super) corrected: Corrected,
-    pub(super) reading: Reading,
-    /// By how much it scores better than the channel as it was logged, on the same instants.
+/// A hypothesis with a channel at another moment.
+pub(super) struct LateChannel {
+    pub(super) explained: Explained,
+    /// Improvement of the score over the channel as it was logged, on the same instants.
     pub(super) gain: f64,
 }
 
@@ -74,46 +74,45 @@ impl<'a> TorqueClock<'a> {
             .clamp(-self.reach_s, self.reach_s)
     }
 
-    /// Instants with the torque, or the motion, of `joints` taken `lag_s` later.
-    pub(super) fn rows(&self, (joints, channels): (&[usize], Channels), lag_s: f64, most: usize) -> MotionRows {
+    /// At most `most` instants with the torque, or the motion, of `joints` taken `lag_s` later.
+    pub(super) fn rows(&self, joints: &[usize], channels: Channels, lag_s: f64, most: usize) -> MotionRows {
         let lags: Vec<f64> =
             (0..self.taken_off_s.len()).map(|joint| if joints.contains(&joint) { lag_s } else { 0.0 }).collect();
         let mut rows = MotionRows::empty(lags.len());
         for (place, samples) in self.samples.iter().enumerate() {
-            let share = share_of_log(most, (place, self.samples.len()));
+            let share = share_of_log(most, place, self.samples.len());
             rows.append(&samples.shifted(channels, &lags, self.reach_s, share));
         }
         rows
     }
 
-    /// The mistake of a lag beside what is taken off; none where a fit takes off the whole of it by itself.
-    pub(super) fn mistake(&self, (joints, channels): (&[usize], Channels), lag_s: f64) -> Option<Mistake> {
+    /// The mistake of a lag in addition to the compensated one; none where a fit compensates the whole lag.
+    pub(super) fn mistake(&self, joints: &[usize], channels: Channels, lag_s: f64) -> Option<Mistake> {
         let taken_off_s = match channels {
             Channels::Torque => joints.iter().map(|&joint| self.taken_off_s[joint]).sum::<f64>(),
             Channels::Position | Channels::Both => 0.0,
         };
         let whole_s = taken_off_s / joints.len().max(1) as f64 + lag_s;
-        // Of positions a fit takes nothing off.
+        // A fit compensates no lag of positions.
         let is_long = channels == Channels::Position || whole_s.abs() > self.least_s || lag_s.abs() > self.least_s;
-        is_long.then(|| Mistake::Lag { joints: joints.to_vec(), channels, lag_s: whole_s })
+        is_long.then(|| Lag { joints: joints.to_vec(), channels, lag_s: whole_s }.into())
     }
 
-    /// The reading with the torque of all joints, or with torque or position of one joint beside a torque that does not
-    /// belong to one robot with the others, at another moment, if it explains the recordings clearly better than the
-    /// study `as_written` does. It has no mistake where a fit takes the lag off by itself.
-    pub(super) fn reading(
+    /// The hypothesis that the torque of all joints was logged at another moment, or, where a torque is inconsistent
+    /// with the others, torque or position of one joint, if it is clearly better than the study `as_written`. It has
+    /// no mistake where a fit compensates the lag.
+    pub(super) fn late_channel(
         &self,
         robot: &ParametricModel,
-        as_written: &Reading,
+        as_written: &Hypothesis,
         consistency: &ConsistencySettings,
         instants: usize,
-    ) -> Option<LateReading> {
+    ) -> Option<LateChannel> {
         if as_written.left_of_all < EXPLAINED {
             return None;
         }
-        let dof = robot.dof();
-        let all: Vec<usize> = (0..dof).collect();
-        let rows = self.rows((&all, Channels::Torque), 0.0, INSTANTS);
+        let all: Vec<usize> = (0..robot.dof()).collect();
+        let rows = self.rows(&all, Channels::Torque, 0.0, INSTANTS);
         let most_columns = all.iter().map(|&joint| robot.layout().joint_columns(joint).len()).max()?;
         if rows.len() < ROWS_PER_COLUMN * most_columns {
             return None;
@@ -121,58 +120,63 @@ impl<'a> TorqueClock<'a> {
         let here = Explanation::new(robot, &rows, None).ok()?;
         let alone = here.alone_of_noise_free();
         let mut groups = vec![(all.clone(), Channels::Torque)];
-        if (0..dof).any(|joint| here.free[joint] > DOUBTFUL * alone[joint]) {
-            groups.extend(
-                all.iter()
-                    .flat_map(|&joint| [Channels::Torque, Channels::Position].map(|channels| (vec![joint], channels))),
-            );
+        if all.iter().any(|&joint| here.free[joint] > DOUBTFUL * alone[joint]) {
+            let of_one =
+                |&joint: &usize| [Channels::Torque, Channels::Position].map(|channels| (vec![joint], channels));
+            groups.extend(all.iter().flat_map(of_one));
         }
-        // By the fit without physical limits, which is cheap.
-        let score = |(joints, channels): &(Vec<usize>, Channels), lag_s: f64| {
-            let rows = self.rows((joints, *channels), lag_s, INSTANTS);
+        let (joints, channels, lag_s) = self.best_lag(robot, &rows, &groups, here.free_score())?;
+        let mistakes: Vec<Mistake> = self.mistake(joints, channels, lag_s).into_iter().collect();
+        // Both on the same instants, which keep away from the ends.
+        let explained = |lag_s: f64, mistakes: Vec<Mistake>| {
+            let rows = self.rows(joints, channels, lag_s, instants);
+            CorrectedStudy::new(robot.clone(), rows, mistakes).explained(consistency).ok()
+        };
+        let (late, unshifted) = (explained(lag_s, mistakes)?, explained(0.0, Vec::new())?.hypothesis);
+        let gain = unshifted.score() - late.hypothesis.score();
+        let is_better = late.hypothesis.score() < unshifted.score() - CLEARLY_BETTER
+            && late.hypothesis.left_of_all < unshifted.left_of_all;
+        is_better.then_some(LateChannel { explained: late, gain })
+    }
+
+    /// The channels and the lag of the best fit without physical limits, which is cheap, if it is clearly better than
+    /// `unshifted`.
+    fn best_lag<'g>(
+        &self,
+        robot: &ParametricModel,
+        rows: &MotionRows,
+        groups: &'g [(Vec<usize>, Channels)],
+        unshifted: f64,
+    ) -> Option<(&'g [usize], Channels, f64)> {
+        let score = |joints: &[usize], channels: Channels, lag_s: f64| {
+            let rows = self.rows(joints, channels, lag_s, INSTANTS);
             JointFits::new(robot, &rows).and_then(|fits| fits.free_score()).unwrap_or(f64::INFINITY)
         };
+        let all: Vec<usize> = (0..robot.dof()).collect();
         let lags_s: Vec<f64> = self.lags_s().collect();
         let late: Vec<MotionRows> =
-            lags_s.iter().map(|&lag_s| self.rows((&all, Channels::Torque), lag_s, INSTANTS)).collect();
-        // Other moments of the torque are torques of one motion.
-        let torques = |joint: usize| [&rows].into_iter().chain(&late).map(|rows| &rows.tau[joint][..]).collect();
-        let motion = SharedMotion::new(robot, &rows, torques).ok()?;
-        let score_of_tried = |group: &(Vec<usize>, Channels), lag: usize| {
-            if group.1 != Channels::Torque {
-                return score(group, lags_s[lag]);
+            lags_s.iter().map(|&lag_s| self.rows(&all, Channels::Torque, lag_s, INSTANTS)).collect();
+        // Torques of other moments are torques of one motion.
+        let torques = |joint: usize| [rows].into_iter().chain(&late).map(|rows| &rows.tau[joint][..]).collect();
+        let motion = SharedMotion::new(robot, rows, torques).ok()?;
+        let score_of_tried = |joints: &[usize], channels: Channels, lag: usize| {
+            if channels != Channels::Torque {
+                return score(joints, channels, lags_s[lag]);
             }
             let chosen: Vec<(usize, f64)> =
-                all.iter().map(|joint| (if group.0.contains(joint) { 1 + lag } else { 0 }, 1.0)).collect();
-            let fits = JointFits::of_shared((robot, &rows), &motion, &chosen);
+                all.iter().map(|joint| (if joints.contains(joint) { 1 + lag } else { 0 }, 1.0)).collect();
+            let fits = JointFits::of_shared(robot, rows, &motion, &chosen);
             fits.and_then(|fits| fits.free_score()).unwrap_or(f64::INFINITY)
         };
-        let best_of = |group: &(Vec<usize>, Channels)| -> Option<(f64, f64)> {
-            let is_near = |lag: &usize| group.0.len() > 1 || lags_s[*lag].abs() <= self.alone_s;
+        let best_of = |(joints, channels): &'g (Vec<usize>, Channels)| {
+            let is_near = |lag: &usize| joints.len() > 1 || lags_s[*lag].abs() <= self.alone_s;
             let tried: Vec<usize> = (0..lags_s.len()).filter(is_near).collect();
-            let scores: Vec<f64> = tried.par_iter().map(|&lag| score_of_tried(group, lag)).collect();
+            let scores: Vec<f64> = tried.par_iter().map(|&lag| score_of_tried(joints, *channels, lag)).collect();
             let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
-            Some((lags_s[tried[best]], scores[best]))
+            Some((&joints[..], *channels, lags_s[tried[best]], scores[best]))
         };
-        let found = groups.iter().filter_map(|group| best_of(group).map(|(lag_s, score)| (group, lag_s, score)));
-        let (group, lag_s, least) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
-        if least > here.free_score() - CLEARLY_BETTER {
-            return None;
-        }
-        let lag_s = self.least_near(lag_s, |lag_s| score(group, lag_s));
-        let (joints, channels) = group;
-        let mistakes: Vec<Mistake> = self.mistake((joints, *channels), lag_s).into_iter().collect();
-        // Both on the same instants, which keep away from the ends.
-        let read = |lag_s: f64, mistakes: Vec<Mistake>| {
-            let corrected = Corrected::new(robot.clone(), self.rows((joints, *channels), lag_s, instants), mistakes);
-            let reading = corrected.reading(Some(consistency)).ok()?;
-            Some((corrected, reading))
-        };
-        let (corrected, reading) = read(lag_s, mistakes)?;
-        let (_, unshifted) = read(0.0, Vec::new())?;
-        let is_better =
-            reading.score() < unshifted.score() - CLEARLY_BETTER && reading.left_of_all < unshifted.left_of_all;
-        let gain = unshifted.score() - reading.score();
-        is_better.then_some(LateReading { corrected, reading, gain })
+        let (joints, channels, lag_s, least) = groups.iter().filter_map(best_of).min_by(|a, b| a.3.total_cmp(&b.3))?;
+        let is_clear = least <= unshifted - CLEARLY_BETTER;
+        is_clear.then(|| (joints, channels, self.least_near(lag_s, |lag_s| score(joints, channels, lag_s))))
     }
 }

@@ -5,7 +5,6 @@ use super::motion_rows::MotionRows;
 use super::nominal::nominal_torque;
 use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;
-use nalgebra::DVector;
 
 /// Factors within which descriptions err.
 const USUAL: [f64; 2] = [0.5, 2.0];
@@ -28,11 +27,12 @@ pub struct WrongMass {
 /// all joints.
 pub(super) fn wrong_mass(
     robot: &ParametricModel,
-    (rows, beside): (&MotionRows, &BesideFriction),
+    rows: &MotionRows,
+    beside: &BesideFriction,
     left_by_scales: f64,
 ) -> Option<WrongMass> {
     let all = nominal_torque(robot, rows)?;
-    let torque: Vec<DVector<f64>> = rows.tau.iter().enumerate().map(|(joint, tau)| beside.of(joint, tau)).collect();
+    let torque = beside.of_all(&rows.tau);
     let inertials = robot.model().inertials();
     let of_body = |body: usize| {
         let own: Vec<InertialParameters> = (0..inertials.len())

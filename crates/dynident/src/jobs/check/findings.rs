@@ -1,37 +1,37 @@
-//! What a diagnosis says to the person who wrote the study.
+//! The findings of a diagnosis in words.
 
-use super::changes::StudyFormat;
-use super::wording::{alternative, channels_text, evidence, kind, other_factors, sentence};
+use super::changes::{changes, keys_of_log, keys_of_study};
+use super::wording::{alternative, evidence};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
-    BeyondLimit, Channels, DescriptionFit, Diagnosis, HeldOutReading, Mistake, Reading, SameColumn, StrayTorque,
-    UnseenLoad, WrongMass,
+    BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
+    InconsistentTorque, Mistake, StudyKeys, UnmodelledPayload, WrongMass,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
 
-/// Share of all torque that a reading may leave to be an explanation; most real sets leave 0.1.
-const MOST_LEFT: f64 = 0.3;
-/// The same as a share of what the study as written leaves, for logs whose noise leaves more.
-const MOST_LEFT_OF_IT: f64 = 0.75;
-/// Share of all torque that is left where even the best reading explains nothing. Of a slow pendulum's noisy log a
-/// right study leaves 0.81 here.
+/// Largest unexplained share of all torque for an explanation; most real sets have 0.1.
+const MAX_LEFT: f64 = 0.3;
+/// The same as a share of that of the study as written, for noisy logs.
+const MAX_LEFT_RATIO: f64 = 0.75;
+/// Unexplained share of all torque from which even the best hypothesis explains nothing. A correct study of a slow
+/// pendulum's noisy log has 0.81.
 const NOTHING_EXPLAINED: f64 = 0.92;
 
 /// Times the least factor of a joint's torque that the largest may be where they are one unit, or the currents of
 /// drives: motor constants times gear ratios of an arm lie within five of each other.
 const MOST_SPREAD: f64 = 10.0;
 
-/// A finding under way: a sentence without its evidence.
+/// A problem without keys to write.
 fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
     CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
 }
 
-/// The diagnosis of a study as findings and readings.
+/// The findings of a diagnosis, with the evidence of the study as written and of the best hypothesis.
 pub(super) fn study_check(
     study: &Study,
     robot: &StudyRobot,
@@ -39,15 +39,16 @@ pub(super) fn study_check(
     diagnosis: &Diagnosis,
 ) -> StudyCheck {
     let joints = robot.parametric.joint_names();
-    let format = StudyFormat::new(study, robot);
+    let keys = keys_of_study(study, robot);
+    let keys = keys.as_ref();
     let search = &diagnosis.search;
     let mut findings = Vec::new();
-    // Another reading, one finding for each of its mistakes; what cannot be told from it stands with the last.
-    // A reading that explains nothing is no advice.
+    // One finding for each mistake of the best hypothesis; the last one names hypotheses that are not distinguishable.
+    // A hypothesis that explains nothing is no advice.
     let spoilt = spoilt_columns(diagnosis, &joints);
     let is_spoilt = !spoilt.is_empty();
-    let most_left = MOST_LEFT.max(MOST_LEFT_OF_IT * search.as_written.left_of_all);
-    let explains = |best: &&Reading| !is_spoilt && !best.is_unexplained() && best.left_of_all < most_left;
+    let most_left = MAX_LEFT.max(MAX_LEFT_RATIO * search.as_written.left_of_all);
+    let explains = |best: &&Hypothesis| !is_spoilt && !best.is_unexplained() && best.left_of_all < most_left;
     let best = search.best.as_ref().filter(explains);
     let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
     if is_spoilt {
@@ -55,23 +56,21 @@ pub(super) fn study_check(
     } else if let Some(fit) = foreign {
         let mut found = another_robot(fit, &joints);
         // Some mistake of the study always makes a little less of it.
-        let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, *best)));
-        let text = |(mistake, best): (&Mistake, &Reading)| {
-            alternative(mistake, &joints, format.as_ref()) + &other_factors(mistake, best)
+        let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, best.factors_alike)));
+        let text = |(mistake, range): (&Mistake, Option<[f64; 2]>)| {
+            let range = range.map_or_else(String::new, |range| mistake.other_factors(range));
+            alternative(mistake, &joints, keys) + &range
         };
         found.or = others.map(text).collect();
         findings.push(found);
     } else if let Some(best) = best {
         for (number, mistake) in best.mistakes.iter().enumerate() {
-            let mut found = finding(
-                kind(mistake),
-                sentence(mistake, &joints),
-                evidence(mistake, &search.as_written, best, &joints),
-            );
-            found.write = format.as_ref().map_or_else(Vec::new, |format| format.changes(mistake));
+            let evidence = evidence(mistake, &search.as_written, best, &joints);
+            let mut found = finding(mistake.key(), mistake.sentence(&joints), evidence);
+            found.write = changes(mistake, keys);
             if number + 1 == best.mistakes.len() {
                 let others = search.alike.iter().filter_map(|other| other.mistakes.last());
-                found.or = others.map(|other| alternative(other, &joints, format.as_ref())).collect();
+                found.or = others.map(|other| alternative(other, &joints, keys)).collect();
             }
             findings.push(found);
         }
@@ -85,16 +84,16 @@ pub(super) fn study_check(
         if let Some(wrong) = &unit.wrong_mass {
             findings.push(wrong_mass(wrong, robot.model()));
         } else if !far.is_empty() {
-            findings.push(torque_unit(unit, &far, robot.model(), &joints, format.as_ref()));
+            findings.push(torque_unit(unit, &far, robot.model(), &joints, keys));
         }
     }
     // The runs of an iteration are no logs of its study: whether the held-out ones are predicted is judged there.
-    let loads = diagnosis.unseen_loads.iter().filter(|load| load.log < study.log.len());
-    findings.extend(loads.map(|load| unseen_load(study, robot, load)));
-    let held_out = diagnosis.held_out.iter().filter(|reading| reading.log < study.log.len());
-    findings.extend(held_out.map(|reading| of_held_out_log(study, robot, reading, &joints)));
+    let payloads = diagnosis.unmodelled_payloads.iter().filter(|payload| payload.log < study.log.len());
+    findings.extend(payloads.map(|payload| unmodelled_payload(study, robot, payload)));
+    let held_out = diagnosis.held_out.iter().filter(|found| found.log < study.log.len());
+    findings.extend(held_out.map(|found| of_held_out_log(study, robot, found, &joints)));
     if findings.is_empty() {
-        findings.extend(diagnosis.stray_torques.iter().map(|torque| stray_torque(torque, &joints)));
+        findings.extend(diagnosis.inconsistent_torques.iter().map(|torque| inconsistent_torque(torque, &joints)));
     }
     if findings.is_empty() && diagnosis.is_unexplained() {
         let left = &search.as_written.left;
@@ -125,8 +124,8 @@ pub(super) fn study_check(
     }
     StudyCheck {
         findings,
-        as_written: Some(reading_result(&search.as_written, &joints)),
-        best: best.map(|best| reading_result(best, &joints)),
+        as_written: Some(hypothesis_result(&search.as_written, &joints)),
+        best: best.map(|best| hypothesis_result(best, &joints)),
         joints,
         tried: search.tried,
     }
@@ -138,7 +137,7 @@ fn torque_unit(
     far: &[usize],
     model: &Model,
     joints: &[String],
-    format: Option<&StudyFormat<'_>>,
+    keys: Option<&StudyKeys>,
 ) -> CheckFinding {
     let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
     let factors = factors.collect::<Vec<_>>().join(", ");
@@ -189,10 +188,10 @@ fn torque_unit(
              add a log with a known payload"
         ),
     );
-    let of_joints = |scale: &[Option<f64>]| format.map(|format| format.torque_scale(scale));
+    let of_joints = |scale: &[Option<f64>]| keys.map(|keys| StudyChange::from(keys.torque_scale(scale)));
     match common {
         Some((_, unit)) => {
-            found.write.extend(format.map(|format| format.torque_unit(unit)));
+            found.write.extend(keys.map(|keys| keys.torque_unit(unit).into()));
             let other = of_joints(&fit.scale).map(|change| format!("currents ({} {})", change.place(), change.line));
             found.or.extend(other);
         }
@@ -242,14 +241,14 @@ pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSet
     Some(found)
 }
 
-/// Columns that cannot be what the study says: no reading of the others means much beside them.
+/// Columns that are not what the study states: with these, no hypothesis about the others means much.
 fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding> {
-    let same = |same: &SameColumn| {
+    let same = |same: &DuplicateChannel| {
         let [a, b] = same.joints.map(|joint| &joints[joint]);
         let what = match same.channels {
             Channels::Both => format!("the position of joint `{a}` and the torque of joint `{b}` are"),
             Channels::Position | Channels::Torque => {
-                format!("{} of joints `{a}` and `{b}` is", channels_text(same.channels))
+                format!("{} of joints `{a}` and `{b}` is", same.channels.text())
             }
         };
         finding(
@@ -258,7 +257,7 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
             "sample by sample one is a multiple of the other, and no robot explains both: compare `columns` with the log's header".to_owned(),
         )
     };
-    let mut found: Vec<CheckFinding> = diagnosis.same_columns.iter().map(same).collect();
+    let mut found: Vec<CheckFinding> = diagnosis.duplicate_channels.iter().map(same).collect();
     if found.is_empty() && diagnosis.lost_signs {
         found.push(finding(
             "sign",
@@ -269,19 +268,25 @@ fn spoilt_columns(diagnosis: &Diagnosis, joints: &[String]) -> Vec<CheckFinding>
     found
 }
 
-/// A mistake that one held-out log has and the training logs have not.
-fn of_held_out_log(study: &Study, robot: &StudyRobot, reading: &HeldOutReading, joints: &[String]) -> CheckFinding {
-    let format = StudyFormat::of_log(study, robot, reading.log);
+/// A mistake of one held-out log that the training logs do not have.
+fn of_held_out_log(
+    study: &Study,
+    robot: &StudyRobot,
+    hypothesis: &HeldOutHypothesis,
+    joints: &[String],
+) -> CheckFinding {
+    let HeldOutHypothesis { log, mistake, alike, left_as_written, left_without } = hypothesis;
+    let keys = keys_of_log(study, robot, *log);
     let mut found = finding(
-        kind(&reading.mistake),
-        format!("in log `{}` {}", study.log_name(reading.log), sentence(&reading.mistake, joints)),
+        mistake.key(),
+        format!("in log `{}` {}", study.log_name(*log), mistake.sentence(joints)),
         format!(
             "the training logs' parameters leave {:.3} Nm of its torque as the study is written and {:.3} Nm so corrected; the training logs have no such mistake",
-            reading.left_as_written, reading.left_without
+            left_as_written, left_without
         ),
     );
-    found.write = format.changes(&reading.mistake);
-    found.or = reading.alike.iter().map(|other| alternative(other, joints, Some(&format))).collect();
+    found.write = changes(mistake, Some(&keys));
+    found.or = alike.iter().map(|other| alternative(other, joints, Some(&keys))).collect();
     found
 }
 
@@ -301,7 +306,7 @@ fn another_robot(fit: &DescriptionFit, joints: &[String]) -> CheckFinding {
 }
 
 /// A torque that the robot which explains the others does not explain.
-fn stray_torque(torque: &StrayTorque, joints: &[String]) -> CheckFinding {
+fn inconsistent_torque(torque: &InconsistentTorque, joints: &[String]) -> CheckFinding {
     let name = &joints[torque.joint];
     if torque.is_motionless() {
         return finding(
@@ -345,28 +350,31 @@ fn behind_limit(beyond: &BeyondLimit, joints: &[String]) -> CheckFinding {
     finding("limits", what, evidence)
 }
 
-fn unseen_load(study: &Study, robot: &StudyRobot, load: &UnseenLoad) -> CheckFinding {
-    let log = study.log_name(load.log);
+fn unmodelled_payload(study: &Study, robot: &StudyRobot, payload: &UnmodelledPayload) -> CheckFinding {
+    let log = study.log_name(payload.log);
     let link = robot.model().bodies().last().map_or("", |body| body.name());
-    let [x, y, z] = load.com_m;
+    let [x, y, z] = payload.com_m;
     let mut found = finding(
         "payload",
-        if load.mass_kg > 0.0 {
+        if payload.mass_kg > 0.0 {
             format!("log `{log}` carries a payload that the training logs do not")
         } else {
             format!("the training logs carry a payload that log `{log}` does not")
         },
         format!(
             "with {:.2} ± {:.2} kg at [{x:.3}, {y:.3}, {z:.3}] m of `{link}` what is left of its torque falls from {:.3} to {:.3} Nm",
-            load.mass_kg.abs(),
-            1.96 * load.mass_std_kg,
-            load.left_without,
-            load.left_with
+            payload.mass_kg.abs(),
+            1.96 * payload.mass_std_kg,
+            payload.left_without,
+            payload.left_with
         ),
     );
     let section = StudyChange { table: "[[payload]]".to_owned(), line: format!("name = \"tool\", link = {link:?}") };
-    let number =
-        if load.mass_kg > 0.0 { load.log } else { study.logs_of_role(Role::Identify).first().copied().unwrap_or(0) };
+    let number = if payload.mass_kg > 0.0 {
+        payload.log
+    } else {
+        study.logs_of_role(Role::Identify).first().copied().unwrap_or(0)
+    };
     found.write = vec![
         section,
         StudyChange { table: format!("[[log]] number {}", number + 1), line: "payload = \"tool\"".to_owned() },
@@ -374,11 +382,11 @@ fn unseen_load(study: &Study, robot: &StudyRobot, load: &UnseenLoad) -> CheckFin
     found
 }
 
-fn reading_result(reading: &Reading, joints: &[String]) -> ReadingResult {
+fn hypothesis_result(hypothesis: &Hypothesis, joints: &[String]) -> ReadingResult {
     let beyond = |beyond: &BeyondLimit| format!("{} of {}", beyond.quantity, joints[beyond.joint]);
     ReadingResult {
-        left_percent: reading.left.iter().map(|left| 100.0 * left).collect(),
-        beyond_limits: reading.beyond.iter().map(beyond).collect(),
-        score: reading.score(),
+        left_percent: hypothesis.left.iter().map(|left| 100.0 * left).collect(),
+        beyond_limits: hypothesis.beyond.iter().map(beyond).collect(),
+        score: hypothesis.score(),
     }
 }

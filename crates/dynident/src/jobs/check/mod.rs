@@ -25,8 +25,8 @@ const NO_BODY: [&str; 4] = ["mass-not-positive", "inertia-not-positive", "triang
 /// Inertia about the centre of mass, as a share of mass times the arm's length squared, that is none.
 const NO_INERTIA: f64 = 1e-12;
 
-/// Examines a study against its robot and its logs: channels, clock and samples of every log, and which reading of the
-/// training logs a robot that can exist explains best. Nothing is written.
+/// Examines a study against its robot and its logs: channels, clock and samples of every log, and which hypothesis
+/// about the training logs a consistent robot explains best. Nothing is written.
 ///
 /// # Errors
 /// Everything that [`Error`] names: files, study, logs. Mistakes that are found are no error.

@@ -1,0 +1,158 @@
+//! Mistakes of a held-out log alone: a format of its own, another day's cables. The base parameters of the training
+//! logs are known, so the residual alone is the evidence of a hypothesis.
+
+use super::channels::Channels;
+use super::explanation::predicted;
+use super::hypothesis::{CLEARLY_BETTER, INDISTINGUISHABLE, LIMIT_COST};
+use super::mistakes::{Breadth, Mistake, Setup};
+use super::motion_rows::{INSTANTS, MotionRows};
+use super::plausibility::beyond_limits;
+use super::torque_clock::TorqueClock;
+use dynident_dynamics::ParametricModel;
+use rayon::prelude::*;
+
+/// Ratio of a joint's unexplained share to that in the training logs from which a held-out log is not explained; real
+/// sets reach 2.4 for all joints together.
+const MIN_UNEXPLAINED_RATIO: f64 = 3.0;
+/// Smallest unexplained share of a joint's torque that is compared.
+const FLOOR: f64 = 1.0e-2;
+/// Improvement of the score from which a number between the candidates replaces the nearest of these.
+const MIN_IMPROVEMENT: f64 = 0.05;
+
+/// A mistake of a held-out log: without it the parameters of the training logs explain the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldOutHypothesis {
+    /// Number of the recording.
+    pub log: usize,
+    /// The mistake.
+    pub mistake: Mistake,
+    /// Others that explain the log as well.
+    pub alike: Vec<Mistake>,
+    /// Root mean square of the unexplained torque as the study is written, joints stacked, Nm.
+    pub left_as_written: f64,
+    /// The same without the mistake.
+    pub left_without: f64,
+}
+
+/// A robot that the training logs determine.
+#[derive(Clone, Copy)]
+pub(super) struct KnownRobot<'a> {
+    pub(super) robot: &'a ParametricModel,
+    /// Its base parameters.
+    pub(super) theta: &'a [f64],
+    /// Share of each joint's torque in the training logs that it does not explain.
+    pub(super) left: &'a [f64],
+}
+
+/// Residuals of one hypothesis.
+struct Residual {
+    /// `Σ_j ln(unexplained share of joint j's torque)`, at least that of the training logs, and limits.
+    score: f64,
+    /// Root mean square of all joints, Nm.
+    rms: f64,
+    /// Unexplained share of each joint's torque; one for a joint without torque.
+    left: Vec<f64>,
+    /// The same in the training logs, at least the floor.
+    trained: Vec<f64>,
+}
+
+impl Residual {
+    fn new(known: KnownRobot<'_>, rows: &MotionRows) -> Self {
+        let explained = predicted(known.robot, rows, known.theta);
+        let trained: Vec<f64> = known.left.iter().map(|left| left.max(FLOOR)).collect();
+        let (mut shares, mut sum) = (Vec::with_capacity(trained.len()), 0.0);
+        for ((explained, tau), least) in explained.iter().zip(&rows.tau).zip(&trained) {
+            let left = tau.iter().zip(explained).map(|(tau, explained)| tau - explained);
+            let left = left.map(|left| left * left).sum::<f64>();
+            let torque = tau.iter().map(|tau| tau * tau).sum::<f64>();
+            sum += left;
+            shares.push(if torque > 0.0 { (left / torque).sqrt().max(*least) } else { 1.0 });
+        }
+        let count = (rows.len() * explained.len()).max(1) as f64;
+        let broken = beyond_limits(known.robot.model(), rows).len() as f64;
+        let score = shares.iter().map(|left| left.ln()).sum::<f64>() + LIMIT_COST * broken;
+        Self { score, rms: (sum / count).sqrt(), left: shares, trained }
+    }
+
+    /// Whether the torque of every joint is explained about as well as in the training logs.
+    fn is_explained(&self) -> bool {
+        self.left.iter().zip(&self.trained).all(|(left, trained)| *left < MIN_UNEXPLAINED_RATIO * trained)
+    }
+
+    /// Whether it is clearly better than the log `as_written`, and closes half of the gap to the training logs or
+    /// explains every joint; otherwise the cause is another one.
+    fn explains(&self, rarity: f64, as_written: &Self) -> bool {
+        let trained: f64 = as_written.trained.iter().map(|left| left.ln()).sum();
+        let score = self.score + rarity;
+        (score < 0.5 * (as_written.score + trained) || self.is_explained())
+            && score <= as_written.score - CLEARLY_BETTER
+            && self.rms < as_written.rms
+    }
+}
+
+/// Searches one mistake in recording number `log`, whose instants are `rows`, that explains why the robot of the
+/// training logs leaves clearly more of its torque unexplained. `clock` has its torque at other moments, where the log
+/// is long enough.
+pub(super) fn held_out_hypothesis(
+    known: KnownRobot<'_>,
+    rows: &MotionRows,
+    clock: Option<&TorqueClock<'_>>,
+    log: usize,
+) -> Option<HeldOutHypothesis> {
+    let as_written = Residual::new(known, rows);
+    if as_written.is_explained() {
+        return None;
+    }
+    let setup = Setup { robot: known.robot, rows };
+    let explained = predicted(known.robot, rows, known.theta);
+    let breadths = [Breadth::Usual, Breadth::Rare, Breadth::KnownRobot(&explained)];
+    let all = breadths.iter().flat_map(|breadth| Mistake::candidates(setup, *breadth));
+    let all: Vec<Mistake> = all.filter(|mistake| !mistake.facts().is_of_all_logs).collect();
+    let without = |mistake: &Mistake| Residual::new(known, &mistake.corrected(known.robot, rows));
+    let scored = |mistake: Mistake| {
+        let score = without(&mistake).score + mistake.facts().rarity;
+        (mistake, score)
+    };
+    let mut others: Vec<(Mistake, f64)> = all.into_par_iter().map(scored).collect();
+    others.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let least = others.first().map_or(f64::INFINITY, |first| first.1);
+    let late = clock.and_then(|clock| late_torque(known, clock)).filter(|(mistake, residual)| {
+        let rarity = mistake.facts().rarity;
+        residual.score + rarity < least && residual.explains(rarity, &as_written)
+    });
+    let (mistake, residual, score) = match late {
+        Some((mistake, residual)) => {
+            let score = residual.score + mistake.facts().rarity;
+            (mistake, residual, score)
+        }
+        None if others.is_empty() => return None,
+        None => {
+            let (first, score) = others.remove(0);
+            let residual = without(&first);
+            if !residual.explains(first.facts().rarity, &as_written) {
+                return None;
+            }
+            // Known parameters determine every number to within the noise.
+            let between = first.between(|mistake| without(mistake).score).map(|between| (without(&between), between));
+            match between.filter(|(better, _)| better.score < residual.score - MIN_IMPROVEMENT) {
+                Some((better, between)) => (between, better, score),
+                None => (first, residual, score),
+            }
+        }
+    };
+    let alike = others.into_iter().take_while(|(_, other)| *other < score + INDISTINGUISHABLE);
+    let alike = alike.map(|(other, _)| other).collect();
+    Some(HeldOutHypothesis { log, mistake, alike, left_as_written: as_written.rms, left_without: residual.rms })
+}
+
+/// The log with the torque of all joints at the moment that the parameters explain best; none where that is a lag that
+/// a fit compensates.
+fn late_torque(known: KnownRobot<'_>, clock: &TorqueClock<'_>) -> Option<(Mistake, Residual)> {
+    let joints: Vec<usize> = (0..known.robot.dof()).collect();
+    let at = |lag_s: f64| Residual::new(known, &clock.rows(&joints, Channels::Torque, lag_s, INSTANTS));
+    let tried: Vec<f64> = clock.lags_s().collect();
+    let scores: Vec<f64> = tried.par_iter().map(|&lag_s| at(lag_s).score).collect();
+    let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
+    let lag_s = clock.least_near(tried[best], |lag_s| at(lag_s).score);
+    Some((clock.mistake(&joints, Channels::Torque, lag_s)?, at(lag_s)))
+}

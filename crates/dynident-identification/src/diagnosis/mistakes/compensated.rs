@@ -1,0 +1,41 @@
+//! Torque without the gravity of the described bodies.
+
+use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
+use crate::diagnosis::motion_rows::MotionRows;
+use crate::diagnosis::nominal::gravity_torque;
+use dynident_dynamics::ParametricModel;
+
+/// The torques lack the gravity of the description's bodies: a controller that compensates it logs what it adds to
+/// that.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compensated;
+
+impl MistakeKind for Compensated {
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
+        let is_described = setup.robot.nominal_base().is_some() && setup.model().gravity().norm() > 0.0;
+        if matches!(breadth, Breadth::Rare) && is_described { vec![Self] } else { Vec::new() }
+    }
+
+    fn correct(&self, robot: &ParametricModel, rows: &mut MotionRows) {
+        let gravity = gravity_torque(robot, rows);
+        for (tau, gravity) in rows.tau.iter_mut().zip(gravity) {
+            tau.iter_mut().zip(gravity).for_each(|(tau, gravity)| *tau += gravity);
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        Facts {
+            rarity: 0.3,
+            adds_torques: true,
+            is_of_all_logs: true,
+            proof: Proof::ConsistentRobot,
+            ..Facts::of("mounting")
+        }
+    }
+
+    fn sentence(&self, _: &[String]) -> String {
+        "the torque is without gravity: the controller took off that of the description's bodies; log \
+         the torque with gravity, or add to the columns what the controller takes off"
+            .to_owned()
+    }
+}

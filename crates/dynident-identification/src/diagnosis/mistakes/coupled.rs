@@ -1,0 +1,87 @@
+//! A column that moves with a neighbouring joint.
+
+use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
+use super::study_keys::{KeyChange, StudyKeys, list};
+use crate::diagnosis::channels::Channels;
+use crate::diagnosis::motion_rows::MotionRows;
+use dynident_dynamics::ParametricModel;
+
+/// The column of a joint moves with another joint as well: it holds `q_joint + sign q_with`, as the motor of a
+/// parallelogram's arm or of a coupled wrist does; where torque is the motor's, `τ_with` lacks `sign τ_joint`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coupled {
+    /// The joint.
+    pub joint: usize,
+    /// The one that its column moves with.
+    pub with: usize,
+    /// 1 or -1.
+    pub sign: f64,
+    /// Positions alone, or torques as well.
+    pub channels: Channels,
+}
+
+impl MistakeKind for Coupled {
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
+        let Breadth::Rare = breadth else { return Vec::new() };
+        let turns = |joint: usize| setup.model().joints()[joint].turns();
+        let neighbours = (1..setup.robot.dof()).flat_map(|joint| [(joint, joint - 1), (joint - 1, joint)]);
+        let ways =
+            [(Channels::Position, 1.0), (Channels::Position, -1.0), (Channels::Both, 1.0), (Channels::Both, -1.0)];
+        neighbours
+            .filter(|&(joint, with)| turns(joint) && turns(with))
+            .flat_map(|(joint, with)| ways.map(|(channels, sign)| Self { joint, with, sign, channels }))
+            .collect()
+    }
+
+    fn correct(&self, _: &ParametricModel, rows: &mut MotionRows) {
+        let add = |values: &mut [Vec<f64>], to: usize, from: usize, factor: f64| {
+            let added = values[from].clone();
+            values[to].iter_mut().zip(added).for_each(|(to, from)| *to += factor * from);
+        };
+        if self.channels != Channels::Torque {
+            rows.of_mut(Channels::Position).for_each(|values| add(values, self.joint, self.with, -self.sign));
+        }
+        if self.channels != Channels::Position {
+            add(&mut rows.tau, self.with, self.joint, self.sign);
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        Facts {
+            rarity: 0.15,
+            joints: Some(vec![self.joint]),
+            adds_torques: true,
+            proof: Proof::Joint(self.joint),
+            ..Facts::of("coupling")
+        }
+    }
+
+    fn sentence(&self, names: &[String]) -> String {
+        format!(
+            "{channels} of joint `{joint}` {are} of a motor that turns with joint `{with}` as well: its column is `{joint}` {sign} `{with}`",
+            channels = self.channels.text(),
+            joint = names[self.joint],
+            are = if self.channels == Channels::Both { "are those" } else { "is that" },
+            with = names[self.with],
+            sign = if self.sign > 0.0 { "+" } else { "-" },
+        )
+    }
+
+    /// The matrix that takes a neighbour's share out of a joint's position, or adds a joint's torque to a neighbour's.
+    fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
+        let [joint, with] = [self.joint, self.with].map(|joint| keys.places[joint]);
+        let of = |channels: Channels| {
+            let (group, table) = keys.group(channels);
+            if group.matrix.is_some() || group.inverse_matrix.is_some() {
+                let line = format!("# matrix: rows {} and {} are coupled", joint + 1, with + 1);
+                return KeyChange { table, line };
+            }
+            let (place, value) =
+                if channels == Channels::Torque { ([with, joint], self.sign) } else { ([joint, with], -self.sign) };
+            let entry = |at: [usize; 2]| if at == place { value } else { f64::from(u8::from(at[0] == at[1])) };
+            let row = |row: usize| list((0..keys.columns).map(|column| format!("{:?}", entry([row, column]))));
+            keys.per_column(channels, "matrix", row)
+        };
+        self.channels.each().map(of).collect()
+    }
+}

@@ -1,0 +1,55 @@
+//! A channel that was logged at another moment.
+
+use super::kind::{Breadth, Facts, MistakeKind, Setup, joint_list};
+use super::study_keys::{KeyChange, StudyKeys, at, list, number};
+use crate::diagnosis::channels::Channels;
+
+/// The torques of these joints, or a joint's position, were logged later (earlier, if negative) than all else, by more
+/// than the lag of the torque that a fit compensates. Instants are chosen anew for each lag (`torque_clock`), so no
+/// lag is among the candidates and rows are not corrected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lag {
+    /// Which joints.
+    pub joints: Vec<usize>,
+    /// Torques or positions; never both, which would be another recorder's clock.
+    pub channels: Channels,
+    /// The whole lag, of torques with what the study states or a fit compensated, seconds.
+    pub lag_s: f64,
+}
+
+impl MistakeKind for Lag {
+    fn candidates(_: Setup<'_>, _: Breadth<'_>) -> Vec<Self> {
+        Vec::new()
+    }
+
+    fn facts(&self) -> Facts {
+        Facts { rarity: 0.15, joints: Some(self.joints.clone()), ..Facts::of("lag") }
+    }
+
+    fn sentence(&self, names: &[String]) -> String {
+        format!(
+            "{} of {} is logged {:.3} s {} than {}: two clocks, or a buffer",
+            self.channels.text(),
+            joint_list(&self.joints, names),
+            self.lag_s.abs(),
+            if self.lag_s > 0.0 { "later" } else { "earlier" },
+            if self.channels == Channels::Torque { "the motion" } else { "all else" }
+        )
+    }
+
+    /// The key is that of all logs, and positions have none.
+    fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
+        if self.channels != Channels::Torque || !keys.is_common() {
+            return Vec::new();
+        }
+        let dof = keys.places.len();
+        let stated = keys.torque_lag_s.as_ref();
+        let lag = |joint: usize| if self.joints.contains(&joint) { self.lag_s } else { at(stated, joint, 0.0) };
+        let value = if self.joints.len() == dof {
+            number(self.lag_s, 3)
+        } else {
+            list((0..dof).map(|joint| number(lag(joint), 3)))
+        };
+        vec![KeyChange { table: "motion".to_owned(), line: format!("torque_lag_s = {value}") }]
+    }
+}

@@ -1,0 +1,66 @@
+//! A joint at another distance from the one before it.
+
+use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, with_model};
+use super::numbers::Number;
+use dynident_dynamics::ParametricModel;
+
+/// Factors that are tried: halves, a diameter for a radius, the other side. Those between are found from these.
+const FACTORS: [f64; 3] = [0.5, 2.0, -1.0];
+
+/// The description has a joint at another distance from the one before it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Length {
+    /// The joint.
+    pub joint: usize,
+    /// What to multiply the distance by; negative: the other side.
+    pub factor: f64,
+}
+
+impl MistakeKind for Length {
+    /// Where joints follow others the tree has more joints than the log. The place of the first joint in the base has
+    /// no influence on torque.
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
+        let model = setup.model();
+        if !matches!(breadth, Breadth::Rare) || model.coupling().is_some() {
+            return Vec::new();
+        }
+        let is_apart = |joint: &usize| {
+            let description = &model.joints()[*joint];
+            description.parent.is_some() && description.placement.translation.norm() > 0.0
+        };
+        let joints = (0..model.dof()).filter(is_apart);
+        joints.flat_map(|joint| FACTORS.map(|factor| Self { joint, factor })).collect()
+    }
+
+    fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
+        with_model(robot, robot.model().clone().with_joint_distances(&[self.joint], self.factor).ok()?)
+    }
+
+    fn facts(&self) -> Facts {
+        Facts {
+            // Descriptions are wrong in their bodies far more often than in their joints.
+            rarity: 0.3,
+            joints: Some(vec![self.joint]),
+            is_of_all_logs: true,
+            proof: Proof::BaseParameters,
+            number: Some(Number::Factor { at: self.factor, reach: 0.7, is_round: true }),
+            ..Facts::of("description")
+        }
+    }
+
+    fn sentence(&self, names: &[String]) -> String {
+        let place = match self.factor {
+            factor if factor < 0.0 => "on the other side of",
+            factor if factor > 1.0 => "too near to",
+            _ => "too far from",
+        };
+        format!(
+            "the description has joint `{}` {place} the joint before it: `xyz` of its origin has to be times {:.3}",
+            names[self.joint], self.factor
+        )
+    }
+
+    fn with_number(&self, factor: f64) -> Self {
+        Self { factor, ..*self }
+    }
+}

@@ -1,0 +1,75 @@
+//! A zero of a position that is elsewhere.
+
+use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
+use super::numbers::Number;
+use super::study_keys::{KeyChange, StudyKeys, at, number};
+use crate::diagnosis::channels::Channels;
+use crate::diagnosis::motion_rows::MotionRows;
+use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
+use dynident_dynamics::ParametricModel;
+
+/// Offsets that are tried, rad: a quarter or half a turn, or near zero. Those between are found from these.
+const OFFSETS_RAD: [f64; 7] = [-FRAC_PI_2, FRAC_PI_2, PI, -FRAC_PI_6, FRAC_PI_6, -FRAC_PI_6 / 3.0, FRAC_PI_6 / 3.0];
+/// Smaller offsets, rad, which are significant where base parameters are known.
+const SMALL_OFFSETS_RAD: [f64; 6] = [-0.3, -0.15, -0.07, 0.07, 0.15, 0.3];
+/// Factors of an offset at which other robots are tried.
+const OTHER_OFFSETS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
+
+/// The zero of a joint's position is elsewhere: `offset_rad` has to be added.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Offset {
+    /// The joint.
+    pub joint: usize,
+    /// What to add, rad.
+    pub offset_rad: f64,
+}
+
+impl MistakeKind for Offset {
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
+        let offsets_rad: &[f64] = match breadth {
+            Breadth::Usual => &OFFSETS_RAD,
+            Breadth::Rare => &[],
+            Breadth::KnownRobot(_) => &SMALL_OFFSETS_RAD,
+        };
+        let of = |joint: usize| offsets_rad.iter().map(move |&offset_rad| Self { joint, offset_rad });
+        setup.turning().flat_map(of).collect()
+    }
+
+    fn correct(&self, _: &ParametricModel, rows: &mut MotionRows) {
+        rows.q[self.joint].iter_mut().for_each(|q| *q += self.offset_rad);
+    }
+
+    fn facts(&self) -> Facts {
+        // People mistake zeros by quarters of a turn, or by any angle.
+        let is_round = (self.offset_rad / FRAC_PI_2).fract() == 0.0;
+        Facts {
+            rarity: 0.15,
+            joints: Some(vec![self.joint]),
+            proof: Proof::Torque,
+            number: Some(Number::Angle { at: self.offset_rad, reach: 0.5, is_round }),
+            other_numbers: OTHER_OFFSETS.map(|times| times * self.offset_rad).to_vec(),
+            ..Facts::of("offset")
+        }
+    }
+
+    fn sentence(&self, names: &[String]) -> String {
+        format!(
+            "the zero of joint `{}` lies {:.1} degrees away from the description's",
+            names[self.joint],
+            self.offset_rad * 180.0 / PI
+        )
+    }
+
+    fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
+        let (group, _) = keys.group(Channels::Position);
+        let with = |place: usize| {
+            let own = at(group.offset.as_ref(), place, 0.0);
+            number(if place == keys.places[self.joint] { own + self.offset_rad } else { own }, 4)
+        };
+        vec![keys.per_column(Channels::Position, "offset", with)]
+    }
+
+    fn with_number(&self, offset_rad: f64) -> Self {
+        Self { offset_rad, ..*self }
+    }
+}

@@ -1,0 +1,91 @@
+//! Columns in another order.
+
+use super::kind::{Breadth, Facts, MistakeKind, Setup, TorqueSource};
+use super::study_keys::{KeyChange, StudyKeys, list};
+use crate::diagnosis::channels::Channels;
+use crate::diagnosis::motion_rows::MotionRows;
+use dynident_dynamics::ParametricModel;
+use dynident_recording::log::ColumnRef;
+use dynident_text::quoted;
+
+/// The columns are in another order: joint `j` should have what joint `order[j]` has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// For each joint the one whose columns belong to it.
+    pub order: Vec<usize>,
+    /// Which columns.
+    pub channels: Channels,
+}
+
+impl MistakeKind for Order {
+    /// Exchanged joints, columns counted from the wrong end or one off.
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
+        let Breadth::Usual = breadth else { return Vec::new() };
+        let dof = setup.robot.dof();
+        let exchanged = |a: usize, b: usize| {
+            let mut order: Vec<usize> = (0..dof).collect();
+            order.swap(a, b);
+            order
+        };
+        let mut orders: Vec<Vec<usize>> =
+            (0..dof).flat_map(|a| (a + 1..dof).map(move |b| (a, b))).map(|(a, b)| exchanged(a, b)).collect();
+        if dof > 2 {
+            orders.push((0..dof).rev().collect());
+            orders.push((0..dof).map(|joint| (joint + 1) % dof).collect());
+            orders.push((0..dof).map(|joint| (joint + dof - 1) % dof).collect());
+        }
+        let channels = [Channels::Both, Channels::Torque, Channels::Position];
+        orders.into_iter().flat_map(|order| channels.map(|channels| Self { order: order.clone(), channels })).collect()
+    }
+
+    fn correct(&self, _: &ParametricModel, rows: &mut MotionRows) {
+        for values in rows.of_mut(self.channels) {
+            *values = self.order.iter().map(|&from| values[from].clone()).collect();
+        }
+    }
+
+    fn facts(&self) -> Facts {
+        let source = |(joint, &from): (usize, &usize)| TorqueSource { joint, from, factor: 1.0 };
+        Facts {
+            rarity: 0.05,
+            channels: Some(self.channels),
+            torques: self.order.iter().enumerate().map(source).collect(),
+            ..Facts::of("order")
+        }
+    }
+
+    fn sentence(&self, names: &[String]) -> String {
+        let channels = self.channels.text();
+        let moved: Vec<usize> = (0..self.order.len()).filter(|&joint| self.order[joint] != joint).collect();
+        if let [a, b] = moved[..] {
+            return format!("{channels} of joints `{}` and `{}` are exchanged", names[a], names[b]);
+        }
+        let from: Vec<String> = self.order.iter().map(|&joint| format!("`{}`", names[joint])).collect();
+        format!(
+            "the columns of {channels} stand in another order: where the study has {} they are of {}",
+            names.join(", "),
+            from.join(", ")
+        )
+    }
+
+    fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
+        let of = |channels: Channels| {
+            let (group, table) = keys.group(channels);
+            let columns = group.column_list("columns").ok().filter(|columns| columns.len() == keys.columns)?;
+            let mut ordered = columns.clone();
+            for (joint, &from) in self.order.iter().enumerate() {
+                ordered[keys.places[joint]] = columns[keys.places[from]].clone();
+            }
+            let name = |column: ColumnRef| match column {
+                ColumnRef::Index(index) => index.to_string(),
+                ColumnRef::Name(name) => quoted(&name),
+            };
+            Some(KeyChange { table, line: format!("columns = {}", list(ordered.into_iter().map(name))) })
+        };
+        self.channels.each().filter_map(of).collect()
+    }
+
+    fn with_channels(&self, channels: Channels) -> Option<Self> {
+        Some(Self { channels, ..self.clone() })
+    }
+}

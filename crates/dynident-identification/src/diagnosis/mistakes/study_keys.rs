@@ -1,0 +1,133 @@
+//! Keys of a study that correct a mistake.
+
+use crate::diagnosis::channels::Channels;
+use core::f64::consts::{PI, TAU};
+use dynident_recording::LogFormat;
+use dynident_recording::log::{ChannelGroup, OneOrMany};
+
+/// A key of a study and its new value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KeyChange {
+    /// The table of the key: `format.torque`, `robot`, `[[log]] 2`.
+    pub table: String,
+    /// The line to write, as TOML.
+    pub line: String,
+}
+
+/// The keys that a study has now, as far as corrections change them.
+#[derive(Clone, Debug)]
+pub struct StudyKeys {
+    /// The format of the log.
+    pub format: LogFormat,
+    /// The table of the format: `format`, or that of one log.
+    pub table: String,
+    /// For each joint of the model its place among the joints of the log.
+    pub places: Vec<usize>,
+    /// Number of the log's joints.
+    pub columns: usize,
+    /// `torque_lag_s` under `[motion]`.
+    pub torque_lag_s: Option<OneOrMany<f64>>,
+    /// Whether the study states a rotation of the base.
+    pub has_base_rotation: bool,
+}
+
+impl StudyKeys {
+    /// The columns of positions or torques, and their table.
+    pub(super) fn group(&self, channels: Channels) -> (&ChannelGroup, String) {
+        let (group, name) = match channels {
+            Channels::Torque => (&self.format.torque, "torque"),
+            Channels::Position | Channels::Both => (&self.format.position, "position"),
+        };
+        (group, format!("{}.{name}", self.table))
+    }
+
+    /// Whether the format is that of all logs.
+    pub(super) fn is_common(&self) -> bool {
+        self.table == "format"
+    }
+
+    /// `key` of positions or torques with one value for each joint of the log, where `value` is given its place.
+    pub(super) fn per_column(&self, channels: Channels, key: &str, value: impl Fn(usize) -> String) -> KeyChange {
+        let (_, table) = self.group(channels);
+        KeyChange { table, line: format!("{key} = {}", list((0..self.columns).map(value))) }
+    }
+
+    /// `scale` with the values of these joints times `factor`.
+    pub(super) fn scales(&self, channels: Channels, joints: &[usize], factor: f64) -> KeyChange {
+        let (group, _) = self.group(channels);
+        let places: Vec<usize> = joints.iter().map(|&joint| self.places[joint]).collect();
+        self.per_column(channels, "scale", |place| {
+            let own = at(group.scale.as_ref(), place, 1.0);
+            if places.contains(&place) { significant(factor * own) } else { format!("{own:?}") }
+        })
+    }
+
+    /// `scale` of the torque columns, times the factor of each joint; a joint without one gets the median.
+    pub fn torque_scale(&self, factors: &[Option<f64>]) -> KeyChange {
+        let (group, table) = self.group(Channels::Torque);
+        let mut known: Vec<f64> = factors.iter().flatten().copied().collect();
+        known.sort_by(f64::total_cmp);
+        let usual = known.get(known.len() / 2).copied().unwrap_or(1.0);
+        let value = |place: usize| {
+            let mut own = self.places.iter().zip(factors).filter(|(own, _)| **own == place);
+            let factor = own.find_map(|(_, factor)| *factor);
+            significant(factor.map_or(usual, |factor| factor * at(group.scale.as_ref(), place, 1.0)))
+        };
+        KeyChange { table, line: format!("scale = {}", list((0..factors.len()).map(value))) }
+    }
+
+    /// `scale` of the torque columns in one unit of `unit` Nm (N): one number if they have one scale so far.
+    pub fn torque_unit(&self, unit: f64) -> KeyChange {
+        let (group, table) = self.group(Channels::Torque);
+        let own: Vec<f64> = (0..self.columns).map(|place| at(group.scale.as_ref(), place, 1.0)).collect();
+        // A unit is exact.
+        let value = |own: &f64| if *own == 1.0 { format!("{unit:?}") } else { significant(unit * own) };
+        let line = match own.first() {
+            Some(first) if own.iter().all(|other| other == first) => format!("scale = {}", value(first)),
+            _ => format!("scale = {}", list(own.iter().map(value))),
+        };
+        KeyChange { table, line }
+    }
+}
+
+/// The value for one place.
+pub(super) fn at(values: Option<&OneOrMany<f64>>, place: usize, default: f64) -> f64 {
+    values.and_then(|values| values.at(place)).unwrap_or(default)
+}
+
+/// A list in TOML.
+pub(super) fn list(values: impl IntoIterator<Item = String>) -> String {
+    format!("[{}]", values.into_iter().collect::<Vec<_>>().join(", "))
+}
+
+/// A TOML float with at most `decimals` decimals.
+pub(super) fn number(value: f64, decimals: usize) -> String {
+    let mut text = format!("{value:.decimals$}");
+    while text.ends_with('0') && !text.ends_with(".0") {
+        text.pop();
+    }
+    if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+/// Three significant digits; nine of a unit's factor, which is known and not estimated.
+pub(super) fn significant(value: f64) -> String {
+    let units = [PI / 180.0, 180.0 / PI, TAU, TAU.recip(), PI, PI.recip()];
+    let places = if units.iter().any(|unit| (value / unit - 1.0).abs() < 1e-9) { 8.0 } else { 2.0 };
+    let digits = if value == 0.0 { 2 } else { (places - value.abs().log10().floor()).clamp(1.0, 12.0) as usize };
+    format!("{value:.digits$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_toml_floats_without_needless_digits() {
+        assert_eq!(
+            [number(PI / 2.0, 4), number(0.0, 4), number(-9.81, 4), number(-1e-9, 4)],
+            ["1.5708", "0.0", "-9.81", "0.0"]
+        );
+        assert_eq!([significant(13.61234), significant(0.001234), significant(1234.5)], ["13.6", "0.00123", "1234.5"]);
+        assert_eq!(significant(PI / 180.0), "0.0174532925");
+    }
+}

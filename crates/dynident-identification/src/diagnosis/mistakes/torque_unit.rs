@@ -1,0 +1,82 @@
+//! The torque of one joint in another unit.
+
+use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, TorqueSource, scale};
+use super::numbers::Number;
+use super::study_keys::{KeyChange, StudyKeys};
+use crate::diagnosis::channels::Channels;
+use crate::diagnosis::motion_rows::MotionRows;
+use dynident_dynamics::ParametricModel;
+
+/// Factors that are tried: the other units of a table, a gear, a motor of two. Those between, such as the motor
+/// constant of another drive, are found from these.
+const UNITS: [f64; 16] = [0.77, 1.3, 0.6, 1.6, 0.5, 2.0, 0.2, 5.0, 0.1, 10.0, 0.03, 30.0, 0.01, 100.0, 1e-3, 1e3];
+/// Factors of a unit or of a pair of motors; others are those of gears or motor constants.
+const EXACT_UNITS: [f64; 8] = [0.5, 2.0, 0.1, 10.0, 0.01, 100.0, 1e-3, 1e3];
+/// Factors that are no unit's.
+const GAINS: core::ops::RangeInclusive<f64> = 0.4..=2.5;
+/// A gain that differs from one by less is a drive's own.
+const MIN_GAIN: f64 = 1.15;
+
+/// The torque of one joint has another unit than that of the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueUnit {
+    /// The joint.
+    pub joint: usize,
+    /// What to multiply its torque by.
+    pub factor: f64,
+}
+
+impl MistakeKind for TorqueUnit {
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self> {
+        let dof = setup.robot.dof();
+        let known = |explained: &[f64], joint: usize| {
+            let tau = &setup.rows.tau[joint];
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let factor = dot(explained, tau) / dot(tau, tau);
+            let is_clear = factor > 0.0 && factor.ln().abs() > MIN_GAIN.ln();
+            is_clear.then_some(Self { joint, factor })
+        };
+        match breadth {
+            Breadth::Rare if dof > 1 => (0..dof).flat_map(|joint| UNITS.map(|factor| Self { joint, factor })).collect(),
+            Breadth::KnownRobot(explained) => (0..dof).filter_map(|joint| known(&explained[joint], joint)).collect(),
+            Breadth::Usual | Breadth::Rare => Vec::new(),
+        }
+    }
+
+    fn correct(&self, _: &ParametricModel, rows: &mut MotionRows) {
+        scale(&mut rows.tau[self.joint], self.factor);
+    }
+
+    fn facts(&self) -> Facts {
+        Facts {
+            rarity: 0.15,
+            channels: Some(Channels::Torque),
+            joints: Some(vec![self.joint]),
+            torques: vec![TorqueSource { joint: self.joint, from: self.joint, factor: self.factor }],
+            torque_gain: Some(self.joint),
+            proof: Proof::JointGain(self.joint),
+            number: Some(Number::Factor { at: self.factor, reach: 1.2, is_round: EXACT_UNITS.contains(&self.factor) }),
+            ..Facts::of("unit")
+        }
+    }
+
+    fn sentence(&self, names: &[String]) -> String {
+        let (name, factor) = (&names[self.joint], self.factor);
+        if GAINS.contains(&factor) {
+            return format!(
+                "the torque of joint `{name}` has another gain (motor constant, gear ratio) than the study says: times {factor:.3} it is Nm (N)"
+            );
+        }
+        format!(
+            "the torque of joint `{name}` is in another unit than the others, or of the motor side: times {factor:.3} it is Nm (N)"
+        )
+    }
+
+    fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
+        vec![keys.scales(Channels::Torque, &[self.joint], self.factor)]
+    }
+
+    fn with_number(&self, factor: f64) -> Self {
+        Self { factor, ..*self }
+    }
+}

@@ -1,0 +1,136 @@
+//! The search for mistakes in the training recordings.
+
+use super::confirmation::as_written_instead;
+use super::description_fit::description_fit;
+use super::error::DiagnosisError;
+use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
+use super::motion_rows::{INSTANTS, MotionRows, MotionSamples, share_of_log};
+use super::search::{Search, searches};
+use super::torque_clock::TorqueClock;
+use crate::consistent::ConsistencySettings;
+use crate::left_to_the_logs::with_drives_left_to_the_logs;
+use crate::logs::Logs;
+use crate::regressor_model::RegressorModel;
+use crate::settings::IdentificationSettings;
+use dynident_dynamics::ParametricModel;
+
+/// Largest ratio of the unexplained torque with a late channel to that of the best hypothesis without.
+const MAX_RATIO_OF_LATE: f64 = 0.8;
+
+/// What is diagnosed.
+#[derive(Clone, Copy)]
+pub struct DiagnosisTask<'a> {
+    /// The recordings.
+    pub logs: &'a Logs<'a>,
+    /// Settings of the identification.
+    pub settings: &'a IdentificationSettings,
+    /// The robot with the torque terms of the study.
+    pub robot: &'a ParametricModel,
+    /// Numbers of the training recordings.
+    pub training: &'a [usize],
+    /// Base parameters of the training recordings, by which held-out ones are examined; none if these are not.
+    pub theta: Option<&'a [f64]>,
+}
+
+/// The training recordings after the search.
+pub(super) struct SearchedLogs {
+    pub(super) search: Search,
+    /// The robot of the study, with the friction steps and drives that the logs determine.
+    pub(super) robot: ParametricModel,
+    /// Instants of the study as written, except for a lag.
+    pub(super) rows: MotionRows,
+    /// Settings of the consistent fits.
+    pub(super) consistency: ConsistencySettings,
+    /// The lag that is compensated in each joint's torque, s.
+    pub(super) compensated_s: Vec<f64>,
+}
+
+/// Searches the mistake that explains the training recordings best.
+///
+/// # Errors
+/// Recordings that cannot be read, too few rows.
+pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, DiagnosisError> {
+    let DiagnosisTask { logs, settings, robot, training, .. } = task;
+    let model = RegressorModel::from(robot.clone());
+    let of_recording = |&index: &usize| MotionSamples::of_recording(logs, &model, index);
+    let samples: Vec<MotionSamples> = training.iter().map(of_recording).collect::<Result<_, _>>()?;
+    let mut rows = MotionRows::empty(robot.dof());
+    for (place, one) in samples.iter().enumerate() {
+        rows.append(&one.instants(share_of_log(INSTANTS, place, samples.len())));
+    }
+    // Identification estimates from the logs what the study does not state; no mistake has to explain it.
+    let robot = with_drives_left_to_the_logs(robot, settings)?;
+    // A hundredth of a score is accurate enough.
+    let known = settings.consistency.clone().unwrap_or_default();
+    let consistency = ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known };
+    let compensated_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
+    let compensated_s: Vec<f64> = (0..robot.dof()).map(compensated_s).collect();
+    let as_written = CorrectedStudy::new(robot.clone(), rows, Vec::new()).explained(&consistency)?;
+    let clock = TorqueClock::new(&robot, &samples, compensated_s.clone());
+    let found = with_clock(&as_written, clock.as_ref(), &consistency);
+    let search = likelier(found.searches, &robot, &found.rows);
+    let believed = search.corrected(&robot, &found.rows);
+    let again = as_written_instead(&robot, &found.written, &believed, &search, &consistency)?;
+    Ok(match again {
+        Some((robot, search)) => SearchedLogs { search, robot, rows: found.written, consistency, compensated_s },
+        None => SearchedLogs { search, robot, rows: found.rows, consistency, compensated_s },
+    })
+}
+
+/// The searches with the instants that they were made on.
+struct Found {
+    /// For common mistakes, and for rarer ones as well.
+    searches: [Search; 2],
+    /// Instants of the searches.
+    rows: MotionRows,
+    /// Instants of the study as written.
+    written: MotionRows,
+}
+
+/// Searches with the torque at the moment that explains the logs best: a torque of another moment hides every other
+/// mistake, and another mistake may look like one.
+fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consistency: &ConsistencySettings) -> Found {
+    let (robot, written) = (&as_written.study.robot, as_written.study.rows.clone());
+    let late = clock.and_then(|clock| clock.late_channel(robot, &as_written.hypothesis, consistency, INSTANTS));
+    // A fit compensates such a lag.
+    if let Some(late) = late.as_ref().filter(|late| late.explained.study.mistakes.is_empty()) {
+        let rows = late.explained.study.rows.clone();
+        let searches = searches(&late.explained.hypothesis, &late.explained, consistency);
+        return Found { searches, rows: rows.clone(), written: rows };
+    }
+    let in_time = searches(&as_written.hypothesis, as_written, consistency);
+    let believed = in_time[1].believed();
+    // Half a period of a motion that repeats looks like another sign: the lag has to explain clearly more.
+    let gain = as_written.hypothesis.score() - believed.score();
+    let explains_more = |late: &Explained| late.hypothesis.left_of_all < MAX_RATIO_OF_LATE * believed.left_of_all;
+    match late.filter(|late| explains_more(&late.explained) && late.gain > gain + CLEARLY_BETTER) {
+        Some(late) => {
+            let searches = searches(&as_written.hypothesis, &late.explained, consistency);
+            Found { searches, rows: late.explained.study.rows, written }
+        }
+        None => Found { searches: in_time, rows: written.clone(), written },
+    }
+}
+
+/// Selects one of the searches for common mistakes and for all. The latter needs clearly less unexplained torque than
+/// the former: a smaller unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far
+/// beyond its range is an exception. Where most torques are still in another unit, the unit of one joint or another
+/// rate only compensates for that.
+fn likelier(searches: [Search; 2], robot: &ParametricModel, rows: &MotionRows) -> Search {
+    let [usual, all] = searches;
+    let (best, tried) = (all.believed(), all.tried);
+    let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - CLEARLY_BETTER;
+    let is_shown_by_torque = gains(Hypothesis::torque_score) || best.is_shown_by_travel();
+    // Its factor moves torque against motion, as the bodies of another robot do.
+    let has_free_factor = best.mistakes.iter().any(|mistake| {
+        let facts = mistake.facts();
+        facts.torque_gain.is_some() || facts.is_other_rate
+    });
+    let is_in_another_unit = || {
+        let (robot, rows) = all.corrected(robot, rows);
+        let fit = description_fit(&robot, &rows, &best.left);
+        fit.is_some_and(|fit| !fit.joints_in_another_unit().is_empty())
+    };
+    let is_likelier = gains(Hypothesis::score) && is_shown_by_torque && !(has_free_factor && is_in_another_unit());
+    if is_likelier { all } else { Search { tried, ..usual } }
+}
