@@ -35,7 +35,8 @@ pub struct Conditional {
 /// `noise_half_width_95`: a lag that is hardly known does not hide it. Empty where all parameters are excited.
 pub fn conditionals(
     training: &Training,
-    (estimate, noise_half_width_95): (&Estimate, &[f64]),
+    estimate: &Estimate,
+    noise_half_width_95: &[f64],
     knowledge: &ConsistencySettings,
 ) -> Vec<Conditional> {
     let robot = &training.model.parametric;

@@ -100,9 +100,11 @@ impl DriveInertiaChoice {
 /// Recordings that cannot be read, payloads and gains that do not go together. Rows that do not carry an estimate leave
 /// the robot as it is.
 pub fn choose_drive_inertia(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     robot: &ParametricModel,
-    (training, payloads): (&[usize], &[Payload]),
+    training: &[usize],
+    payloads: &[Payload],
 ) -> Result<(ParametricModel, Option<DriveInertiaChoice>), IdentificationError> {
     let tested = joints_left_to_the_logs(robot, settings);
     if tested.is_empty() {

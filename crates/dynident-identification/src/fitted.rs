@@ -12,6 +12,7 @@ use crate::payload::{Payload, free_gains};
 use crate::recording::Recording;
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
+use crate::training::TrainingPasses;
 use dynident_recording::log::OneOrMany;
 use std::sync::Arc;
 use std::time::Instant;
@@ -100,7 +101,7 @@ fn with_choices<'a>(
         rounds = rounds.after(choices.lag.clone());
     }
     let start = LagStart::of(settings, rounds);
-    let mut found = lag_rounds((task, start), (chosen, Some(choices)), execution, &mut Job::Model(None))?;
+    let mut found = lag_rounds(task, start, chosen, Some(choices), execution, &mut Job::Model(None))?;
     found.times = found.times.and(&choices.times);
     Ok(found)
 }
@@ -119,7 +120,7 @@ fn without_lag<'a>(
     } else {
         LagStart::of(settings.clone(), LagRounds::of(settings.lags))
     };
-    lag_rounds((task, start), (chosen, None), execution, job)
+    lag_rounds(task, start, chosen, None, execution, job)
 }
 
 /// Where the rounds begin that take off the lag.
@@ -141,7 +142,8 @@ impl<'a> LagStart<'a> {
     /// parameters: lags of single joints are told only beside friction that is chosen whole. `without_lag` is a fit to
     /// the same recordings.
     fn looked(
-        (task, without_lag): (&'a IdentificationTask, &Fitted<'a>),
+        task: &'a IdentificationTask,
+        without_lag: &Fitted<'a>,
         chosen: &[usize],
         execution: Execution<'a>,
         job: &mut Job<'_, '_>,
@@ -152,7 +154,7 @@ impl<'a> LagStart<'a> {
         let mut alike = Some(without_lag);
         loop {
             let known = Known::Look(GridTerms::WithoutMemory, alike.take());
-            let mut found = fitted_once((task, &settings), (chosen, known), execution, job)?;
+            let mut found = fitted_once(task, &settings, chosen, known, execution, job)?;
             times = times.and(&found.times);
             if !rounds.again(free_lag(&found, chosen)?.as_ref(), &mut found.estimation.estimate) {
                 let rounds = LagRounds::of(task.settings.lags).after(rounds.choice());
@@ -171,7 +173,7 @@ impl<'a> LagStart<'a> {
         job: &mut Job<'_, '_>,
     ) -> Result<Self, IdentificationError> {
         let known = Known::Look(GridTerms::All, self.first_look.as_ref());
-        let found = fitted_once((task, &self.settings), (chosen, known), execution, job)?;
+        let found = fitted_once(task, &self.settings, chosen, known, execution, job)?;
         let times = self.times.and(&found.times);
         Ok(Self { first_look: Some(found), times, ..self })
     }
@@ -207,13 +209,13 @@ fn best_start<'a>(
     let mut times = none.times;
     if !is_seen {
         let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-        let of_stated = fitted_once((task, &stated), (chosen, Known::Alike(found)), execution, job)?;
+        let of_stated = fitted_once(task, &stated, chosen, Known::Alike(found), execution, job)?;
         times = times.and(&of_stated.times);
         if !shows_lag(&of_stated)? {
             return Ok(LagStart { times, ..none });
         }
     }
-    let mut late = LagStart::looked((task, found), chosen, execution, job)?;
+    let mut late = LagStart::looked(task, found, chosen, execution, job)?;
     if !is_seen {
         late = late.with_memory(task, chosen, execution, job)?;
     }
@@ -225,8 +227,10 @@ fn best_start<'a>(
 /// Fits from this start on, until the rows show no lag that moves parameters; with choices where they are made.
 /// Friction is chosen at another cut-off only once the lag is off; then the lag is looked for once more.
 fn lag_rounds<'a>(
-    (task, start): (&'a IdentificationTask, LagStart<'a>),
-    (chosen, choices): (&[usize], Option<&Choices>),
+    task: &'a IdentificationTask,
+    start: LagStart<'a>,
+    chosen: &[usize],
+    choices: Option<&Choices>,
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
@@ -240,7 +244,7 @@ fn lag_rounds<'a>(
             (None, Some(found)) => Known::Alike(found),
             (None, None) => Known::Nothing,
         };
-        let mut found = fitted_once((task, &settings), (chosen, known), execution, job)?;
+        let mut found = fitted_once(task, &settings, chosen, known, execution, job)?;
         first_look = None;
         times = times.and(&found.times);
         let started = Instant::now();
@@ -254,7 +258,7 @@ fn lag_rounds<'a>(
         }
         if !core::mem::replace(&mut is_other_cutoff_asked, true) {
             let started = Instant::now();
-            of_other_cutoff = choices_of_other_cutoff((&found, &task.payloads), chosen)?;
+            of_other_cutoff = choices_of_other_cutoff(&found, &task.payloads, chosen)?;
             times.estimation_s += started.elapsed().as_secs_f64();
             if of_other_cutoff.is_some() {
                 continue;
@@ -273,15 +277,22 @@ fn lag_rounds<'a>(
 
 /// The same choices with friction of another cut-off; none where they stay.
 fn choices_of_other_cutoff(
-    (found, payloads): (&Fitted<'_>, &[Payload]),
+    found: &Fitted<'_>,
+    payloads: &[Payload],
     chosen: &[usize],
 ) -> Result<Option<Choices>, IdentificationError> {
     let Fitted { logs, settings, robot, cutoff, friction: (model, joints), friction_hz, .. } = found;
     let (Some(cutoff), Some(chosen_hz)) = (cutoff, *friction_hz) else { return Ok(None) };
     let (model, joints) = (model.clone(), joints.clone());
     let friction = ChosenFriction { model, joints, ..ChosenFriction::as_stated(robot.clone().into()) };
-    let compared = (&friction, cutoff, chosen_hz);
-    let Some(other) = friction_of_other_cutoff((logs, settings), robot, (chosen, payloads), compared)? else {
+    let Some(other) = friction_of_other_cutoff(
+        &TrainingPasses::of_logs(logs, settings, chosen, payloads),
+        robot,
+        &friction,
+        cutoff,
+        chosen_hz,
+    )?
+    else {
         return Ok(None);
     };
     let OtherFriction { friction, cutoff: own } = other;
@@ -305,8 +316,8 @@ fn free_lag(found: &Fitted<'_>, chosen: &[usize]) -> Result<Option<LagFit>, Iden
     }
     let Fitted { logs, training, estimation, settings, .. } = found;
     let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
-    let found = (&training.columns, &estimation.estimate.values[..], gains);
-    Ok(lag_fit((logs, settings), &training.model, found, chosen)?)
+    let values = &estimation.estimate.values;
+    Ok(lag_fit(logs, settings, &training.model, &training.columns, values, gains, chosen)?)
 }
 
 /// A lag that the study states.

@@ -223,11 +223,11 @@ fn identified(
         let consistent = if held {
             held_arm(task, &training, &estimation.estimate)
         } else {
-            consistent_stage((&logs, settings), &training, &estimation.estimate)?
+            consistent_stage(&logs, settings, &training, &estimation.estimate)?
         };
         let estimation_s = started.elapsed().as_secs_f64();
         let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
-        let held_out = examine_all_held_out((&logs, settings), &training, &estimation.estimate, physical);
+        let held_out = examine_all_held_out(&logs, settings, &training, &estimation.estimate, physical);
         Ok((consistent, estimation_s, held_out))
     };
     // Beside that, what training recordings say of the estimate.
@@ -237,7 +237,7 @@ fn identified(
         Some((stated, plain)) => torque_signs(stated, plain),
         None => torque_signs(&training, &estimation.estimate),
     };
-    let examined = || examine_all_training((&logs, settings), &training, &estimation.estimate);
+    let examined = || examine_all_training(&logs, settings, &training, &estimation.estimate);
     let (bodies, (signs, examined)) = if execution.parallel() {
         rayon::join(bodies, || rayon::join(signs, examined))
     } else {
@@ -274,10 +274,9 @@ fn identified(
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     let of_arm = job.arm().map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
     let gain_std = if settings.gains == GainChoice::Stated { settings.gain_std } else { 0.0 };
-    let estimated = (&estimation.estimate, &of_arm[..]);
-    let with_gains = with_gain_error(&training.problem, &training.columns, estimated, gain_std)?;
+    let with_gains = with_gain_error(&training.problem, &training.columns, &estimation.estimate, &of_arm, gain_std)?;
     Ok(Identification {
-        payloads: payload_results((recordings, payloads), &chosen, &training.columns, &with_gains),
+        payloads: payload_results(recordings, payloads, &chosen, &training.columns, &with_gains),
         motion: logs.motion.clone(),
         cutoff,
         motion_hz: logs.motion_hz(),
@@ -330,7 +329,8 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
 /// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
 /// the result.
 pub fn consistent_stage(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     training: &Training,
     estimate: &Estimate,
 ) -> Result<ConsistentParameters, IdentificationError> {
@@ -338,10 +338,8 @@ pub fn consistent_stage(
     let (alone, arm) = arm_alone(training, estimate)?;
     let problem = alone.as_ref().unwrap_or(&training.problem);
     let plain = settings.estimation.estimator.is_plain();
-    let fit = settings
-        .consistency
-        .as_ref()
-        .map(|knowledge| consistent_with_estimate(robot, problem, (&arm, plain), knowledge));
+    let fit =
+        settings.consistency.as_ref().map(|knowledge| consistent_with_estimate(robot, problem, &arm, plain, knowledge));
     let (fit, failure) = match fit.transpose() {
         Ok(fit) => (fit, None),
         Err(reason) => (None, Some(reason.to_string())),
@@ -349,8 +347,8 @@ pub fn consistent_stage(
     let intervals = match &settings.consistency {
         // Where there is no consistent set, `failure` says why.
         Some(knowledge) if settings.intervals && fit.is_some() => {
-            let estimated = (problem, &arm, plain);
-            let found = consistent_intervals(robot, estimated, knowledge, logs.execution.progress);
+            let progress = logs.execution.progress;
+            let found = consistent_intervals(robot, problem, &arm, plain, knowledge, progress);
             Some(found.map_err(|reason: ConsistencyError| IdentificationError::Intervals(reason))?)
         }
         _ => None,
@@ -359,9 +357,7 @@ pub fn consistent_stage(
     let knowledge = settings.consistency.as_ref();
     // A fit that succeeded has a problem that is one.
     let parameter_std = match knowledge.filter(|_| fit.is_some()) {
-        Some(knowledge) => {
-            parameter_std(robot, (problem, &arm), knowledge).map_err(IdentificationError::Consistency)?
-        }
+        Some(knowledge) => parameter_std(robot, problem, &arm, knowledge).map_err(IdentificationError::Consistency)?,
         None => vec![None; robot.nominal().len()],
     };
     Ok(ConsistentParameters {
@@ -400,13 +396,14 @@ fn torque_signs(
 
 /// [`examine_training`] of every training recording, side by side.
 fn examine_all_training(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     training: &Training,
     estimate: &Estimate,
 ) -> Result<TrainingExamination, IdentificationError> {
     let one = |log: &crate::training::LogFactors| {
         let theta = training.columns.base_values(log.index, &estimate.values);
-        examine_training((logs, &settings.estimation), &training.model, log.index, &theta)
+        examine_training(logs, &settings.estimation, &training.model, log.index, &theta)
     };
     let found: Vec<_> = if logs.execution.parallel() {
         training.logs.par_iter().map(one).collect::<Result<_, _>>()?
@@ -425,7 +422,8 @@ const LEFT_OUT_BLOCKS: usize = 4;
 
 /// [`examine_held_out`] of every recording to test on, side by side.
 fn examine_all_held_out(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     training: &Training,
     estimate: &Estimate,
     physical: Option<&[f64]>,
@@ -445,7 +443,7 @@ fn examine_all_held_out(
             uncertainty: Some(&uncertainty),
             traced: true,
         };
-        Ok(tested_on((logs, &settings.estimation), &training.model, index, &tested, held_out.len() == 1)?)
+        Ok(tested_on(logs, &settings.estimation, &training.model, index, &tested, held_out.len() == 1)?)
     };
     if held_out.is_empty() {
         return Ok(Vec::new());

@@ -38,7 +38,6 @@ pub(crate) fn with_less_noise<'a>(
 ) -> Result<Estimated<'a>, IdentificationError> {
     let Some((cutoff_hz, noise)) = take_estimator(&mut found) else { return Ok(found) };
     let IdentificationTask { recordings, payloads, .. } = task;
-    let filters = (&found.settings.motion, &task.settings.parallel_filter);
     let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
     let before_hz = found.logs.motion.differentiator.cutoff_hz();
     let is_lower = found.settings.motion.differentiator.wants_cutoff()
@@ -49,7 +48,15 @@ pub(crate) fn with_less_noise<'a>(
     let (logs, before) = if is_lower {
         // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
         let execution = found.logs.execution;
-        let lower = Logs::new(robot.model(), recordings, filters, chosen, Some(lower_hz), execution)?;
+        let lower = Logs::new(
+            robot.model(),
+            recordings,
+            &found.settings.motion,
+            &task.settings.parallel_filter,
+            chosen,
+            Some(lower_hz),
+            execution,
+        )?;
         (lower, Some(found.logs))
     } else {
         (found.logs, None)
@@ -57,9 +64,9 @@ pub(crate) fn with_less_noise<'a>(
     // Friction was chosen by least squares, which the noise biases.
     let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISY);
     let friction_choice = found.training.friction_choice.iter().map(as_stated).collect();
-    let training = training_rows((&logs, &found.settings), robot.clone().into(), chosen, payloads, None)?;
+    let training = training_rows(&logs, &found.settings, robot.clone().into(), chosen, payloads, None)?;
     let training = Training { friction_choice, ..training };
-    let mut estimation = estimate(&training.rows((&logs, &found.settings), chosen), None)?;
+    let mut estimation = estimate(&training.rows(&logs, &found.settings, chosen), None)?;
     if let Some(again) = &mut estimation.noise_in_regressor {
         if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {
             return Ok(Estimated { logs: before.unwrap_or(logs), ..found });

@@ -67,7 +67,7 @@
 //! let settings = IdentificationSettings::default();
 //!
 //! // Rows of the regressor, kept as triangular factors; one cut-off frequency for all recordings.
-//! let logs = Logs::new(robot.model(), &recordings, settings.filters(), &[0], None, Execution::default())?;
+//! let logs = Logs::new(robot.model(), &recordings, &settings.motion, &settings.parallel_filter, &[0], None, Execution::default())?;
 //! let training = training_rows((&logs, &settings), robot.clone().into(), &[0], &[], None)?;
 //!
 //! // Base parameters with their covariance, by the estimator of the settings.

@@ -66,7 +66,8 @@ impl<'a> Logs<'a> {
     pub fn new(
         model: &Model,
         recordings: &'a [Recording],
-        (settings, filter): (&MotionSettings, &'a ParallelFilterSettings),
+        settings: &MotionSettings,
+        filter: &'a ParallelFilterSettings,
         deciding: &[usize],
         cutoff_of_model_hz: Option<f64>,
         execution: Execution<'a>,
@@ -286,7 +287,9 @@ mod tests {
         let settings = IdentificationSettings::default();
         let made = excerpts(&recordings, &settings, &[0], Execution::default()).unwrap().unwrap();
         let execution = Execution::default();
-        let logs = Logs::new(model.model(), &recordings, settings.filters(), &[0], None, execution).unwrap();
+        let logs =
+            Logs::new(model.model(), &recordings, &settings.motion, &settings.parallel_filter, &[0], None, execution)
+                .unwrap();
         let logs = logs.with_excerpts(Arc::new(made));
         let rows_of = |pass: LogPass<'_>| {
             let mut rows = 0;

@@ -19,7 +19,7 @@ use crate::payload::{KnownArm, Payload};
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
-use crate::training::{Training, training_rows};
+use crate::training::{Training, TrainingPasses, training_rows};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::Estimate;
 use std::time::Instant;
@@ -128,27 +128,29 @@ pub(crate) enum Known<'k, 'a> {
 
 /// One way from logs to an estimate, with the lag of the settings taken off; with choices where they are made.
 pub(crate) fn fitted_once<'a>(
-    (task, settings): (&'a IdentificationTask, &IdentificationSettings),
-    (chosen, known): (&[usize], Known<'_, 'a>),
+    task: &'a IdentificationTask,
+    settings: &IdentificationSettings,
+    chosen: &[usize],
+    known: Known<'_, 'a>,
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
     let IdentificationTask { robot, recordings, payloads, .. } = task;
-    let filters = (&settings.motion, &task.settings.parallel_filter);
+    let filter = &task.settings.parallel_filter;
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
-    let logs = Logs::new(robot.model(), recordings, filters, chosen, cutoff_hz, execution)?;
+    let logs = Logs::new(robot.model(), recordings, &settings.motion, filter, chosen, cutoff_hz, execution)?;
 
     // Drives, filters and friction, by the logs where they are left to them.
     let started = Instant::now();
     let Chosen { robot, drive_inertia, logs, before_friction, cutoff, friction, friction_hz, of_grid } = match known {
-        Known::Choices(choices) => chosen_before((logs, settings), choices, (chosen, payloads))?,
-        known => chosen_here((logs, settings), robot, (chosen, payloads), (job, known))?,
+        Known::Choices(choices) => chosen_before(logs, settings, choices, chosen, payloads)?,
+        known => chosen_here(logs, settings, robot, chosen, payloads, job, known)?,
     };
     let choice_s = started.elapsed().as_secs_f64();
 
     // Factors, then the estimate. Where noise in the regressor biases least squares, both once more with less of it.
     let refit = job.arm().map(KnownArm::refit);
-    let mut training = training_rows((&logs, settings), friction.model.clone(), chosen, payloads, refit)?;
+    let mut training = training_rows(&logs, settings, friction.model.clone(), chosen, payloads, refit)?;
     training.friction_choice.clone_from(&friction.joints);
     let logs_s = training.timings_s[0];
     let before_s = training.timings_s[1] + choice_s;
@@ -160,7 +162,7 @@ pub(crate) fn fitted_once<'a>(
         }
         Job::Model(source) => match &training.gains {
             Some((found, _)) => Estimation::plain(found.clone()),
-            None => estimate(&training.rows((&logs, settings), chosen), source.take())?,
+            None => estimate(&training.rows(&logs, settings, chosen), source.take())?,
         },
     };
     let mut found = Estimated { logs, training, estimation, settings: settings.clone() };
@@ -210,10 +212,13 @@ struct Chosen<'a> {
 /// Drives, filters and friction by the logs where they are left to them; drives and the first cut-off as a fit that is
 /// alike chose them, friction of a grid while a lag is to be found.
 fn chosen_here<'a>(
-    (logs, settings): (Logs<'a>, &IdentificationSettings),
+    logs: Logs<'a>,
+    settings: &IdentificationSettings,
     robot: &ParametricModel,
-    (chosen, payloads): (&[usize], &[Payload]),
-    (job, known): (&Job<'_, '_>, Known<'_, 'a>),
+    chosen: &[usize],
+    payloads: &[Payload],
+    job: &Job<'_, '_>,
+    known: Known<'_, 'a>,
 ) -> Result<Chosen<'a>, IdentificationError> {
     let alike = match known {
         Known::Alike(found) => Some(found),
@@ -223,31 +228,30 @@ fn chosen_here<'a>(
     let (robot, drive_inertia) = match (job.arm(), alike) {
         (Some(_), _) => (robot.clone(), None),
         (None, Some(alike)) => (alike.robot.clone(), alike.drive_inertia.clone()),
-        (None, None) => choose_drive_inertia((&logs, settings), robot, (chosen, payloads))?,
+        (None, None) => choose_drive_inertia(&logs, settings, robot, chosen, payloads)?,
     };
     let first = RegressorModel::from(robot.clone());
     let cutoff = match alike.and_then(|alike| alike.before_friction.clone()) {
         Some(cutoff) => Some(cutoff),
-        None => choose_cutoff((&logs, settings), &first, chosen)?,
+        None => choose_cutoff(&logs, settings, &first, chosen)?,
     };
     let before_friction = cutoff.clone();
     let (mut friction_hz, mut of_grid) = (None, None);
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
         let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
-        let friction = choose_friction((&logs, settings), &robot, (chosen, payloads))?;
+        let friction = choose_friction(&logs, settings, &robot, chosen, payloads)?;
         (logs, cutoff, friction)
     } else {
-        let places = (chosen, payloads);
         friction_hz = cutoff.as_ref().map(CutoffByError::highest_alike_hz);
         let (of_friction, friction) = if let Known::Look(terms, _) = known {
             let logs = logs.clone().with_chosen_cutoff(&settings.motion, friction_hz);
-            let found = friction_by_grid((&logs, settings), &robot, places, terms)?;
+            let found = friction_by_grid(&TrainingPasses::of_logs(&logs, settings, chosen, payloads), &robot, terms)?;
             let friction = found.as_ref().map_or_else(|| ChosenFriction::as_stated(first), GridFriction::as_chosen);
             of_grid = found.filter(|_| terms == GridTerms::All);
             (None, friction)
         } else {
             let of_grid = alike.and_then(|found| found.of_grid.clone());
-            friction_with_cutoff((&logs, settings), &robot, places, (friction_hz, of_grid))?
+            friction_with_cutoff(&logs, settings, &robot, chosen, payloads, friction_hz, of_grid)?
         };
         let cutoff = of_friction.or(cutoff);
         (logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
@@ -261,16 +265,18 @@ fn chosen_here<'a>(
 
 /// The same as it was chosen before; where an excerpt chose, with the constants of friction by all rows.
 fn chosen_before<'a>(
-    (logs, settings): (Logs<'a>, &IdentificationSettings),
+    logs: Logs<'a>,
+    settings: &IdentificationSettings,
     choices: &Choices,
-    (chosen, payloads): (&[usize], &[Payload]),
+    chosen: &[usize],
+    payloads: &[Payload],
 ) -> Result<Chosen<'a>, IdentificationError> {
     let Choices { robot, drive_inertia, cutoff, motion_hz, friction, .. } = choices;
     let logs = logs.with_chosen_cutoff(&settings.motion, cutoff.as_ref().map(|choice| choice.cutoff_hz));
     let logs = logs.with_motion_band(*motion_hz);
     let friction = if choices.is_of_excerpt {
         let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
-        constants_of_all_rows((&of_constants, settings), robot, friction, (chosen, payloads))?
+        constants_of_all_rows(&of_constants, settings, robot, friction, chosen, payloads)?
     } else {
         friction.clone()
     };

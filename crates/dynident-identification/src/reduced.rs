@@ -58,8 +58,9 @@ pub fn reduce(
     }
     execution.install(|| {
         let training = of_role(recordings, Role::Identify);
-        let filters = (&settings.motion, &settings.parallel_filter);
-        let logs = Logs::new(robot.model(), recordings, filters, &[], None, execution)?.without_keeping();
+        let logs =
+            Logs::new(robot.model(), recordings, &settings.motion, &settings.parallel_filter, &[], None, execution)?
+                .without_keeping();
         let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
         let reduced = passes.factors(&model)?.into_iter().map(|log| {
             let few = |factors: Vec<SegmentedFactor>, most: usize| {
@@ -108,20 +109,20 @@ fn identified(
     let started = Instant::now();
     let recordings: Vec<Recording> = reduced.iter().map(|log| Recording::without_samples(log.name.clone())).collect();
     let training: Vec<usize> = (0..recordings.len()).collect();
-    let filters = (&settings.motion, &settings.parallel_filter);
-    let logs = Logs::new(model.model(), &recordings, filters, &[], None, execution)?;
+    let logs =
+        Logs::new(model.model(), &recordings, &settings.motion, &settings.parallel_filter, &[], None, execution)?;
     let factors = reduced.iter().enumerate().map(|(index, log)| log_factors(&model, index, log));
     let factors = factors.collect::<Result<Vec<_>, _>>()?;
     let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
     let training_rows = passes.of_factors(model, factors)?;
-    let Estimation { mut estimate, .. } = estimate(&training_rows.rows((&logs, settings), &training), None)?;
+    let Estimation { mut estimate, .. } = estimate(&training_rows.rows(&logs, settings, &training), None)?;
     let noise_half_width_95 = estimate.half_width_95.clone();
     let varied = with_variation(&training_rows, &settings.estimation.weighted(), &estimate);
     let between_logs = varied.map(|(wider, between)| {
         estimate = wider;
         between
     });
-    let consistent = consistent_stage((&logs, settings), &training_rows, &estimate)?;
+    let consistent = consistent_stage(&logs, settings, &training_rows, &estimate)?;
     let dof = training_rows.model.dof();
     let examination = TrainingExamination {
         delays: vec![vec![None; dof]; recordings.len()],

@@ -122,11 +122,6 @@ impl Default for IdentificationSettings {
 }
 
 impl IdentificationSettings {
-    /// What makes rows of positions: from positions to velocities and accelerations, and the parallel filter.
-    pub fn filters(&self) -> (&MotionSettings, &ParallelFilterSettings) {
-        (&self.motion, &self.parallel_filter)
-    }
-
     /// Checks that the bodies and terms of which something is known are there.
     ///
     /// # Errors

@@ -74,7 +74,8 @@ impl Training {
     /// What estimators are given: the recordings `training`, as factors and to come back to.
     pub fn rows<'a>(
         &'a self,
-        (logs, settings): (&'a Logs<'a>, &'a IdentificationSettings),
+        logs: &'a Logs<'a>,
+        settings: &'a IdentificationSettings,
         training: &'a [usize],
     ) -> TrainingRows<'a> {
         let (settings, consistency) = (&settings.estimation, settings.consistency.as_ref());
@@ -89,7 +90,8 @@ impl Training {
 /// # Errors
 /// Recordings that cannot be read, payloads and gains that do not go together, rows that do not carry an estimate.
 pub fn training_rows(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     model: RegressorModel,
     training: &[usize],
     payloads: &[Payload],
@@ -118,12 +120,13 @@ pub(crate) fn plain_fit(
     model: RegressorModel,
     pieces: Vec<MotionBlock>,
     filter: &ParallelFilterSettings,
-    (settings, execution): (&IdentificationSettings, Execution<'_>),
+    settings: &IdentificationSettings,
+    execution: Execution<'_>,
 ) -> Result<Vec<f64>, IdentificationError> {
     let recordings: Vec<Recording> = pieces.into_iter().map(of_piece).collect();
     let all: Vec<usize> = (0..recordings.len()).collect();
     let motion = MotionSettings::default();
-    let logs = Logs::new(model.model(), &recordings, (&motion, filter), &[], None, execution)?;
+    let logs = Logs::new(model.model(), &recordings, &motion, filter, &[], None, execution)?;
     let job = TrainingPasses { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
     let rows = job.rows_once(model)?;
     Ok(plain_values(&settings.estimation, &rows.problem)?.values)
@@ -146,7 +149,17 @@ pub(crate) struct TrainingPasses<'a> {
     pub(crate) known_arm: Option<Refit>,
 }
 
-impl TrainingPasses<'_> {
+impl<'a> TrainingPasses<'a> {
+    /// Passes over these training logs, without a known arm.
+    pub(crate) fn of_logs(
+        logs: &'a Logs<'a>,
+        settings: &'a IdentificationSettings,
+        training: &'a [usize],
+        payloads: &'a [Payload],
+    ) -> Self {
+        Self { logs, settings, training, payloads, known_arm: None }
+    }
+
     /// The rows of this model; where friction depends on a load that is not known yet, again and again with the load
     /// of the fit before, until it settles.
     pub(crate) fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
@@ -239,7 +252,7 @@ impl TrainingPasses<'_> {
     pub(crate) fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         self.logs.begin("logs to factors", self.training);
         let alone = self.training.len() == 1;
-        let one = |index: &usize| log_factors((self.logs, self.settings), model, *index, alone);
+        let one = |index: &usize| log_factors(self.logs, self.settings, model, *index, alone);
         let factors = if !alone && self.logs.execution.parallel() {
             self.training.par_iter().map(one).collect()
         } else {
@@ -275,7 +288,7 @@ impl TrainingPasses<'_> {
             return Ok(problem);
         }
         let noise = self.rows_of(model, columns, logs, |log| log.noise.as_ref())?;
-        let unexcited = self.unexcited(model, (&problem, &noise))?;
+        let unexcited = self.unexcited(model, &problem, &noise)?;
         problem.with_unexcited(unexcited)
     }
 
@@ -326,7 +339,8 @@ impl TrainingPasses<'_> {
     fn unexcited(
         &self,
         model: &RegressorModel,
-        (problem, noise): (&LinearProblem, &LinearProblem),
+        problem: &LinearProblem,
+        noise: &LinearProblem,
     ) -> Result<Unexcited, EstimationError> {
         let weights = match weighted_values(problem, &self.settings.estimation.weighted()) {
             Ok(first) => first.joint_sigma.iter().map(|sigma| sigma.recip()).collect(),
@@ -479,7 +493,8 @@ impl RowConsumer for JointFactor {
 /// # Errors
 /// What reading it can give.
 pub fn log_factors(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     model: &RegressorModel,
     index: usize,
     alone: bool,

@@ -203,10 +203,18 @@ fn residual(
     let identification = identification_settings(task, settings, 1);
     let all: Vec<usize> = (0..motions.len()).collect();
     let (robot, execution) = (&task.robot, Execution::default());
-    let logs = Logs::new(robot.model(), motions, identification.filters(), &all, None, execution)?;
-    let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
-    let training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
-    let found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
+    let logs = Logs::new(
+        robot.model(),
+        motions,
+        &identification.motion,
+        &identification.parallel_filter,
+        &all,
+        None,
+        execution,
+    )?;
+    let chosen = choose_friction(&logs, &identification, robot, &all, &settings.payloads)?;
+    let training = training_rows(&logs, &identification, chosen.model, &all, &settings.payloads, None)?;
+    let found = estimate(&training.rows(&logs, &identification, &all), None)?.estimate;
     let rows = training.problem.joint_rows();
     let sum: f64 =
         found.joint_sigma.iter().zip(&rows).map(|(sigma, rows)| *rows as f64 * sigma.max(f64::MIN_POSITIVE).ln()).sum();

@@ -177,10 +177,18 @@ impl RunsFit<'_> {
         let mut identification = identification.clone();
         loop {
             identification.motion.torque_lag_s = rounds.torque_lag_s();
-            let logs = Logs::new(robot.model(), recordings, identification.filters(), &all, None, execution)?;
-            let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
+            let logs = Logs::new(
+                robot.model(),
+                recordings,
+                &identification.motion,
+                &identification.parallel_filter,
+                &all,
+                None,
+                execution,
+            )?;
+            let chosen = choose_friction(&logs, &identification, robot, &all, &settings.payloads)?;
             let mut training =
-                training_rows((&logs, &identification), chosen.model.clone(), &all, &settings.payloads, None)?;
+                training_rows(&logs, &identification, chosen.model.clone(), &all, &settings.payloads, None)?;
             training.friction_choice.clone_from(&chosen.joints);
             if training.problem.joint_rows().iter().sum::<usize>() == 0 {
                 let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
@@ -190,9 +198,8 @@ impl RunsFit<'_> {
                 let estimate = joint_by_joint(task, &logs, &training, settings, &run_weights(task, runs))?;
                 return Ok(RunsEstimate { estimate, schwarz: 0.0 });
             }
-            let mut found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
-            let fit =
-                lag_fit((&logs, &identification), &training.model, (&training.columns, &found.values, &[]), &all)?;
+            let mut found = estimate(&training.rows(&logs, &identification, &all), None)?.estimate;
+            let fit = lag_fit(&logs, &identification, &training.model, &training.columns, &found.values, &[], &all)?;
             if !rounds.again(fit.as_ref(), &mut found) {
                 let schwarz = schwarz(&training.problem, &found);
                 let found = chosen.with_error_of_constants(training.problem.columns(), found);
@@ -223,14 +230,14 @@ fn all_joints(
     lag: LagChoice,
     runs: &[RunLog<'_>],
 ) -> Result<RunEstimate, IterationError> {
-    let consistent = consistent_stage((logs, settings), &training, &estimate)?;
+    let consistent = consistent_stage(logs, settings, &training, &estimate)?;
     let arm = training.columns.arm_estimate(&estimate);
     let run_offsets = deviations(&training.columns.offsets, &estimate, runs);
     let mut joint_sigma = vec![0.0; training.model.dof()];
     training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
     let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();
     let theta = |index: usize| training.columns.base_values(index, &estimate.values);
-    let torque_lags = lags_of_recordings((logs, &settings.estimation), &training.model, &theta, all)?;
+    let torque_lags = lags_of_recordings(logs, &settings.estimation, &training.model, &theta, all)?;
     Ok(RunEstimate {
         std: (0..arm.values.len()).map(|k| arm.covariance[(k, k)].max(0.0).sqrt()).collect(),
         covariance: arm.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),

@@ -69,7 +69,7 @@ impl<'a> Rows<'a> {
         let columns = model.layout().columns().iter().map(Column::symbol).collect();
         let mut problem = LinearProblem::new(columns, model.joint_names());
         let logs = logs(scenario, &recordings, &settings).map_err(IdentificationError::from)?;
-        let factors = log_factors((&logs, &settings), model, 0, false).map_err(IdentificationError::from)?.factors;
+        let factors = log_factors(&logs, &settings, model, 0, false).map_err(IdentificationError::from)?.factors;
         for (joint, factor) in factors.into_iter().enumerate() {
             problem
                 .add(LOG, joint, model.layout().joint_columns(joint).to_vec(), factor)
@@ -140,5 +140,5 @@ fn logs<'b>(
     settings: &'b IdentificationSettings,
 ) -> Result<Logs<'b>, LogError> {
     let alone = Execution { threads: 1, progress: &Silent };
-    Logs::new(scenario.model.model(), recordings, settings.filters(), &[], None, alone)
+    Logs::new(scenario.model.model(), recordings, &settings.motion, &settings.parallel_filter, &[], None, alone)
 }

@@ -80,7 +80,8 @@ impl CutoffByError {
 /// # Errors
 /// Recordings that cannot be read.
 pub fn choose_cutoff(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     model: &RegressorModel,
     training: &[usize],
 ) -> Result<Option<CutoffByError>, IdentificationError> {
@@ -109,7 +110,7 @@ pub fn choose_cutoff(
             let filter = filter_of_copy(&stand_in, cutoff_hz);
             let (mut sum, mut copies) = (0.0, 0.0);
             for pieces in stand_in.copies(&settings.motion, cutoff_hz).ok()? {
-                let values = plain_fit(model.clone(), pieces?, &filter, (&plain, alone)).ok()?;
+                let values = plain_fit(model.clone(), pieces?, &filter, &plain, alone).ok()?;
                 sum += stand_in.square_error(model, &values);
                 copies += 1.0;
             }

@@ -160,7 +160,7 @@ impl StandIn {
         if measured.is_empty() || used == 0 {
             return Ok(None);
         }
-        let fitted = Self::fitted((logs, settings), model, measured, (log_rate_hz, thinning))?;
+        let fitted = Self::fitted(logs, settings, model, measured, log_rate_hz, thinning)?;
         let Some(mut stand_in) = fitted else { return Ok(None) };
         // White noise of the log, thinned out below a low-pass.
         stand_in.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
@@ -233,10 +233,12 @@ impl StandIn {
 
     /// The first fit, its torque and what it leaves.
     fn fitted(
-        (logs, settings): (&Logs<'_>, &IdentificationSettings),
+        logs: &Logs<'_>,
+        settings: &IdentificationSettings,
         model: &RegressorModel,
         measured: Vec<MotionBlock>,
-        (log_rate_hz, thinning): (f64, usize),
+        log_rate_hz: f64,
+        thinning: usize,
     ) -> Result<Option<Self>, IdentificationError> {
         let motion_hz: f64 = logs.spectra().iter().map(|log| log.choice.cutoff_hz).fold(0.0, f64::max);
         let rate_hz = log_rate_hz / thinning as f64;
@@ -249,7 +251,7 @@ impl StandIn {
         };
         let execution = Execution { threads: logs.execution.threads, ..Execution::default() };
         let plain = super::plain_settings(settings);
-        let Ok(values) = plain_fit(model.clone(), measured.clone(), &filter, (&plain, execution)) else {
+        let Ok(values) = plain_fit(model.clone(), measured.clone(), &filter, &plain, execution) else {
             return Ok(None);
         };
         let theta = values[..model.layout().columns().len()].to_vec();

@@ -54,40 +54,47 @@ impl ChosenFriction {
 /// # Errors
 /// Recordings that cannot be read, rows that do not carry an estimate.
 pub fn choose_friction(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     robot: &ParametricModel,
-    (training, payloads): (&[usize], &[Payload]),
+    training: &[usize],
+    payloads: &[Payload],
 ) -> Result<ChosenFriction, IdentificationError> {
-    friction_of_logs((logs, logs), settings, robot, (training, payloads), None)
+    friction_of_logs(logs, logs, settings, robot, training, payloads, None)
 }
 
 /// The same with other filters for the constants: terms from the rows of `logs`, constants from those of
 /// `of_constants`; terms of all that may be were found [before](friction_by_grid) or not. Where the first are too few
 /// to choose from, terms come from the second as well.
 pub(crate) fn friction_of_logs(
-    (logs, of_constants): (&Logs<'_>, &Logs<'_>),
+    logs: &Logs<'_>,
+    of_constants: &Logs<'_>,
     settings: &IdentificationSettings,
     robot: &ParametricModel,
-    (training, payloads): (&[usize], &[Payload]),
+    training: &[usize],
+    payloads: &[Payload],
     of_grid: Option<GridFriction>,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let found = friction_by_terms((logs, of_constants), settings, robot, (training, payloads), of_grid)?;
+    let found = friction_by_terms(logs, of_constants, settings, robot, training, payloads, of_grid)?;
     let is_nothing = |one: &JointFriction| one.terms.is_none();
     if core::ptr::eq(logs, of_constants) || found.joints.is_empty() || !found.joints.iter().all(is_nothing) {
         return Ok(found);
     }
-    friction_by_terms((of_constants, of_constants), settings, robot, (training, payloads), None)
+    friction_by_terms(of_constants, of_constants, settings, robot, training, payloads, None)
 }
 
 fn friction_by_terms(
-    (logs, of_constants): (&Logs<'_>, &Logs<'_>),
+    logs: &Logs<'_>,
+    of_constants: &Logs<'_>,
     settings: &IdentificationSettings,
     robot: &ParametricModel,
-    (training, payloads): (&[usize], &[Payload]),
+    training: &[usize],
+    payloads: &[Payload],
     of_grid: Option<GridFriction>,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let (passes, searches) = (passes_over(logs, settings, (training, payloads)), searches_of(settings, robot));
-    let of_constants = passes_over(of_constants, settings, (training, payloads));
+    let (passes, searches) =
+        (TrainingPasses::of_logs(logs, settings, training, payloads), searches_of(settings, robot));
+    let of_constants = TrainingPasses::of_logs(of_constants, settings, training, payloads);
     if searches.is_empty() {
         let stated = RegressorModel::from(robot.clone());
         if settings.friction_before.is_empty() {
@@ -105,8 +112,7 @@ fn friction_by_terms(
     let GridFriction { model, mut joints, stated, gains } = of_grid;
     let near_rest: Vec<&str> =
         searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
-    let (mut model, constants_error) =
-        best_constants(&of_constants, robot, (&mut joints, &near_rest), (model, &gains))?;
+    let (mut model, constants_error) = best_constants(&of_constants, robot, &mut joints, &near_rest, model, &gains)?;
     // What follows finds the gains with the friction that was chosen.
     model.torque_gains.clear();
     Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
@@ -134,24 +140,15 @@ impl GridTerms {
 /// # Errors
 /// As [`choose_friction`].
 pub(crate) fn friction_by_grid(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
-    places: (&[usize], &[Payload]),
     terms: GridTerms,
 ) -> Result<Option<GridFriction>, IdentificationError> {
-    let searches = searches_of(settings, robot);
+    let searches = searches_of(passes.settings, robot);
     if searches.is_empty() {
         return Ok(None);
     }
-    friction_of_grid(&passes_over(logs, settings, places), robot, &searches, terms).map(Some)
-}
-
-fn passes_over<'a>(
-    logs: &'a Logs<'a>,
-    settings: &'a IdentificationSettings,
-    (training, payloads): (&'a [usize], &'a [Payload]),
-) -> TrainingPasses<'a> {
-    TrainingPasses { logs, settings, training, payloads, known_arm: None }
+    friction_of_grid(passes, robot, &searches, terms).map(Some)
 }
 
 /// The joints whose friction is to be chosen.
@@ -204,9 +201,8 @@ fn friction_of_grid(
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
         let wide = with_terms(&first.model, further).with_load_of_estimate(&first.model, &plain.values);
-        let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain.values, &gains))?;
-        let candidates = (candidates, &most_inflation[..]);
-        Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
+        let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, &first.model, &plain.values, &gains)?;
+        Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, &most_inflation, &plain, equal_weights)?)
     };
     // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.
     let scale = |joint: usize| JointScale::of(robot.model(), joint);
@@ -220,7 +216,7 @@ fn friction_of_grid(
     };
     let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
     let joints = chosen_among(&candidates)?;
-    let model = with_friction_of(robot, &joints, (&first.model, &plain.values))?;
+    let model = with_friction_of(robot, &joints, &first.model, &plain.values)?;
     Ok(GridFriction { model, joints, stated: (first, plain), gains })
 }
 
@@ -236,21 +232,21 @@ fn friction_of_grid(
 /// # Errors
 /// As [`choose_friction`].
 pub(crate) fn better_friction(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
-    (chosen, other, shows_less): (&ChosenFriction, ChosenFriction, bool),
-    (training, payloads): (&[usize], &[Payload]),
+    chosen: &ChosenFriction,
+    other: ChosenFriction,
+    shows_less: bool,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let passes = passes_over(logs, settings, (training, payloads));
     let mut joints = chosen.joints.clone();
-    let (model, constants_error) = with_constants(&passes, robot, &mut joints, (chosen.model.clone(), &[]))?;
+    let (model, constants_error) = with_constants(passes, robot, &mut joints, chosen.model.clone(), &[])?;
     let (mut may_be, mut effects) = (vec![true; joints.len()], vec![1.0; joints.len()]);
     if shows_less {
-        let evidence = friction_evidence(&passes, (&other.joints, &other.model), &joints)?;
+        let evidence = friction_evidence(passes, &other.joints, &other.model, &joints)?;
         may_be = evidence.iter().map(|one| !one.is_doubtful).collect();
         effects = evidence.iter().map(|one| one.design_effect).collect();
     }
-    let taken = better_of_joints(&passes, (&joints, &model), (&other.joints, &other.model), (&may_be, &effects))?;
+    let taken = better_of_joints(passes, &joints, &model, &other.joints, &other.model, &may_be, &effects)?;
     if !taken.contains(&false) {
         return Ok(other);
     }
@@ -262,7 +258,7 @@ pub(crate) fn better_friction(
     // A mixture, each joint with the constants that it has beside its own others.
     take(&mut joints, other.joints, &taken);
     let model = passes.with_friction(robot, &joints, &model)?;
-    let constants_error = error_of_constants(&passes, &joints, &model)?;
+    let constants_error = error_of_constants(passes, &joints, &model)?;
     Ok(ChosenFriction { model, joints, stated, constants_error })
 }
 
@@ -270,13 +266,15 @@ pub(crate) fn better_friction(
 /// where the excerpt's have settled, for what is left is short, and a step of Gauss and Newton then ends where a second
 /// one would.
 pub(crate) fn constants_of_all_rows(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     robot: &ParametricModel,
     chosen: &ChosenFriction,
-    (training, payloads): (&[usize], &[Payload]),
+    training: &[usize],
+    payloads: &[Payload],
 ) -> Result<ChosenFriction, IdentificationError> {
     let mut found = chosen.clone();
-    let passes = passes_over(logs, settings, (training, payloads));
+    let passes = TrainingPasses::of_logs(logs, settings, training, payloads);
     if let Some((model, error)) = one_step(&passes, robot, &mut found.joints, &chosen.model)? {
         (found.model, found.constants_error) = (model, Some(error));
     }

@@ -49,32 +49,36 @@ impl ConstantsPass {
     fn step(
         &self,
         passes: &TrainingPasses<'_>,
-        centre: (&FrictionConstants, &RegressorModel),
+        constants: &FrictionConstants,
+        model: &RegressorModel,
         gains: &[usize],
     ) -> Result<ConstantsStep, IdentificationError> {
-        self.step_by(passes, centre, gains, (&self.factors, &passes.settings.estimation))
+        self.step_by(passes, constants, model, gains, &self.factors, &passes.settings.estimation)
     }
 
     /// The same step with bars that count every row for independent: no time segments are looked at.
     fn step_without_bars(
         &self,
         passes: &TrainingPasses<'_>,
-        centre: (&FrictionConstants, &RegressorModel),
+        constants: &FrictionConstants,
+        model: &RegressorModel,
         gains: &[usize],
     ) -> Result<ConstantsStep, IdentificationError> {
-        self.step_by(passes, centre, gains, (&self.merged, &without_bars(passes.settings)))
+        self.step_by(passes, constants, model, gains, &self.merged, &without_bars(passes.settings))
     }
 
     fn step_by(
         &self,
         passes: &TrainingPasses<'_>,
-        (constants, model): (&FrictionConstants, &RegressorModel),
+        constants: &FrictionConstants,
+        model: &RegressorModel,
         gains: &[usize],
-        (factors, estimation): (&[LogFactors], &EstimationSettings),
+        factors: &[LogFactors],
+        estimation: &EstimationSettings,
     ) -> Result<ConstantsStep, IdentificationError> {
-        let wide_problem = passes.free_problem(&self.wide, factors, (model, &self.fit.values, gains))?;
+        let wide_problem = passes.free_problem(&self.wide, factors, model, &self.fit.values, gains)?;
         let solve = |problem: &LinearProblem| plain_estimate(estimation, problem);
-        Ok(constants.step((model, &self.fit.values), (&self.wide, &wide_problem), solve)?)
+        Ok(constants.step(model, &self.fit.values, &self.wide, &wide_problem, solve)?)
     }
 }
 
@@ -103,7 +107,8 @@ pub(crate) struct FrictionEvidence {
 /// same motion had the friction `before`. Where no friction has constants every row is taken for independent.
 pub(crate) fn friction_evidence(
     passes: &TrainingPasses<'_>,
-    (joints, model): (&[JointFriction], &RegressorModel),
+    joints: &[JointFriction],
+    model: &RegressorModel,
     before: &[JointFriction],
 ) -> Result<Vec<FrictionEvidence>, IdentificationError> {
     let constants = FrictionConstants::new(model, joints);
@@ -112,7 +117,7 @@ pub(crate) fn friction_evidence(
         return Ok(joints.iter().map(nothing).collect());
     }
     let measured = passes.constants_pass(&constants, model)?;
-    let step = measured.step(passes, (&constants, model), &[])?;
+    let step = measured.step(passes, &constants, model, &[])?;
     let norms = measured.problem.column_norms();
     let of_joint = |(one, before): (&JointFriction, &JointFriction)| {
         let place = model.model().joint_index(&one.joint);
@@ -133,8 +138,10 @@ pub(crate) fn friction_evidence(
 pub(crate) fn best_constants(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
-    (joints, near_rest): (&mut Vec<JointFriction>, &[&str]),
-    (model, gains): (RegressorModel, &[usize]),
+    joints: &mut Vec<JointFriction>,
+    near_rest: &[&str],
+    model: RegressorModel,
+    gains: &[usize],
 ) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
     let mut others = joints.clone();
     let mut is_moved = vec![false; joints.len()];
@@ -148,16 +155,16 @@ pub(crate) fn best_constants(
             *is_moved = true;
         }
     }
-    let first = with_constants(passes, robot, joints, (model, gains))?;
+    let first = with_constants(passes, robot, joints, model, gains)?;
     if !is_moved.contains(&true) {
         return Ok(first);
     }
 
     // From the other start; then of both what is better.
     let start = passes.with_friction(robot, &others, &first.0)?;
-    let second = with_constants(passes, robot, &mut others, (start, gains))?;
+    let second = with_constants(passes, robot, &mut others, start, gains)?;
     let as_counted = vec![1.0; joints.len()];
-    let taken = better_of_joints(passes, (joints, &first.0), (&others, &second.0), (&is_moved, &as_counted))?;
+    let taken = better_of_joints(passes, joints, &first.0, &others, &second.0, &is_moved, &as_counted)?;
     if !taken.contains(&true) {
         return Ok(first);
     }
@@ -167,7 +174,7 @@ pub(crate) fn best_constants(
     }
     take(joints, others, &taken);
     let start = passes.with_friction(robot, joints, &first.0)?;
-    with_constants(passes, robot, joints, (start, gains))
+    with_constants(passes, robot, joints, start, gains)
 }
 
 /// Of two frictions with the constants that suit the rows of `passes` whether, joint by joint, the second says more of
@@ -175,9 +182,12 @@ pub(crate) fn best_constants(
 /// their `design_effects` have it. Only joints count whose friction `is_other`.
 pub(crate) fn better_of_joints(
     passes: &TrainingPasses<'_>,
-    (joints, model): (&[JointFriction], &RegressorModel),
-    (others, of_others): (&[JointFriction], &RegressorModel),
-    (is_other, design_effects): (&[bool], &[f64]),
+    joints: &[JointFriction],
+    model: &RegressorModel,
+    others: &[JointFriction],
+    of_others: &RegressorModel,
+    is_other: &[bool],
+    design_effects: &[f64],
 ) -> Result<Vec<bool>, IdentificationError> {
     let of_joints =
         |model: &RegressorModel, joints: &[JointFriction]| -> Result<Vec<JointScore>, IdentificationError> {
@@ -212,7 +222,7 @@ pub(crate) fn error_of_constants(
     if constants.is_empty() {
         return Ok(None);
     }
-    let step = passes.constants_pass(&constants, model)?.step(passes, (&constants, model), &[])?;
+    let step = passes.constants_pass(&constants, model)?.step(passes, &constants, model, &[])?;
     Ok(Some(step.error().clone()))
 }
 
@@ -229,11 +239,11 @@ pub(crate) fn one_step(
         return Ok(None);
     }
     let measured = passes.constants_pass(&constants, model)?;
-    let step = measured.step(passes, (&constants, model), &[])?;
+    let step = measured.step(passes, &constants, model, &[])?;
     take_intervals(joints, model, &constants, &step);
     let error = step.error().clone();
     let terms = constants.moved(&step.steps);
-    Ok(Some((with_chosen(robot, joints, &terms, (model, &measured.fit.values))?, error)))
+    Ok(Some((with_chosen(robot, joints, &terms, model, &measured.fit.values)?, error)))
 }
 
 /// How well every joint's rows are explained by a model, with the terms and the constants of its friction as its own
@@ -260,7 +270,8 @@ pub(crate) fn with_constants(
     passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
     joints: &mut [JointFriction],
-    (mut model, gains): (RegressorModel, &[usize]),
+    mut model: RegressorModel,
+    gains: &[usize],
 ) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
     let equal_weights = matches!(passes.settings.estimation.estimator, Estimator::Ordinary);
     let mut last: Option<LastPass> = None;
@@ -281,23 +292,23 @@ pub(crate) fn with_constants(
             are_found = before.halvings > MOST_HALVINGS || pass >= MOST_PASSES;
             before.steps.iter_mut().for_each(|step| *step *= if are_found { 0.0 } else { 0.5 });
             let terms = before.constants.moved(&before.steps);
-            model = with_chosen(robot, joints, &terms, (&model, &fit.values))?;
+            model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
             last = last.filter(|_| !are_found);
             continue;
         }
 
         // On the way bars are for nobody.
         if pass < DROP_PASSES && !are_found {
-            let step = measured.step_without_bars(passes, (&constants, &model), gains)?;
+            let step = measured.step_without_bars(passes, &constants, &model, gains)?;
             if !step.may_have_settled() {
                 let terms = constants.moved(&step.steps);
-                model = with_chosen(robot, joints, &terms, (&model, &fit.values))?;
+                model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
                 last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
                 continue;
             }
         }
 
-        let step = measured.step(passes, (&constants, &model), gains)?;
+        let step = measured.step(passes, &constants, &model, gains)?;
         take_intervals(joints, &model, &constants, &step);
         error = Some(step.error().clone());
         let has_settled = are_found || step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
@@ -308,12 +319,12 @@ pub(crate) fn with_constants(
         let fewer = constants.without_weakest(weak, (&model, &measured.problem.column_norms()), &step);
         if pass >= MOST_PASSES {
             if !fewer.is_empty() {
-                model = with_chosen(robot, joints, &fewer, (&model, &fit.values))?;
+                model = with_chosen(robot, joints, &fewer, &model, &fit.values)?;
             }
             break;
         }
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
-            model = with_chosen(robot, joints, &fewer, (&model, &fit.values))?;
+            model = with_chosen(robot, joints, &fewer, &model, &fit.values)?;
             last = None;
             are_found = false;
             continue;
@@ -322,7 +333,7 @@ pub(crate) fn with_constants(
             break;
         }
         let terms = constants.moved(&step.steps);
-        model = with_chosen(robot, joints, &terms, (&model, &fit.values))?;
+        model = with_chosen(robot, joints, &terms, &model, &fit.values)?;
         last = Some(LastPass { constants, steps: step.steps, misfit, halvings: 0 });
     }
     Ok((model, error))
@@ -333,13 +344,14 @@ fn with_chosen(
     robot: &ParametricModel,
     joints: &mut [JointFriction],
     terms: &[(usize, Vec<TorqueTerm>)],
-    (before, values): (&RegressorModel, &[f64]),
+    before: &RegressorModel,
+    values: &[f64],
 ) -> Result<RegressorModel, IdentificationError> {
     for (joint, terms) in terms {
         let name = &before.model().joints()[*joint].name;
         joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.choose(terms));
     }
-    with_friction_of(robot, joints, (before, values))
+    with_friction_of(robot, joints, before, values)
 }
 
 impl TrainingPasses<'_> {
@@ -351,7 +363,7 @@ impl TrainingPasses<'_> {
         before: &RegressorModel,
     ) -> Result<RegressorModel, IdentificationError> {
         let (_, fit) = self.rows_and_fit(before)?;
-        with_friction_of(robot, joints, (before, &fit.values))
+        with_friction_of(robot, joints, before, &fit.values)
     }
 
     /// The rows of a model and a fit without bars.

@@ -16,6 +16,7 @@ use crate::friction::smooth_width;
 use crate::logs::{LogSpectrum, Logs};
 use crate::payload::Payload;
 use crate::settings::IdentificationSettings;
+use crate::training::TrainingPasses;
 use dynident_dynamics::ParametricModel;
 
 /// Cut-offs closer than this are one: they are tried in steps of √2.
@@ -30,15 +31,18 @@ const SMEARED: f64 = 0.05;
 /// # Errors
 /// Recordings that cannot be read, rows that do not carry an estimate.
 pub(crate) fn friction_with_cutoff(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     robot: &ParametricModel,
-    (training, payloads): (&[usize], &[Payload]),
-    (at_hz, of_grid): (Option<f64>, Option<GridFriction>),
+    training: &[usize],
+    payloads: &[Payload],
+    at_hz: Option<f64>,
+    of_grid: Option<GridFriction>,
 ) -> Result<(Option<CutoffByError>, ChosenFriction), IdentificationError> {
     let logs = logs.clone().with_chosen_cutoff(&settings.motion, at_hz);
     let of_constants = logs.with_torque_beyond_motion(&robot.clone().into())?;
-    let friction = friction_of_logs((&logs, &of_constants), settings, robot, (training, payloads), of_grid)?;
-    Ok((choose_cutoff((&logs, settings), &friction.model, training)?, friction))
+    let friction = friction_of_logs(&logs, &of_constants, settings, robot, training, payloads, of_grid)?;
+    Ok((choose_cutoff(&logs, settings, &friction.model, training)?, friction))
 }
 
 /// The friction that the recordings choose at another cut-off than `at_hz`, where they chose `friction` and then
@@ -52,11 +56,13 @@ pub(crate) fn friction_with_cutoff(
 /// # Errors
 /// As [`friction_with_cutoff`].
 pub(crate) fn friction_of_other_cutoff(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
-    places: (&[usize], &[Payload]),
-    (friction, cutoff, at_hz): (&ChosenFriction, &CutoffByError, f64),
+    friction: &ChosenFriction,
+    cutoff: &CutoffByError,
+    at_hz: f64,
 ) -> Result<Option<OtherFriction>, IdentificationError> {
+    let TrainingPasses { logs, settings, training, payloads, .. } = *passes;
     let high_hz = cutoff.highest_alike_hz();
     let other_hz = if friction.joints.is_empty() {
         None
@@ -70,10 +76,10 @@ pub(crate) fn friction_of_other_cutoff(
     let Some(other_hz) = other_hz else { return Ok(None) };
     let logs = logs.clone().with_chosen_cutoff(&settings.motion, Some(other_hz));
     let rows = logs.with_torque_beyond_motion(&robot.clone().into())?;
-    let other = friction_of_logs((&logs, &rows), settings, robot, places, None)?;
-    let compared = (friction, other, other_hz < at_hz);
-    let friction = better_friction((&rows, settings), robot, compared, places)?;
-    let cutoff = choose_cutoff((&logs, settings), &friction.model, places.0)?;
+    let other = friction_of_logs(&logs, &rows, settings, robot, training, payloads, None)?;
+    let passes = TrainingPasses::of_logs(&rows, settings, training, payloads);
+    let friction = better_friction(&passes, robot, friction, other, other_hz < at_hz)?;
+    let cutoff = choose_cutoff(&logs, settings, &friction.model, training)?;
     Ok(Some(OtherFriction { friction, cutoff }))
 }
 

@@ -32,7 +32,8 @@ pub(crate) fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = Tor
 pub(crate) fn with_friction_of(
     robot: &ParametricModel,
     joints: &[JointFriction],
-    (before, values): (&RegressorModel, &[f64]),
+    before: &RegressorModel,
+    values: &[f64],
 ) -> Result<RegressorModel, IdentificationError> {
     let torque_gains = before.torque_gains.clone();
     let next = RegressorModel { torque_gains, ..RegressorModel::from(chosen_model(robot, joints)?) };
@@ -46,7 +47,9 @@ impl TrainingPasses<'_> {
         &self,
         wide: &RegressorModel,
         factors: &[LogFactors],
-        (model, fitted, free): (&RegressorModel, &[f64], &[usize]),
+        model: &RegressorModel,
+        fitted: &[f64],
+        free: &[usize],
     ) -> Result<LinearProblem, IdentificationError> {
         let columns = self.columns(wide)?;
         let problem = self.stated_problem(wide, &columns, factors)?;
@@ -55,6 +58,6 @@ impl TrainingPasses<'_> {
         values.resize(wide_base, 0.0);
         values.extend_from_slice(&fitted[base..]);
         let known: Vec<Vec<f64>> = self.training.iter().map(|&log| columns.known(log)).collect();
-        Ok(with_free_gains(problem, free, (&known, &values))?)
+        Ok(with_free_gains(problem, free, &known, &values)?)
     }
 }

@@ -38,7 +38,9 @@ pub struct ParameterInterval {
 /// Numbers that are not finite, bodies whose limits exclude each other.
 pub fn consistent_intervals(
     robot: &ParametricModel,
-    (problem, estimate, plain): (&LinearProblem, &Estimate, bool),
+    problem: &LinearProblem,
+    estimate: &Estimate,
+    plain: bool,
     settings: &ConsistencySettings,
     progress: &dyn Progress,
 ) -> Result<Vec<ParameterInterval>, ConsistencyError> {

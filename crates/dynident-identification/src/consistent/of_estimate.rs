@@ -16,7 +16,8 @@ use dynident_estimation::{Estimate, LinearProblem};
 pub fn consistent_with_estimate(
     robot: &ParametricModel,
     problem: &LinearProblem,
-    (estimate, plain): (&Estimate, bool),
+    estimate: &Estimate,
+    plain: bool,
     settings: &ConsistencySettings,
 ) -> Result<PhysicalFit, ConsistencyError> {
     let sigma = &estimate.joint_sigma;

@@ -20,7 +20,8 @@ use dynident_model::Body;
 /// As [`consistent_parameters`](super::consistent_parameters).
 pub fn parameter_std(
     robot: &ParametricModel,
-    (problem, estimate): (&LinearProblem, &Estimate),
+    problem: &LinearProblem,
+    estimate: &Estimate,
     settings: &ConsistencySettings,
 ) -> Result<Vec<Option<f64>>, ConsistencyError> {
     let physical = described_problem(robot, problem, &estimate.joint_sigma, settings)?;

@@ -50,7 +50,7 @@ pub(super) fn examined(
     let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
     let is_suspect = noise.is_some_and(|noise| noise.share_of_torque > LARGE_SHARE || !agrees(&first));
     let chosen = if is_suspect && settings.cutoff_hz.is_none() && is_strong(&first, least_squares) {
-        settled_band(rows, settings, (first, least_squares))
+        settled_band(rows, settings, first, least_squares)
     } else {
         first
     };
@@ -124,7 +124,8 @@ fn first_band(
 fn settled_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
-    (first, least_squares): (BandEstimate, &Estimate),
+    first: BandEstimate,
+    least_squares: &Estimate,
 ) -> BandEstimate {
     let mut bands = vec![first];
     while let Some(last) = bands.last().filter(|_| bands.len() <= MOST_BANDS) {

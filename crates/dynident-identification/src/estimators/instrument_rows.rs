@@ -17,7 +17,7 @@ pub(super) fn instrumented_factors(
     index: usize,
     source: &mut dyn InstrumentSource,
 ) -> Result<Vec<SegmentedFactor>, EstimatorError> {
-    made_rows(rows, index, (None, None), source).map(|made| made.factors)
+    made_rows(rows, index, None, None, source).map(|made| made.factors)
 }
 
 /// The factors of `[(W − Z) θ | τ − Z θ]` of one log or of its first samples, one for each joint, and each joint's
@@ -25,16 +25,18 @@ pub(super) fn instrumented_factors(
 pub(super) fn fast_motion_factors(
     rows: &TrainingRows<'_>,
     index: usize,
-    (theta, most_samples): (&[f64], Option<u64>),
+    theta: &[f64],
+    most_samples: Option<u64>,
     source: &mut dyn InstrumentSource,
 ) -> Result<(Vec<SegmentedFactor>, Vec<f64>), EstimatorError> {
-    made_rows(rows, index, (Some(theta), most_samples), source).map(|made| (made.factors, made.squares))
+    made_rows(rows, index, Some(theta), most_samples, source).map(|made| (made.factors, made.squares))
 }
 
 fn made_rows<'r, 'a>(
     rows: &'r TrainingRows<'a>,
     index: usize,
-    (theta, most_samples): (Option<&'r [f64]>, Option<u64>),
+    theta: Option<&'r [f64]>,
+    most_samples: Option<u64>,
     source: &mut dyn InstrumentSource,
 ) -> Result<InstrumentedRows<'r, 'a>, EstimatorError> {
     let (logs, recording) = (rows.logs, &rows.logs.recordings[index]);
@@ -105,7 +107,7 @@ impl Side {
     }
 
     /// The panels of some samples of `block`, whose joints stand at `places`.
-    fn make(&mut self, model: &RegressorModel, block: &MotionBlock, places: &[usize], (from, samples): (usize, usize)) {
+    fn make(&mut self, model: &RegressorModel, block: &MotionBlock, places: &[usize], from: usize, samples: usize) {
         in_model_order(block, places, from, samples, &mut self.motion);
         let [q, dq, ddq] = &self.motion;
         let motion = JointMotion { samples, q, dq, ddq };
@@ -188,9 +190,12 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                 }
                 self.sides.iter_mut().for_each(|side| side.history.set_temperature(&self.temperature_c));
             }
-            let (model, places, run) = (self.rows.model, &self.places, (from, samples));
+            let (model, places) = (self.rows.model, &self.places);
             let [other, own] = &mut self.sides;
-            rayon::join(|| other.make(model, &self.other, places, run), || own.make(model, measured, places, run));
+            rayon::join(
+                || other.make(model, &self.other, places, from, samples),
+                || own.make(model, measured, places, from, samples),
+            );
             for (joint, &place) in self.places.iter().enumerate() {
                 let columns = layout.joint_columns(joint);
                 let gain = self.rows.model.torque_gains.get(joint).copied().unwrap_or(1.0);

@@ -64,7 +64,8 @@ pub(super) struct BandEstimate {
 fn band_source<'r>(
     rows: &'r TrainingRows<'_>,
     index: usize,
-    (cutoff_hz, most_samples): (f64, Option<u64>),
+    cutoff_hz: f64,
+    most_samples: Option<u64>,
 ) -> Box<dyn InstrumentSource + 'r> {
     match rows.logs.recordings[index].samples {
         Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz, most_samples)),
@@ -101,8 +102,8 @@ pub(super) fn fast_motion_problem(
 ) -> Result<(LinearProblem, Vec<f64>), EstimatorError> {
     let most = (FAST_MOTION_SAMPLES[0] / rows.training.len().max(1) as u64).max(FAST_MOTION_SAMPLES[1]);
     let logs = of_every_log(rows, |index| {
-        let source = &mut *band_source(rows, index, (cutoff_hz, Some(most)));
-        fast_motion_factors(rows, index, (theta, Some(most)), source)
+        let source = &mut *band_source(rows, index, cutoff_hz, Some(most));
+        fast_motion_factors(rows, index, theta, Some(most), source)
     })?;
     let mut problem = LinearProblem::new(vec!["fast motion".to_owned()], rows.problem.joints().to_vec());
     let mut squares = vec![0.0; rows.problem.joints().len()];
@@ -125,9 +126,8 @@ pub(super) fn with_band(
     settings: &InstrumentSettings,
     cutoff_hz: f64,
 ) -> Result<BandEstimate, EstimatorError> {
-    let factors = of_every_log(rows, |index| {
-        instrumented_factors(rows, index, &mut *band_source(rows, index, (cutoff_hz, None)))
-    })?;
+    let factors =
+        of_every_log(rows, |index| instrumented_factors(rows, index, &mut *band_source(rows, index, cutoff_hz, None)))?;
     let problem = instrumented_problem(rows, factors)?;
     let found = instrumental_variables(&problem, &settings.instrumental(rows.settings))?;
     Ok(BandEstimate { cutoff_hz, problem, found })

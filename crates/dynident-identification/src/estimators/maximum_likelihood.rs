@@ -154,7 +154,7 @@ pub(super) fn periodic(
                 "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
             )));
         };
-        means.push(mean_period(rows, index, (period_s, periods.skip_s), &|message| {
+        means.push(mean_period(rows, index, period_s, periods.skip_s, &|message| {
             wrong(format!("log `{name}`: {message}"))
         })?);
     }
@@ -237,7 +237,8 @@ fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>
 fn mean_period(
     rows: &TrainingRows<'_>,
     index: usize,
-    (period_s, skip_s): (f64, f64),
+    period_s: f64,
+    skip_s: f64,
     wrong: &dyn Fn(String) -> EstimatorError,
 ) -> Result<MeanPeriod, EstimatorError> {
     let TrainingRows { logs, model, .. } = *rows;

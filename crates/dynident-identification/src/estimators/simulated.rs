@@ -157,7 +157,7 @@ pub(super) fn simulated(
     let mut best: Option<StartOutcome> = None;
     let (mut iterations, mut simulations) = (0, 0);
     for start in begun {
-        let settled = settled(rows, &mut simulated, (start, experiment), (&measured, &plain.std))?;
+        let settled = settled(rows, &mut simulated, start, experiment, &measured, &plain.std)?;
         iterations += settled.iterations;
         simulations += settled.simulations;
         let done = settled.found.status != EstimateStatus::IterationLimit;
@@ -233,8 +233,10 @@ fn log_sum(sigma: &[f64]) -> f64 {
 fn settled(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
-    (start, experiment): (SimulatedStart, &SimulatedLoopSettings),
-    (measured, std): (&DVector<f64>, &[f64]),
+    start: SimulatedStart,
+    experiment: &SimulatedLoopSettings,
+    measured: &DVector<f64>,
+    std: &[f64],
 ) -> Result<StartOutcome, EstimatorError> {
     let settings = SimulatedSettings {
         criterion: simulated.compared.criterion(),

@@ -52,7 +52,7 @@ pub(super) fn spline_motion(
     rows.begin("motion and torque");
     let (mut records, mut temperatures_c) = (Vec::new(), Vec::new());
     for (log, &index) in rows.training.iter().enumerate() {
-        for (record, temperature_c) in read(rows, (log, index), &wrong)? {
+        for (record, temperature_c) in read(rows, log, index, &wrong)? {
             records.push(record);
             temperatures_c.push(temperature_c);
         }
@@ -110,7 +110,8 @@ pub(super) fn spline_motion(
 /// The pieces of recording number `index` as it was recorded, with temperatures where they were measured.
 fn read(
     rows: &TrainingRows<'_>,
-    (log, index): (usize, usize),
+    log: usize,
+    index: usize,
     wrong: &dyn Fn(String) -> EstimatorError,
 ) -> Result<Vec<(SplineRecord, Vec<f64>)>, EstimatorError> {
     let TrainingRows { logs, model, .. } = *rows;

@@ -46,7 +46,7 @@ impl<'a> SplineTorque<'a> {
     }
 
     /// Panels of all parts where friction follows the motion: one after another.
-    fn following(&mut self, (record, first): (usize, usize), parts: &[Part]) -> Option<Vec<Panels>> {
+    fn following(&mut self, record: usize, first: usize, parts: &[Part]) -> Option<Vec<Panels>> {
         let (workspace, history) = self.following.as_mut()?;
         if first == 0 {
             history.restart();
@@ -110,7 +110,8 @@ impl Instants<'_> {
         self,
         joint: usize,
         workspace: &mut BatchWorkspace,
-        (part, adjoint): (&Part, &mut Panels),
+        part: &Part,
+        adjoint: &mut Panels,
         parameters: &[f64],
     ) -> Vec<f64> {
         let (model, layout, samples) = (self.0.model(), self.0.layout(), part.samples);
@@ -148,7 +149,7 @@ impl TorqueModel for SplineTorque<'_> {
         let (joints, samples) = (self.model.dof(), motion.samples);
         let instants = Instants(self.model);
         let parts = Instants::parts(motion);
-        let known = self.following(place, &parts);
+        let known = self.following(place.0, place.1, &parts);
         let of = |workspace: &mut BatchWorkspace, (number, part): (usize, &Part)| -> Vec<Vec<f64>> {
             let torques = |panels: &Panels| {
                 (0..joints).map(|joint| instants.torque_of(joint, panels, part.samples, parameters)).collect()
@@ -178,14 +179,14 @@ impl TorqueModel for SplineTorque<'_> {
         let (joints, samples, layout) = (self.model.dof(), motion.samples, self.model.layout());
         let instants = Instants(self.model);
         let parts = Instants::parts(motion);
-        let known = self.following(place, &parts);
+        let known = self.following(place.0, place.1, &parts);
         let of = |workspace: &mut BatchWorkspace, part: &Part| {
             let panels = if known.is_none() { Some(instants.panels(workspace, part)) } else { None };
             let mut adjoint = Panels::default();
             adjoint.resize(layout, part.samples);
             (0..joints).for_each(|joint| adjoint.joint_mut(joint).fill(0.0));
             let slopes = (0..joints)
-                .map(|joint| instants.slopes_of(joint, workspace, (part, &mut adjoint), parameters))
+                .map(|joint| instants.slopes_of(joint, workspace, part, &mut adjoint, parameters))
                 .collect::<Vec<_>>();
             (panels, slopes)
         };

@@ -152,20 +152,22 @@ pub struct ModelUnderTest<'a> {
 /// # Errors
 /// What reading it can give.
 pub fn examine_held_out(
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    logs: &Logs<'_>,
+    settings: &EstimationSettings,
     model: &RegressorModel,
     index: usize,
     tested: &ModelUnderTest<'_>,
 ) -> Result<HeldOutExamination, LogError> {
     logs.begin(&format!("testing on {}", logs.recordings[index].name), &[index]);
-    let found = tested_on((logs, settings), model, index, tested, true);
+    let found = tested_on(logs, settings, model, index, tested, true);
     logs.end();
     found
 }
 
 /// [`examine_held_out`] as a part of a stage; `alone` lets a second thread read.
 pub(crate) fn tested_on(
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    logs: &Logs<'_>,
+    settings: &EstimationSettings,
     model: &RegressorModel,
     index: usize,
     tested: &ModelUnderTest<'_>,

@@ -46,7 +46,7 @@ impl Stiction {
         let levels = velocities.map(|velocity| {
             let mut level = [0.0; 2];
             for &(_, value, term) in &terms {
-                level[usize::from(term.needs_load())] += value * steady(term, (joint, model.dof()), velocity);
+                level[usize::from(term.needs_load())] += value * steady(term, joint, model.dof(), velocity);
             }
             level
         });
@@ -68,7 +68,7 @@ impl Stiction {
 
 /// The column of a term in the row of a joint while all joints move at a constant velocity, under a load of 1 Nm (N),
 /// after so long a way that elements with hysteresis slip.
-fn steady(term: &TorqueTerm, (joint, dof): (usize, usize), velocity: f64) -> f64 {
+fn steady(term: &TorqueTerm, joint: usize, dof: usize, velocity: f64) -> f64 {
     let (q, dq) = ([0.0, velocity.signum()].repeat(dof), vec![velocity; 2 * dof]);
     let ddq = vec![0.0; 2 * dof];
     let motion = JointMotion { samples: 2, q: &q, dq: &dq, ddq: &ddq };

@@ -33,7 +33,8 @@ impl RowConsumer for SecondPass<'_> {
 /// # Errors
 /// What reading it can give.
 pub fn examine_training(
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    logs: &Logs<'_>,
+    settings: &EstimationSettings,
     model: &RegressorModel,
     index: usize,
     theta: &[f64],

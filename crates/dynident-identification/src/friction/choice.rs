@@ -155,8 +155,10 @@ fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
 /// The columns behind the base parameters (payloads, offsets of single logs, gains), which every candidate has: their
 /// places among the columns of `wide_problem`, as far as the fit `plain` of `model` excites them.
 pub(super) fn further_columns(
-    (model, plain): (&RegressorModel, &Estimate),
-    (wide, wide_problem): (&RegressorModel, &LinearProblem),
+    model: &RegressorModel,
+    plain: &Estimate,
+    wide: &RegressorModel,
+    wide_problem: &LinearProblem,
 ) -> impl Iterator<Item = usize> {
     let (base, wide_base) = (model.layout().columns().len(), wide.layout().columns().len());
     let fixed: Vec<usize> = plain.rank.fixed.iter().map(|fixed| fixed.column).collect();
@@ -171,8 +173,10 @@ pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,
     wide_problem: &LinearProblem,
-    (candidates, most_inflation): (&[(usize, Vec<CandidateColumn>)], &[f64]),
-    (plain, equal_weights): (&Estimate, bool),
+    candidates: &[(usize, Vec<CandidateColumn>)],
+    most_inflation: &[f64],
+    plain: &Estimate,
+    equal_weights: bool,
 ) -> Result<Vec<JointFriction>, EstimationError> {
     let name = |joint: usize| model.model().joints()[joint].name.clone();
     let refused = |joint: usize, reason: &str| JointFriction::as_stated(name(joint), reason);
@@ -206,10 +210,10 @@ pub(crate) fn choose_friction(
         let fixed = |index: &usize| plain.rank.fixed.iter().any(|fixed| fixed.column == *index);
         let stated = (0..model.layout().columns().len()).filter(|index| kept(index) && !fixed(index));
         let others = choose.iter().filter(|&&other| other != joint).filter_map(|&other| chosen_before(other));
-        let further = further_columns((model, plain), (wide, wide_problem));
+        let further = further_columns(model, plain, wide, wide_problem);
         let common: Vec<usize> = stated.chain(others.flatten().copied()).chain(further).collect();
         match validation.joint(joint, &common, &variable, &weights) {
-            Ok(prepared) => Ok(search((name(joint), scale), (folds, inflation), &prepared, columns)),
+            Ok(prepared) => Ok(search(name(joint), scale, folds, inflation, &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {
                 Ok((refused(joint, "fewer rows than columns once a block is left out"), Vec::new()))
             }

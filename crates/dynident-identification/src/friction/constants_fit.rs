@@ -233,11 +233,13 @@ impl FrictionConstants {
     /// Rows that do not carry an estimate.
     pub(crate) fn step(
         &self,
-        (model, fitted): (&RegressorModel, &[f64]),
-        (wide, wide_problem): (&RegressorModel, &LinearProblem),
+        model: &RegressorModel,
+        fitted: &[f64],
+        wide: &RegressorModel,
+        wide_problem: &LinearProblem,
         solve: impl Fn(&LinearProblem) -> Result<Estimate, EstimationError>,
     ) -> Result<ConstantsStep, EstimationError> {
-        let problem = self.linearised((model, fitted), (wide, wide_problem))?;
+        let problem = self.linearised(model, fitted, wide, wide_problem)?;
         let found = solve(&problem)?;
         let (count, own) = (problem.columns().len() - self.axes.len(), self.axes.len());
         let furthest = |joint: usize| {
@@ -270,8 +272,10 @@ impl FrictionConstants {
     /// `[Y(c) | ∂(Y θ)/∂c]`: the model's columns, those of loads, and one for each constant.
     fn linearised(
         &self,
-        (model, fitted): (&RegressorModel, &[f64]),
-        (wide, wide_problem): (&RegressorModel, &LinearProblem),
+        model: &RegressorModel,
+        fitted: &[f64],
+        wide: &RegressorModel,
+        wide_problem: &LinearProblem,
     ) -> Result<LinearProblem, EstimationError> {
         let (own, further) = (model.layout().columns().len(), wide.layout().columns().len());
         let loads = wide_problem.columns().len() - further;

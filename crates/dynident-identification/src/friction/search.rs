@@ -207,8 +207,10 @@ fn add_terms(
 
 /// The choice for one joint, and the places of its columns.
 pub(super) fn search(
-    (joint, scale): (String, JointScale),
-    (count, most_inflation): (usize, f64),
+    joint: String,
+    scale: JointScale,
+    count: usize,
+    most_inflation: f64,
     folds: &JointFolds,
     columns: &[CandidateColumn],
 ) -> (JointFriction, Vec<usize>) {

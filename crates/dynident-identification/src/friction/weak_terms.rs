@@ -47,7 +47,8 @@ impl Further {
 /// are.
 fn further_terms(
     terms: &[TorqueTerm],
-    (columns, norms): (&[Column], &[f64]),
+    columns: &[Column],
+    norms: &[f64],
     estimate: &Estimate,
     own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
 ) -> Vec<Further> {
@@ -108,7 +109,7 @@ pub(super) fn without_weakest(
     own_constants: impl Fn(&TorqueTerm) -> Vec<usize>,
 ) -> Option<Vec<TorqueTerm>> {
     let of = |further: Further| (further.in_units_of(&SEEN), further.left);
-    let further = further_terms(terms, columns, estimate, own_constants).into_iter().map(of);
+    let further = further_terms(terms, columns.0, columns.1, estimate, own_constants).into_iter().map(of);
     let (seen, left) = further.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let is_weak = match weak {
         Weak::Unseen => seen < 1.0,
@@ -127,7 +128,7 @@ pub(super) fn has_doubtful_term(
 ) -> bool {
     let kind = core::mem::discriminant;
     let is_new = |further: &Further| !before.iter().any(|one| kind(one) == kind(&further.term));
-    let further = further_terms(terms, columns, estimate, own_constants);
+    let further = further_terms(terms, columns.0, columns.1, estimate, own_constants);
     further.iter().any(|further| is_new(further) && further.in_units_of(&SEEN_AT_SECOND_LOOK) < 1.0)
 }
 
@@ -212,7 +213,7 @@ mod tests {
         let settings = OrdinarySettings { covariance: CovarianceMethod::White, ..OrdinarySettings::default() };
         let estimate = ordinary_least_squares(&problem, &settings).unwrap();
         let norms = problem.column_norms();
-        let further = further_terms(&terms, (&columns, &norms), &estimate, |_| Vec::new());
+        let further = further_terms(&terms, &columns, &norms, &estimate, |_| Vec::new());
         assert_eq!(further.len(), 1);
         assert!((SEEN[0]..SEEN_AT_SECOND_LOOK[0]).contains(&further[0].square), "{}", further[0].square);
 

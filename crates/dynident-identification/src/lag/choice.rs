@@ -185,7 +185,8 @@ fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Opt
 /// The estimate with the error of the lags in its covariance, `Σ + S Σ_δ Sᵀ`.
 pub(super) fn with_lag_error(
     fit: &LagFit,
-    (choice, candidates): (&LagChoice, LagCandidates),
+    choice: &LagChoice,
+    candidates: LagCandidates,
     estimate: &Estimate,
 ) -> Estimate {
     let Some(half) = lag_error(fit, choice, candidates) else { return estimate.clone() };

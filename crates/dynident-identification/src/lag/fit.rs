@@ -97,10 +97,11 @@ struct Samples<'a> {
 /// short to fit to.
 pub(crate) fn fit_lags(
     checks: &[DelayCheck<'_>],
-    (unknowns, noise): (Unknowns<'_>, LogNoise),
+    unknowns: Unknowns<'_>,
+    noise: LogNoise,
     with: (&Logs<'_>, &EstimationSettings),
 ) -> Option<LagFit> {
-    fitted(checks.first()?.model(), (checks, unknowns, noise), with).ok()
+    fitted(checks.first()?.model(), checks, unknowns, noise, with).ok()
 }
 
 /// The lags of one log alone with what was taken off before it was read, by joint; `None` where it does not determine
@@ -111,14 +112,16 @@ pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSe
     let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
     let unknowns = Unknowns::of_log(check.theta());
     let rest =
-        fit_lags(&[check], (unknowns, LogNoise::Shared), with).map_or_else(|| vec![None; joints], |fit| fit.joints);
+        fit_lags(&[check], unknowns, LogNoise::Shared, with).map_or_else(|| vec![None; joints], |fit| fit.joints);
     let total = |(joint, rest): (usize, Option<TorqueLag>)| rest.map(|rest| rest.after(before(joint)));
     rest.into_iter().enumerate().map(total).collect()
 }
 
 fn fitted(
     model: &RegressorModel,
-    (checks, unknowns, noise): (&[DelayCheck<'_>], Unknowns<'_>, LogNoise),
+    checks: &[DelayCheck<'_>],
+    unknowns: Unknowns<'_>,
+    noise: LogNoise,
     with: (&Logs<'_>, &EstimationSettings),
 ) -> Result<LagFit, EstimationError> {
     let (logs, settings) = with;
@@ -166,7 +169,7 @@ impl<'a> Samples<'a> {
         lag_s: Vec<f64>,
     ) -> Result<Self, EstimationError> {
         let of_log = |check: &DelayCheck<'_>| -> Result<Vec<DelayRows>, EstimationError> {
-            let of_joint = |joint: usize| check.rows(with, joint, lag_s[joint] * check.rate_hz());
+            let of_joint = |joint: usize| check.rows(with.0, with.1, joint, lag_s[joint] * check.rate_hz());
             (0..lag_s.len()).into_par_iter().map(of_joint).collect()
         };
         let rows = checks.par_iter().map(of_log).collect::<Result<_, _>>()?;
@@ -179,7 +182,7 @@ impl<'a> Samples<'a> {
             for (joint, rows) in rows.iter_mut().enumerate() {
                 let shift = self.lag_s[joint] * check.rate_hz();
                 if !rows.reaches(shift) {
-                    *rows = check.rows(self.with, joint, shift)?;
+                    *rows = check.rows(self.with.0, self.with.1, joint, shift)?;
                 }
             }
         }

@@ -36,9 +36,12 @@ impl RowConsumer for DelayCheck<'_> {
 /// # Errors
 /// What reading them can give.
 pub fn lag_fit(
-    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
     model: &RegressorModel,
-    (columns, values, gains): (&LoadColumns, &[f64], &[DriveGain]),
+    columns: &LoadColumns,
+    values: &[f64],
+    gains: &[DriveGain],
     chosen: &[usize],
 ) -> Result<Option<LagFit>, LogError> {
     let theta: Vec<Vec<f64>> = chosen.iter().map(|&index| columns.base_values(index, values)).collect();
@@ -47,7 +50,7 @@ pub fn lag_fit(
     let values = &values[..columns.count()];
     let unknowns = Unknowns { values, loads: Some((columns, chosen)), gains: &free_gains(gains) };
     let with = (logs, &settings.estimation);
-    Ok(checks.and_then(|checks| fit_lags(&checks, (unknowns, settings.log_noise), with)))
+    Ok(checks.and_then(|checks| fit_lags(&checks, unknowns, settings.log_noise, with)))
 }
 
 /// The whole lag of each joint by the recordings `chosen`, each with the base parameters that `theta` gives for it:
@@ -57,7 +60,8 @@ pub fn lag_fit(
 /// # Errors
 /// What reading them can give.
 pub fn lags_of_recordings(
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    logs: &Logs<'_>,
+    settings: &EstimationSettings,
     model: &RegressorModel,
     theta: &(dyn Fn(usize) -> Vec<f64> + Sync),
     chosen: &[usize],
@@ -81,7 +85,7 @@ pub(crate) fn lags_after_pass(
 ) -> Result<Vec<Option<TorqueLag>>, LogError> {
     match whole(&with.0.recordings[index]) {
         Some(Cow::Borrowed(_)) => Ok(lags_of_log(check, with)),
-        _ => lags_of_recordings(with, check.model(), &|_| check.theta().to_vec(), &[index]),
+        _ => lags_of_recordings(with.0, with.1, check.model(), &|_| check.theta().to_vec(), &[index]),
     }
 }
 

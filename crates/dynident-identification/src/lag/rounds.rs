@@ -49,7 +49,7 @@ impl LagRounds {
         }
         let before = core::mem::take(&mut self.choice);
         self.choice = LagChoice { kind: before.kind, lag_s: before.lag_s, ..next };
-        *estimate = with_lag_error(fit, (&self.choice, self.candidates), estimate);
+        *estimate = with_lag_error(fit, &self.choice, self.candidates, estimate);
         false
     }
 

@@ -76,8 +76,8 @@ impl DelayRows {
         let mut panel = Vec::new();
         let (mut shares, mut counted) = (Vec::new(), Vec::new());
         for piece in pieces {
-            let signals = (&piece.model[joint][..], &piece.measured[joint][..], &piece.left_out[joint][..]);
-            let further = Further::new(signals, centre, rate_hz, filter);
+            let (measured, left_out) = (&piece.measured[joint], &piece.left_out[joint]);
+            let further = Further::new(&piece.model[joint], measured, left_out, centre, rate_hz, filter);
             let mut first = 0;
             for FilteredRows { rows, regressor, coverage } in &piece.rows[joint] {
                 let from = further.valid.start.max(first).min(first + rows);
@@ -124,7 +124,9 @@ impl Further {
     /// Of the predicted torque, the measured one, and the samples that are left out of both as they were of the
     /// regressor.
     fn new(
-        (model, measured, left_out): (&[f64], &[f64], &[usize]),
+        model: &[f64],
+        measured: &[f64],
+        left_out: &[usize],
         centre: isize,
         rate_hz: f64,
         filter: Option<&DecimationSettings>,
@@ -190,7 +192,7 @@ mod tests {
     fn rows_at_the_ends_are_left_out() {
         let signal: Vec<f64> = (0..50).map(f64::from).collect();
         for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
-            let found = Further::new((&signal, &signal, &[]), centre, 100.0, None);
+            let found = Further::new(&signal, &signal, &[], centre, 100.0, None);
             assert_eq!(found.valid, valid, "{centre}");
             for k in valid {
                 // The slope of a ramp, and the ramp itself further on.
@@ -198,6 +200,6 @@ mod tests {
                 assert_eq!(found.values[50 + k], (k as isize + centre - 2) as f64);
             }
         }
-        assert!(Further::new((&signal[..3], &signal[..3], &[]), 20, 100.0, None).valid.is_empty());
+        assert!(Further::new(&signal[..3], &signal[..3], &[], 20, 100.0, None).valid.is_empty());
     }
 }

@@ -106,7 +106,8 @@ impl<'a> DelayCheck<'a> {
     /// Too few rows.
     pub(crate) fn rows(
         &self,
-        (logs, settings): (&Logs<'_>, &EstimationSettings),
+        logs: &Logs<'_>,
+        settings: &EstimationSettings,
         joint: usize,
         shift: f64,
     ) -> Result<DelayRows, EstimationError> {

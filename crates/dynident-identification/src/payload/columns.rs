@@ -156,7 +156,7 @@ impl LoadColumns {
             }
         }
         let mut columns = Self { base, symbols, payloads, offsets, logs: Vec::new() };
-        let of_log = |log| columns.of_log(recordings, described, model, (&training, &known), log);
+        let of_log = |log| columns.of_log(recordings, described, model, &training, &known, log);
         columns.logs = (0..recordings.len()).map(of_log).collect();
         Ok(columns)
     }
@@ -182,7 +182,8 @@ impl LoadColumns {
         recordings: &[Recording],
         described: &[Payload],
         model: &RegressorModel,
-        (training, known): (&[usize], &[Option<Vec<f64>>]),
+        training: &[usize],
+        known: &[Option<Vec<f64>>],
         log: usize,
     ) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let carried = recordings[log].payload.as_ref();

@@ -25,7 +25,8 @@ pub(crate) fn free_gains(gains: &[DriveGain]) -> Vec<usize> {
 pub fn with_free_gains(
     problem: LinearProblem,
     free: &[usize],
-    (known, values): (&[Vec<f64>], &[f64]),
+    known: &[Vec<f64>],
+    values: &[f64],
 ) -> Result<LinearProblem, EstimationError> {
     if free.is_empty() {
         return Ok(problem);

@@ -16,7 +16,8 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) fn with_gain_error(
     problem: &LinearProblem,
     columns: &LoadColumns,
-    (estimate, held): (&Estimate, &[usize]),
+    estimate: &Estimate,
+    held: &[usize],
     share: f64,
 ) -> Result<Estimate, EstimationError> {
     let count = problem.columns().len();

@@ -86,16 +86,18 @@ pub struct PayloadResult {
 
 /// All payloads that were estimated.
 pub fn payload_results(
-    (recordings, payloads): (&[Recording], &[Payload]),
+    recordings: &[Recording],
+    payloads: &[Payload],
     training: &[usize],
     columns: &LoadColumns,
     estimate: &Estimate,
 ) -> Vec<PayloadResult> {
-    columns.payloads.iter().map(|payload| result((recordings, payloads), training, payload, estimate)).collect()
+    columns.payloads.iter().map(|payload| result(recordings, payloads, training, payload, estimate)).collect()
 }
 
 fn result(
-    (recordings, payloads): (&[Recording], &[Payload]),
+    recordings: &[Recording],
+    payloads: &[Payload],
     training: &[usize],
     columns: &PayloadColumns,
     estimate: &Estimate,

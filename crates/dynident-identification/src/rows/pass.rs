@@ -130,7 +130,7 @@ impl LogPass<'_> {
             && self.may_keep_rows(filter, consumer)
             && RowStore::has_room(self.model, filter, kept.samples())
         {
-            return self.kept_rows(kept, (filter, &places), consumer);
+            return self.kept_rows(kept, filter, &places, consumer);
         }
         let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let mut builder = RowBuilder::new(self.model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
@@ -169,15 +169,17 @@ impl LogPass<'_> {
         if let (Some(made), Some(kept), Some(filter)) = (made, self.kept.and_then(OnceLock::get), &filter) {
             kept.rows.keep(self.model, filter, made, passed.clone());
         }
-        self.statistics(report, (rate_hz, filter.as_ref()), (rows, needed), passed)
+        self.statistics(report, rate_hz, filter.as_ref(), rows, needed, passed)
     }
 
     /// What is known of a recording that has passed.
     fn statistics(
         &self,
         report: Option<ImportReport>,
-        (rate_hz, filter): (f64, Option<&DecimationSettings>),
-        (filtered_rows, needed): (u64, usize),
+        rate_hz: f64,
+        filter: Option<&DecimationSettings>,
+        filtered_rows: u64,
+        needed: usize,
         passed: Passed,
     ) -> Result<LogStatistics, LogError> {
         if filtered_rows == 0 {
@@ -207,7 +209,8 @@ impl LogPass<'_> {
     fn kept_rows(
         &self,
         kept: &KeptLog,
-        (filter, places): (&DecimationSettings, &[usize]),
+        filter: &DecimationSettings,
+        places: &[usize],
         consumer: &mut dyn RowConsumer,
     ) -> Result<LogStatistics, LogError> {
         let name = &self.recording.name;
@@ -228,7 +231,7 @@ impl LogPass<'_> {
         self.progress.advance(rows.samples() - made);
         rows.give(self.model, consumer, self.reader_thread)?;
         let passed = Passed { samples: rows.samples(), velocities: rows.velocities().to_vec() };
-        self.statistics(Some(kept.report.clone()), (kept.rate_hz, Some(filter)), (rows.count(), needed), passed)
+        self.statistics(Some(kept.report.clone()), kept.rate_hz, Some(filter), rows.count(), needed, passed)
     }
 
     /// Gives the motion to `take`, block by block and without its regressor, all of it or as many samples as are asked

@@ -71,7 +71,7 @@ impl<'a> PanelMaker<'a> {
     /// All columns of a model, joint `j` of which stands at place `places[j]` of the motion.
     pub(super) fn new(model: &'a RegressorModel, places: &[usize]) -> Self {
         let (layout, load) = (Cow::Borrowed(model.layout()), model.load_parameters.clone());
-        Self::of_layout(model, (layout, true), load, places)
+        Self::of_layout(model, layout, true, load, places)
     }
 
     /// Nothing but some `terms` of the model and what they need: where they know the load, bodies stand before them.
@@ -87,12 +87,13 @@ impl<'a> PanelMaker<'a> {
             columns.iter().map(of_column).collect()
         });
         let layout = PanelLayout::new(model.model(), columns);
-        Self::of_layout(model, (Cow::Owned(layout), needs_load), load, places)
+        Self::of_layout(model, Cow::Owned(layout), needs_load, load, places)
     }
 
     fn of_layout(
         model: &'a RegressorModel,
-        (layout, has_bodies): (Cow<'a, PanelLayout>, bool),
+        layout: Cow<'a, PanelLayout>,
+        has_bodies: bool,
         load: Option<Vec<f64>>,
         places: &[usize],
     ) -> Self {

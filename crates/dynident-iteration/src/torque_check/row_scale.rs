@@ -83,9 +83,18 @@ pub(crate) fn row_scales(
     let found = || {
         let model = RegressorModel::from(task.robot.clone());
         let execution = Execution::default();
-        let logs = Logs::new(task.robot.model(), &motions, identification.filters(), &all, None, execution).ok()?;
-        let training = training_rows((&logs, &identification), model, &all, &[], None).ok()?;
-        let found = estimate(&training.rows((&logs, &identification), &all), None).ok()?.estimate;
+        let logs = Logs::new(
+            task.robot.model(),
+            &motions,
+            &identification.motion,
+            &identification.parallel_filter,
+            &all,
+            None,
+            execution,
+        )
+        .ok()?;
+        let training = training_rows(&logs, &identification, model, &all, &[], None).ok()?;
+        let found = estimate(&training.rows(&logs, &identification, &all), None).ok()?.estimate;
         let mut out = vec![None; dof];
         let scales = tested(&training.problem, &found.values, least);
         for (&joint, mut scale) in training.joints.iter().zip(scales) {
@@ -165,7 +174,7 @@ struct Kappa {
 fn kappa(problem: &LinearProblem, values: &[f64], free: &[usize], place: usize) -> Option<Kappa> {
     let columns = problem.columns().len();
     let without_load = vec![vec![0.0; columns]; problem.logs().len()];
-    let wider = with_free_gains(problem.clone(), free, (&without_load, values)).ok()?;
+    let wider = with_free_gains(problem.clone(), free, &without_load, values).ok()?;
     let found = weighted_least_squares(&wider, &WeightedSettings::default()).ok()?;
     let column = columns + place;
     let (value, std) = (found.values[column], found.std[column]);

@@ -53,15 +53,23 @@ pub fn validate_result(
     let execution = options.execution();
     let (recordings, settings) = (&task.recordings, &task.settings);
     let tested = execution.install(|| {
-        let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, stored.cutoff_hz(), execution)?
-            .with_motion_band(stored.motion_hz());
+        let logs = Logs::new(
+            robot.model(),
+            recordings,
+            &settings.motion,
+            &settings.parallel_filter,
+            &chosen,
+            stored.cutoff_hz(),
+            execution,
+        )?
+        .with_motion_band(stored.motion_hz());
         let one = |&index: &usize| {
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);
             let physical = consistent.as_ref().map(|values| payloads.base_values(carried, values));
             let tested =
                 ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
-            examine_held_out((&logs, &settings.estimation), &model, index, &tested)
+            examine_held_out(&logs, &settings.estimation, &model, index, &tested)
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
     });

@@ -319,7 +319,7 @@ fn result_file(
         Findings::None => {}
     }
     let knowledge = task.settings.consistency.clone().unwrap_or_default();
-    let conditionals = conditionals(&found.training, (estimate, &found.noise_half_width_95), &knowledge);
+    let conditionals = conditionals(&found.training, estimate, &found.noise_half_width_95, &knowledge);
     let held_out = found.held_out.iter();
     let bands = held_out.clone().flat_map(|log| &log.validation.residuals).filter_map(|joint| joint.band.clone());
     ResultFile {
