@@ -36,13 +36,13 @@ pub struct BetweenLogs {
     pub friction: Option<f64>,
 }
 
-/// The estimate with what varies between the training logs in its covariance, as of what a further day will show, and
-/// by how much that was. `None` for a single log.
-pub(crate) fn with_variation(
+/// The covariance that the variation between the training logs adds to an estimate, for the prediction of a further
+/// day, and the size of that variation. `None` for a single log.
+pub(crate) fn variation_of_logs(
     training: &Training,
     settings: &WeightedSettings,
     estimate: &Estimate,
-) -> Option<(Estimate, BetweenLogs)> {
+) -> Option<(DMatrix<f64>, BetweenLogs)> {
     let problem = &training.problem;
     if problem.logs().len() < 2 || !training.columns.is_plain() {
         return None;
@@ -64,7 +64,7 @@ pub(crate) fn with_variation(
     });
     let between = DMatrix::from_fn(count, count, |row, column| of_one[(row, column)] * apart(row) * apart(column));
     let of_mean = error_of_all(problem, estimate, &between).unwrap_or_else(|| &between / alone.len().max(1) as f64);
-    Some((estimate.with_further_error(&(of_mean + between)), BetweenLogs { bodies, friction }))
+    Some((of_mean + between, BetweenLogs { bodies, friction }))
 }
 
 /// `Σ_l A_l T A_lᵀ` of the columns that T, `between`, is of. `None` where the rows of all logs do not determine the

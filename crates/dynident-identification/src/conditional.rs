@@ -24,6 +24,9 @@ pub struct Condition {
 pub struct Conditional {
     /// The parameters at nominal that matter for it, the strongest first; empty for one that stands on its own.
     pub on: Vec<Condition>,
+    /// Standard deviation by the error of the nominal values, in the parameter's unit; none where nothing is known of
+    /// them, and where they do not matter.
+    pub nominal_std: Option<f64>,
     /// Half the width of the 95 % interval with what the nominal values may be wrong by; for a parameter at nominal
     /// that alone. None where nothing is known of the nominal values.
     pub half_width_95: Option<f64>,
@@ -75,11 +78,13 @@ pub fn conditionals(
         let name = |&place: &usize| Condition { on: fixed[place].name.clone(), per_unit: answers[place] };
         Conditional {
             on: places.iter().map(name).collect(),
+            nominal_std: variance.map(f64::sqrt),
             half_width_95: variance.map(|variance| own.hypot(HALF_WIDTH_95 * variance.sqrt())),
         }
     };
     let of_fixed = |column: usize| Conditional {
         on: Vec::new(),
+        nominal_std: spread.as_ref().map(|spread| spread[(column, column)].sqrt()),
         half_width_95: spread.as_ref().map(|spread| HALF_WIDTH_95 * spread[(column, column)].sqrt()),
     };
     let is_fixed = |column: usize| fixed.iter().any(|fixed| fixed.column == column);

@@ -1,10 +1,12 @@
 //! From recordings to an estimate, with the torque's lag among the unknowns: fits until the rows show none.
 
-use crate::between_logs::with_variation;
+use crate::bars::ErrorSource;
+use crate::between_logs::variation_of_logs;
 use crate::chosen_friction::{ChosenFriction, GridTerms, OtherFriction, friction_of_other_cutoff};
 use crate::error::IdentificationError;
 use crate::excerpt::excerpts;
 use crate::execution::Execution;
+use crate::friction::ConstantsError;
 use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::likelihood::schwarz;
 use crate::one_fit::{Choices, Fitted, Job, Known, StageTimes, fitted_once};
@@ -36,15 +38,15 @@ pub(crate) fn fitted<'a>(
     };
     if is_model && found.settings.estimation.estimator.reads_filtered_rows() {
         let weighted = found.settings.estimation.weighted();
-        let varied = with_variation(&found.training, &weighted, &found.estimation.estimate);
-        found.between_logs = varied.map(|(estimate, between)| {
-            found.estimation.estimate = estimate;
-            between
-        });
+        let variation = variation_of_logs(&found.training, &weighted, &found.estimation.estimate);
+        let (covariance, between_logs) = variation.unzip();
+        found.bars = found.bars.with(ErrorSource::BetweenLogs, covariance);
+        found.between_logs = between_logs;
     }
-    if let Some(error) = &found.constants_error {
-        found.estimation.estimate = error.added_to(found.training.problem.columns(), &found.estimation.estimate);
-    }
+    let of_columns =
+        |error: &ConstantsError| error.covariance_of(found.training.problem.columns(), &found.estimation.estimate);
+    let covariance = found.constants_error.as_ref().map(of_columns);
+    found.bars = found.bars.with(ErrorSource::FrictionConstants, covariance);
     Ok(found)
 }
 
@@ -154,9 +156,9 @@ impl<'a> LagStart<'a> {
         let mut alike = Some(without_lag);
         loop {
             let known = Known::Look(GridTerms::WithoutMemory, alike.take());
-            let mut found = fitted_once(task, &settings, chosen, known, execution, job)?;
+            let found = fitted_once(task, &settings, chosen, known, execution, job)?;
             times = times.and(&found.times);
-            if !rounds.again(free_lag(&found, chosen)?.as_ref(), &mut found.estimation.estimate) {
+            if !rounds.again(free_lag(&found, chosen)?.as_ref(), &found.estimation.estimate) {
                 let rounds = LagRounds::of(task.settings.lags).after(rounds.choice());
                 return Ok(Self { settings, rounds, first_look: Some(found), times });
             }
@@ -203,7 +205,7 @@ fn best_start<'a>(
     let Some(found) = &none.first_look else { return Ok(none) };
     let shows_lag = |found: &Fitted<'_>| -> Result<bool, IdentificationError> {
         let fit = free_lag(found, chosen)?;
-        Ok(LagRounds::of(LagCandidates::Common).again(fit.as_ref(), &mut found.estimation.estimate.clone()))
+        Ok(LagRounds::of(LagCandidates::Common).again(fit.as_ref(), &found.estimation.estimate))
     };
     let is_seen = shows_lag(found)?;
     let mut times = none.times;
@@ -249,8 +251,7 @@ fn lag_rounds<'a>(
         times = times.and(&found.times);
         let started = Instant::now();
         let fit = if is_free { free_lag(&found, chosen)? } else { None };
-        found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);
-        let again = rounds.again(fit.as_ref(), &mut found.estimation.estimate);
+        let again = rounds.again(fit.as_ref(), &found.estimation.estimate);
         times.estimation_s += started.elapsed().as_secs_f64();
         if again {
             settings.motion.torque_lag_s = rounds.torque_lag_s();
@@ -265,6 +266,7 @@ fn lag_rounds<'a>(
             }
         }
         found.times = times;
+        found.bars = found.bars.with(ErrorSource::Lag, rounds.error(fit.as_ref(), &found.estimation.estimate));
         found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
         if let (Some(fit), Some((_, gains))) = (&fit, &mut found.training.gains) {
             for (joint, share) in free_gains(gains).into_iter().zip(gain_errors(fit, &found.lag)) {

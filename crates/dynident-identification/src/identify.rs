@@ -1,6 +1,7 @@
 //! The whole way from recordings to an identified model, stage by stage.
 
 use crate::bandwidth::CutoffByError;
+use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::BetweenLogs;
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
@@ -20,7 +21,7 @@ use crate::fitted::fitted;
 use crate::lag::LagChoice;
 use crate::logs::{Logs, of_role};
 use crate::one_fit::{Fitted, Job, StageTimes};
-use crate::payload::{KnownArm, PayloadError, PayloadResult, payload_results, with_gain_error};
+use crate::payload::{KnownArm, PayloadError, PayloadResult, gain_error, payload_results};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
 use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings};
@@ -83,8 +84,12 @@ pub struct Identification {
     pub training: Training,
     /// The estimator that made the estimate: of `auto` the one that it took.
     pub estimator: Estimator,
-    /// The estimate and what its estimator can determine.
+    /// What the estimator returned: values with error bars by the residuals alone, and what it can determine.
     pub estimation: Estimation,
+    /// The other terms of the error bars.
+    pub bars: ErrorBars,
+    /// The estimate with all terms in its error bars, and with parameters held at zero where that was asked for.
+    pub estimate: Estimate,
     /// What was held at zero because the data hardly determine it, if that was asked for.
     pub essential: Option<EssentialReport>,
     /// Bodies, friction and drives.
@@ -103,9 +108,6 @@ pub struct Identification {
     /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
     /// one.
     pub between_logs: Option<BetweenLogs>,
-    /// Halves of the 95 % intervals of the estimate by its residuals alone, before what is unknown of the lag and of
-    /// the constants of chosen friction and what varies between logs have widened them.
-    pub noise_half_width_95: Vec<f64>,
     /// Where the time went.
     pub times: StageTimes,
 }
@@ -118,12 +120,12 @@ impl Identification {
 
     /// The estimate over base parameters, payloads and offsets of single logs.
     pub fn estimate(&self) -> &Estimate {
-        &self.estimation.estimate
+        &self.estimate
     }
 
     /// Base parameters as estimated.
     pub fn base_values(&self) -> &[f64] {
-        &self.estimation.estimate.values[..self.training.columns.base()]
+        &self.estimate.values[..self.training.columns.base()]
     }
 
     /// Inertial parameters of all bodies: of the consistent set, where there is one.
@@ -198,7 +200,7 @@ fn identified(
     let Fitted {
         logs,
         training,
-        mut estimation,
+        estimation,
         settings,
         cutoff,
         robot,
@@ -206,28 +208,29 @@ fn identified(
         stated_friction,
         lag,
         between_logs,
-        noise_half_width_95,
+        bars,
         mut times,
         ..
     } = fitted(task, &chosen, execution, job)?;
     let (settings, started) = (&settings, Instant::now());
+    let mut estimate = bars.total(&estimation.estimate);
     let mut dropped = None;
     if let Some(essential_settings) = &settings.estimation.essential {
-        let (rest, report) = essential(&estimation.estimate, essential_settings)?;
-        (estimation.estimate, dropped) = (rest, Some(report));
+        let (rest, report) = essential(&estimate, essential_settings)?;
+        (estimate, dropped) = (rest, Some(report));
     }
 
     // Bodies, friction and drives that a robot can have; then what held-out recordings say of them.
     let held = job.arm().is_some();
     let bodies = || -> Result<_, IdentificationError> {
         let consistent = if held {
-            held_arm(task, &training, &estimation.estimate)
+            held_arm(task, &training, &estimate)
         } else {
-            consistent_stage(&logs, settings, &training, &estimation.estimate)?
+            consistent_stage(&logs, settings, &training, &estimate)?
         };
         let estimation_s = started.elapsed().as_secs_f64();
         let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
-        let held_out = examine_all_held_out(&logs, settings, &training, &estimation.estimate, physical);
+        let held_out = examine_all_held_out(&logs, settings, &training, &estimate, physical);
         Ok((consistent, estimation_s, held_out))
     };
     // Beside that, what training recordings say of the estimate.
@@ -235,9 +238,9 @@ fn identified(
     let signs = || match &stated_friction {
         _ if held => Ok((None, Vec::new())),
         Some((stated, plain)) => torque_signs(stated, plain),
-        None => torque_signs(&training, &estimation.estimate),
+        None => torque_signs(&training, &estimate),
     };
-    let examined = || examine_all_training(&logs, settings, &training, &estimation.estimate);
+    let examined = || examine_all_training(&logs, settings, &training, &estimate);
     let (bodies, (signs, examined)) = if execution.parallel() {
         rayon::join(bodies, || rayon::join(signs, examined))
     } else {
@@ -257,9 +260,9 @@ fn identified(
             || agreements().any(PriorAgreement::is_poor)
             || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
             || break_limits(&training, robot.model())
-            || held_out.iter().any(|log| is_far_worse(&log.validation, &estimation.estimate.joint_sigma))
+            || held_out.iter().any(|log| is_far_worse(&log.validation, &estimate.joint_sigma))
     };
-    let plain = training.columns.is_plain().then(|| &estimation.estimate.values[..training.columns.base()]);
+    let plain = training.columns.is_plain().then(|| &estimate.values[..training.columns.base()]);
     let own_terms = training.friction_choice.is_empty();
     let diagnosis = match settings.diagnosis {
         DiagnosisChoice::Never => None,
@@ -274,7 +277,8 @@ fn identified(
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     let of_arm = job.arm().map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
     let gain_std = if settings.gains == GainChoice::Stated { settings.gain_std } else { 0.0 };
-    let with_gains = with_gain_error(&training.problem, &training.columns, &estimation.estimate, &of_arm, gain_std)?;
+    let gain_error = gain_error(&training.problem, &training.columns, &estimate, &of_arm, gain_std)?;
+    let with_gains = ErrorBars::default().with(ErrorSource::Gains, gain_error).total(&estimate);
     Ok(Identification {
         payloads: payload_results(recordings, payloads, &chosen, &training.columns, &with_gains),
         motion: logs.motion.clone(),
@@ -284,6 +288,8 @@ fn identified(
         training,
         estimator: settings.estimation.estimator.clone(),
         estimation,
+        bars,
+        estimate,
         essential: dropped,
         consistent,
         examination,
@@ -291,7 +297,6 @@ fn identified(
         diagnosis,
         torque_lag: lag,
         between_logs,
-        noise_half_width_95,
         times,
     })
 }

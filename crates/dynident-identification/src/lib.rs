@@ -117,6 +117,7 @@
 #![forbid(unsafe_code)]
 
 mod bandwidth;
+mod bars;
 mod between_logs;
 mod check;
 mod chosen_friction;
@@ -153,6 +154,7 @@ mod task;
 mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
+pub use bars::{ErrorBars, ErrorSource};
 pub use between_logs::BetweenLogs;
 pub use check::{StudyExamination, examine_study};
 pub use chosen_friction::{ChosenFriction, choose_friction};

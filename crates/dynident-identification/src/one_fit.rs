@@ -2,6 +2,7 @@
 //! that is known or none.
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
+use crate::bars::ErrorBars;
 use crate::between_logs::BetweenLogs;
 use crate::chosen_friction::{
     ChosenFriction, GridFriction, GridTerms, choose_friction, constants_of_all_rows, friction_by_grid,
@@ -93,8 +94,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) lag: LagChoice,
     /// None for a single log.
     pub(crate) between_logs: Option<BetweenLogs>,
-    /// Halves of the 95 % intervals before lag, logs and constants of friction have widened them.
-    pub(crate) noise_half_width_95: Vec<f64>,
+    /// Terms of the estimate's covariance beyond the noise.
+    pub(crate) bars: ErrorBars,
     pub(crate) times: StageTimes,
 }
 
@@ -190,7 +191,7 @@ pub(crate) fn fitted_once<'a>(
         constants_error: friction.constants_error,
         lag: LagChoice::default(),
         between_logs: None,
-        noise_half_width_95: Vec::new(),
+        bars: ErrorBars::default(),
         times: StageTimes { logs_s, estimation_s, examination_s: 0.0 },
     })
 }

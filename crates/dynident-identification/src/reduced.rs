@@ -4,7 +4,8 @@
 //! triangles alone, as [`identify`](crate::identify()) would of the logs. For that, nothing may be left that is chosen
 //! by looking at the samples again: cut-off, drives and friction are stated, the estimator is least squares.
 
-use crate::between_logs::with_variation;
+use crate::bars::{ErrorBars, ErrorSource};
+use crate::between_logs::variation_of_logs;
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, estimate};
 use crate::examination::{friction_signs, sign_evidence};
@@ -115,13 +116,11 @@ fn identified(
     let factors = factors.collect::<Result<Vec<_>, _>>()?;
     let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
     let training_rows = passes.of_factors(model, factors)?;
-    let Estimation { mut estimate, .. } = estimate(&training_rows.rows(&logs, settings, &training), None)?;
-    let noise_half_width_95 = estimate.half_width_95.clone();
-    let varied = with_variation(&training_rows, &settings.estimation.weighted(), &estimate);
-    let between_logs = varied.map(|(wider, between)| {
-        estimate = wider;
-        between
-    });
+    let Estimation { estimate: noise, .. } = estimate(&training_rows.rows(&logs, settings, &training), None)?;
+    let variation = variation_of_logs(&training_rows, &settings.estimation.weighted(), &noise);
+    let (covariance, between_logs) = variation.unzip();
+    let bars = ErrorBars::default().with(ErrorSource::BetweenLogs, covariance);
+    let estimate = bars.total(&noise);
     let consistent = consistent_stage(&logs, settings, &training_rows, &estimate)?;
     let dof = training_rows.model.dof();
     let examination = TrainingExamination {
@@ -138,7 +137,9 @@ fn identified(
         motion_hz: None,
         drive_inertia: None,
         estimator: settings.estimation.estimator.clone(),
-        estimation: Estimation::plain(estimate),
+        estimation: Estimation::plain(noise),
+        bars,
+        estimate,
         essential: None,
         consistent,
         examination,
@@ -146,7 +147,6 @@ fn identified(
         diagnosis: None,
         torque_lag: LagChoice::default(),
         between_logs,
-        noise_half_width_95,
         times: StageTimes { estimation_s: started.elapsed().as_secs_f64(), ..StageTimes::default() },
         training: training_rows,
     })

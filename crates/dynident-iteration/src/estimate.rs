@@ -17,8 +17,8 @@ use dynident_identification::estimators::estimate;
 use dynident_identification::examination::{LagChoice, LagKind, LagRounds, TorqueLag, lag_fit, lags_of_recordings};
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{
-    Execution, IdentificationSettings, Logs, OffsetChoice, Recording, Training, choose_friction, consistent_stage,
-    schwarz, training_rows,
+    ErrorBars, ErrorSource, Execution, IdentificationSettings, Logs, OffsetChoice, Recording, Training,
+    choose_friction, consistent_stage, schwarz, training_rows,
 };
 use serde::{Deserialize, Serialize};
 
@@ -198,12 +198,16 @@ impl RunsFit<'_> {
                 let estimate = joint_by_joint(task, &logs, &training, settings, &run_weights(task, runs))?;
                 return Ok(RunsEstimate { estimate, schwarz: 0.0 });
             }
-            let mut found = estimate(&training.rows(&logs, &identification, &all), None)?.estimate;
+            let found = estimate(&training.rows(&logs, &identification, &all), None)?.estimate;
             let fit = lag_fit(&logs, &identification, &training.model, &training.columns, &found.values, &[], &all)?;
-            if !rounds.again(fit.as_ref(), &mut found) {
+            if !rounds.again(fit.as_ref(), &found) {
                 let schwarz = schwarz(&training.problem, &found);
-                let found = chosen.with_error_of_constants(training.problem.columns(), found);
-                let estimate = all_joints(&logs, &identification, training, &all[..], found, rounds.choice(), runs)?;
+                let of_constants = chosen.error_of_constants(training.problem.columns(), &found);
+                let bars = ErrorBars::default()
+                    .with(ErrorSource::Lag, rounds.error(fit.as_ref(), &found))
+                    .with(ErrorSource::FrictionConstants, of_constants);
+                let total = bars.total(&found);
+                let estimate = all_joints(&logs, &identification, training, &all, total, rounds.choice(), runs)?;
                 return Ok(RunsEstimate { estimate, schwarz });
             }
         }

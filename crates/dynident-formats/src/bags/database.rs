@@ -1,6 +1,6 @@
 //! The SQLite files of rosbag2.
 
-use super::messages::{Channel, Encoding, Part};
+use super::part::{Channel, Encoding, Part};
 use super::sqlite::{Rows, Sqlite, Value};
 use crate::error::FileError;
 use crate::ros::definitions_of;

@@ -1,6 +1,6 @@
 //! MCAP, read from front to end: <https://mcap.dev/spec>.
 
-use super::messages::{Channel, Encoding, Part};
+use super::part::{Channel, Encoding, Part};
 use crate::bytes::Bytes;
 use crate::error::FileError;
 use crate::kind::FileFormat;

@@ -1,41 +1,10 @@
 //! Messages one after the other, whatever file they lie in.
 
+use super::part::{Channel, Part};
 use super::{database, mcap_file};
 use crate::error::FileError;
 use crate::kind::FileFormat;
-use core::fmt;
 use std::path::{Path, PathBuf};
-
-/// How messages of a channel are written.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
-    /// CDR; the texts of a definition that may explain it.
-    Cdr(Vec<String>),
-    /// JSON.
-    Json,
-    /// Any other, and what it is.
-    Other(String),
-}
-
-/// What a part of a recording calls one stream of messages.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Channel {
-    pub(super) topic: String,
-    pub(super) kind: String,
-    pub(super) encoding: Encoding,
-}
-
-/// One part of a recording, read from its beginning.
-pub(super) trait Part: fmt::Debug + Send {
-    /// The next message: its channel, the time at which it was recorded (ns), its bytes; `None` at the end.
-    fn next(&mut self, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError>;
-
-    /// The channels met so far, by their number.
-    fn channel(&self, index: usize) -> Option<&Channel>;
-
-    /// Whether the part ended too early.
-    fn truncated(&self) -> bool;
-}
 
 /// The messages of all parts.
 #[derive(Debug)]

@@ -13,6 +13,8 @@ mod mcap_file;
 #[cfg(feature = "bags")]
 mod messages;
 #[cfg(feature = "bags")]
+mod part;
+#[cfg(feature = "bags")]
 mod sqlite;
 #[cfg(feature = "bags")]
 mod table;

@@ -1,6 +1,6 @@
 //! One topic: its columns, found in its first messages, and the numbers of each message.
 
-use super::messages::{Channel, Encoding};
+use super::part::{Channel, Encoding};
 use crate::arrays::MOST_COLUMNS;
 use crate::json_lines::flattened;
 use crate::ros::{Decoder, Definition, Leaves};

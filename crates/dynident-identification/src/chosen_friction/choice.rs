@@ -18,6 +18,7 @@ use crate::training::{Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::Estimate;
 use dynident_model::terms::TorqueTerm;
+use nalgebra::DMatrix;
 
 /// A model with the friction that its recordings chose.
 #[derive(Clone, Debug)]
@@ -38,12 +39,9 @@ impl ChosenFriction {
         Self { model, joints: Vec::new(), stated: None, constants_error: None }
     }
 
-    /// An estimate over the columns `symbols` with what is unknown of the constants of friction in its bars.
-    pub fn with_error_of_constants(&self, symbols: &[String], estimate: Estimate) -> Estimate {
-        match &self.constants_error {
-            Some(error) => error.added_to(symbols, &estimate),
-            None => estimate,
-        }
+    /// The covariance that the uncertainty of the friction constants adds to an estimate of the columns `symbols`.
+    pub fn error_of_constants(&self, symbols: &[String], estimate: &Estimate) -> Option<DMatrix<f64>> {
+        self.constants_error.as_ref().map(|error| error.covariance_of(symbols, estimate))
     }
 }
 

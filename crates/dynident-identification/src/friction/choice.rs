@@ -3,14 +3,14 @@
 //! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see
 //! [`CrossValidation`]); how one joint's are searched is in `search`.
 
-use super::candidates::{CandidateColumn, FrictionKind, JointScale};
+use super::candidates::{CandidateColumn, JointScale};
+use super::joint_friction::JointFriction;
 use super::search::search;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
 use dynident_estimation::{CrossValidation, Estimate, EstimationError, LinearProblem};
 use dynident_model::terms::{TorqueTerm, sort_terms};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// Blocks of time; half as many where a log is too short for these.
 const FOLDS: [usize; 2] = [10, 5];
@@ -19,101 +19,6 @@ const ROUNDS: usize = 2;
 /// Root mean square velocity below which a joint does not move, rad/s or m/s of a usual arm: what the position noise of
 /// a standing joint looks like.
 const MOVING: f64 = 1.0e-3;
-
-/// How the friction of one joint was chosen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct JointFriction {
-    /// The joint.
-    pub joint: String,
-    /// What was chosen, or why nothing was: the stated terms then stay in force.
-    pub chosen: String,
-    /// The joint's friction; none when nothing was chosen.
-    pub terms: Option<Vec<TorqueTerm>>,
-    /// The constants of these terms, estimated together with all parameters.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub constants: Vec<FrictionConstant>,
-    /// Blocks of time that were left out in turn.
-    pub folds: usize,
-    /// What was compared, each with its best constants.
-    pub candidates: Vec<FrictionCandidate>,
-}
-
-impl JointFriction {
-    /// A joint whose friction stays as it is stated, for this reason.
-    pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
-        let chosen = format!("as the study states: {reason}");
-        Self { joint: joint.into(), chosen, terms: None, constants: Vec::new(), folds: 0, candidates: Vec::new() }
-    }
-
-    /// The same with these terms in the place of what was chosen before: with other constants, or fewer.
-    pub(crate) fn choose(&mut self, terms: &[TorqueTerm]) {
-        let name = name_of(terms);
-        if self.terms.as_deref().map(name_of).is_some_and(|before| before != name) {
-            if self.candidates.iter().any(|candidate| candidate.term == name) {
-                self.candidates.iter_mut().for_each(|candidate| candidate.chosen = candidate.term == name);
-            }
-            self.chosen = name;
-        }
-        self.terms = Some(terms.to_vec());
-    }
-}
-
-/// A constant of a friction term that the recordings chose.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct FrictionConstant {
-    /// The term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
-    pub term: String,
-    /// The constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
-    pub constant: String,
-    /// Its value: widths and velocities in rad/s (m/s), steepness in s/rad (s/m).
-    pub value: f64,
-    /// 95 % interval by the torque that the model leaves, with little known of the constant beforehand: a factor of 10
-    /// either way. It is symmetric on a logarithmic scale.
-    pub interval_95: [f64; 2],
-}
-
-impl FrictionConstant {
-    /// The narrowest step at rest that its 95 % interval leaves, rad/s (m/s): the lower end of a `width`; of a
-    /// `steepness` `φ₂` what half a Coulomb step of width `2/φ₂` has at the upper end. `None` for other constants.
-    pub fn narrowest_step(&self) -> Option<f64> {
-        let [least, most] = self.interval_95;
-        match &self.constant[..] {
-            "width" => Some(least),
-            "steepness" => Some(2.0 / most),
-            _ => None,
-        }
-    }
-}
-
-/// One model of a joint's friction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct FrictionCandidate {
-    /// Its terms.
-    #[serde(rename = "law")]
-    pub term: String,
-    /// Symbols of the parameters that are not zero.
-    pub parameters: Vec<String>,
-    /// Parameters and tuned constants.
-    pub complexity: usize,
-    /// Root mean square of the joint's residual on blocks that were left out, Nm (N).
-    pub cv_error_nm: f64,
-    /// Mean square error above the least of all candidates, in standard errors of this difference; 0 for the least.
-    pub excess_standard_errors: f64,
-    /// Whether it was chosen.
-    pub chosen: bool,
-}
-
-/// The kinds of some terms, as candidates are named.
-fn name_of(terms: &[TorqueTerm]) -> String {
-    let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(FrictionKind::of).collect();
-    kinds.sort();
-    kinds.dedup();
-    let names: Vec<&str> = kinds.into_iter().map(FrictionKind::name).collect();
-    if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
-}
 
 /// The robot with the choice in force: a joint's friction is replaced, its drive inertia and offset stay.
 ///

@@ -10,8 +10,8 @@
 //! `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`: their error bars have to hold it.
 
 use super::candidates::JointScale;
-use super::choice::{FrictionConstant, JointFriction};
 use super::constants::{at, coordinates, step_of, value_at};
+use super::joint_friction::{FrictionConstant, JointFriction};
 use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
@@ -72,18 +72,16 @@ pub(crate) struct ConstantsError {
 }
 
 impl ConstantsError {
-    /// The estimate with this error in its bars. Columns are found by their symbols; what is held stays as it is.
-    pub(crate) fn added_to(&self, symbols: &[String], estimate: &Estimate) -> Estimate {
+    /// The covariance that this error adds to an estimate of the columns `symbols`; zero for columns that are held.
+    pub(crate) fn covariance_of(&self, symbols: &[String], estimate: &Estimate) -> DMatrix<f64> {
         let is_fixed = |column: usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == column);
         let place = |column: usize| self.symbols.iter().position(|own| *own == symbols[column]);
         let places: Vec<Option<usize>> =
             (0..symbols.len()).map(|column| place(column).filter(|_| !is_fixed(column))).collect();
-        let further =
-            DMatrix::from_fn(symbols.len(), symbols.len(), |row, column| match (places[row], places[column]) {
-                (Some(row), Some(column)) => self.covariance[(row, column)],
-                _ => 0.0,
-            });
-        estimate.with_further_error(&further)
+        DMatrix::from_fn(symbols.len(), symbols.len(), |row, column| match (places[row], places[column]) {
+            (Some(row), Some(column)) => self.covariance[(row, column)],
+            _ => 0.0,
+        })
     }
 }
 

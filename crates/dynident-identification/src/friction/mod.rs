@@ -4,12 +4,14 @@ mod candidates;
 mod choice;
 mod constants;
 mod constants_fit;
+mod joint_friction;
 mod search;
 mod second_start;
 mod weak_terms;
 
 pub use candidates::FrictionSearch;
-pub use choice::{FrictionCandidate, FrictionConstant, JointFriction, chosen_model};
+pub use choice::chosen_model;
+pub use joint_friction::{FrictionCandidate, FrictionConstant, JointFriction};
 
 pub(crate) use candidates::{CandidateColumn, JointScale, candidate_columns, step_columns};
 pub(crate) use choice::choose_friction;

@@ -13,8 +13,8 @@
 //! what the column between them would: so no further term is needed to patch up a grid that is too coarse.
 
 use super::candidates::{CandidateColumn, FrictionKind, JointScale};
-use super::choice::{FrictionCandidate, JointFriction};
 use super::constants::{mean_term, with_one_step};
+use super::joint_friction::{FrictionCandidate, JointFriction};
 use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::TorqueTerm;
 

@@ -182,21 +182,21 @@ fn lag_error(fit: &LagFit, choice: &LagChoice, candidates: LagCandidates) -> Opt
     })
 }
 
-/// The estimate with the error of the lags in its covariance, `Σ + S Σ_δ Sᵀ`.
-pub(super) fn with_lag_error(
+/// The covariance `S Σ_δ Sᵀ` that the error of the lags adds to an estimate.
+pub(super) fn covariance_of_lag(
     fit: &LagFit,
     choice: &LagChoice,
     candidates: LagCandidates,
     estimate: &Estimate,
-) -> Estimate {
-    let Some(half) = lag_error(fit, choice, candidates) else { return estimate.clone() };
+) -> Option<DMatrix<f64>> {
+    let half = lag_error(fit, choice, candidates)?;
     let half = half.rows(0, fit.parameters);
     let mut further = half * half.transpose();
     for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.parameters) {
         further.row_mut(fixed.column).fill(0.0);
         further.column_mut(fixed.column).fill(0.0);
     }
-    estimate.with_further_error(&further)
+    Some(further)
 }
 
 /// Standard deviations that the error of the lags makes in the gains that are unknown, as shares of them.

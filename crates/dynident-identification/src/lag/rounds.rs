@@ -1,10 +1,11 @@
 //! Fitting again without the lag that the rows show.
 
-use super::choice::{LagChoice, LagKind, choose_lag, with_lag_error};
+use super::choice::{LagChoice, LagKind, choose_lag, covariance_of_lag};
 use super::fit::LagFit;
 use crate::settings::LagCandidates;
 use dynident_estimation::Estimate;
 use dynident_recording::log::OneOrMany;
+use nalgebra::DMatrix;
 
 /// Rounds of measuring the lag and making the rows again without it, at most; one or two are usual.
 const MOST_ROUNDS: usize = 3;
@@ -37,9 +38,9 @@ impl LagRounds {
         self.choice.taken_off()
     }
 
-    /// Whether to fit once more, now without the lag that `fit` found in the rows of `estimate`. Where not, what stays
-    /// unknown of the lag is in the error bars of `estimate` from now on. `fit` is none where no lag can be told.
-    pub fn again(&mut self, fit: Option<&LagFit>, estimate: &mut Estimate) -> bool {
+    /// Whether to fit once more, now without the lag that `fit` found in the rows of `estimate`. `fit` is `None` where
+    /// the rows do not determine a lag.
+    pub fn again(&mut self, fit: Option<&LagFit>, estimate: &Estimate) -> bool {
         let Some(fit) = fit else { return false };
         let next = choose_lag(fit, &self.choice.lag_s, estimate, self.candidates);
         if next.kind != LagKind::None && self.done < MOST_ROUNDS {
@@ -49,8 +50,13 @@ impl LagRounds {
         }
         let before = core::mem::take(&mut self.choice);
         self.choice = LagChoice { kind: before.kind, lag_s: before.lag_s, ..next };
-        *estimate = with_lag_error(fit, &self.choice, self.candidates, estimate);
         false
+    }
+
+    /// The covariance that the remaining uncertainty of the lag adds to `estimate`, after the last round. `None` where
+    /// the rows do not determine a lag, and for a lag that the study states.
+    pub fn error(&self, fit: Option<&LagFit>, estimate: &Estimate) -> Option<DMatrix<f64>> {
+        covariance_of_lag(fit?, &self.choice, self.candidates, estimate)
     }
 
     /// What was taken off in the end.

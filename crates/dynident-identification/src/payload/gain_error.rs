@@ -4,7 +4,8 @@ use super::columns::LoadColumns;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem};
 use nalgebra::{DMatrix, DVector};
 
-/// The estimate with the error of the joints' gains in the covariance of its payloads.
+/// The covariance that the error of the joints' gains adds to the payloads of an estimate; `None` without payloads or
+/// without an error of the gains.
 ///
 /// An estimate is linear in torque, `x = Σ_j x_j` with `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` the
 /// part that joint j's torque makes. A gain that is off by the share ε_j makes x_j larger by it, and the arm with it:
@@ -13,17 +14,17 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// # Errors
 /// An estimate of other columns.
-pub(crate) fn with_gain_error(
+pub(crate) fn gain_error(
     problem: &LinearProblem,
     columns: &LoadColumns,
     estimate: &Estimate,
     held: &[usize],
     share: f64,
-) -> Result<Estimate, EstimationError> {
+) -> Result<Option<DMatrix<f64>>, EstimationError> {
     let count = problem.columns().len();
     let payload: Vec<usize> = columns.payloads.iter().flat_map(|own| own.first..own.first + own.kept.len()).collect();
     if share <= 0.0 || payload.is_empty() {
-        return Ok(estimate.clone());
+        return Ok(None);
     }
     let fixed = |column: usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == column);
     let free: Vec<usize> = (0..count).filter(|&column| !held.contains(&column) && !fixed(column)).collect();
@@ -61,7 +62,5 @@ pub(crate) fn with_gain_error(
             }
         }
     }
-    let mut wider = estimate.with_further_error(&further);
-    wider.covariance_white += further;
-    Ok(wider)
+    Ok(Some(further))
 }

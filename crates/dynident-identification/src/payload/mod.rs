@@ -20,5 +20,5 @@ pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, p
 
 pub(crate) use columns::SeenColumns;
 pub(crate) use free_gains::free_gains;
-pub(crate) use gain_error::with_gain_error;
+pub(crate) use gain_error::gain_error;
 pub(crate) use gains::{Gains, drive_gains, known_loads};

@@ -2,7 +2,8 @@
 
 use crate::error::Error;
 use crate::result::{
-    BaseParameterResult, BodyResult, JointFrictionResult, LogSummary, ResultFile, TermResult, ValueSource,
+    BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, LogSummary, ResultFile, TermResult,
+    ValueSource,
 };
 use dynident_estimation::consistent::IntervalEnd;
 use dynident_estimation::{HALF_WIDTH_95, ValidationReport};
@@ -259,9 +260,19 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             optional(p.physical),
             optional(p.prior),
             Cell::from(unit(&p.unit)),
+            Cell::from(p.largest_error().map_or("", ErrorTermResult::name)),
         ]
     };
-    let columns = ["expression", "free fit", "± (95 %)", "± in %", "consistent set", "description", "unit"];
+    let columns = [
+        "expression",
+        "free fit",
+        "± (95 %)",
+        "± in %",
+        "consistent set",
+        "description",
+        "unit",
+        "largest error source",
+    ];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
     if !r.method.coincident.is_empty() {
         let points = r.method.coincident.iter().map(|sentence| (Tone::Warning, sentence.clone())).collect();

@@ -16,7 +16,7 @@ use dynident_identification::examination::{
 use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
-use dynident_identification::{BetweenLogs, Condition, CutoffByError, DriveInertiaChoice, Role};
+use dynident_identification::{BetweenLogs, Condition, CutoffByError, DriveInertiaChoice, ErrorSource, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -258,11 +258,46 @@ pub struct BaseParameterResult {
     /// are no nominal values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_width_95_with_nominal: Option<f64>,
+    /// Standard deviation by source of error, where there is more than the noise: their squares add up to the square of
+    /// the whole. Empty for a parameter that is not excited.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub error_terms: Vec<ErrorTermResult>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
     pub excited: bool,
 }
 
+/// What one source of error contributes to a parameter's error bar.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ErrorTermResult {
+    /// The source.
+    pub source: ErrorSource,
+    /// Standard deviation, in the parameter's unit.
+    #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
+    pub std: f64,
+}
+
+impl ErrorTermResult {
+    /// The source in words.
+    pub fn name(&self) -> &'static str {
+        match self.source {
+            ErrorSource::Noise => "noise",
+            ErrorSource::Lag => "lag",
+            ErrorSource::BetweenLogs => "differences between logs",
+            ErrorSource::FrictionConstants => "friction constants",
+            ErrorSource::Gains => "drive gains",
+            ErrorSource::NominalValues => "nominal values",
+        }
+    }
+}
+
 impl BaseParameterResult {
+    /// The largest source of error; none where the noise is the only one.
+    pub fn largest_error(&self) -> Option<&ErrorTermResult> {
+        self.error_terms.iter().max_by(|one, other| one.std.total_cmp(&other.std))
+    }
+
     /// `100 bar_95 / |value|`; none for a value of zero and for what the data do not excite.
     pub fn relative_half_width_percent(&self) -> Option<f64> {
         (self.excited && self.value != 0.0).then(|| 100.0 * self.bar_95() / self.value.abs())

@@ -28,9 +28,9 @@ pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
 pub use identification::{
-    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
-    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
-    Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
+    BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, JointResult, LogOffset, LogSummary,
+    MethodSummary, PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary,
+    TermResult, Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
 };
 pub use inspection::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,

@@ -229,7 +229,7 @@ pub(in crate::jobs) fn written(
     result.seal();
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
-    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, mjcf, sdf, traces })
+    Ok(IdentificationOutcome { result, estimate: found.estimate, inertials, urdf, table, mjcf, sdf, traces })
 }
 
 /// The earlier result of an arm, and where it lies.
@@ -319,7 +319,7 @@ fn result_file(
         Findings::None => {}
     }
     let knowledge = task.settings.consistency.clone().unwrap_or_default();
-    let conditionals = conditionals(&found.training, estimate, &found.noise_half_width_95, &knowledge);
+    let conditionals = conditionals(&found.training, estimate, &found.estimation.estimate.half_width_95, &knowledge);
     let held_out = found.held_out.iter();
     let bands = held_out.clone().flat_map(|log| &log.validation.residuals).filter_map(|joint| joint.band.clone());
     ResultFile {
@@ -337,7 +337,7 @@ fn result_file(
         series,
         spline_motion,
         simulated,
-        base_parameters: base_parameters(model, estimate, found.consistent_base_values(), &conditionals),
+        base_parameters: base_parameters(found, &conditionals),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(model, parts.inertials, &sources(model, estimate), &found.consistent.parameter_std),
         possible_intervals: found.consistent.intervals.clone(),

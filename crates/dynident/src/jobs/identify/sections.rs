@@ -2,9 +2,9 @@
 
 use crate::jobs::violations::violations;
 use crate::result::{
-    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, MethodSummary, PhysicalBodyResult,
-    PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingErrors, TrainingJoint, TrainingResult,
-    ValueSource,
+    BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, JointResult, LogOffset, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingErrors, TrainingJoint,
+    TrainingResult, ValueSource,
 };
 use crate::study::{JointDrive, Study, StudyRobot};
 use dynident_dynamics::Determination;
@@ -14,7 +14,7 @@ use dynident_identification::consistent::typical_length_m;
 use dynident_identification::estimators::Estimator;
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
-use dynident_identification::{Conditional, Identification, Recording, RegressorModel, resting_joints};
+use dynident_identification::{Conditional, ErrorSource, Identification, Recording, RegressorModel, resting_joints};
 use dynident_model::terms::{StateFunction, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 
@@ -85,14 +85,19 @@ fn coincident(model: &RegressorModel) -> Vec<String> {
     model.base().coincident().into_iter().map(of_term).collect()
 }
 
-pub(super) fn base_parameters(
-    model: &RegressorModel,
-    estimate: &Estimate,
-    physical: Option<&[f64]>,
-    conditionals: &[Conditional],
-) -> Vec<BaseParameterResult> {
+/// The base parameters; error terms only where the estimate is the estimator's own, without parameters held at zero.
+pub(super) fn base_parameters(found: &Identification, conditionals: &[Conditional]) -> Vec<BaseParameterResult> {
+    let (model, estimate, physical) = (found.model(), found.estimate(), found.consistent_base_values());
     let expressions = model.base().expressions();
     let columns = model.layout().columns();
+    let error_terms = |index: usize| -> Vec<ErrorTermResult> {
+        let of_nominal = conditionals.get(index).and_then(|own| own.nominal_std);
+        let of_nominal = of_nominal.map(|std| (ErrorSource::NominalValues, std));
+        let terms = found.bars.std_by_source(&found.estimation.estimate, index).into_iter().chain(of_nominal);
+        let terms: Vec<_> = terms.map(|(source, std)| ErrorTermResult { source, std }).collect();
+        let is_fixed = estimate.rank.fixed.iter().any(|fixed| fixed.column == index);
+        if is_fixed || terms.len() < 2 || found.essential.is_some() { Vec::new() } else { terms }
+    };
     (0..columns.len())
         .map(|index| BaseParameterResult {
             symbol: columns[index].symbol(),
@@ -107,6 +112,7 @@ pub(super) fn base_parameters(
             physical: physical.map(|values| values[index]),
             conditional_on: conditionals.get(index).map_or_else(Vec::new, |own| own.on.clone()),
             half_width_95_with_nominal: conditionals.get(index).and_then(|own| own.half_width_95),
+            error_terms: error_terms(index),
             excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
         })
         .collect()
