@@ -106,7 +106,6 @@ run 0 "$examples/gallery" "$out/gallery.html"
 run 0 target/debug/dynident-benchmark --limits --only peak_flops,text --csv "$out/panda_arm7.csv" --csv-rows 2000 planar2r
 run 0 env DYNIDENT_BENCHMARK='target/debug/dynident-benchmark --only rnea' benchmarks/compare.sh --own-only "$venv" "$out/compare" 1
 run 0 "$venv/bin/python" benchmarks/bench_commands.py "$dynident" "$out/panda_arm7.csv" "$out"
-run 0 "$venv/bin/python" benchmarks/bench_rollout.py robots/ur10.urdf
 run 0 "$venv/bin/python" benchmarks/growth.py "$dynident" target/debug/dynident-benchmark "$out/growth" --logs 1 --joints 2 --only logs identify --out "$out/growth.csv"
 run 0 "$venv/bin/python" benchmarks/generated.py target/debug/dynident-benchmark "$examples/description" "$out/generated" robots/ur10.urdf --rounds 1
 run 0 python3 docs/summaries.py --check

@@ -52,7 +52,6 @@ while [ "$round" -le "$rounds" ]; do
     own
   done
   $pin "$out/bench_mujoco" robots/ur10.urdf robots/panda_arm7.urdf robots/iiwa14.urdf >> "$out/mujoco.jsonl"
-  $pin "$python" "$here/bench_rollout.py" robots/ur10.urdf robots/panda_arm7.urdf robots/iiwa14.urdf >> "$out/mujoco.jsonl"
   $pin "$python" "$here/bench_python.py" >> "$out/python.jsonl"
   if [ -z "$rivals_only" ]; then
     long=

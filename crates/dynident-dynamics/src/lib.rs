@@ -10,7 +10,6 @@
 //! | joint torques of a motion | [`inverse_dynamics()`]; of many samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
 //! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`]; of many samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
-//! | the same of many robots of one tree | [`RobotLanes`], inside a kernel | the same, one robot in each lane |
 //! | Coriolis matrix, `Ṁ = C + Cᵀ` | [`coriolis_matrix`]; of many samples: [`coriolis_matrices`] | analytic, in one frame |
 //! | torque of gravity, its derivative, energies | [`gravity_torque`], [`gravity_torque_derivative`], [`kinetic_energy`], [`potential_energy`] | |
 //! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
@@ -73,7 +72,6 @@ mod parametric_model;
 mod regressor;
 mod regressor_adjoint;
 mod regressor_panels;
-mod robot_lanes;
 mod same_tree;
 mod sample_lanes;
 mod states;
@@ -108,7 +106,6 @@ pub use regressor_panels::{
     Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following, regressor_panels_of_sample,
     term_panels_following,
 };
-pub use robot_lanes::{RobotLanes, share_tree};
 pub use term_history::TermHistory;
 pub use workspace::{BatchWorkspace, Workspace};
 

@@ -180,7 +180,7 @@ impl Beginning {
 
 /// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques,
 /// which are cut to their limits and hold until the next sample. The controller is reset first. Steps allocate nothing
-/// (but those of the adaptive integrator). Many loops at once: [`closed_loops`](crate::closed_loops).
+/// (but those of the adaptive integrator).
 ///
 /// ```
 /// use dynident_simulation::{ControllerSettings, LoopSettings, Plant, Reference, closed_loop};

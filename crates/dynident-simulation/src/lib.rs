@@ -9,7 +9,6 @@
 //! | how it is controlled | [`ControllerSettings`], or a type of one's own with [`Controller`] |
 //! | what stops a run | [`RunLimits`] in [`LoopSettings`] |
 //! | the run | [`closed_loop()`] gives a [`Run`]: what truly was, what the controller saw, how well the joints followed, a [`RunStatus`] |
-//! | many runs: Monte Carlo | [`closed_loops`]: over lanes and threads, every [`Run`] as by itself |
 //! | what a log of it would hold | [`SensorSettings::record`]: quantised, noisy, late |
 //!
 //! ```
@@ -41,7 +40,6 @@ mod closed_loop;
 pub mod controllers;
 mod error;
 mod feedback;
-mod many_loops;
 mod motion_buffer;
 mod per_joint;
 mod plant;
@@ -54,7 +52,6 @@ mod slow_motion;
 pub use closed_loop::{LoopSettings, RunLimits, Start, closed_loop};
 pub use controllers::{Controller, ControllerModel, ControllerSettings, FrictionCompensation};
 pub use error::{SimulationError, require, require_length};
-pub use many_loops::{ClosedLoop, closed_loops};
 pub use per_joint::PerJoint;
 pub use plant::{Disturbance, Integrator, Plant, PlantFault, TimeCourse, with_length_errors, with_placements};
 pub use record::Record;

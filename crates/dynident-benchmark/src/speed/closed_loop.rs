@@ -6,18 +6,15 @@ use dynident_excitation::Motion;
 use dynident_model::Model;
 use dynident_model::sample::Random;
 use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
-use dynident_simulation::controllers::{FiniteTimeSettings, JointPd, JointPdSettings};
+use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{
-    ClosedLoop, ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SimulationError,
-    Start, closed_loop, closed_loops,
+    ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SimulationError, Start,
+    closed_loop,
 };
 use std::hint::black_box;
 
 /// Samples of a timed run: as in `bench_mujoco.c`.
 const SAMPLES: usize = 5000;
-/// Loops of the batch, and samples of each: as in `bench_rollout.py`.
-const LOOPS: usize = 64;
-const LOOP_SAMPLES: usize = 501;
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
@@ -44,7 +41,6 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
-    time_many(model, &gains, &mut random, report)?;
     // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some
     // slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
@@ -73,40 +69,5 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
     report.time("finite_time_10s", 1, || {
         let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
     });
-    Ok(())
-}
-
-/// Times a step of one of many loops from different postures, side by side.
-fn time_many(
-    model: &Model,
-    gains: &JointPdSettings,
-    random: &mut Random,
-    report: &Report<'_>,
-) -> Result<(), SimulationError> {
-    let zeros = vec![0.0; model.dof()];
-    let reference = Reference::standing(&zeros, 1000.0, (LOOP_SAMPLES - 1) as f64 / 1000.0)?;
-    let plant = Plant::new(model, &[], &[])?;
-    let starts: Vec<Start> = (0..LOOPS)
-        .map(|_| zeros.iter().map(|_| random.uniform(-0.3, 0.3)).collect())
-        .map(|q| Start::At { q, dq: zeros.clone() })
-        .collect();
-    let controllers = (0..LOOPS).map(|_| JointPd::new(model.dof(), gains)).collect::<Result<Vec<_>, _>>()?;
-    for (quantity, integrator) in [("pd_step_euler_64_loops", EULER), ("pd_step_rk4_64_loops", RK4)] {
-        let mut controllers = controllers.clone();
-        let settings: Vec<LoopSettings> = (starts.iter().cloned())
-            .map(|start| LoopSettings { integrator, start, ..LoopSettings::default() })
-            .collect();
-        let mut loops: Vec<ClosedLoop<'_>> = (controllers.iter_mut().zip(&settings))
-            .map(|(controller, settings)| ClosedLoop { plant: &plant, controller, reference: &reference, settings })
-            .collect();
-        // Every run is looked at and dropped, as the single ones are.
-        let one_by_one = |_, run| {
-            black_box(run);
-        };
-        closed_loops(&mut loops, one_by_one)?;
-        report.time(quantity, LOOPS * LOOP_SAMPLES, || {
-            let _ = closed_loops(&mut loops, one_by_one);
-        });
-    }
     Ok(())
 }

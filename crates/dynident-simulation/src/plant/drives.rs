@@ -102,11 +102,6 @@ impl Drives {
         Ok(drives)
     }
 
-    /// Whether they are linear in the motion and remember nothing: inertia, viscous friction, constant torques.
-    pub(super) fn is_linear(&self) -> bool {
-        self.units.is_empty() && self.slips.is_empty() && self.states.is_empty()
-    }
-
     /// Takes the torques of slipping springs at positions `q` off `torque`. The deflection is that of the last
     /// [`follow`](Self::follow) moved on to `q`.
     pub(super) fn subtract_slips(&self, q: &[f64], torque: &mut [f64]) {

@@ -6,17 +6,14 @@ mod drives;
 mod equations;
 mod euler;
 mod factor;
-mod factor_lanes;
 mod friction_solver;
 mod friction_unit;
 mod integrator;
-mod lanes;
 mod lengths;
 mod runge_kutta;
 
 pub use disturbance::{Disturbance, TimeCourse};
 pub use integrator::Integrator;
-pub(crate) use lanes::{FARTHEST, MOST_LANES, PlantLanes};
 pub use lengths::{with_length_errors, with_placements};
 
 use crate::error::{SimulationError, require, require_length};

@@ -3,7 +3,6 @@
 
 mod closed_loop;
 mod controllers;
-mod many_loops;
 mod mujoco;
 mod mujoco_springs;
 mod plant;
