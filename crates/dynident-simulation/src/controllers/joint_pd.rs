@@ -59,11 +59,6 @@ impl Controller for JointPd {
 
     fn reset(&mut self) {}
 
-    fn joint_gains(&self) -> Option<[&[f64]; 2]> {
-        let [kp, kd] = &self.gains;
-        Some([kp, kd])
-    }
-
     fn torque(&mut self, _time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]) {
         let [kp, kd] = &self.gains;
         for joint in 0..kp.len() {

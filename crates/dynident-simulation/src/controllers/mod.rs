@@ -59,12 +59,6 @@ pub trait Controller: core::fmt::Debug + Send {
     /// If a vector has not one entry per joint.
     fn torque(&mut self, time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]);
 
-    /// `K_p` and `K_d` of every joint, where the law is `τ = K_p (q_d - q) + K_d (q̇_d - q̇)` and nothing else: many
-    /// loops at once then need not call it. None, the default, for all other laws.
-    fn joint_gains(&self) -> Option<[&[f64]; 2]> {
-        None
-    }
-
     /// Takes another model for the next run. Controllers without a model ignore it.
     ///
     /// # Errors
