@@ -330,7 +330,8 @@ fn band(x: f64, lower: f64, upper: f64) -> f64 {
 }
 
 /// The larger magnitude of the lowest and the highest torque of a joint.
-fn most([low, high]: &[Vec<f64>; 2], joint: usize) -> f64 {
+fn most(bounds: &[Vec<f64>; 2], joint: usize) -> f64 {
+    let [low, high] = bounds;
     low[joint].abs().max(high[joint].abs())
 }
 

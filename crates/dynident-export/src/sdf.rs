@@ -66,8 +66,9 @@ fn write_joint(
     joint: &Joint,
     friction: &NearestFriction,
     spring: Option<(f64, f64)>,
-    [name, parent, child]: [&String; 3],
+    names: [&String; 3],
 ) {
+    let [name, parent, child] = names;
     let limits = &joint.limits;
     let stops = limits.lower.zip(limits.upper).filter(|(lower, upper)| lower < upper);
     let stops = stops.filter(|_| joint.kind != JointKind::Continuous);

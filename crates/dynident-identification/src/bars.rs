@@ -1,9 +1,9 @@
 //! Error bars of an estimate as a sum of named terms.
 //!
-//! An estimator gives the covariance Σ of its values that follows from the residuals. Everything else that is uncertain
-//! about the values is a separate term, a covariance `F_k` over the same columns, with the name of its source. The terms
-//! are independent of each other and of the noise, so the covariance of the whole is `Σ + Σ_k F_k`. [`ErrorBars::total`]
-//! is the only place where they are summed.
+//! An estimator gives the covariance Σ of its values that follows from the residuals. Every other source of error is a
+//! separate term: a covariance `F_k` over the same columns, with the name of its source. The terms are independent of
+//! each other and of the noise, so the covariance of the whole is `Σ + Σ_k F_k`. [`ErrorBars::total`] is the only place
+//! where they are summed.
 
 use dynident_estimation::Estimate;
 use nalgebra::DMatrix;

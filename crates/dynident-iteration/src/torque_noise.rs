@@ -75,7 +75,8 @@ pub(crate) fn torque_noise(tau: &[f64], q: &[f64], rate_hz: f64, motion_hz: f64)
 }
 
 /// One-sided density of the noise within an octave, Nm²/Hz, from third differences; none where no window fits.
-fn octave_density(third: &[f64], q: &[f64], rate_hz: f64, [from_hz, to_hz]: [f64; 2]) -> Option<f64> {
+fn octave_density(third: &[f64], q: &[f64], rate_hz: f64, band_hz: [f64; 2]) -> Option<f64> {
+    let [from_hz, to_hz] = band_hz;
     let length = (PERIODS as f64 * rate_hz / from_hz).round() as usize;
     if length < 2 * PERIODS || third.len() < length {
         return None;

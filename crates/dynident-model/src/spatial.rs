@@ -226,7 +226,8 @@ impl Mat3<f64> {
     }
 
     /// The rotation that the unit quaternion `x y z w` stands for.
-    pub fn from_quaternion([x, y, z, w]: [f64; 4]) -> Self {
+    pub fn from_quaternion(quaternion: [f64; 4]) -> Self {
+        let [x, y, z, w] = quaternion;
         Self([
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
             [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],

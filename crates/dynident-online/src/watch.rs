@@ -230,8 +230,9 @@ fn look(
     reference: &[f64],
     residuals: &mut [f64],
     contact: &mut ContactMonitor,
-    [q, dq, ddq, tau]: [&[f64]; 4],
+    sample: [&[f64]; 4],
 ) -> Result<Option<Contact>, OnlineError> {
+    let [q, dq, ddq, tau] = sample;
     estimator.add(q, dq, ddq, tau)?;
     estimator.torque(reference, residuals);
     for (residual, tau) in residuals.iter_mut().zip(tau) {

@@ -125,11 +125,12 @@ impl Robot {
     /// `each(motion, numbers)` for blocks of samples, whose motion stands joint by joint.
     fn for_blocks(
         &self,
-        [q, dq, ddq]: [&[f64]; 3],
+        motion: [&[f64]; 3],
         out: &mut [f64],
         size: usize,
         each: impl Fn(&mut BatchWorkspace, &JointMotion<'_>, &mut [f64]) + Sync,
     ) {
+        let [q, dq, ddq] = motion;
         let dof = self.model.dof();
         in_blocks(out, size, |(number, block): (usize, &mut [f64])| {
             let samples = block.len() / size.max(1);

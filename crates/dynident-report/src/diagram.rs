@@ -113,7 +113,8 @@ impl Diagram {
         self.framed(at, size, lines, true)
     }
 
-    fn framed(mut self, at: [f64; 2], [width, height]: [f64; 2], lines: &[&str], decision: bool) -> Self {
+    fn framed(mut self, at: [f64; 2], size: [f64; 2], lines: &[&str], decision: bool) -> Self {
+        let [width, height] = size;
         let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) as f64;
         // Half of a frame on its corner is empty at the height of its words.
         let room = if decision { 1.7 } else { 1.0 };

@@ -96,7 +96,8 @@ impl<'a> MotionPicture<'a> {
 }
 
 /// One curve with its limits and the ends of its scale.
-fn plot([left, top]: [f64; 2], times: &[f64], curve: &MotionCurve<'_>) -> Plot {
+fn plot(corner: [f64; 2], times: &[f64], curve: &MotionCurve<'_>) -> Plot {
+    let [left, top] = corner;
     let [width, height] = PLOT;
     let finite = curve.values.iter().copied().filter(|x| x.is_finite());
     let (mut lower, mut upper) =

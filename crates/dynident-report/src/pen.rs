@@ -15,7 +15,8 @@ pub(crate) struct Pen {
 }
 
 impl Pen {
-    pub(crate) fn to(&mut self, [x, y]: [f64; 2]) {
+    pub(crate) fn to(&mut self, point: [f64; 2]) {
+        let [x, y] = point;
         let drawn = x.is_finite() && y.is_finite();
         if drawn {
             let command = if self.down { 'L' } else { 'M' };

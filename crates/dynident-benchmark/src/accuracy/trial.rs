@@ -1,5 +1,5 @@
-//! One simulated experiment, the answer of an estimator, and work that several estimators of a trial share: done for the
-//! first one that needs it, and not part of its time.
+//! One simulated experiment, the answer of an estimator, and work that several estimators of a trial share: done for
+//! the first one that needs it, and not part of its time.
 
 use super::pipeline;
 use super::rows::Rows;

@@ -281,7 +281,8 @@ fn checked_scalar(scalar: &PhysicalScalar) -> Result<(), PhysicalError> {
     }
 }
 
-fn interval(what: &str, [lower, upper]: Limits) -> Result<(), PhysicalError> {
+fn interval(what: &str, range: Limits) -> Result<(), PhysicalError> {
+    let [lower, upper] = range;
     finite(what, &[lower, upper])?;
     if upper - lower > LEAST_WIDTH * lower.abs().max(upper.abs()) {
         Ok(())

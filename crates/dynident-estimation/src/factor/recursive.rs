@@ -362,7 +362,8 @@ impl Reflector {
 
 /// Applies a reflector to a row of the triangle and the rows in `x`.
 #[inline(always)]
-fn apply<T: Lane, const M: usize>([nu, beta]: [T; 2], a: &[T; M], above: &mut [f64], x: &mut [T; M]) {
+fn apply<T: Lane, const M: usize>(reflector: [T; 2], a: &[T; M], above: &mut [f64], x: &mut [T; M]) {
+    let [nu, beta] = reflector;
     let r = T::load(above);
     // Two sums, which do not wait for each other.
     let mut sums = [r * nu, T::ZERO];

@@ -64,9 +64,10 @@ pub(crate) fn restored(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
     kept: Assessment,
-    [fine, logged]: [&[f64]; 2],
+    grids: [&[f64]; 2],
     stop: &(dyn Fn(f64, f64) -> bool + Sync),
 ) -> Result<(Assessment, usize), OptimiserError> {
+    let [fine, logged] = grids;
     let criterion = task.criteria[task.criteria.len() - 1];
     let mut random = Random::new(settings.seed ^ 0x5e57);
     let (positions, speeds) = ranges(task.limits);

@@ -39,9 +39,10 @@ pub(super) fn shrunk(
     criterion: &dyn Criterion,
     outside: &Assessment,
     worst: &[f64],
-    [fine, logged]: [&[f64]; 2],
+    grids: [&[f64]; 2],
     stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
+    let [fine, logged] = grids;
     if outside.violation <= 0.0 || !outside.violation.is_finite() {
         return None;
     }

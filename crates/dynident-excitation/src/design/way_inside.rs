@@ -23,9 +23,10 @@ pub(super) fn way_inside(
     criterion: &dyn Criterion,
     outside: &Assessment,
     inside: &Assessment,
-    [fine, logged]: [&[f64]; 2],
+    grids: [&[f64]; 2],
     stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
+    let [fine, logged] = grids;
     let near = outside.violation > 0.0 && outside.violation <= SMALL;
     if !near || inside.violation > 0.0 || !task.family.is_linear() {
         return None;

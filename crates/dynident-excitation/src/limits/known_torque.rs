@@ -115,7 +115,8 @@ impl KnownTorque {
     ///
     /// # Panics
     /// If lengths differ.
-    pub fn range(&self, rigid: &[f64], [q, dq, ddq]: [&[f64]; 3], low: &mut [f64], high: &mut [f64]) {
+    pub fn range(&self, rigid: &[f64], motion: [&[f64]; 3], low: &mut [f64], high: &mut [f64]) {
+        let [q, dq, ddq] = motion;
         low.copy_from_slice(rigid);
         high.copy_from_slice(rigid);
         let motion = JointMotion { samples: 1, q, dq, ddq };

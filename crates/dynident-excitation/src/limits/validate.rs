@@ -67,7 +67,8 @@ impl Limits {
     }
 }
 
-fn range(what: &str, [lower, upper]: [f64; 2]) -> Result<(), LimitError> {
+fn range(what: &str, range: [f64; 2]) -> Result<(), LimitError> {
+    let [lower, upper] = range;
     finite(&format!("lower end of {what}"), lower)?;
     finite(&format!("upper end of {what}"), upper)?;
     if lower <= upper { Ok(()) } else { Err(LimitError::LowerAboveUpper { what: what.to_owned(), lower, upper }) }
@@ -104,7 +105,8 @@ fn validate_joint(limit: &JointLimit) -> Result<(), LimitError> {
 }
 
 /// Middle and half width of a range, without overflow.
-pub(super) fn middle_and_half([lower, upper]: [f64; 2]) -> (f64, f64) {
+pub(super) fn middle_and_half(range: [f64; 2]) -> (f64, f64) {
+    let [lower, upper] = range;
     (0.5 * lower + 0.5 * upper, 0.5 * upper - 0.5 * lower)
 }
 

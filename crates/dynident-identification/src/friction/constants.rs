@@ -37,7 +37,8 @@ const EXPONENTS: [f64; 2] = [0.5, 3.0];
 const MOST_SHIFT: f64 = 2.0;
 
 /// The constant of this logarithm, within its bounds.
-fn within(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
+fn within(logarithm: f64, range_s: [f64; 2]) -> f64 {
+    let [least, most] = range_s;
     logarithm.clamp(least.ln(), most.ln()).exp()
 }
 

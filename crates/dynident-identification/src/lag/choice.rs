@@ -69,8 +69,8 @@ impl LagChoice {
         self.lag_s.iter().fold(0.0, |longest, lag_s| longest.max(lag_s.abs()))
     }
 
-    /// The longest lag that was compensated at a joint, in either direction, less half the width of the 95 % interval of
-    /// the common lag; s. Zero if no lag was compensated or the interval includes zero.
+    /// The longest lag that was compensated at a joint, in either direction, less half the width of the 95 % interval
+    /// of the common lag; s. Zero if no lag was compensated or the interval includes zero.
     pub fn certain_s(&self) -> f64 {
         let half_width_s = self.common.as_ref().map_or(0.0, |common| common.half_width_95_s);
         (self.longest_s() - half_width_s).max(0.0)

@@ -122,7 +122,8 @@ pub struct WayRecords {
 }
 
 /// The samples of a record from a time to a time (that one is not included), with times from `zero_s` on.
-pub(super) fn cut(record: &Record, [from_s, to_s]: [f64; 2], zero_s: f64) -> Record {
+pub(super) fn cut(record: &Record, window_s: [f64; 2], zero_s: f64) -> Record {
+    let [from_s, to_s] = window_s;
     let kept: Vec<usize> =
         (0..record.samples).filter(|&sample| (from_s..to_s).contains(&record.times_s[sample])).collect();
     let some = |values: &[f64]| -> Vec<f64> {

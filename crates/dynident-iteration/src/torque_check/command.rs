@@ -224,7 +224,8 @@ impl LoggedMotion<'_> {
     }
 
     /// Position, velocity and acceleration of each joint as commanded.
-    fn reference(&self, time_s: f64, [q, dq, ddq]: [&mut [f64]; 3]) {
+    fn reference(&self, time_s: f64, motion: [&mut [f64]; 3]) {
+        let [q, dq, ddq] = motion;
         for joint in 0..self.joints {
             [q[joint], dq[joint], ddq[joint]] = self.leg.commanded().at(joint, time_s);
         }

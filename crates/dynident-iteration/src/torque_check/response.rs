@@ -155,7 +155,8 @@ fn by_command(logged: &[Vec<f64>], commanded: &[Vec<f64>]) -> Vec<Assignment> {
 }
 
 /// Whose torque each joint's acceleration follows.
-fn by_motion([velocities, accelerations]: &[Vec<Vec<f64>>; 2], torques: &[Vec<f64>]) -> Vec<Assignment> {
+fn by_motion(motions: &[Vec<Vec<f64>>; 2], torques: &[Vec<f64>]) -> Vec<Assignment> {
+    let [velocities, accelerations] = motions;
     let joints = torques.len();
     let speed = |joint: usize| velocities[joint].iter().map(|dq| dq.abs()).sum::<f64>();
     let fastest = (0..joints).map(speed).fold(0.0, f64::max);

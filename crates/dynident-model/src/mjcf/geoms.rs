@@ -181,7 +181,8 @@ fn placed(stated: &Stated<'_>, compiler: &Compiler, solid: Solid) -> Result<(Tra
 }
 
 /// m³.
-fn volume(solid: Solid, [a, b, c]: [f64; 3]) -> f64 {
+fn volume(solid: Solid, size: [f64; 3]) -> f64 {
+    let [a, b, c] = size;
     match solid {
         Solid::Sphere => 4.0 / 3.0 * PI * a * a * a,
         Solid::Capsule => PI * a * a * (2.0 * b + 4.0 / 3.0 * a),
@@ -213,7 +214,8 @@ fn moments(solid: Solid, [a, b, c]: [f64; 3], mass: f64) -> [f64; 3] {
     }
 }
 
-fn shape(solid: Solid, [a, b, c]: [f64; 3]) -> CollisionGeometry {
+fn shape(solid: Solid, size: [f64; 3]) -> CollisionGeometry {
+    let [a, b, c] = size;
     match solid {
         Solid::Sphere => CollisionGeometry::Sphere { radius_m: a },
         Solid::Capsule => CollisionGeometry::Capsule { radius_m: a, length_m: 2.0 * b },

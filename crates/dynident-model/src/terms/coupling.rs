@@ -107,13 +107,8 @@ impl TermKind for Coupling {
         }
     }
 
-    fn apply_adjoint(
-        &self,
-        row: usize,
-        motion: &JointMotion<'_>,
-        weights: &[f64],
-        [_, by_dq, by_ddq]: [&mut [f64]; 3],
-    ) {
+    fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 3]) {
+        let [_, by_dq, by_ddq] = adjoints;
         let (other, own_ratio) =
             if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
         let cross = self.ratios[0] * self.ratios[1];

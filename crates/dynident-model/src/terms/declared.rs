@@ -187,7 +187,8 @@ impl TermKind for Declared {
         out.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = 0.0);
     }
 
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], [by_q, by_dq, _]: [&mut [f64]; 3]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 3]) {
+        let [by_q, by_dq, _] = adjoints;
         if let DeclaredLaw::Function(function) = &self.law {
             return function.apply_adjoint(motion, weights, [by_q, by_dq]);
         }

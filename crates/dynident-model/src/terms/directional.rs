@@ -48,7 +48,8 @@ impl Direction {
     }
 
     /// Its half of a function.
-    fn half(self, [forward, backward]: [MotionFunction; 2]) -> Vec<MotionFunction> {
+    fn half(self, halves: [MotionFunction; 2]) -> Vec<MotionFunction> {
+        let [forward, backward] = halves;
         match self {
             Self::Forward => vec![forward],
             Self::Backward => vec![backward],

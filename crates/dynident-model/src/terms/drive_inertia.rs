@@ -42,7 +42,8 @@ impl TermKind for DriveInertia {
         out.copy_from_slice(motion.ddq_of(self.joint));
     }
 
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], [_, _, by_ddq]: [&mut [f64]; 3]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 3]) {
+        let [_, _, by_ddq] = adjoints;
         let range = self.joint * motion.samples..(self.joint + 1) * motion.samples;
         by_ddq[range].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
     }

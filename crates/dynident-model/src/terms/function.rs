@@ -70,7 +70,8 @@ impl TorqueFunction {
 
     /// Adds `weights · ∂f` by the positions and velocities that it follows, by central differences: two calls for each.
     /// Nothing where it has no value on either side.
-    pub(super) fn apply_adjoint(&self, motion: &JointMotion<'_>, weights: &[f64], [by_q, by_dq]: [&mut [f64]; 2]) {
+    pub(super) fn apply_adjoint(&self, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 2]) {
+        let [by_q, by_dq] = adjoints;
         let (mut q, mut dq) = (motion.q.to_vec(), motion.dq.to_vec());
         let mut sides = [vec![0.0; motion.samples], vec![0.0; motion.samples]];
         for &joint in &self.follows {

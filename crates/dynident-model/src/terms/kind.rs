@@ -258,8 +258,9 @@ macro_rules! column_of_velocity {
             _: usize,
             motion: &super::JointMotion<'_>,
             weights: &[f64],
-            [_, by_dq, _]: [&mut [f64]; 3],
+            adjoints: [&mut [f64]; 3],
         ) {
+            let [_, by_dq, _] = adjoints;
             self$(.$field)?.add_slopes(self.joint, motion, weights, by_dq);
         }
     };

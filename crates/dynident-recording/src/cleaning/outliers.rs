@@ -151,7 +151,8 @@ pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
 
 /// From the least to the largest of what the medians at -8, -3, 3 and 8 suggest at 0: the lines through those before
 /// and those behind, the cubic through all.
-fn usual_range([far, before, behind, beyond]: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
+fn usual_range(values: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
+    let [far, before, behind, beyond] = values;
     let suggested = [before + 0.6 * (before - far), behind + 0.6 * (behind - beyond), smooth];
     let low = suggested.iter().fold(f64::INFINITY, |low, value| low.min(*value));
     low..suggested.iter().fold(f64::NEG_INFINITY, |high, value| high.max(*value))

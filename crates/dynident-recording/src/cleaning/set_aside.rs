@@ -114,9 +114,10 @@ impl Tally {
         (joint, reason): (usize, Reason),
         block: &RawBlock,
         index: usize,
-        [value, expected]: [f64; 2],
+        pair: [f64; 2],
         (samples, places): (u64, u64),
     ) {
+        let [value, expected] = pair;
         let (row, time_s) = (block.row[index], block.time_s[index]);
         let known = self.found.iter_mut().find(|(of, known)| *of == joint && known.reason == reason);
         let Some((_, known)) = known else {

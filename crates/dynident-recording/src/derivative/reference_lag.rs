@@ -87,8 +87,9 @@ fn best(
     place: Place,
     q: &[f64],
     samples: core::ops::Range<usize>,
-    [least, most]: [f64; 2],
+    range_s: [f64; 2],
 ) -> (f64, bool) {
+    let [least, most] = range_s;
     let joint = place.joint;
     let step = (samples.len() / COARSE_SAMPLES).max(1);
     // Samples at which the shifted reference is known.

@@ -75,8 +75,8 @@ pub struct DesignFile {
     pub cpu_s: Option<f64>,
     /// Seconds by the clock.
     pub seconds: f64,
-    /// Whether the search or its check was stopped before its end. A complete search with the same seed may find another
-    /// motion.
+    /// Whether the search or its check was stopped before its end. A complete search with the same seed may find
+    /// another motion.
     #[serde(default)]
     pub stopped: bool,
     /// Seed of the random starts.

@@ -94,7 +94,8 @@ fn numbers(of: &StatedInertial) -> [f64; 10] {
     [of.mass_kg, x, y, z, a, b, c, d, e, f]
 }
 
-fn with_numbers(of: &StatedInertial, [mass_kg, x, y, z, a, b, c, d, e, f]: [f64; 10]) -> StatedInertial {
+fn with_numbers(of: &StatedInertial, numbers: [f64; 10]) -> StatedInertial {
+    let [mass_kg, x, y, z, a, b, c, d, e, f] = numbers;
     debug_assert_eq!(MOMENT_NAMES.len() + 4, NAMES.len());
     StatedInertial { mass_kg, com_m: [x, y, z], moments: [a, b, c, d, e, f], ..of.clone() }
 }
