@@ -113,6 +113,7 @@ pub(crate) fn figure_8() -> PaperFigure {
     )
 }
 
-fn rounded([x, y]: [f64; 2]) -> [f64; 2] {
+fn rounded(point: [f64; 2]) -> [f64; 2] {
+    let [x, y] = point;
     [x.round(), y.round()]
 }

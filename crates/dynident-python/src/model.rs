@@ -72,7 +72,7 @@ impl FittedModel {
         if self.predictor.get().is_none() {
             // Code of Python is called on the way: nobody waits for it with the interpreter's lock.
             let made = py.detach(|| {
-                guarded(|| TorquePredictor::new(&self.result, Path::new(RESULT), (&self.study, &self.path), None))
+                guarded(|| TorquePredictor::new(&self.result, Path::new(RESULT), &self.study, &self.path, None))
             })?;
             // Another thread may have been faster with the same.
             let _ = self.predictor.set(made.map_err(|error| errors::job(py, &error))?);

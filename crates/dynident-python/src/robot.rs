@@ -64,7 +64,8 @@ impl Robot {
     fn new(
         py: Python<'_>,
         source: &Path,
-        (wanted, name): (DescriptionFormat, &str),
+        wanted: DescriptionFormat,
+        name: &str,
         is_text: impl FnOnce(&str) -> bool,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
@@ -232,21 +233,21 @@ impl Robot {
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_urdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        Self::new(py, &source, (DescriptionFormat::Urdf, "robot.urdf"), is_xml, settings)
+        Self::new(py, &source, DescriptionFormat::Urdf, "robot.urdf", is_xml, settings)
     }
 
     /// A robot of MuJoCo's MJCF: a path, or the text itself.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_mjcf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        Self::new(py, &source, (DescriptionFormat::Mjcf, "robot.xml"), is_xml, settings)
+        Self::new(py, &source, DescriptionFormat::Mjcf, "robot.xml", is_xml, settings)
     }
 
     /// A robot of Gazebo's SDF: a path, or the text itself.
     #[staticmethod]
     #[pyo3(signature = (source, **settings))]
     fn from_sdf(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        Self::new(py, &source, (DescriptionFormat::Sdf, "robot.sdf"), is_xml, settings)
+        Self::new(py, &source, DescriptionFormat::Sdf, "robot.sdf", is_xml, settings)
     }
 
     /// A robot of a Denavit-Hartenberg table in TOML: a path, or the text itself, which has more than one line.
@@ -254,7 +255,7 @@ impl Robot {
     #[pyo3(signature = (source, **settings))]
     fn from_dh(py: Python<'_>, source: PathBuf, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let is_text = |source: &str| source.contains('\n');
-        Self::new(py, &source, (DescriptionFormat::Dh, "robot.toml"), is_text, settings)
+        Self::new(py, &source, DescriptionFormat::Dh, "robot.toml", is_text, settings)
     }
 
     /// The inverse of ``__reduce__``.

@@ -229,7 +229,8 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// A little air above and below; a flat or empty range gets one of its own.
-fn padded([low, high]: [f64; 2]) -> [f64; 2] {
+fn padded(bounds: [f64; 2]) -> [f64; 2] {
+    let [low, high] = bounds;
     if !(low.is_finite() && high.is_finite()) {
         return [0.0, 1.0];
     }

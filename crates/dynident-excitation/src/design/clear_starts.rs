@@ -115,7 +115,8 @@ impl<'a> Starts<'a> {
 }
 
 /// The part of a range about a position that is `share` of it.
-fn about([low, high]: &[f64; 2], position: &f64, share: &f64) -> [f64; 2] {
+fn about(range: &[f64; 2], position: &f64, share: &f64) -> [f64; 2] {
+    let [low, high] = range;
     let half = 0.5 * share * (high - low);
     let middle = position.max(low + half).min(high - half);
     [middle - half, middle + half]

@@ -185,7 +185,8 @@ fn factor_in_words(factor: f64) -> String {
 }
 
 /// One limit's change, with its factor where the limit is a magnitude.
-fn in_words(kind: LimitKind, (subject, now, needed, unit): &LimitChange) -> String {
+fn in_words(kind: LimitKind, change: &LimitChange) -> String {
+    let (subject, now, needed, unit) = change;
     let what = match kind {
         LimitKind::Position | LimitKind::Box => "half range",
         LimitKind::Floor => return format!("`{subject}` height {needed:.4} {unit} instead of {now:.4}"),

@@ -117,7 +117,7 @@ pub(crate) struct AgreementRows<'a> {
 
 impl<'a> AgreementRows<'a> {
     /// For rows of a joint of the model, with the nominal values of all its columns.
-    pub(crate) fn new((model, joint): (&'a RegressorModel, usize), nominal: &'a [f64]) -> Self {
+    pub(crate) fn new(model: &'a RegressorModel, joint: usize, nominal: &'a [f64]) -> Self {
         let friction = OwnFriction::of(model, joint);
         let factor = TriangularFactor::new(friction.columns.len() + 1);
         let columns = model.layout().joint_columns(joint);

@@ -92,11 +92,7 @@ pub(crate) struct JointWatch {
 }
 
 impl JointWatch {
-    pub(crate) fn new(
-        (model, theta): (&RegressorModel, &[f64]),
-        joint: usize,
-        uncertainty: Option<&Uncertainty>,
-    ) -> Self {
+    pub(crate) fn new(model: &RegressorModel, theta: &[f64], joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
         let layout = model.layout();
         let columns = layout.joint_columns(joint);
         let all = layout.columns();
@@ -156,7 +152,7 @@ impl JointWatch {
                 let variance: f64 = (0..self.own.nrows())
                     .map(|k| (0..columns).map(|c| self.own[(k, c)] * panel[c * rows + row]).sum::<f64>().powi(2))
                     .sum();
-                let held = if rests { self.stiction.level((panel, rows), row, predicted[row]) } else { 0.0 };
+                let held = if rests { self.stiction.level(panel, rows, row, predicted[row]) } else { 0.0 };
                 let half = width * (variance + sigma * sigma).sqrt() + held;
                 self.widths += half;
                 self.inside += usize::from(residual.abs() <= half);

@@ -60,7 +60,7 @@ impl Stiction {
 
     /// F in one row of the joint's panel of `rows` rows, whose model predicts the torque `predicted`, Nm (N): the load
     /// is what of that is not friction.
-    pub(crate) fn level(&self, (panel, rows): (&[f64], usize), row: usize, predicted: f64) -> f64 {
+    pub(crate) fn level(&self, panel: &[f64], rows: usize, row: usize, predicted: f64) -> f64 {
         let friction: f64 = self.friction.iter().map(|(place, value)| value * panel[place * rows + row]).sum();
         self.under(predicted - friction)
     }

@@ -138,7 +138,7 @@ fn fitted(
         LogNoise::Shared => Ok(problem),
         LogNoise::Own => weighted_by_log(settings, problem),
     };
-    let mut samples = Samples::new((checks, unknowns), with, (0..dof).into_par_iter().map(start).collect())?;
+    let mut samples = Samples::new(checks, unknowns, with, (0..dof).into_par_iter().map(start).collect())?;
     let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
     for _ in 0..MOST_STEPS {
@@ -164,7 +164,8 @@ fn fitted(
 
 impl<'a> Samples<'a> {
     fn new(
-        (checks, unknowns): (&'a [DelayCheck<'a>], Unknowns<'a>),
+        checks: &'a [DelayCheck<'a>],
+        unknowns: Unknowns<'a>,
         with: (&'a Logs<'a>, &'a EstimationSettings),
         lag_s: Vec<f64>,
     ) -> Result<Self, EstimationError> {

@@ -67,7 +67,8 @@ impl DelayRows {
         pieces: &[Piece],
         joint: usize,
         columns: usize,
-        (rate_hz, filter): (f64, Option<&DecimationSettings>),
+        rate_hz: f64,
+        filter: Option<&DecimationSettings>,
         shift: f64,
         segments: SegmentSettings,
     ) -> Result<Self, EstimationError> {

@@ -113,6 +113,6 @@ impl<'a> DelayCheck<'a> {
     ) -> Result<DelayRows, EstimationError> {
         let columns = self.model.layout().joint_columns(joint).len();
         let filter = logs.filter.decimation(self.rate_hz, motion_band_hz(&logs.motion));
-        DelayRows::new(&self.pieces, joint, columns, (self.rate_hz, filter.as_ref()), shift, settings.segments)
+        DelayRows::new(&self.pieces, joint, columns, self.rate_hz, filter.as_ref(), shift, settings.segments)
     }
 }

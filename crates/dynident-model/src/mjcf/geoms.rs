@@ -193,7 +193,8 @@ fn volume(solid: Solid, size: [f64; 3]) -> f64 {
 }
 
 /// Principal moments about the centre of mass in the geom's axes, kg m².
-fn moments(solid: Solid, [a, b, c]: [f64; 3], mass: f64) -> [f64; 3] {
+fn moments(solid: Solid, size: [f64; 3], mass: f64) -> [f64; 3] {
+    let [a, b, c] = size;
     match solid {
         Solid::Sphere => [0.4 * mass * a * a; 3],
         Solid::Capsule => {

@@ -49,7 +49,8 @@ impl TorquePredictor {
     pub fn new(
         stored: &ResultFile,
         result_path: &Path,
-        (study, study_path): (&Study, &Path),
+        study: &Study,
+        study_path: &Path,
         data: Option<&Path>,
     ) -> Result<Self, Error> {
         let wrong = |message: &str| Error::Result { path: result_path.to_owned(), message: message.to_owned() };

@@ -211,6 +211,7 @@ fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -
 }
 
 /// Root mean square of a joint's measured torque.
-fn torque_norm((_, rmse_nm, relative): &(&str, f64, Option<f64>)) -> f64 {
+fn torque_norm(joint: &(&str, f64, Option<f64>)) -> f64 {
+    let (_, rmse_nm, relative) = joint;
     relative.map_or(0.0, |percent| if percent > 0.0 { 100.0 * rmse_nm / percent } else { 0.0 })
 }

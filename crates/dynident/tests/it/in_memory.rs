@@ -131,7 +131,7 @@ fn a_result_in_memory_predicts_and_is_tested() {
     assert_eq!(serde_json::to_value(&by_file).unwrap(), serde_json::to_value(&in_memory).unwrap());
 
     // The prediction is the torque of the bodies and terms that are written.
-    let predictor = TorquePredictor::new(&stored, &file, (&study, &path), None).unwrap();
+    let predictor = TorquePredictor::new(&stored, &file, &study, &path, None).unwrap();
     let (samples, joints) = (300, predictor.dof());
     let at = |shift: f64| -> Vec<f64> { (0..samples * joints).map(|k| (0.37 * k as f64 + shift).sin()).collect() };
     let (q, dq, ddq) = (at(0.0), at(1.0), at(2.0));

@@ -200,7 +200,8 @@ fn possible(moments: &[f64; 6]) -> bool {
 }
 
 /// Principal moments, ascending.
-fn principal([xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> [f64; 3] {
+fn principal(inertia: &[f64; 6]) -> [f64; 3] {
+    let [xx, xy, xz, yy, yz, zz] = inertia;
     let matrix = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
     let mut moments: [f64; 3] = matrix.symmetric_eigenvalues().into();
     moments.sort_by(f64::total_cmp);

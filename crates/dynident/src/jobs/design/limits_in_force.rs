@@ -86,7 +86,7 @@ pub(super) fn in_force(
 ///
 /// # Errors
 /// A payload that the study does not have, or of which mass or centre of mass is not known.
-pub(super) fn loaded((study, study_path): (&Study, &Path), robot: &StudyRobot) -> Result<Model, Error> {
+pub(super) fn loaded(study: &Study, study_path: &Path, robot: &StudyRobot) -> Result<Model, Error> {
     let model = robot.model();
     let Some(name) = study.design.as_ref().and_then(|design| design.payload.as_ref()) else { return Ok(model.clone()) };
     let wrong = Error::section::<StudyError>(study_path, "design");

@@ -86,7 +86,7 @@ impl DesignSetup {
         let robot = StudyRobot::new(study, study_path, &folders)?;
         let LimitsInForce { limits, assumed, not_checked } = in_force(study, study_path, &folders, &robot, purpose)?;
         notes.extend(included(&limits, robot.model()));
-        let loaded = loaded((study, study_path), &robot)?;
+        let loaded = loaded(study, study_path, &robot)?;
         let set = LimitSet::new(&limits, &loaded).map_err(Error::section(study_path, "design.limits"))?;
         let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study_path, "design"))?;
         let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
