@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# python.sh SCRATCH: the package of Python as README installs it, in clean environments: with `python3` everything (tests, types, stubs, the book's page, the notebooks), with the oldest
-# Python that is here (3.10 or newer; NumPy 1.26) and the newest the tests alone. Other versions are looked for on the path and under PYENV_ROOT.
+# python.sh SCRATCH [--long]: the package of Python as README installs it, in a clean environment with `python3`: tests, types, stubs, the pages of the book. With --long also the
+# notebooks, the comparison with other tools, and the tests with the oldest Python that is here (3.10 or newer; NumPy 1.26) and the newest. Other versions are looked for on the path
+# and under PYENV_ROOT.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scratch=$1
@@ -45,8 +46,9 @@ program=$scratch/python/bin
 (cd "$scratch" && "$program/stubtest" --mypy-config-file "$here/pyproject.toml" --allowlist "$here/python/tests/allowed.txt" dynident)
 "$program/python" .ci/python_pages.py docs/src/python.md docs/src/fleets.md docs/src/online.md
 "$program/python" benchmarks/fleet.py --quick
-"$program/python" .ci/notebooks.py
+[ "${2:-}" = --long ] || exit 0
 
+"$program/python" .ci/notebooks.py
 # One wheel for every Python: pip links it anew each time that it builds it.
 "$program/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$scratch/wheel" .
 # Beside FIGAROH and mujoco.sysid, once and short.

@@ -1,0 +1,114 @@
+# Parts of .ci/run and .ci/long: sourced by both.
+
+# Property tests draw the same cases in every run: what fails here fails because of a change. Without it they draw others each time (CONTRIBUTING.md).
+export PROPTEST_RNG_SEED=20261121
+# Nothing here is built twice, so what an incremental build keeps for next time is only work.
+export CARGO_INCREMENTAL=0
+
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+# step NAME SECONDS COMMAND...: runs one check with a time limit and says how long it took.
+step() {
+    local name=$1 limit=$2 start=$SECONDS status=0
+    shift 2
+    printf '\n== %s\n' "$name"
+    timeout "$limit" "$@" || status=$?
+    if [ "$status" -eq 124 ]; then
+        printf '== %s: stopped after %s s\n' "$name" "$limit" >&2
+        exit 1
+    elif [ "$status" -ne 0 ]; then
+        printf '== %s: failed with exit status %s\n' "$name" "$status" >&2
+        exit 1
+    fi
+    printf '== %s: passed in %s s\n' "$name" "$((SECONDS - start))"
+}
+
+# readme_command PREFIX: the README's own command, so that what is checked is what is promised.
+readme_command() {
+    local line
+    line=$(grep -m 1 "^$1" README.md) || { echo "README.md has no line that begins with: $1" >&2; exit 1; }
+    # Without the comment behind it.
+    printf '%s' "${line%%[[:space:]]#*}" | sed 's/[[:space:]]*$//'
+}
+
+# test_program PACKAGE NAME: the test program NAME of a package as the tests above built it (all features of the workspace).
+test_program() {
+    cargo test --workspace --locked --no-run --message-format json | python3 -c '
+import json, sys
+package, name = sys.argv[1:]
+built = [json.loads(line) for line in sys.stdin]
+tests = [
+    one["executable"] for one in built
+    if one.get("executable") and one["profile"]["test"] and one["target"]["name"] == name and f"/{package}/" in one["manifest_path"]
+]
+assert len(tests) == 1, tests
+print(tests[0])' "$1" "$2"
+}
+export -f test_program
+
+# The unit tests of excitation on lanes of four.
+portable_excitation() {
+    local program
+    program=$(test_program dynident-excitation dynident_excitation)
+    cd crates/dynident-excitation
+    DYNIDENT_INSTRUCTIONS=portable "$program" --quiet
+}
+export -f portable_excitation
+
+# mujoco_robot PYTHON: the test of a robot outside that ordinary runs leave out, for it needs MuJoCo.
+mujoco_robot() {
+    local program
+    program=$(test_program dynident-iteration it)
+    cd crates/dynident-iteration
+    DYNIDENT_PYTHON=$1 "$program" --ignored --exact robots::mujoco_is_a_robot
+}
+export -f mujoco_robot
+
+# A virtual environment; Debian keeps the part that fills it in a package of its own.
+python_environment() {
+    if ! python3 -m venv "$1/venv"; then
+        [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null || {
+            echo "python3 cannot make a virtual environment: install python3-venv" >&2
+            return 1
+        }
+        apt-get update -qq
+        apt-get install -y -qq python3-venv
+        rm -rf "$1/venv"
+        python3 -m venv "$1/venv"
+    fi
+    "$1/venv/bin/pip" install --quiet --disable-pip-version-check -r golden/requirements.txt
+}
+export -f python_environment
+
+# What reads exports beside the Python environment: another compiler of C, and libsdformat.
+readers_of_exports() {
+    if command -v clang >/dev/null && command -v pkg-config >/dev/null && pkg-config --list-all | grep -q '^sdformat'; then
+        return 0
+    fi
+    [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null || {
+        echo "exports are read by clang and libsdformat: install clang, libsdformat-dev and pkg-config" >&2
+        return 1
+    }
+    apt-get update -qq
+    apt-get install -y -qq clang libsdformat-dev pkg-config
+}
+export -f readers_of_exports
+
+# pages_in_a_browser SCRATCH: the reports that the commands wrote, looked at as a person does; see .ci/pages.py. DYNIDENT_CHROMIUM names another browser.
+pages_in_a_browser() {
+    local browser
+    browser=${DYNIDENT_CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)}
+    if [ -z "$browser" ]; then
+        [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null || {
+            echo "no browser to look at pages with: install chromium, or name one in DYNIDENT_CHROMIUM" >&2
+            return 1
+        }
+        apt-get update -qq
+        apt-get install -y -qq chromium
+        browser=$(command -v chromium)
+    fi
+    "$1/venv/bin/pip" install --quiet --disable-pip-version-check --no-deps --target "$1/page_libraries" -r .ci/requirements.txt
+    python3 .ci/pages.py "$browser" "$1/page_libraries" "$1"/commands/{paper,result,iteration}/report.html "$1/commands/gallery.html"
+}
+export -f pages_in_a_browser
