@@ -9,7 +9,7 @@ use crate::robot_model::RobotModel;
 use crate::symbol::{Symbol, record};
 use dynident_dynamics::{inverse_dynamics_over, mass_matrix_over};
 use dynident_lanes::Scalar;
-use dynident_model::Vec3;
+use dynident_model::{Model, Vec3};
 
 /// One function: inputs are joint vectors, the output is a joint vector or a square matrix by rows.
 #[derive(Debug)]
@@ -44,106 +44,167 @@ impl Equations {
     pub(crate) fn of(robot: &RobotModel) -> Result<Self, ExportError> {
         let reduced = robot.reduced()?;
         let weightless = reduced.clone().with_gravity(Vec3::ZERO)?;
-        let dof = robot.model().dof();
-        let (graph, functions) = record(|| {
-            let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
-                .map(|input| Symbol::inputs(input, dof));
-            let rest = vec![Symbol::ZERO; dof];
-            let rotors = drive_inertia(robot);
-            let friction = friction(robot, &dq)?;
-            let declared = declared_torque(robot, &q, &dq)?;
-            // Other than rigid bodies and inertia of drives.
-            let beside: Vec<Symbol> = match &declared {
-                Some(declared) => {
-                    friction.iter().zip(declared).map(|(&friction, &declared)| friction + declared).collect()
-                }
-                None => friction.clone(),
-            };
-
-            let mut mass_matrix = mass_matrix_over(&reduced, &q);
-            for (entry, &rotor) in mass_matrix.iter_mut().zip(&rotors) {
-                *entry += Symbol::splat(rotor);
-            }
-            let mut inverse = inverse_dynamics_over(&reduced, &q, &dq, &ddq);
-            for (row, torque) in inverse.iter_mut().enumerate() {
-                for (column, &ddq) in ddq.iter().enumerate() {
-                    *torque += Symbol::splat(rotors[row * dof + column]) * ddq;
-                }
-                *torque += beside[row];
-            }
-            let bias = inverse_dynamics_over(&reduced, &q, &dq, &rest);
-            let left = (0..dof).map(|joint| tau[joint] - (bias[joint] + beside[joint])).collect();
-            let forward = solved(mass_matrix.clone(), left)
-                .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })?;
-            let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
-                name,
-                about,
-                inputs,
-                output,
-                is_matrix: name == "mass_matrix",
-                values,
-            };
-            let mut functions = vec![
-                function(
-                    "inverse_dynamics",
-                    "Torque of a motion: tau = M(q) ddq + C(q, dq) dq + g(q) + friction(dq).",
-                    &[Input::Position, Input::Velocity, Input::Acceleration],
-                    "tau",
-                    inverse,
-                ),
-                function(
-                    "gravity",
-                    "Torque against gravity, g(q).",
-                    &[Input::Position],
-                    "tau",
-                    inverse_dynamics_over(&reduced, &q, &rest, &rest),
-                ),
-                function(
-                    "coriolis",
-                    "Coriolis and centrifugal torque, the vector C(q, dq) dq.",
-                    &[Input::Position, Input::Velocity],
-                    "tau",
-                    inverse_dynamics_over(&weightless, &q, &dq, &rest),
-                ),
-                function(
-                    "friction",
-                    "Friction and constant offsets of the drives.",
-                    &[Input::Velocity],
-                    "tau",
-                    friction,
-                ),
-                function(
-                    "mass_matrix",
-                    "Mass matrix M(q) with the inertia of the drives, row by row.",
-                    &[Input::Position],
-                    "mass",
-                    mass_matrix,
-                ),
-                function(
-                    "forward_dynamics",
-                    "Accelerations under torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
-                    &[Input::Position, Input::Velocity, Input::Torque],
-                    "ddq",
-                    forward,
-                ),
-            ];
-            if let Some(declared) = declared {
-                functions.push(function(
-                    "declared",
-                    "Torque that the study declares, of springs and the like; inverse_dynamics and forward_dynamics have it in them.",
-                    &[Input::Position, Input::Velocity],
-                    "tau",
-                    declared,
-                ));
-            }
-            Ok::<_, ExportError>(functions)
-        });
-        let functions = functions?;
+        let (graph, values) = record(|| Values::of(robot, &reduced, &weightless));
+        let functions = values?.functions();
         match graph.not_finite() {
             Some(value) => Err(ExportError::Overflow { value }),
-            None => Ok(Self { dof, graph, functions }),
+            None => Ok(Self { dof: robot.model().dof(), graph, functions }),
         }
     }
+}
+
+/// Symbols of the inputs.
+struct Inputs {
+    q: Vec<Symbol>,
+    dq: Vec<Symbol>,
+    ddq: Vec<Symbol>,
+    tau: Vec<Symbol>,
+    /// Zero velocities or accelerations.
+    rest: Vec<Symbol>,
+}
+
+impl Inputs {
+    /// Of a robot with `dof` joints.
+    fn new(dof: usize) -> Self {
+        let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
+            .map(|input| Symbol::inputs(input, dof));
+        Self { q, dq, ddq, tau, rest: vec![Symbol::ZERO; dof] }
+    }
+}
+
+/// Symbols of the outputs of all functions.
+struct Values {
+    inverse: Vec<Symbol>,
+    gravity: Vec<Symbol>,
+    coriolis: Vec<Symbol>,
+    friction: Vec<Symbol>,
+    mass_matrix: Vec<Symbol>,
+    forward: Vec<Symbol>,
+    declared: Option<Vec<Symbol>>,
+}
+
+impl Values {
+    /// Runs the algorithms; `weightless` is the reduced robot without gravity.
+    fn of(robot: &RobotModel, reduced: &Model, weightless: &Model) -> Result<Self, ExportError> {
+        let inputs = Inputs::new(robot.model().dof());
+        let Inputs { q, dq, rest, .. } = &inputs;
+        let rotors = drive_inertia(robot);
+        let friction = friction(robot, dq)?;
+        let declared = declared_torque(robot, q, dq)?;
+        // Torque other than that of rigid bodies and inertia of drives.
+        let other: Vec<Symbol> = match &declared {
+            Some(declared) => friction.iter().zip(declared).map(|(&friction, &declared)| friction + declared).collect(),
+            None => friction.clone(),
+        };
+        let mass_matrix = mass_matrix(reduced, q, &rotors);
+        let inverse = inverse(reduced, &inputs, &rotors, &other);
+        let forward = forward(reduced, &inputs, &mass_matrix, &other)?;
+        Ok(Self {
+            inverse,
+            gravity: inverse_dynamics_over(reduced, q, rest, rest),
+            coriolis: inverse_dynamics_over(weightless, q, dq, rest),
+            friction,
+            mass_matrix,
+            forward,
+            declared,
+        })
+    }
+
+    /// The functions with these outputs.
+    fn functions(self) -> Vec<Equation> {
+        let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
+            name,
+            about,
+            inputs,
+            output,
+            is_matrix: name == "mass_matrix",
+            values,
+        };
+        let mut functions = vec![
+            function(
+                "inverse_dynamics",
+                "Torque of a motion: tau = M(q) ddq + C(q, dq) dq + g(q) + friction(dq).",
+                &[Input::Position, Input::Velocity, Input::Acceleration],
+                "tau",
+                self.inverse,
+            ),
+            function("gravity", "Torque against gravity, g(q).", &[Input::Position], "tau", self.gravity),
+            function(
+                "coriolis",
+                "Coriolis and centrifugal torque, the vector C(q, dq) dq.",
+                &[Input::Position, Input::Velocity],
+                "tau",
+                self.coriolis,
+            ),
+            function(
+                "friction",
+                "Friction and constant offsets of the drives.",
+                &[Input::Velocity],
+                "tau",
+                self.friction,
+            ),
+            function(
+                "mass_matrix",
+                "Mass matrix M(q) with the inertia of the drives, row by row.",
+                &[Input::Position],
+                "mass",
+                self.mass_matrix,
+            ),
+            function(
+                "forward_dynamics",
+                "Accelerations under torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
+                &[Input::Position, Input::Velocity, Input::Torque],
+                "ddq",
+                self.forward,
+            ),
+        ];
+        functions.extend(self.declared.map(|declared| {
+            function(
+                "declared",
+                "Torque that the study declares, of springs and the like; inverse_dynamics and forward_dynamics have it in them.",
+                &[Input::Position, Input::Velocity],
+                "tau",
+                declared,
+            )
+        }));
+        functions
+    }
+}
+
+/// `M(q)` with the inertia of the drives.
+fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
+    let mut mass_matrix = mass_matrix_over(reduced, q);
+    for (entry, &rotor) in mass_matrix.iter_mut().zip(rotors) {
+        *entry += Symbol::splat(rotor);
+    }
+    mass_matrix
+}
+
+/// The torque of a motion, with the inertia of the drives and `other` torques.
+fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -> Vec<Symbol> {
+    let Inputs { q, dq, ddq, .. } = inputs;
+    let mut inverse = inverse_dynamics_over(reduced, q, dq, ddq);
+    for (row, torque) in inverse.iter_mut().enumerate() {
+        for (column, &acceleration) in ddq.iter().enumerate() {
+            *torque += Symbol::splat(rotors[row * ddq.len() + column]) * acceleration;
+        }
+        *torque += other[row];
+    }
+    inverse
+}
+
+/// The accelerations under torques.
+fn forward(
+    reduced: &Model,
+    inputs: &Inputs,
+    mass_matrix: &[Symbol],
+    other: &[Symbol],
+) -> Result<Vec<Symbol>, ExportError> {
+    let Inputs { q, dq, tau, rest, .. } = inputs;
+    let bias = inverse_dynamics_over(reduced, q, dq, rest);
+    let left = (0..tau.len()).map(|joint| tau[joint] - (bias[joint] + other[joint])).collect();
+    solved(mass_matrix.to_vec(), left)
+        .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })
 }
 
 /// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that branches that do not see each other stay zero

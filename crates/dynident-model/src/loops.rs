@@ -95,80 +95,126 @@ pub enum LoopError {
 /// # Errors
 /// Names that are not there, a loop that does not close or is no parallelogram, passive joints that it does not hold.
 pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mimic)>, LoopError> {
-    let tree = model.tree_joints();
-    let known = || tree.iter().map(|joint| joint.name.clone()).collect();
-    let place = |name: &String| {
-        let found = tree.iter().position(|joint| joint.name == *name);
-        found.ok_or_else(|| LoopError::UnknownJoint { joint: name.clone(), known: known() })
-    };
-    let mut passive = loops.iter().flat_map(|one| &one.passive).map(place).collect::<Result<Vec<usize>, _>>()?;
-    passive.sort_unstable();
-    passive.dedup();
-    let cuts = loops.iter().map(|one| Cut::of(model, one)).collect::<Result<Vec<Cut>, _>>()?;
-    if passive.is_empty() {
+    let loops = Loops::of(model, loops)?;
+    if loops.passive.is_empty() {
         return Ok(Vec::new());
     }
-    // Only what moves a loop's points is followed.
-    let on_loop = |joint: usize| cuts.iter().any(|cut| cut.ends.iter().any(|(path, _)| path.contains(&joint)));
-    let active: Vec<usize> = (0..tree.len()).filter(|joint| !passive.contains(joint) && on_loop(*joint)).collect();
-    let open = |q: &[f64]| worst(model, &cuts, q);
-    let named = |cut: &Cut| (cut.links[0].clone(), cut.links[1].clone());
+    let q = loops.closed()?;
+    let law = loops.law(&q)?;
+    loops.check(&law, q)?;
+    Ok(loops.mimics(&law))
+}
 
-    // Closed at the description's zero, or near it.
-    let mut q = vec![0.0; tree.len()];
-    for _ in 0..STEPS {
-        let (gap, jacobian) = (gaps(model, &cuts, &q), jacobian(model, &cuts, &q, &passive));
-        let Ok(step) = jacobian.svd(true, true).solve(&gap, 1e-9) else { break };
-        for (&joint, step) in passive.iter().zip(step.iter()) {
-            q[joint] -= step;
-        }
-    }
-    let (gap_m, cut) = open(&q);
-    if gap_m.is_nan() || gap_m > CLOSES * cut.size_m {
-        let (first, second) = named(cut);
-        return Err(LoopError::Open { first, second, gap_m });
-    }
+/// The loops of a model, and the joints of its tree that move them.
+struct Loops<'a> {
+    model: &'a Model,
+    cuts: Vec<Cut>,
+    /// Joints without drives, which the loops move.
+    passive: Vec<usize>,
+    /// The other joints on the loops.
+    active: Vec<usize>,
+}
 
-    // C and c.
-    let of_passive = jacobian(model, &cuts, &q, &passive).svd(true, true);
-    let largest = of_passive.singular_values.max();
-    if of_passive.rank(1e-6 * largest) < passive.len() {
-        let joints = passive.iter().map(|&joint| tree[joint].name.clone()).collect();
-        return Err(LoopError::Undetermined { joints });
-    }
-    let of_active = jacobian(model, &cuts, &q, &active);
-    let solved = of_passive.solve(&of_active, 1e-9 * largest).unwrap_or_else(|_| of_active.map(|_| f64::NAN));
-    let whole = |x: f64| if (x - x.round()).abs() < WHOLE { x.round() + 0.0 } else { x };
-    let law = (-solved).map(whole);
-    let offsets: Vec<f64> = passive.iter().map(|&joint| whole(q[joint])).collect();
+/// `q_p = C q_a + c`.
+struct Law {
+    /// `C`: a row for each passive joint, a column for each active joint.
+    multipliers: DMatrix<f64>,
+    /// `c`.
+    offsets: Vec<f64>,
+}
 
-    // The same everywhere.
-    let mut random = Random::new(1);
-    for _ in 0..POSTURES {
-        for &joint in &active {
-            let reach = if tree[joint].turns() { TRIED_RAD } else { 0.2 * TRIED_RAD };
-            q[joint] = random.uniform(-reach, reach);
-        }
-        for (row, &joint) in passive.iter().enumerate() {
-            let followed = active.iter().enumerate().map(|(column, &source)| law[(row, column)] * q[source]);
-            q[joint] = offsets[row] + followed.sum::<f64>();
-        }
-        let (gap_m, cut) = open(&q);
-        // The multipliers are as exact as the description's lengths, and postures far from zero lever them.
-        if gap_m.is_nan() || gap_m > 10.0 * CLOSES * cut.size_m {
-            let (first, second) = named(cut);
-            return Err(LoopError::NotLinear { first, second, gap_m });
-        }
-    }
-    let follower = |(row, &joint): (usize, &usize)| {
-        let source = |(column, &source): (usize, &usize)| {
-            let multiplier = law[(row, column)];
-            (multiplier != 0.0).then(|| MimicSource { joint: tree[source].name.clone(), multiplier })
+impl<'a> Loops<'a> {
+    /// Looks up links and joints.
+    fn of(model: &'a Model, loops: &[LoopClosure]) -> Result<Self, LoopError> {
+        let tree = model.tree_joints();
+        let known = || tree.iter().map(|joint| joint.name.clone()).collect();
+        let place = |name: &String| {
+            let found = tree.iter().position(|joint| joint.name == *name);
+            found.ok_or_else(|| LoopError::UnknownJoint { joint: name.clone(), known: known() })
         };
-        let sources = active.iter().enumerate().filter_map(source).collect();
-        (tree[joint].name.clone(), Mimic { sources, offset: offsets[row] })
-    };
-    Ok(passive.iter().enumerate().map(follower).collect())
+        let mut passive = loops.iter().flat_map(|one| &one.passive).map(place).collect::<Result<Vec<usize>, _>>()?;
+        passive.sort_unstable();
+        passive.dedup();
+        let cuts = loops.iter().map(|one| Cut::of(model, one)).collect::<Result<Vec<Cut>, _>>()?;
+        // Only joints that move the points of a loop are followed.
+        let on_loop = |joint: usize| cuts.iter().any(|cut| cut.ends.iter().any(|(path, _)| path.contains(&joint)));
+        let active = (0..tree.len()).filter(|joint| !passive.contains(joint) && on_loop(*joint)).collect();
+        Ok(Self { model, cuts, passive, active })
+    }
+
+    /// The positions that close all loops at the zero of the robot description, or near it.
+    fn closed(&self) -> Result<Vec<f64>, LoopError> {
+        let Self { model, cuts, passive, .. } = self;
+        let mut q = vec![0.0; model.tree_joints().len()];
+        for _ in 0..STEPS {
+            let (gap, jacobian) = (gaps(model, cuts, &q), jacobian(model, cuts, &q, passive));
+            let Ok(step) = jacobian.svd(true, true).solve(&gap, 1e-9) else { break };
+            for (&joint, step) in passive.iter().zip(step.iter()) {
+                q[joint] -= step;
+            }
+        }
+        let (gap_m, cut) = worst(model, cuts, &q);
+        if gap_m.is_nan() || gap_m > CLOSES * cut.size_m {
+            let [first, second] = cut.links.clone();
+            return Err(LoopError::Open { first, second, gap_m });
+        }
+        Ok(q)
+    }
+
+    /// `C` and `c`, from the Jacobians at the positions that close the loops.
+    fn law(&self, q: &[f64]) -> Result<Law, LoopError> {
+        let Self { model, cuts, passive, active } = self;
+        let of_passive = jacobian(model, cuts, q, passive).svd(true, true);
+        let largest = of_passive.singular_values.max();
+        if of_passive.rank(1e-6 * largest) < passive.len() {
+            let joints = passive.iter().map(|&joint| model.tree_joints()[joint].name.clone()).collect();
+            return Err(LoopError::Undetermined { joints });
+        }
+        let of_active = jacobian(model, cuts, q, active);
+        let solved = of_passive.solve(&of_active, 1e-9 * largest).unwrap_or_else(|_| of_active.map(|_| f64::NAN));
+        let whole = |x: f64| if (x - x.round()).abs() < WHOLE { x.round() + 0.0 } else { x };
+        let offsets = passive.iter().map(|&joint| whole(q[joint])).collect();
+        Ok(Law { multipliers: (-solved).map(whole), offsets })
+    }
+
+    /// Checks that the law closes all loops in random postures, from the positions `q` on.
+    fn check(&self, law: &Law, mut q: Vec<f64>) -> Result<(), LoopError> {
+        let Self { model, cuts, passive, active } = self;
+        let mut random = Random::new(1);
+        for _ in 0..POSTURES {
+            for &joint in active {
+                let reach = if model.tree_joints()[joint].turns() { TRIED_RAD } else { 0.2 * TRIED_RAD };
+                q[joint] = random.uniform(-reach, reach);
+            }
+            for (row, &joint) in passive.iter().enumerate() {
+                let followed = active.iter().enumerate();
+                let followed = followed.map(|(column, &source)| law.multipliers[(row, column)] * q[source]);
+                q[joint] = law.offsets[row] + followed.sum::<f64>();
+            }
+            let (gap_m, cut) = worst(model, cuts, &q);
+            // The multipliers are as exact as the lengths of the description, and postures far from zero amplify their
+            // errors.
+            if gap_m.is_nan() || gap_m > 10.0 * CLOSES * cut.size_m {
+                let [first, second] = cut.links.clone();
+                return Err(LoopError::NotLinear { first, second, gap_m });
+            }
+        }
+        Ok(())
+    }
+
+    /// The law by the names of the joints.
+    fn mimics(&self, law: &Law) -> Vec<(String, Mimic)> {
+        let tree = self.model.tree_joints();
+        let follower = |(row, &joint): (usize, &usize)| {
+            let source = |(column, &source): (usize, &usize)| {
+                let multiplier = law.multipliers[(row, column)];
+                (multiplier != 0.0).then(|| MimicSource { joint: tree[source].name.clone(), multiplier })
+            };
+            let sources = self.active.iter().enumerate().filter_map(source).collect();
+            (tree[joint].name.clone(), Mimic { sources, offset: law.offsets[row] })
+        };
+        self.passive.iter().enumerate().map(follower).collect()
+    }
 }
 
 /// The joints of the tree on the way to a link, and where it stands in the frame of the last one's body (of the base
@@ -227,7 +273,7 @@ fn gaps(model: &Model, cuts: &[Cut], q: &[f64]) -> DVector<f64> {
     DVector::from_iterator(3 * cuts.len(), cuts.iter().flat_map(|cut| gap(cut).0))
 }
 
-/// The widest loop beside its size.
+/// The loop with the largest gap compared with its size.
 fn worst<'c>(model: &Model, cuts: &'c [Cut], q: &[f64]) -> (f64, &'c Cut) {
     let gap = |cut: &Cut| (cut.end(model, 0, q).0 - cut.end(model, 1, q).0).norm();
     let of_size = |cut: &&Cut| gap(cut) / cut.size_m;

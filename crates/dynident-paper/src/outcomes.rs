@@ -9,33 +9,41 @@ const SWING: f64 = 0.1;
 
 /// In the order of the paper; `genetic` and `optimum` are H of the genetic algorithm and of the optimum inside (18),
 /// `claim` the sentence on both methods.
-pub(crate) fn statements(runs: &JointRuns, figures: [f64; 2], claim: &str, quotient: f64) -> Vec<PaperStatement> {
+pub(crate) fn statements(
+    runs: &JointRuns,
+    figures: [f64; 2],
+    claim: &str,
+    quotient: f64,
+) -> Vec<PaperStatement> {
     let [optimum, genetic] = figures;
-    let one = |place: &str, paper: &str, here: String, holds: bool| PaperStatement {
-        place: place.to_owned(),
-        paper: paper.to_owned(),
-        here,
-        holds,
-    };
-    // By run, of the columns as in the paper.
-    let values = |joint: usize, place: usize| -> Vec<f64> {
-        runs.as_paper[joint].values.iter().take(FIGURE_12.len()).map(|values| values[place]).collect()
-    };
-    let listed = |values: &[f64]| values.iter().map(|value| shown(*value)).collect::<Vec<_>>().join(", ");
-    let (theta_4, theta_1) = (values(1, 0), values(0, 0));
+    let convergence = statement(
+        "section 2.2, Fig. 7",
+        "after 500 generations the optimal solution is no longer updated and the genetic algorithm has converged",
+        format!("it stands still at H = {}; the optimum inside (18) is {}", shown(genetic), shown(optimum)),
+        genetic < 1.01 * optimum,
+    );
+    let comparison = statement(
+        "section 3, Figs. 16, 17",
+        "the logistic method predicts torques better than the Fourier series",
+        claim.to_owned(),
+        quotient < 1.0,
+    );
+    [vec![convergence], tracking(runs), parameters(runs), vec![comparison]].concat()
+}
+
+/// What the paper says at a place, and the result here.
+fn statement(place: &str, paper: &str, here: String, holds: bool) -> PaperStatement {
+    PaperStatement { place: place.to_owned(), paper: paper.to_owned(), here, holds }
+}
+
+/// The statements on the tracking errors of joint 2.
+fn tracking(runs: &JointRuns) -> Vec<PaperStatement> {
     let errors: Vec<f64> = runs.as_paper[1].runs.iter().map(|run| run.max_error[1]).collect();
     let swings: Vec<usize> = runs.as_paper[1].runs.iter().take(2).map(|run| swings(run, 1)).collect();
     let many = |count: &usize| *count > 4;
     let share = 100.0 * errors.get(1).copied().unwrap_or(f64::NAN) / errors.first().copied().unwrap_or(f64::NAN);
-    let [_, three, six] = runs.literal_errors;
     vec![
-        one(
-            "section 2.2, Fig. 7",
-            "after 500 generations the optimal solution is no longer updated and the genetic algorithm has converged",
-            format!("it stands still at H = {}; the optimum inside (18) is {}", shown(genetic), shown(optimum)),
-            genetic < 1.01 * optimum,
-        ),
-        one(
+        statement(
             "section 3, Figs. 9, 10",
             "the actual trajectory fluctuates up and down near the desired one in runs 1 and 2",
             format!(
@@ -45,41 +53,54 @@ pub(crate) fn statements(runs: &JointRuns, figures: [f64; 2], claim: &str, quoti
             ),
             swings.iter().all(many),
         ),
-        one(
+        statement(
             "section 3, Fig. 12",
             "largest tracking errors of joint 2: 0.6, 0.15 and 0 rad",
             format!(
                 "{} rad; the first agrees because the gains of the first run's joint PD were chosen for it, the others follow from it",
                 errors.iter().map(|error| rough(*error)).collect::<Vec<_>>().join(", ")
             ),
-            // Half a tenth of a radian is what the figure's axis lets one read.
+            // The axis of the figure can be read to half a tenth of a radian.
             errors.iter().zip(FIGURE_12).all(|(error, paper)| (error - paper).abs() < 0.05),
         ),
-        one(
+        statement(
             "section 3, Fig. 12",
             "the second run's error is 25 % of the first's",
             format!("{share:.0} %"),
             (share - 25.0).abs() < 5.0,
         ),
-        one(
+    ]
+}
+
+/// The statements on the parameters, run by run.
+fn parameters(runs: &JointRuns) -> Vec<PaperStatement> {
+    // By run, of the columns as in the paper.
+    let values = |joint: usize, place: usize| -> Vec<f64> {
+        runs.as_paper[joint].values.iter().take(FIGURE_12.len()).map(|values| values[place]).collect()
+    };
+    let listed = |values: &[f64]| values.iter().map(|value| shown(*value)).collect::<Vec<_>>().join(", ");
+    let (theta_4, theta_1) = (values(1, 0), values(0, 0));
+    let [_, three, six] = runs.literal_errors;
+    vec![
+        statement(
             "Table 4",
             "θ₄ rises run by run: 0.203, 0.698, 0.993",
             format!("{}: it overshoots in the second run", listed(&theta_4)),
             theta_4.windows(2).all(|pair| pair[0] <= pair[1]),
         ),
-        one(
+        statement(
             "Table 5",
             &format!("the first θ₁ is positive: {}", PAPER[0][0][0]),
             format!("{}: a negative inertia, which no arm has", listed(&theta_1[..1.min(theta_1.len())])),
             theta_1.first().is_some_and(|value| *value > 0.0),
         ),
-        one(
+        statement(
             "Tables 4, 5",
             "after three runs every parameter is right to 0.01 (largest error 0.009)",
             format!("largest error {} with the paper's own loop", rough(three)),
             three < 0.01,
         ),
-        one(
+        statement(
             "section 3",
             "with more iterations the parameters become more accurate",
             format!(
@@ -88,12 +109,6 @@ pub(crate) fn statements(runs: &JointRuns, figures: [f64; 2], claim: &str, quoti
                 rough(six)
             ),
             six < three,
-        ),
-        one(
-            "section 3, Figs. 16, 17",
-            "the logistic method predicts torques better than the Fourier series",
-            claim.to_owned(),
-            quotient < 1.0,
         ),
     ]
 }

@@ -60,6 +60,85 @@ pub(crate) enum Place {
     Page,
 }
 
+impl Place {
+    /// The colour of a curve.
+    fn colour(self, curve: usize) -> String {
+        match self {
+            Self::Document => COLOURS[curve % COLOURS.len()].to_owned(),
+            Self::Page => format!("var(--c{})", curve % COLOURS.len()),
+        }
+    }
+}
+
+/// A rectangle for curves, px, and the ranges of its axes.
+struct Frame {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+    from: f64,
+    to: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Frame {
+    /// A value of the x axis, px.
+    fn at_x(&self, x: f64) -> f64 {
+        self.left + (x - self.from) / (self.to - self.from) * (self.right - self.left)
+    }
+
+    /// A value of the y axis, px.
+    fn at_y(&self, y: f64) -> f64 {
+        self.bottom - (y - self.low) / (self.high - self.low) * (self.bottom - self.top)
+    }
+}
+
+/// The samples that are drawn.
+struct Samples<'a> {
+    x: &'a [f64],
+    kept: Vec<usize>,
+}
+
+impl Samples<'_> {
+    /// The line through values of the y axis.
+    fn path(&self, values: &[f64], frame: &Frame) -> String {
+        let mut pen = Pen::default();
+        for &i in &self.kept {
+            pen.to([frame.at_x(self.x[i]), frame.at_y(values[i])]);
+        }
+        pen.path()
+    }
+
+    /// The points of the finite values of the y axis.
+    fn points(&self, values: &[f64], frame: &Frame) -> Vec<[f64; 2]> {
+        let finite = self.kept.iter().filter(|&&i| values[i].is_finite());
+        finite.map(|&i| [tenth(frame.at_x(self.x[i])), tenth(frame.at_y(values[i]))]).collect()
+    }
+
+    /// Whether each sample is marked.
+    fn are_marked(&self) -> bool {
+        self.kept.len() <= MARKED
+    }
+}
+
+/// The difference of two curves, in a strip below the frame.
+fn strip_view(name: &str, values: &[f64], colour: String, samples: &Samples<'_>, above: &Frame) -> StripView {
+    let [low, high] = padded(range(values.iter().copied().chain([0.0])));
+    let (top, bottom) = (above.bottom + BETWEEN, above.bottom + BETWEEN + STRIP);
+    let frame = Frame { top, bottom, low, high, ..*above };
+    StripView {
+        name: shortened(name),
+        colour,
+        top,
+        bottom,
+        zero: tenth(frame.at_y(0.0)),
+        ticks: ticks(low, high, 3).into_iter().map(|y| (tenth(frame.at_y(y)), short(y, 3))).collect(),
+        path: samples.path(values, &frame),
+        points: if samples.are_marked() { samples.points(values, &frame) } else { Vec::new() },
+    }
+}
+
 impl CurvePicture<'_> {
     /// What a person who does not see the picture is told: ranges of axis and curves, size of the difference.
     pub(crate) fn in_words(&self) -> String {
@@ -94,109 +173,103 @@ impl CurvePicture<'_> {
 
     /// The picture, `width` by `height` px without the strip.
     pub(crate) fn svg(&self, width: f64, height: f64, place: Place) -> Result<String, ReportError> {
-        let value = |y: f64| match self.log_y {
-            true if y > 0.0 => y.log10(),
-            true => f64::NAN,
-            false => y,
-        };
-        let exact = |y: f64| if self.log_y { 10.0_f64.powf(y) } else { y };
         let curves: Vec<Vec<f64>> =
-            self.curves.iter().map(|curve| curve.values.iter().map(|y| value(*y)).collect()).collect();
-        let bars = self.curves.iter().filter_map(|curve| curve.bars.as_ref()).flatten().flatten().map(|y| value(*y));
+            self.curves.iter().map(|curve| curve.values.iter().map(|y| self.on_axis(*y)).collect()).collect();
+        let bars = self.curves.iter().filter_map(|curve| curve.bars.as_ref()).flatten().flatten();
+        let bars = bars.map(|y| self.on_axis(*y));
         let [low, high] = padded(range(curves.iter().flatten().copied().chain(bars)));
-        let room = if self.counts { 0.3 } else { 0.0 };
-        let from = self.x.first().map_or(0.0, |x| x - room);
-        let to = self.x.last().map_or(1.0, |x| x + room);
-        let to = if to > from { to } else { from + 1.0 };
+        let [from, to] = self.x_range();
 
         // The frame, below the title and the legend.
         let (left, right) = (64.0, width - 12.0);
         let titled = if place == Place::Document { 18.0 } else { 0.0 };
         let legend = self.legend(left, right, titled + 12.0);
         let top = legend.last().map_or(titled, |entry| entry.y) + 8.0;
-        let bottom = height - 42.0;
-        let at_x = |x: f64| left + (x - from) / (to - from) * (right - left);
-        let at_y = |y: f64| bottom - (y - low) / (high - low) * (bottom - top);
+        let frame = Frame { left, right, top, bottom: height - 42.0, from, to, low, high };
         let strip = self.strip();
         let views: Vec<&[f64]> =
             curves.iter().map(|curve| &curve[..]).chain(strip.iter().map(|(_, values)| &values[..])).collect();
         let kept = kept_samples(self.x, &views, ((right - left) / 2.0).max(1.0) as usize);
-        let path = |values: &[f64], at: &dyn Fn(f64) -> f64| {
-            let mut pen = Pen::default();
-            for &i in &kept {
-                pen.to([at_x(self.x[i]), at(values[i])]);
-            }
-            pen.path()
-        };
-        let marked = kept.len() <= MARKED;
-        let colour = |k: usize| match place {
-            Place::Document => COLOURS[k % COLOURS.len()].to_owned(),
-            Place::Page => format!("var(--c{})", k % COLOURS.len()),
-        };
-        let points = |values: &[f64], at: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
-            let finite = kept.iter().filter(|&&i| values[i].is_finite());
-            finite.map(|&i| [tenth(at_x(self.x[i])), tenth(at(values[i]))]).collect()
-        };
-        let lines = self.curves.iter().zip(&curves).enumerate().map(|(k, (curve, values))| {
-            let whiskers = curve.bars.as_ref().map(|[lower, upper]| {
-                let ends = |&i: &usize| -> Option<String> {
-                    let end = |ends: &[f64]| ends.get(i).copied().map(value).filter(|y| y.is_finite());
-                    let (x, upper) = (tenth(at_x(self.x[i])), tenth(at_y(end(upper)?)));
-                    let lower = tenth(end(lower).map_or(bottom, at_y));
-                    Some(format!("M{x} {upper}V{lower}M{} {upper}h8M{} {lower}h8", tenth(x - 4.0), tenth(x - 4.0)))
-                };
-                kept.iter().filter(|&&i| values[i].is_finite()).filter_map(ends).collect::<String>()
-            });
-            CurveView {
-                colour: colour(k),
-                dashed: curve.dashed,
-                broad: curve.broad,
-                path: if curve.points { String::new() } else { path(values, &at_y) },
-                whiskers: whiskers.unwrap_or_default(),
-                points: if curve.points || (marked && !curve.broad) { points(values, &at_y) } else { Vec::new() },
-            }
-        });
+        let samples = Samples { x: self.x, kept };
+
+        let lines = self.curves.iter().zip(&curves).enumerate();
+        let lines = lines.map(|(k, (curve, values))| self.line(curve, values, place.colour(k), &samples, &frame));
         let lines = lines.collect();
-        let strip = strip.map(|(name, values)| {
-            let [low, high] = padded(range(values.iter().copied().chain([0.0])));
-            let (top, bottom) = (bottom + BETWEEN, bottom + BETWEEN + STRIP);
-            let at_y = |y: f64| bottom - (y - low) / (high - low) * (bottom - top);
-            StripView {
-                name: shortened(name),
-                colour: colour(self.curves.len()),
-                top,
-                bottom,
-                zero: tenth(at_y(0.0)),
-                ticks: ticks(low, high, 3).into_iter().map(|y| (tenth(at_y(y)), short(y, 3))).collect(),
-                path: path(&values, &at_y),
-                points: if marked { points(&values, &at_y) } else { Vec::new() },
-            }
-        });
+        let strip =
+            strip.map(|(name, values)| strip_view(name, &values, place.colour(self.curves.len()), &samples, &frame));
         let grown = strip.as_ref().map_or(0.0, |_| BETWEEN + STRIP);
         let whole = |x: &f64| !self.counts || (*x == x.round() && *x >= from && *x <= to);
         let count = if self.counts { ((to - from) as usize).clamp(1, 12) } else { 8 };
+        let exact = |y: f64| if self.log_y { 10.0_f64.powf(y) } else { y };
         let view = Picture {
             title: self.title,
             words: self.in_words(),
             document: place == Place::Document,
             width,
             height: height + grown,
-            frame: [left, top, right, bottom],
-            axis: bottom + grown,
+            frame: [left, top, right, frame.bottom],
+            axis: frame.bottom + grown,
             x_label: self.x_label,
             y_label: self.y_label,
             x_ticks: (ticks(from, to, count).into_iter().filter(whole))
-                .map(|x| (tenth(at_x(x)), short(x, 4)))
+                .map(|x| (tenth(frame.at_x(x)), short(x, 4)))
                 .collect(),
-            y_ticks: ticks(low, high, 5).into_iter().map(|y| (tenth(at_y(y)), short(exact(y), 3))).collect(),
+            y_ticks: ticks(low, high, 5).into_iter().map(|y| (tenth(frame.at_y(y)), short(exact(y), 3))).collect(),
             lines,
             strip,
-            legend: legend.into_iter().enumerate().map(|(k, entry)| (entry, colour(k))).collect(),
+            legend: legend.into_iter().enumerate().map(|(k, entry)| (entry, place.colour(k))).collect(),
         };
         crate::templates::rendered("line_plot.svg", &view)
     }
 
-    /// The names beside samples of their lines, in rows.
+    /// A value on the y axis: its exponent on a logarithmic one, NaN if it has none.
+    fn on_axis(&self, y: f64) -> f64 {
+        match self.log_y {
+            true if y > 0.0 => y.log10(),
+            true => f64::NAN,
+            false => y,
+        }
+    }
+
+    /// The first and the last value of the x axis.
+    fn x_range(&self) -> [f64; 2] {
+        let room = if self.counts { 0.3 } else { 0.0 };
+        let from = self.x.first().map_or(0.0, |x| x - room);
+        let to = self.x.last().map_or(1.0, |x| x + room);
+        [from, if to > from { to } else { from + 1.0 }]
+    }
+
+    /// One curve, whose values on the y axis are `values`.
+    fn line(
+        &self,
+        curve: &Curve<'_>,
+        values: &[f64],
+        colour: String,
+        samples: &Samples<'_>,
+        frame: &Frame,
+    ) -> CurveView {
+        let whiskers = curve.bars.as_ref().map(|[lower, upper]| {
+            let ends = |&i: &usize| -> Option<String> {
+                let end = |ends: &[f64]| ends.get(i).copied().map(|y| self.on_axis(y)).filter(|y| y.is_finite());
+                let (x, upper) = (tenth(frame.at_x(self.x[i])), tenth(frame.at_y(end(upper)?)));
+                let lower = tenth(end(lower).map_or(frame.bottom, |y| frame.at_y(y)));
+                let left = tenth(x - 4.0);
+                Some(format!("M{x} {upper}V{lower}M{left} {upper}h8M{left} {lower}h8"))
+            };
+            samples.kept.iter().filter(|&&i| values[i].is_finite()).filter_map(ends).collect::<String>()
+        });
+        let has_points = curve.points || (samples.are_marked() && !curve.broad);
+        CurveView {
+            colour,
+            dashed: curve.dashed,
+            broad: curve.broad,
+            path: if curve.points { String::new() } else { samples.path(values, frame) },
+            whiskers: whiskers.unwrap_or_default(),
+            points: if has_points { samples.points(values, frame) } else { Vec::new() },
+        }
+    }
+
+    /// The names, each next to a sample of its line, in rows.
     fn legend(&self, left: f64, right: f64, first: f64) -> Vec<LegendView> {
         let (mut x, mut y) = (left, first);
         let entries = self.curves.iter().map(|curve| {

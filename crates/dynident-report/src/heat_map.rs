@@ -101,43 +101,13 @@ impl HeatMap {
     /// # Errors
     /// If rows or columns do not have as many values as names.
     pub fn svg(&self) -> Result<String, ReportError> {
-        let wrong =
-            |what: String, expected, found| ReportError::Shape { section: self.title.clone(), what, expected, found };
-        if self.values.len() != self.rows.len() {
-            return Err(wrong("values".to_owned(), self.rows.len(), self.values.len()));
-        }
-        if let Some(row) = self.values.iter().position(|row| row.len() != self.columns.len()) {
-            return Err(wrong(format!("row {row} (0-based)"), self.columns.len(), self.values[row].len()));
-        }
+        self.check_shape()?;
         let finite = self.values.iter().flatten().filter(|value| value.is_finite());
         let largest = finite.fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let limit = self.limit.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(largest);
         let side = (CELLS / self.columns.len().max(1) as f64).clamp(4.0, 36.0);
         let longest = self.rows.iter().chain(&self.columns).map(|name| name.chars().count().min(LETTERS)).max();
         let labels = 14.0 + LETTER * longest.unwrap_or(0) as f64;
-        let texts = self.columns.len() * self.rows.len() <= MOST_TEXTS;
-        let symmetric = self.is_symmetric();
-        let cells = self.values.iter().enumerate().flat_map(|(row, values)| {
-            values
-                .iter()
-                .enumerate()
-                .filter(move |(column, value)| value.is_finite() && !(symmetric && *column > row))
-                .map(move |(column, value)| (row, column, *value))
-        });
-        let strength =
-            |value: f64| if limit > 0.0 { ((value.abs() / limit).min(1.0) * 100.0).round() / 100.0 } else { 0.0 };
-        // What is not seen needs no cell, unless for its text.
-        let views = cells.filter(|cell| texts || strength(cell.2) > 0.0).map(|(row, column, value)| {
-            let cell = CellView {
-                x: tenth(labels + side * column as f64),
-                y: tenth(labels + side * row as f64),
-                strength: format!("{}", strength(value)),
-                text: texts.then(|| format!("{} × {}: {}", self.rows[row], self.columns[column], short(value, 3))),
-            };
-            (value < 0.0, cell)
-        });
-        let (below, above): (Vec<_>, Vec<_>) = views.partition(|(is_below, _)| *is_below);
-        let cells_of = |cells: Vec<(bool, CellView)>| cells.into_iter().map(|(_, cell)| cell).collect();
         let (right, bottom) = (labels + side * self.columns.len() as f64, labels + side * self.rows.len() as f64);
         let lines = (0..=self.columns.len())
             .map(|k| format!("M{} {labels}V{}", tenth(labels + side * k as f64), tenth(bottom)));
@@ -173,7 +143,7 @@ impl HeatMap {
             side: tenth(side),
             columns: names(&self.columns),
             rows: names(&self.rows),
-            signs: [(BELOW, cells_of(below)), (ABOVE, cells_of(above))],
+            signs: self.cells(limit, side, labels),
             grid: lines.chain(rows).collect(),
             scale: scale.collect(),
             step_width: tenth(step_width + 0.1),
@@ -181,6 +151,46 @@ impl HeatMap {
             marks,
         };
         crate::templates::rendered("heat_map.svg", &view)
+    }
+
+    /// Checks that there is a value for each row and column.
+    fn check_shape(&self) -> Result<(), ReportError> {
+        let wrong =
+            |what: String, expected, found| ReportError::Shape { section: self.title.clone(), what, expected, found };
+        if self.values.len() != self.rows.len() {
+            return Err(wrong("values".to_owned(), self.rows.len(), self.values.len()));
+        }
+        match self.values.iter().position(|row| row.len() != self.columns.len()) {
+            Some(row) => Err(wrong(format!("row {row} (0-based)"), self.columns.len(), self.values[row].len())),
+            None => Ok(()),
+        }
+    }
+
+    /// The cells below zero and the others, with their colours. `side` and the room for `labels` are in px; values of
+    /// `limit` have full colour.
+    fn cells(&self, limit: f64, side: f64, labels: f64) -> [(&'static str, Vec<CellView>); 2] {
+        let texts = self.columns.len() * self.rows.len() <= MOST_TEXTS;
+        let symmetric = self.is_symmetric();
+        let strength =
+            |value: f64| if limit > 0.0 { ((value.abs() / limit).min(1.0) * 100.0).round() / 100.0 } else { 0.0 };
+        let (mut below, mut above) = (Vec::new(), Vec::new());
+        for (row, values) in self.values.iter().enumerate() {
+            for (column, &value) in values.iter().enumerate() {
+                let is_hidden = !value.is_finite() || (symmetric && column > row);
+                // An invisible cell is needed only for its text.
+                if is_hidden || !(texts || strength(value) > 0.0) {
+                    continue;
+                }
+                let cell = CellView {
+                    x: tenth(labels + side * column as f64),
+                    y: tenth(labels + side * row as f64),
+                    strength: format!("{}", strength(value)),
+                    text: texts.then(|| format!("{} × {}: {}", self.rows[row], self.columns[column], short(value, 3))),
+                };
+                if value < 0.0 { below.push(cell) } else { above.push(cell) }
+            }
+        }
+        [(BELOW, below), (ABOVE, above)]
     }
 }
 

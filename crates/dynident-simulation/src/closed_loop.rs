@@ -213,33 +213,80 @@ pub fn closed_loop(
     if !sees_the_truth {
         (run.measured_q, run.measured_dq) = (vec![0.0; joints * samples], vec![0.0; joints * samples]);
     }
-    let mut target = ReferenceBuffer::new(reference);
-    let mut feedback = Feedback::new(&settings.sensors, plant, reference.rate_hz());
-    let (mut tau, mut ddq) = (vec![0.0; joints], vec![0.0; joints]);
-    let mut tape = MotionBuffer::new(joints, !sees_the_truth);
-    let mut kept = 0;
+    let feedback = (!sees_the_truth).then(|| Feedback::new(&settings.sensors, plant, reference.rate_hz()));
+    let mut running = RunningLoop {
+        controller,
+        settings,
+        limits,
+        target: ReferenceBuffer::new(reference),
+        feedback,
+        step_s: 1.0 / reference.rate_hz(),
+        samples,
+        tau: vec![0.0; joints],
+        ddq: vec![0.0; joints],
+        tape: MotionBuffer::new(joints, !sees_the_truth),
+        plant,
+        run,
+        kept: 0,
+    };
     for sample in 0..samples {
-        // The state at this sample: still inside its limits?
+        if let Err(status) = running.sample(sample) {
+            running.run.status = status;
+            break;
+        }
+    }
+    let RunningLoop { plant, mut tape, mut run, kept, .. } = running;
+    tape.flush(arrays(&mut run), samples);
+    if sees_the_truth {
+        (run.measured_q, run.measured_dq) = (run.q.clone(), run.dq.clone());
+    }
+    run.unsettled_steps = plant.unsettled_steps();
+    run.end(kept);
+    Ok(run)
+}
+
+/// A loop during its run.
+struct RunningLoop<'a> {
+    plant: &'a mut Plant,
+    controller: &'a mut dyn Controller,
+    settings: &'a LoopSettings,
+    limits: Limits,
+    target: ReferenceBuffer<'a>,
+    /// The sensors; `None` where the controller sees the true state.
+    feedback: Option<Feedback<'a>>,
+    /// Time between samples, s.
+    step_s: f64,
+    samples: usize,
+    tau: Vec<f64>,
+    ddq: Vec<f64>,
+    tape: MotionBuffer,
+    run: Run,
+    /// Complete samples.
+    kept: usize,
+}
+
+impl RunningLoop<'_> {
+    /// Controls and records one sample and moves on to the next; the error is the status that ends the run.
+    fn sample(&mut self, sample: usize) -> Result<(), RunStatus> {
+        let Self { plant, settings, limits, target, tau, run, .. } = self;
         let time_s = run.time_s(sample);
+        let diverged = |reason| RunStatus::Diverged { time_s, reason };
         plant.set_time_s(time_s);
         target.go_to(sample);
-        if let Some(status) = verdict(plant.q(), plant.dq(), &limits, target.target().q, time_s, &run.joints) {
-            run.status = status;
-            break;
+        if let Some(status) = verdict(plant.q(), plant.dq(), limits, target.target().q, time_s, &run.joints) {
+            return Err(status);
         }
         // Sensors, control law, drives that saturate.
-        let measured = if sees_the_truth {
-            Measured { q: plant.q(), dq: plant.dq() }
-        } else {
+        let sensed = self.feedback.as_mut().map(|feedback| {
             feedback.read(plant.q(), plant.dq());
             feedback.measured()
-        };
-        controller.torque(time_s, target.target(), measured, &mut tau);
+        });
+        let measured = sensed.unwrap_or(Measured { q: plant.q(), dq: plant.dq() });
+        self.controller.torque(time_s, target.target(), measured, tau);
         if let Some(joint) = tau.iter().position(|tau| !tau.is_finite()) {
-            run.status = RunStatus::Diverged { time_s, reason: Divergence::Torque { joint } };
-            break;
+            return Err(diverged(Divergence::Torque { joint }));
         }
-        for joint in 0..joints {
+        for joint in 0..tau.len() {
             if tau[joint].abs() > limits.torque[joint] {
                 tau[joint] = limits.torque[joint].copysign(tau[joint]);
                 run.saturated[joint] += 1;
@@ -249,35 +296,22 @@ pub fn closed_loop(
             run.rms_error[joint] += error * error;
         }
         // Record the sample, and move on to the next.
-        let measured = (!sees_the_truth).then_some(measured);
-        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured };
-        if tape.push(row) {
-            tape.flush(arrays(&mut run), samples);
+        if self.tape.push(Row { q: plant.q(), dq: plant.dq(), tau, measured: sensed }) {
+            self.tape.flush(arrays(run), self.samples);
         }
         if settings.accelerations {
-            if let Err(fault) = plant.accelerations(&tau, &mut ddq) {
-                run.status = RunStatus::Diverged { time_s, reason: Divergence::Plant { fault } };
-                break;
-            }
-            for joint in 0..joints {
-                run.ddq[joint * samples + sample] = ddq[joint];
+            plant.accelerations(tau, &mut self.ddq).map_err(|fault| diverged(Divergence::Plant { fault }))?;
+            for joint in 0..tau.len() {
+                run.ddq[joint * self.samples + sample] = self.ddq[joint];
             }
         }
-        kept = sample + 1;
-        if kept < samples
-            && let Err(fault) = plant.advance(&tau, 1.0 / reference.rate_hz(), settings.integrator)
-        {
-            run.status = RunStatus::Diverged { time_s, reason: Divergence::Plant { fault } };
-            break;
+        self.kept = sample + 1;
+        if self.kept < self.samples {
+            let advanced = plant.advance(tau, self.step_s, settings.integrator);
+            advanced.map_err(|fault| diverged(Divergence::Plant { fault }))?;
         }
+        Ok(())
     }
-    tape.flush(arrays(&mut run), samples);
-    if sees_the_truth {
-        (run.measured_q, run.measured_dq) = (run.q.clone(), run.dq.clone());
-    }
-    run.unsettled_steps = plant.unsettled_steps();
-    run.end(kept);
-    Ok(run)
 }
 
 fn arrays(run: &mut Run) -> Arrays<'_> {

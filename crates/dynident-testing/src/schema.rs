@@ -53,18 +53,8 @@ impl Checker<'_> {
             self.part(part, value, at, found, known);
         }
         for key in ["anyOf", "oneOf"] {
-            let Some(alternatives) = schema[key].as_array() else { continue };
-            let tried = alternatives.iter().map(|alternative| {
-                let (mut found, mut known) = (Vec::new(), BTreeSet::new());
-                self.part(alternative, value, at, &mut found, &mut known);
-                (found, known)
-            });
-            match tried.min_by_key(|(found, _)| found.len()) {
-                Some((fewest, own)) => {
-                    found.extend(fewest);
-                    known.extend(own);
-                }
-                None => found.push(format!("{at}: no alternative")),
+            if let Some(alternatives) = schema[key].as_array() {
+                self.best_alternative(alternatives, value, at, found, known);
             }
         }
         let is_one_of = |types: &Value| match types {
@@ -92,21 +82,47 @@ impl Checker<'_> {
                 let missing = required.filter(|key| !object.contains_key(*key));
                 found.extend(missing.map(|key| format!("{at}.{key}: missing")));
             }
-            Value::Array(values) => {
-                let count = values.len() as u64;
-                if schema["minItems"].as_u64().is_some_and(|least| count < least)
-                    || schema["maxItems"].as_u64().is_some_and(|most| count > most)
-                {
-                    found.push(format!("{at}: {count} values"));
-                }
-                for (index, value) in values.iter().enumerate() {
-                    let own = schema["items"].get(index).or_else(|| schema.get("items"));
-                    if let Some(own) = own {
-                        self.value(own, value, &format!("{at}[{index}]"), found);
-                    }
-                }
-            }
+            Value::Array(values) => self.array(schema, values, at, found),
             Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
+        }
+    }
+
+    /// A value against the alternative from which it differs least.
+    fn best_alternative<'v>(
+        &self,
+        alternatives: &[Value],
+        value: &'v Value,
+        at: &str,
+        found: &mut Vec<String>,
+        known: &mut BTreeSet<&'v str>,
+    ) {
+        let tried = alternatives.iter().map(|alternative| {
+            let (mut found, mut known) = (Vec::new(), BTreeSet::new());
+            self.part(alternative, value, at, &mut found, &mut known);
+            (found, known)
+        });
+        match tried.min_by_key(|(found, _)| found.len()) {
+            Some((fewest, own)) => {
+                found.extend(fewest);
+                known.extend(own);
+            }
+            None => found.push(format!("{at}: no alternative")),
+        }
+    }
+
+    /// The length and the values of an array against its schema.
+    fn array(&self, schema: &Value, values: &[Value], at: &str, found: &mut Vec<String>) {
+        let count = values.len() as u64;
+        if schema["minItems"].as_u64().is_some_and(|least| count < least)
+            || schema["maxItems"].as_u64().is_some_and(|most| count > most)
+        {
+            found.push(format!("{at}: {count} values"));
+        }
+        for (index, value) in values.iter().enumerate() {
+            let own = schema["items"].get(index).or_else(|| schema.get("items"));
+            if let Some(own) = own {
+                self.value(own, value, &format!("{at}[{index}]"), found);
+            }
         }
     }
 }

@@ -7,12 +7,27 @@ use crate::{Verdict, summary, terminal};
 use dynident::excitation::DesignProgress;
 use dynident::iteration::{NextMotion, RobotRun, RunRecord, StopSignal};
 use dynident::result::INTERRUPTED;
-use dynident::study::LegOrder;
+use dynident::study::{LegOrder, Study};
 use dynident::{
     Error, IterationWatch, IterationsFile, ProgramPermission, ProgramRequest, Progress, RunOptions, Silent,
     check_writable, iterate_study,
 };
 use std::path::{Path, PathBuf};
+
+/// Files and folders of every iteration.
+const WRITTEN: [&str; 11] = [
+    "iterations.json",
+    "report.html",
+    "trajectory.json",
+    "runs",
+    "result.json",
+    "identified.urdf",
+    "identified.toml",
+    "identified.xml",
+    "identified.sdf",
+    "identification.html",
+    "controller.json",
+];
 
 /// Options of `iterate`.
 #[derive(clap::Args)]
@@ -42,6 +57,7 @@ pub(crate) struct Options {
     data: Option<PathBuf>,
 }
 
+/// Runs the command.
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     if options.status {
         return status(&options.out, context);
@@ -50,19 +66,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
-    let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
-    let legs: Vec<String> = (1..=legs).map(|leg| format!("leg_{leg}/runs")).collect();
-    let mut names = vec!["iterations.json", "report.html", "trajectory.json", "runs"];
-    names.extend([
-        "result.json",
-        "identified.urdf",
-        "identified.toml",
-        "identified.xml",
-        "identified.sdf",
-        "identification.html",
-        "controller.json",
-    ]);
-    names.extend(legs.iter().map(String::as_str));
+    let names = written_files(&study);
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let of_study = (&study, &*options.study, options.data.as_deref());
     let sections = ["robot", "torque", "design", "iteration", "simulation", "controller"];
     refuse_overwriting((&options.out, &names), of_study, &sections, &[])?;
@@ -78,10 +83,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context, OnInterrupt::EndsCommand);
-    let section = study.iteration.clone().unwrap_or_default();
-    let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
-    let most = section.max_runs * iterations;
-    progress.begin("runs", Some(most as u64));
+    progress.begin("runs", Some(most_runs(&study)));
     let mut notes = Vec::new();
     let mut hear = |record: &RunRecord, runs: &[RobotRun]| {
         progress.advance(1);
@@ -101,17 +103,35 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     for note in &notes {
         terminal::remark(note);
     }
-    let file = match file {
+    match file {
         Err(error @ Error::Interrupted { .. }) => {
             terminal::remark(&error.to_string());
-            return Ok(Verdict::Interrupted);
+            Ok(Verdict::Interrupted)
         }
-        other => other.map_err(known_in(&options.study))?,
-    };
+        other => ended(&other.map_err(known_in(&options.study))?, options, context),
+    }
+}
+
+/// Files and folders that an iteration may write into its folder.
+fn written_files(study: &Study) -> Vec<String> {
+    let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
+    let legs = (1..=legs).map(|leg| format!("leg_{leg}/runs"));
+    WRITTEN.into_iter().map(str::to_owned).chain(legs).collect()
+}
+
+/// The largest number of runs of a study.
+fn most_runs(study: &Study) -> u64 {
+    let section = study.iteration.clone().unwrap_or_default();
+    let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
+    (section.max_runs * iterations) as u64
+}
+
+/// Prints the result of an iteration that has ended.
+fn ended(file: &IterationsFile, options: &Options, context: &Context) -> Result<Verdict, String> {
     if context.json {
-        terminal::print_document(&json(&file)?)?;
+        terminal::print_document(&json(file)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::iteration(&file, &options.out))?;
+        terminal::print(&summary::iteration(file, &options.out))?;
     }
     if file.status == INTERRUPTED {
         return Ok(Verdict::Interrupted);

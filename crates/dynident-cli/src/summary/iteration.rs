@@ -17,6 +17,27 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let rows = file.runs.iter().enumerate().map(|(place, run)| row(run, place.checked_sub(1).map(|k| &file.runs[k])));
     text += &table(&header, 2..5, rows.collect());
     text += "  tracking: largest distance from the trajectory, rad (m); change: of the\n  parameters, in error bars; error: largest, where the truth is known; both of\n  all good runs so far together\n\n";
+    text += &run_remarks(file);
+    text += &verdict_remarks(file);
+    text += &parameters(file);
+    if let Some(why) = &file.no_result {
+        text += &wrapped(&format!("No result.json: {why}"), 4);
+    }
+    let robot = if file.base_parameters.is_empty() {
+        ""
+    } else {
+        ", and the robot found: result.json, identification.html, controller.json and its description"
+    };
+    text += &wrapped(
+        &format!("Written: {}, {}{robot}", out.join("iterations.json").display(), out.join("report.html").display()),
+        4,
+    );
+    text
+}
+
+/// Remarks on single runs: rejections, lowered bandwidths, oscillations, warm-ups, held-out motions and forecasts.
+fn run_remarks(file: &IterationsFile) -> String {
+    let mut text = String::new();
     for run in file.runs.iter().filter(|run| !run.accepted) {
         if let Some(reason) = &run.reason {
             text += &wrapped(&format!("run {} does not count: {reason}", run.run), 4);
@@ -43,6 +64,12 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
             text += &wrapped(&format!("Run {}: {}.", run.run, forecast.sentence()), 4);
         }
     }
+    text
+}
+
+/// Remarks on the iteration as a whole: progress, errors, missing checks and unmet conditions.
+fn verdict_remarks(file: &IterationsFile) -> String {
+    let mut text = String::new();
     if let Some(forecast) = &file.declined {
         text += &wrapped(&format!("A further run was not worth it: {}.", forecast.sentence()), 4);
     }
@@ -73,19 +100,6 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     for unmet in &file.unmet {
         text += &wrapped(&format!("UNMET: {}. What would help: {}.", unmet.message, unmet.remedy), 4);
     }
-    text += &parameters(file);
-    if let Some(why) = &file.no_result {
-        text += &wrapped(&format!("No result.json: {why}"), 4);
-    }
-    let robot = if file.base_parameters.is_empty() {
-        ""
-    } else {
-        ", and the robot found: result.json, identification.html, controller.json and its description"
-    };
-    text += &wrapped(
-        &format!("Written: {}, {}{robot}", out.join("iterations.json").display(), out.join("report.html").display()),
-        4,
-    );
     text
 }
 

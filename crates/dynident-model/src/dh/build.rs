@@ -39,9 +39,8 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
         return Err(source.fault(at, DhFault::TooManyJoints { limit: MAX_MOVING_JOINTS }));
     }
 
-    // Every link so far: the body it moves with, and its D-H frame in that body's frame.
-    let mut places: HashMap<String, (Option<usize>, Transform)> = HashMap::new();
-    places.insert(base_name.to_owned(), (None, source.base(&table.base)?));
+    let mut places: HashMap<String, LinkPlace> = HashMap::new();
+    places.insert(base_name.to_owned(), LinkPlace { body: None, body_from_dh: source.base(&table.base)? });
     let mut joint_names = HashSet::new();
     let (mut joints, mut bodies): (Vec<Joint>, Vec<Body>) = (Vec::new(), Vec::new());
     let mut previous = base_name.to_owned();
@@ -59,36 +58,9 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
         if places.contains_key(&link) {
             return Err(source.fault(link_at, DhFault::DuplicateName { what: "link", name: link }));
         }
-        let parent = row.parent.as_ref().map_or(previous.as_str(), |parent| parent.get_ref());
-        let Some(&(parent_body, body_from_parent)) = places.get(parent) else {
-            let mut known: Vec<String> = places.keys().cloned().collect();
-            known.sort_unstable();
-            known.truncate(20);
-            let at = row.parent.as_ref().map_or(0, |parent| parent.span().start);
-            return Err(source.fault(at, DhFault::UnknownParent { parent: parent.to_owned(), known }));
-        };
-
+        let parent = source.parent(row, &previous, &places)?;
         let frames = source.frames(convention, row)?;
-        let kind = JointKind::from(row.kind);
-        let sign = row.sign.as_ref().map_or(1.0, |sign| *sign.get_ref());
-        if sign.abs() != 1.0 {
-            let at = row.sign.as_ref().map_or(0, |sign| sign.span().start);
-            return Err(source.fault(at, DhFault::Sign { sign }));
-        }
-        let Dynamics { damping, friction } = &row.dynamics;
-        joints.push(Joint {
-            name: name.to_owned(),
-            kind,
-            parent: parent_body,
-            placement: body_from_parent.then(&frames.placement),
-            axis: Vec3([0.0, 0.0, sign]),
-            limits: source.limits(kind, &row.limits)?,
-            damping: source.number("damping", damping)?,
-            friction: source.number("friction", friction)?,
-            drive_inertia: None,
-            spring: None,
-            mimic: None,
-        });
+        joints.push(source.joint(row, name, parent, &frames)?);
         let inertial = row
             .inertial
             .as_ref()
@@ -97,7 +69,7 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
         bodies.push(Body {
             links: vec![Link { name: link.clone(), placement: Transform::IDENTITY, inertial, collision: Vec::new() }],
         });
-        places.insert(link.clone(), (Some(bodies.len() - 1), frames.body_from_dh));
+        places.insert(link.clone(), LinkPlace { body: Some(bodies.len() - 1), body_from_dh: frames.body_from_dh });
         previous = link;
     }
 
@@ -108,7 +80,16 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
     model.and_then(|model| model.with_gravity(gravity)).map_err(|error| source.fault(0, DhFault::Model(error)))
 }
 
-/// A row's names and where its D-H frame stands.
+/// Where a link is.
+#[derive(Clone, Copy)]
+struct LinkPlace {
+    /// The body it moves with; `None` for the base.
+    body: Option<usize>,
+    /// Its D-H frame in the frame of that body.
+    body_from_dh: Transform,
+}
+
+/// A row's names and the place of its D-H frame.
 pub(super) struct RowFrame {
     pub(super) joint: String,
     pub(super) link: String,
@@ -171,6 +152,42 @@ impl Source<'_> {
             None => Ok(*numbers.get_ref()),
             Some(&value) => Err(self.fault(numbers.span().start, DhFault::Number { key, value })),
         }
+    }
+
+    /// The place of a row's parent link, by default the link of the row before.
+    fn parent(&self, row: &Row, previous: &str, places: &HashMap<String, LinkPlace>) -> Result<LinkPlace, DhError> {
+        let parent = row.parent.as_ref().map_or(previous, |parent| parent.get_ref());
+        places.get(parent).copied().ok_or_else(|| {
+            let mut known: Vec<String> = places.keys().cloned().collect();
+            known.sort_unstable();
+            known.truncate(20);
+            let at = row.parent.as_ref().map_or(0, |parent| parent.span().start);
+            self.fault(at, DhFault::UnknownParent { parent: parent.to_owned(), known })
+        })
+    }
+
+    /// The joint of a row.
+    fn joint(&self, row: &Row, name: &str, parent: LinkPlace, frames: &Frames) -> Result<Joint, DhError> {
+        let kind = JointKind::from(row.kind);
+        let sign = row.sign.as_ref().map_or(1.0, |sign| *sign.get_ref());
+        if sign.abs() != 1.0 {
+            let at = row.sign.as_ref().map_or(0, |sign| sign.span().start);
+            return Err(self.fault(at, DhFault::Sign { sign }));
+        }
+        let Dynamics { damping, friction } = &row.dynamics;
+        Ok(Joint {
+            name: name.to_owned(),
+            kind,
+            parent: parent.body,
+            placement: parent.body_from_dh.then(&frames.placement),
+            axis: Vec3([0.0, 0.0, sign]),
+            limits: self.limits(kind, &row.limits)?,
+            damping: self.number("damping", damping)?,
+            friction: self.number("friction", friction)?,
+            drive_inertia: None,
+            spring: None,
+            mimic: None,
+        })
     }
 
     /// The one of two keys that is given.

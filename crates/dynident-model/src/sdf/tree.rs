@@ -40,100 +40,10 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     };
     note_includes(found.items[first].node.document().root_element(), notices);
     let connections = connections(found, frames)?;
-
-    // Who carries whom.
-    let mut carried_by: HashMap<usize, usize> = HashMap::new();
-    let mut under: HashMap<Carrier, Vec<usize>> = HashMap::new();
-    for (number, connection) in connections.iter().enumerate() {
-        if let Some(first) = carried_by.insert(connection.child, number) {
-            let fault = SdfFault::TwoParents {
-                link: found.items[connection.child].name.clone(),
-                first: connections[first].item.name.clone(),
-                second: connection.item.name.clone(),
-            };
-            return Err(fault_at(connection.item.node, fault));
-        }
-        under.entry(connection.parent).or_default().push(number);
-    }
-    // The world carries everything, or one link does.
-    let mut roots = links.iter().copied().filter(|link| !carried_by.contains_key(link));
-    let root = match (under.contains_key(&Carrier::World), roots.next(), roots.next()) {
-        (true, None, _) => None,
-        (false, Some(only), None) => Some(only),
-        (true, Some(second), _) => return Err(several(found, WORLD, second)),
-        (false, Some(first), Some(second)) => return Err(several(found, &found.items[first].name, second)),
-        (false, None, _) => {
-            let item = &found.items[first];
-            return Err(fault_at(item.node, SdfFault::Loop { link: item.name.clone() }));
-        }
-    };
-
-    let mut link_at = |index: usize, body_from_link: Transform, shift: Transform, moves: bool| {
-        let item = &found.items[index];
-        // The body's own link is moved to the joint; the frame of every other one stays.
-        let moved = |shape: &mut crate::collision::CollisionShape| shape.placement = shift.then(&shape.placement);
-        let mut collision = shapes(item.node);
-        collision.iter_mut().for_each(moved);
-        let stays = shift == Transform::IDENTITY;
-        // What stands still may be unknown.
-        let mut unheard = Notices::default();
-        let notices = if moves { &mut *notices } else { &mut unheard };
-        // Exact numbers stay exact where nothing is shifted.
-        let shifted = |inertial: InertialParameters| if stays { inertial } else { inertial.expressed_in(&shift) };
-        let inertial = inertial(item, notices)?.map(shifted);
-        Ok::<Link, SdfError>(Link { name: item.name.clone(), placement: body_from_link, inertial, collision })
-    };
-    let model_from_link = |index: usize| frames.of(&found.items[index].name).unwrap_or(Transform::IDENTITY);
-    let world =
-        || Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() };
-    let base = match root {
-        // The base's own link is at the identity: the frame of the model, to which the link is fixed.
-        Some(root) => link_at(root, Transform::IDENTITY, model_from_link(root), false)?,
-        None => world(),
-    };
-    let mut tree = Tree { base: Body { links: vec![base] }, joints: Vec::new(), bodies: Vec::new() };
-    let mut reached: HashSet<usize> = root.into_iter().collect();
-    // Joints still to visit, with the body that carries their parent link and its place. A stack, not recursion: a
-    // chain may be as long as the file.
-    let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
-    let visit_later = |ahead: &mut Vec<_>, link: Carrier, body: Option<usize>, model_from_body: Transform| {
-        let below = under.get(&link).map_or(&[][..], Vec::as_slice);
-        ahead.extend(below.iter().rev().map(|&joint| (joint, body, model_from_body)));
-    };
-    visit_later(&mut ahead, root.map_or(Carrier::World, Carrier::Link), None, Transform::IDENTITY);
-    while let Some((number, body, model_from_body)) = ahead.pop() {
-        let Connection { item, child, axis, .. } = &connections[number];
-        reached.insert(*child);
-        let link_place = model_from_link(*child);
-        if let Some(axis) = axis {
-            let joint_place = frames.of(&item.name).unwrap_or(link_place);
-            let place = Transform { rotation: link_place.rotation, translation: joint_place.translation };
-            tree.joints.push(Joint {
-                name: item.name.clone(),
-                kind: axis.kind,
-                parent: body,
-                placement: model_from_body.inverse().then(&place),
-                axis: place.rotation.transpose_mul_vec(axis.direction),
-                limits: axis.limits,
-                damping: axis.damping,
-                friction: axis.friction,
-                drive_inertia: None,
-                spring: axis.spring,
-                mimic: axis.mimic.clone(),
-            });
-            if tree.joints.len() > MAX_MOVING_JOINTS {
-                return Err(fault_at(item.node, SdfFault::TooManyJoints { limit: MAX_MOVING_JOINTS }));
-            }
-            let shift = place.inverse().then(&link_place);
-            tree.bodies.push(Body { links: vec![link_at(*child, Transform::IDENTITY, shift, true)?] });
-            visit_later(&mut ahead, Carrier::Link(*child), Some(tree.bodies.len() - 1), place);
-        } else {
-            let placement = model_from_body.inverse().then(&link_place);
-            let link = link_at(*child, placement, Transform::IDENTITY, body.is_some())?;
-            body.map_or(&mut tree.base, |body| &mut tree.bodies[body]).links.push(link);
-            visit_later(&mut ahead, Carrier::Link(*child), body, model_from_body);
-        }
-    }
+    let carriers = Carriers::of(found, &connections)?;
+    let root = carriers.root(found, &links)?;
+    let walk = Walk { found, frames, connections: &connections, under: &carriers.under };
+    let Walked { tree, reached } = walk.from_root(root, notices)?;
     if let Some(lost) = links.iter().find(|link| !reached.contains(link)) {
         let item = &found.items[*lost];
         return Err(fault_at(item.node, SdfFault::Loop { link: item.name.clone() }));
@@ -144,6 +54,187 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     Ok(tree)
 }
 
+/// Which joint carries each link, and which joints each link or the world carries.
+struct Carriers {
+    carried_by: HashMap<usize, usize>,
+    under: HashMap<Carrier, Vec<usize>>,
+}
+
+impl Carriers {
+    /// Of all joints; two joints that carry the same link are refused.
+    fn of(found: &Scopes<'_, '_>, connections: &[Connection<'_, '_, '_>]) -> Result<Self, SdfError> {
+        let (mut carried_by, mut under) = (HashMap::new(), HashMap::<Carrier, Vec<usize>>::new());
+        for (number, connection) in connections.iter().enumerate() {
+            if let Some(first) = carried_by.insert(connection.child, number) {
+                let fault = SdfFault::TwoParents {
+                    link: found.items[connection.child].name.clone(),
+                    first: connections[first].item.name.clone(),
+                    second: connection.item.name.clone(),
+                };
+                return Err(fault_at(connection.item.node, fault));
+            }
+            under.entry(connection.parent).or_default().push(number);
+        }
+        Ok(Self { carried_by, under })
+    }
+
+    /// The one link that carries everything; `None` if the world does.
+    fn root(&self, found: &Scopes<'_, '_>, links: &[usize]) -> Result<Option<usize>, SdfError> {
+        let mut roots = links.iter().copied().filter(|link| !self.carried_by.contains_key(link));
+        match (self.under.contains_key(&Carrier::World), roots.next(), roots.next()) {
+            (true, None, _) => Ok(None),
+            (false, Some(only), None) => Ok(Some(only)),
+            (true, Some(second), _) => Err(several(found, WORLD, second)),
+            (false, Some(first), Some(second)) => Err(several(found, &found.items[first].name, second)),
+            (false, None, _) => {
+                let item = &found.items[links[0]];
+                Err(fault_at(item.node, SdfFault::Loop { link: item.name.clone() }))
+            }
+        }
+    }
+}
+
+/// A walk from the root along all joints.
+struct Walk<'s, 'a, 'input> {
+    found: &'s Scopes<'a, 'input>,
+    frames: &'s Frames,
+    connections: &'s [Connection<'s, 'a, 'input>],
+    under: &'s HashMap<Carrier, Vec<usize>>,
+}
+
+/// The tree of a walk and the links on it.
+struct Walked {
+    tree: Tree,
+    reached: HashSet<usize>,
+}
+
+/// A body, `None` for the base, and its place in the frame of the model.
+#[derive(Clone, Copy)]
+struct BodyPlace {
+    body: Option<usize>,
+    model_from_body: Transform,
+}
+
+/// A joint still to visit, with the body that carries its parent link.
+struct Ahead {
+    connection: usize,
+    parent: BodyPlace,
+}
+
+impl Walk<'_, '_, '_> {
+    /// Walks from the root, `None` for the world.
+    fn from_root(&self, root: Option<usize>, notices: &mut Notices) -> Result<Walked, SdfError> {
+        let base = match root {
+            // The base's own link is at the identity: the frame of the model, to which the link is fixed. The inertial
+            // of a link that does not move may be unknown.
+            Some(root) => self.link(root, Transform::IDENTITY, self.model_from_link(root), &mut Notices::default())?,
+            None => {
+                Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() }
+            }
+        };
+        let mut tree = Tree { base: Body { links: vec![base] }, joints: Vec::new(), bodies: Vec::new() };
+        let mut reached: HashSet<usize> = root.into_iter().collect();
+        // A stack, not recursion: a chain may be as long as the file.
+        let mut ahead: Vec<Ahead> = Vec::new();
+        let base_place = BodyPlace { body: None, model_from_body: Transform::IDENTITY };
+        ahead.extend(self.below(root.map_or(Carrier::World, Carrier::Link), base_place));
+        while let Some(Ahead { connection, parent }) = ahead.pop() {
+            let Connection { child, axis, .. } = &self.connections[connection];
+            reached.insert(*child);
+            let place = match axis {
+                Some(axis) => self.add_moving(connection, axis, parent, &mut tree, notices)?,
+                None => self.add_fixed(*child, parent, &mut tree, notices)?,
+            };
+            ahead.extend(self.below(Carrier::Link(*child), place));
+        }
+        Ok(Walked { tree, reached })
+    }
+
+    /// The joints under a link or the world, the last one first.
+    fn below(&self, carrier: Carrier, parent: BodyPlace) -> impl Iterator<Item = Ahead> {
+        let joints = self.under.get(&carrier).map_or(&[][..], Vec::as_slice);
+        joints.iter().rev().map(move |&connection| Ahead { connection, parent })
+    }
+
+    /// Adds a moving joint and the body of its child link.
+    fn add_moving(
+        &self,
+        connection: usize,
+        axis: &Axis,
+        parent: BodyPlace,
+        tree: &mut Tree,
+        notices: &mut Notices,
+    ) -> Result<BodyPlace, SdfError> {
+        let Connection { item, child, .. } = &self.connections[connection];
+        let link_place = self.model_from_link(*child);
+        let joint_place = self.frames.of(&item.name).unwrap_or(link_place);
+        let place = Transform { rotation: link_place.rotation, translation: joint_place.translation };
+        tree.joints.push(Joint {
+            name: item.name.clone(),
+            kind: axis.kind,
+            parent: parent.body,
+            placement: parent.model_from_body.inverse().then(&place),
+            axis: place.rotation.transpose_mul_vec(axis.direction),
+            limits: axis.limits,
+            damping: axis.damping,
+            friction: axis.friction,
+            drive_inertia: None,
+            spring: axis.spring,
+            mimic: axis.mimic.clone(),
+        });
+        if tree.joints.len() > MAX_MOVING_JOINTS {
+            return Err(fault_at(item.node, SdfFault::TooManyJoints { limit: MAX_MOVING_JOINTS }));
+        }
+        let shift = place.inverse().then(&link_place);
+        tree.bodies.push(Body { links: vec![self.link(*child, Transform::IDENTITY, shift, notices)?] });
+        Ok(BodyPlace { body: Some(tree.bodies.len() - 1), model_from_body: place })
+    }
+
+    /// Adds the child link of a fixed joint to the body of its parent link.
+    fn add_fixed(
+        &self,
+        child: usize,
+        parent: BodyPlace,
+        tree: &mut Tree,
+        notices: &mut Notices,
+    ) -> Result<BodyPlace, SdfError> {
+        let placement = parent.model_from_body.inverse().then(&self.model_from_link(child));
+        // The inertial of a link that does not move may be unknown.
+        let mut unheard = Notices::default();
+        let (body, notices) = match parent.body {
+            Some(body) => (&mut tree.bodies[body], notices),
+            None => (&mut tree.base, &mut unheard),
+        };
+        body.links.push(self.link(child, placement, Transform::IDENTITY, notices)?);
+        Ok(parent)
+    }
+
+    /// The frame of a link in that of the model.
+    fn model_from_link(&self, index: usize) -> Transform {
+        self.frames.of(&self.found.items[index].name).unwrap_or(Transform::IDENTITY)
+    }
+
+    /// A link of a body. `shift` moves its shapes and its inertial to the frame of the joint: only the first link of a
+    /// body is moved.
+    fn link(
+        &self,
+        index: usize,
+        body_from_link: Transform,
+        shift: Transform,
+        notices: &mut Notices,
+    ) -> Result<Link, SdfError> {
+        let item = &self.found.items[index];
+        let mut collision = shapes(item.node);
+        collision.iter_mut().for_each(|shape| shape.placement = shift.then(&shape.placement));
+        let stays = shift == Transform::IDENTITY;
+        // Exact numbers stay exact where nothing is shifted.
+        let shifted = |inertial: InertialParameters| if stays { inertial } else { inertial.expressed_in(&shift) };
+        let inertial = inertial(item, notices)?.map(shifted);
+        Ok(Link { name: item.name.clone(), placement: body_from_link, inertial, collision })
+    }
+}
+
+/// More than one link, or the world and a link, that no joint carries.
 fn several(found: &Scopes<'_, '_>, first: &str, second: usize) -> SdfError {
     let item = &found.items[second];
     fault_at(item.node, SdfFault::SeveralRoots { first: first.to_owned(), second: item.name.clone() })

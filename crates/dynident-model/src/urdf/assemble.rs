@@ -14,45 +14,9 @@ pub(super) fn model(
     links: &[LinkElement<'_, '_>],
     joints: &[JointElement<'_, '_>],
 ) -> Result<Model, UrdfError> {
-    let robot_fault = |fault| Located { line: 1, column: 1, fault };
-    let index_of: HashMap<&str, usize> = links.iter().enumerate().map(|(index, link)| (link.name, index)).collect();
-    let mut parent_joint: Vec<Option<usize>> = vec![None; links.len()];
-    let mut joints_under: Vec<Vec<usize>> = vec![Vec::new(); links.len()];
-    let mut child_of = Vec::with_capacity(joints.len());
-    for (index, joint) in joints.iter().enumerate() {
-        let find = |link: &str| {
-            index_of.get(link).copied().ok_or_else(|| {
-                fault_at(joint.node, UrdfFault::UnknownLink { joint: joint.name.to_owned(), link: link.to_owned() })
-            })
-        };
-        let (parent, child) = (find(joint.parent)?, find(joint.child)?);
-        if let Some(first) = parent_joint[child].replace(index) {
-            let fault = UrdfFault::TwoParents {
-                link: joint.child.to_owned(),
-                first: joints[first].name.to_owned(),
-                second: joint.name.to_owned(),
-            };
-            return Err(fault_at(joint.node, fault));
-        }
-        joints_under[parent].push(index);
-        child_of.push(child);
-    }
+    let connections = Connections::of(links, joints)?;
     refuse_own_mimics(joints)?;
-
-    let mut roots = (0..links.len()).filter(|&link| parent_joint[link].is_none());
-    let root = match (roots.next(), roots.next()) {
-        (Some(root), None) => root,
-        (Some(first), Some(second)) => {
-            let fault =
-                UrdfFault::SeveralRoots { first: links[first].name.to_owned(), second: links[second].name.to_owned() };
-            return Err(fault_at(links[second].node, fault));
-        }
-        (None, _) => match links.first() {
-            Some(link) => return Err(fault_at(link.node, UrdfFault::Loop { link: link.name.to_owned() })),
-            None => return Err(robot_fault(UrdfFault::NoLinks)),
-        },
-    };
-
+    let root = connections.root(links)?;
     let link_at = |index: usize, placement| Link {
         name: links[index].name.to_owned(),
         placement,
@@ -67,11 +31,11 @@ pub(super) fn model(
     // recursion: a chain may be as long as the file.
     let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
     let visit_later = |ahead: &mut Vec<_>, link: usize, body: Option<usize>, placement: Transform| {
-        ahead.extend(joints_under[link].iter().rev().map(|&joint| (joint, body, placement)));
+        ahead.extend(connections.joints_under[link].iter().rev().map(|&joint| (joint, body, placement)));
     };
     visit_later(&mut ahead, root, None, Transform::IDENTITY);
     while let Some((index, body, body_from_parent)) = ahead.pop() {
-        let (joint, child) = (&joints[index], child_of[index]);
+        let (joint, child) = (&joints[index], connections.child_of[index]);
         reached[child] = true;
         let placement = body_from_parent.then(&joint.origin);
         if let Some(kind) = joint.kind {
@@ -102,6 +66,66 @@ pub(super) fn model(
         return Err(robot_fault(UrdfFault::NoMovingJoint));
     }
     Model::new(name, base, tree_joints, bodies).map_err(|error| robot_fault(UrdfFault::Model(error)))
+}
+
+/// A fault of the robot as a whole.
+fn robot_fault(fault: UrdfFault) -> UrdfError {
+    Located { line: 1, column: 1, fault }
+}
+
+/// Which joints and links are connected, as places in the document.
+struct Connections {
+    /// For each joint the link that it carries.
+    child_of: Vec<usize>,
+    /// For each link the joint that carries it.
+    parent_joint: Vec<Option<usize>>,
+    /// For each link the joints that it carries.
+    joints_under: Vec<Vec<usize>>,
+}
+
+impl Connections {
+    /// Looks up the links of all joints; unknown links and two joints that carry the same link are refused.
+    fn of(links: &[LinkElement<'_, '_>], joints: &[JointElement<'_, '_>]) -> Result<Self, UrdfError> {
+        let index_of: HashMap<&str, usize> = links.iter().enumerate().map(|(index, link)| (link.name, index)).collect();
+        let mut parent_joint: Vec<Option<usize>> = vec![None; links.len()];
+        let mut joints_under: Vec<Vec<usize>> = vec![Vec::new(); links.len()];
+        let mut child_of = Vec::with_capacity(joints.len());
+        for (index, joint) in joints.iter().enumerate() {
+            let find = |link: &str| {
+                index_of.get(link).copied().ok_or_else(|| {
+                    fault_at(joint.node, UrdfFault::UnknownLink { joint: joint.name.to_owned(), link: link.to_owned() })
+                })
+            };
+            let (parent, child) = (find(joint.parent)?, find(joint.child)?);
+            if let Some(first) = parent_joint[child].replace(index) {
+                let fault = UrdfFault::TwoParents {
+                    link: joint.child.to_owned(),
+                    first: joints[first].name.to_owned(),
+                    second: joint.name.to_owned(),
+                };
+                return Err(fault_at(joint.node, fault));
+            }
+            joints_under[parent].push(index);
+            child_of.push(child);
+        }
+        Ok(Self { child_of, parent_joint, joints_under })
+    }
+
+    /// The only link that no joint carries.
+    fn root(&self, links: &[LinkElement<'_, '_>]) -> Result<usize, UrdfError> {
+        let mut roots = (0..links.len()).filter(|&link| self.parent_joint[link].is_none());
+        match (roots.next(), roots.next()) {
+            (Some(root), None) => Ok(root),
+            (Some(first), Some(second)) => {
+                let (first, node) = (links[first].name.to_owned(), links[second].node);
+                Err(fault_at(node, UrdfFault::SeveralRoots { first, second: links[second].name.to_owned() }))
+            }
+            (None, _) => match links.first() {
+                Some(link) => Err(fault_at(link.node, UrdfFault::Loop { link: link.name.to_owned() })),
+                None => Err(robot_fault(UrdfFault::NoLinks)),
+            },
+        }
+    }
 }
 
 /// A joint may follow any other joint of the file.

@@ -56,6 +56,21 @@ impl Quantity {
                 .collect(),
         }
     }
+
+    /// The values for one state, whose numbers are those of the groups in order.
+    fn of_state<'w>(self, model: &Model, workspace: &'w mut Workspace, state: &[f64]) -> &'w [f64] {
+        let dof = model.dof();
+        let (q, rest) = state.split_at(dof);
+        match self {
+            Self::MassMatrix => mass_matrix(model, workspace, q),
+            Self::CoriolisMatrix => coriolis_matrix(model, workspace, q, rest),
+            Self::Gravity => gravity_torque(model, workspace, q),
+            Self::GravityDerivative => gravity_torque_derivative(model, workspace, q),
+            Self::InverseDynamics => inverse_dynamics(model, workspace, q, &rest[..dof], &rest[dof..]),
+            Self::ForwardDynamics => forward_dynamics(model, workspace, q, &rest[..dof], &rest[dof..]),
+            Self::Regressor => torque_regressor(model, workspace, q, &rest[..dof], &rest[dof..]),
+        }
+    }
 }
 
 /// Computes `quantity` for every row of the CSV table `states` (header `q1..`, `dq1..`, `ddq1..`, `tau1..` as far as
@@ -76,30 +91,12 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
         return Err(Error::States { path: states.to_owned(), line: 1, message });
     }
 
-    // Where the columns are.
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
         .from_reader(dynident_files::open(states).map_err(|source| Error::File { path: states.to_owned(), source })?);
     let header = reader.headers().map_err(|error| table_error(states, &error))?.clone();
-    let mut places = Vec::new();
-    for group in quantity.groups() {
-        for joint in 1..=dof {
-            let name = format!("{group}{joint}");
-            let place = header.iter().position(|column| column == name).ok_or_else(|| Error::States {
-                path: states.to_owned(),
-                line: 1,
-                message: format!(
-                    "no column `{name}`: the quantity needs {} each with the numbers 1 to {dof}; the table has {}",
-                    quantity.groups().join(", "),
-                    header.iter().collect::<Vec<_>>().join(", ")
-                ),
-            })?;
-            places.push(place);
-        }
-    }
-
-    // Row by row.
+    let places = column_places(&header, states, quantity, dof)?;
     let cannot = |source| Error::Output { path: PathBuf::from("standard output"), source };
     writeln!(out, "{}", quantity.header(dof, model.body_count()).join(",")).map_err(cannot)?;
     let mut workspace = Workspace::new(model);
@@ -114,16 +111,7 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
                 message: format!("column `{}`: `{field}` is not a finite number", &header[place]),
             })?;
         }
-        let (q, rest) = state.split_at(dof);
-        let result = match quantity {
-            Quantity::MassMatrix => mass_matrix(model, &mut workspace, q),
-            Quantity::CoriolisMatrix => coriolis_matrix(model, &mut workspace, q, rest),
-            Quantity::Gravity => gravity_torque(model, &mut workspace, q),
-            Quantity::GravityDerivative => gravity_torque_derivative(model, &mut workspace, q),
-            Quantity::InverseDynamics => inverse_dynamics(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
-            Quantity::ForwardDynamics => forward_dynamics(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
-            Quantity::Regressor => torque_regressor(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
-        };
+        let result = quantity.of_state(model, &mut workspace, &state);
         if result.iter().any(|value| !value.is_finite()) {
             let message = "the result is not finite: the state is too large, or a joint moves no inertia".to_owned();
             return Err(Error::States { path: states.to_owned(), line, message });
@@ -136,6 +124,28 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
         rows += 1;
     }
     Ok(rows)
+}
+
+/// Place in the table of every column that the quantity needs.
+fn column_places(
+    header: &csv::StringRecord,
+    states: &Path,
+    quantity: Quantity,
+    dof: usize,
+) -> Result<Vec<usize>, Error> {
+    let names = quantity.groups().iter().flat_map(|group| (1..=dof).map(move |joint| format!("{group}{joint}")));
+    let place = |name: String| {
+        header.iter().position(|column| column == name).ok_or_else(|| Error::States {
+            path: states.to_owned(),
+            line: 1,
+            message: format!(
+                "no column `{name}`: the quantity needs {} each with the numbers 1 to {dof}; the table has {}",
+                quantity.groups().join(", "),
+                header.iter().collect::<Vec<_>>().join(", ")
+            ),
+        })
+    };
+    names.map(place).collect()
 }
 
 fn table_error(path: &Path, error: &csv::Error) -> Error {

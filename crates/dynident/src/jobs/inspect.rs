@@ -7,8 +7,8 @@ use crate::result::{
 use crate::robot_file::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
 use dynident_model::{
-    DescriptionFormat, InertialParameters, ReadError, Robot, Slip, Slips, UrdfIrregularity, audit, rewrite_inertials,
-    slips,
+    Body, DescriptionFormat, InertialParameters, Joint, Model, ReadError, Robot, Slip, Slips, UrdfIrregularity, audit,
+    rewrite_inertials, slips,
 };
 use std::path::Path;
 
@@ -85,10 +85,24 @@ pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspectio
 pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspection, Error> {
     let slips = slips_of(robot, settings)?.map_or_else(Vec::new, |slips| slips.found);
     let model = &robot.model;
-    let base_settings = BaseParameterSettings::default();
-    let base = BaseParameters::new(model, &[], &base_settings);
-    let (weakest, strongest) = base.gap();
-    let joints = model.tree_joints().iter().map(|joint| JointSummary {
+    Ok(Inspection {
+        schema: INSPECTION_SCHEMA.to_owned(),
+        name: model.name().to_owned(),
+        file: robot.path.display().to_string(),
+        dof: model.dof(),
+        moving_mass_kg: model.inertials().iter().map(InertialParameters::mass_kg).sum(),
+        gravity_m_s2: model.gravity().0,
+        joints: joint_summaries(model),
+        bodies: body_summaries(model),
+        base_parameters: base_summary(model),
+        audit: audit_entries(robot),
+        slips: slips.iter().map(slip_entry).collect(),
+    })
+}
+
+/// All joints of the tree.
+fn joint_summaries(model: &Model) -> Vec<JointSummary> {
+    let one = |joint: &Joint| JointSummary {
         name: joint.name.clone(),
         kind: joint.kind.name().to_owned(),
         parent: joint.parent.map(|parent| model.bodies()[parent].name().to_owned()),
@@ -97,8 +111,13 @@ pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspec
         velocity: joint.limits.velocity,
         effort: joint.limits.effort,
         mimic: joint.mimic.as_ref().map(dynident_model::Mimic::source_names),
-    });
-    let bodies = model.bodies().iter().map(|body| {
+    };
+    model.tree_joints().iter().map(one).collect()
+}
+
+/// All moving bodies.
+fn body_summaries(model: &Model) -> Vec<BodySummary> {
+    let one = |body: &Body| {
         let prior = body.prior();
         BodySummary {
             name: body.name().to_owned(),
@@ -106,8 +125,27 @@ pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspec
             com_m: prior.and_then(|prior| prior.com_m()).map(|com| com.0),
             links: body.links.iter().map(|link| link.name.clone()).collect(),
         }
-    });
-    let mut entries: Vec<AuditEntry> = audit(model)
+    };
+    model.bodies().iter().map(one).collect()
+}
+
+/// The base parameters of the rigid bodies, without torque terms.
+fn base_summary(model: &Model) -> BaseSummary {
+    let settings = BaseParameterSettings::default();
+    let base = BaseParameters::new(model, &[], &settings);
+    let (weakest, strongest) = base.gap();
+    BaseSummary {
+        count: base.count(),
+        expressions: base.exact_expressions(),
+        unidentifiable: base.unidentifiable().iter().map(|&column| base.all_columns()[column].symbol()).collect(),
+        numerical_rank: numerical_rank_by_body(model, 1, settings.tolerance).independent.len(),
+        gap: [weakest, strongest],
+    }
+}
+
+/// The findings of the audit and everything that the reader of the robot description reports.
+fn audit_entries(robot: &Robot) -> Vec<AuditEntry> {
+    let mut entries: Vec<AuditEntry> = audit(&robot.model)
         .into_iter()
         .map(|finding| AuditEntry {
             level: finding.level.name().to_owned(),
@@ -138,25 +176,7 @@ pub fn inspect_robot(robot: &Robot, settings: &InspectSettings) -> Result<Inspec
         place: format!("line {}", notice.line),
         what: notice.loss.to_string(),
     }));
-    Ok(Inspection {
-        schema: INSPECTION_SCHEMA.to_owned(),
-        name: model.name().to_owned(),
-        file: robot.path.display().to_string(),
-        dof: model.dof(),
-        moving_mass_kg: model.inertials().iter().map(InertialParameters::mass_kg).sum(),
-        gravity_m_s2: model.gravity().0,
-        joints: joints.collect(),
-        bodies: bodies.collect(),
-        base_parameters: BaseSummary {
-            count: base.count(),
-            expressions: base.exact_expressions(),
-            unidentifiable: base.unidentifiable().iter().map(|&column| base.all_columns()[column].symbol()).collect(),
-            numerical_rank: numerical_rank_by_body(model, 1, base_settings.tolerance).independent.len(),
-            gap: [weakest, strongest],
-        },
-        audit: entries,
-        slips: slips.iter().map(slip_entry).collect(),
-    })
+    entries
 }
 
 fn slip_entry(slip: &Slip) -> SlipEntry {

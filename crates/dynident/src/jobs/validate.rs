@@ -82,16 +82,7 @@ pub fn validate_result(
         summary
     };
     let logs: Vec<LogSummary> = tested.iter().map(summary).collect();
-    let mut problems = Vec::new();
-    for (log, &index) in logs.iter().zip(&chosen) {
-        let input = read_input("log", &StudyInput::from(study.log_source(&folders, index)?), folder)?;
-        if let Some(fitted) = fitted_to(stored, &input) {
-            problems.push(format!(
-                "log `{}` is `{fitted}`, which the model was fitted to: its figures prove nothing; give a log of another run",
-                log.log
-            ));
-        }
-    }
+    let mut problems = training_logs(stored, study, study_path, &folders, &chosen)?;
     problems.extend(logs.iter().flat_map(LogSummary::problems));
     files.unchanged()?;
     Ok(ValidationFile {
@@ -101,6 +92,28 @@ pub fn validate_result(
         problems,
         validation: tested.into_iter().map(|log| log.validation).collect(),
     })
+}
+
+/// Problems of chosen logs that the model was fitted to.
+fn training_logs(
+    stored: &ResultFile,
+    study: &Study,
+    study_path: &Path,
+    folders: &Folders,
+    chosen: &[usize],
+) -> Result<Vec<String>, Error> {
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    let mut problems = Vec::new();
+    for &index in chosen {
+        let input = read_input("log", &StudyInput::from(study.log_source(folders, index)?), folder)?;
+        if let Some(fitted) = fitted_to(stored, &input) {
+            problems.push(format!(
+                "log `{}` is `{fitted}`, which the model was fitted to: its figures prove nothing; give a log of another run",
+                study.log_name(index)
+            ));
+        }
+    }
+    Ok(problems)
 }
 
 /// The name of the log with the content of `input` that a result was fitted to; none where it was not, and where parts

@@ -1,16 +1,17 @@
 //! The findings of a diagnosis in words.
 
 use super::changes::{changes, keys_of_log, keys_of_study};
-use super::wording::{alternative, evidence};
+use super::description::{another_robot, torque_unit, wrong_mass};
+use super::wording::{alternative, evidence, finding};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
     BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
-    InconsistentTorque, Mistake, StudyKeys, UnmodelledPayload, WrongMass,
+    InconsistentTorque, Mistake, Search, StudyKeys, UnmodelledPayload,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
-use dynident_model::{AuditFinding, Model, audit};
+use dynident_model::Model;
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
 
@@ -22,15 +23,6 @@ const MAX_LEFT_RATIO: f64 = 0.75;
 /// pendulum's noisy log has 0.81.
 const NOTHING_EXPLAINED: f64 = 0.92;
 
-/// Times the least factor of a joint's torque that the largest may be where they are one unit, or the currents of
-/// drives: motor constants times gear ratios of an arm lie within five of each other.
-const MOST_SPREAD: f64 = 10.0;
-
-/// A problem without keys to write.
-fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
-    CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
-}
-
 /// The findings of a diagnosis, with the evidence of the study as written and of the best hypothesis.
 pub(super) fn study_check(
     study: &Study,
@@ -40,54 +32,27 @@ pub(super) fn study_check(
 ) -> StudyCheck {
     let joints = robot.parametric.joint_names();
     let keys = keys_of_study(study, robot);
-    let keys = keys.as_ref();
+    let words = Words { joints: &joints, keys: keys.as_ref() };
     let search = &diagnosis.search;
-    let mut findings = Vec::new();
-    // One finding for each mistake of the best hypothesis; the last one names hypotheses that are not distinguishable.
-    // A hypothesis that explains nothing is no advice.
     let spoilt = spoilt_columns(diagnosis, &joints);
     let is_spoilt = !spoilt.is_empty();
-    let most_left = MAX_LEFT.max(MAX_LEFT_RATIO * search.as_written.left_of_all);
-    let explains = |best: &&Hypothesis| !is_spoilt && !best.is_unexplained() && best.left_of_all < most_left;
-    let best = search.best.as_ref().filter(explains);
+    let best = explanation(search).filter(|_| !is_spoilt);
     let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
-    if is_spoilt {
-        findings.extend(spoilt);
+    let mut findings = if is_spoilt {
+        spoilt
     } else if let Some(fit) = foreign {
-        let mut found = another_robot(fit, &joints);
-        // Some mistake of the study always makes a little less of it.
-        let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, best.factors_alike)));
-        let text = |(mistake, range): (&Mistake, Option<[f64; 2]>)| {
-            let range = range.map_or_else(String::new, |range| mistake.other_factors(range));
-            alternative(mistake, &joints, keys) + &range
-        };
-        found.or = others.map(text).collect();
-        findings.push(found);
+        vec![words.another_robot(fit, best)]
     } else if let Some(best) = best {
-        for (number, mistake) in best.mistakes.iter().enumerate() {
-            let evidence = evidence(mistake, &search.as_written, best, &joints);
-            let mut found = finding(mistake.key(), mistake.sentence(&joints), evidence);
-            found.write = changes(mistake, keys);
-            if number + 1 == best.mistakes.len() {
-                let others = search.alike.iter().filter_map(|other| other.mistakes.last());
-                found.or = others.map(|other| alternative(other, &joints, keys)).collect();
-            }
-            findings.push(found);
-        }
-    } else if !search.as_written.beyond.is_empty() {
-        findings.extend(search.as_written.beyond.iter().map(|beyond| behind_limit(beyond, &joints)));
-    }
-    let is_stated = settings.gains == GainChoice::Stated;
+        words.mistakes(search, best)
+    } else {
+        search.as_written.beyond.iter().map(|beyond| behind_limit(beyond, &joints)).collect()
+    };
+    let has_stated_gains = settings.gains == GainChoice::Stated;
     let bodies = diagnosis.description_fit.as_ref();
-    if let Some(unit) = bodies.filter(|_| is_stated && foreign.is_none() && !is_spoilt) {
-        let far = unit.joints_in_another_unit();
-        if let Some(wrong) = &unit.wrong_mass {
-            findings.push(wrong_mass(wrong, robot.model()));
-        } else if !far.is_empty() {
-            findings.push(torque_unit(unit, &far, robot.model(), &joints, keys));
-        }
+    if let Some(fit) = bodies.filter(|_| has_stated_gains && foreign.is_none() && !is_spoilt) {
+        findings.extend(words.wrong_scale(fit, robot.model()));
     }
-    // The runs of an iteration are no logs of its study: whether the held-out ones are predicted is judged there.
+    // The runs of an iteration are not logs of its study: the iteration itself judges its held-out runs.
     let payloads = diagnosis.unmodelled_payloads.iter().filter(|payload| payload.log < study.log.len());
     findings.extend(payloads.map(|payload| unmodelled_payload(study, robot, payload)));
     let held_out = diagnosis.held_out.iter().filter(|found| found.log < study.log.len());
@@ -96,31 +61,10 @@ pub(super) fn study_check(
         findings.extend(diagnosis.inconsistent_torques.iter().map(|torque| inconsistent_torque(torque, &joints)));
     }
     if findings.is_empty() && diagnosis.is_unexplained() {
-        let left = &search.as_written.left;
-        let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
-        findings.push(finding(
-            "description",
-            "the description is not this robot's, or several mistakes were made at once".to_owned(),
-            format!(
-                "none of {} readings of the logs (signs, orders, zeros, mounting) makes a robot of this description that explains them: {:.0} % of the torque of `{}` is left; \
-                 check link lengths, axes and the kind of the robot",
-                search.tried,
-                100.0 * left[worst],
-                joints[worst]
-            ),
-        ));
+        findings.push(unexplained(search, &joints));
     }
     if findings.is_empty() && search.believed().left_of_all > NOTHING_EXPLAINED {
-        findings.push(finding(
-            "torque",
-            "the torques have nothing to do with the motion".to_owned(),
-            format!(
-                "the best of {} readings of the logs leaves {:.0} % of all torque: compare `columns` under torque and position with the log's \
-                 header, and whether both are of one run; commanded positions, or positions that are held for many rows, are no measured ones",
-                search.tried,
-                100.0 * search.believed().left_of_all
-            ),
-        ));
+        findings.push(unrelated_torques(search));
     }
     StudyCheck {
         findings,
@@ -131,91 +75,90 @@ pub(super) fn study_check(
     }
 }
 
-/// Torques of another size than the description's bodies make: another unit of theirs, or of the masses.
-fn torque_unit(
-    fit: &DescriptionFit,
-    far: &[usize],
-    model: &Model,
-    joints: &[String],
-    keys: Option<&StudyKeys>,
-) -> CheckFinding {
-    let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
-    let factors = factors.collect::<Vec<_>>().join(", ");
-    let common = fit.common_unit();
-    // Where the description is absurd by itself it is not the torques' unit.
-    let audited = audit(model);
-    let of_inertia = |found: &&AuditFinding| found.check == "inertia-too-large";
-    let most_have_it = 2 * audited.iter().filter(of_inertia).count() > model.bodies().len();
-    let absurd = audited.iter().find(|found| ["mass-absurd", "length-unit"].contains(&found.check));
-    let absurd = absurd.or_else(|| audited.iter().find(of_inertia).filter(|_| most_have_it));
-    if let Some(absurd) = absurd {
-        return finding(
-            "description",
-            format!("the description is in other units: {} {}", absurd.place, absurd.message),
-            format!(
-                "its bodies would need other torques than the log has, times {factors}: `dynident inspect` says more; where the \
-                 description is right the torque is not in Nm (N)"
-            ),
-        );
-    }
-    let scales = || far.iter().filter_map(|&joint| fit.scale[joint]);
-    let (least, most) = (scales().fold(f64::INFINITY, f64::min), scales().fold(0.0, f64::max));
-    // One joint of several may have a body that is described badly.
-    let is_alone = far.len() == 1 && joints.len() > 1;
-    if is_alone || (common.is_none() && most > MOST_SPREAD * least) {
-        return finding(
-            "description",
-            "the description's masses are not this robot's, or the torques of some joints are in another unit"
-                .to_owned(),
-            format!(
-                "its bodies, friction aside, would need other torques than the log has, times {factors}: {}; compare the \
-                 masses of the bodies beyond these joints with the maker's data (`dynident inspect`), and the units of \
-                 their columns",
-                if is_alone {
-                    "one joint, which says nothing of the others' unit"
-                } else {
-                    "too far apart for one unit or for the currents of drives"
-                }
-            ),
-        );
-    }
-    let mut found = finding(
-        "unit",
-        common.map_or_else(|| "the torque is not in Nm (N)".to_owned(), |(name, _)| format!("the torque is in {name}")),
-        format!(
-            "by the description's bodies, friction aside, a unit of it is worth this many Nm (N): {factors}; for currents that is \
-             motor constant times gear ratio, which the maker's data say better, or write `gains = \"unknown\"` under [estimator] and \
-             add a log with a known payload"
-        ),
-    );
-    let of_joints = |scale: &[Option<f64>]| keys.map(|keys| StudyChange::from(keys.torque_scale(scale)));
-    match common {
-        Some((_, unit)) => {
-            found.write.extend(keys.map(|keys| keys.torque_unit(unit).into()));
-            let other = of_joints(&fit.scale).map(|change| format!("currents ({} {})", change.place(), change.line));
-            found.or.extend(other);
-        }
-        None => found.write.extend(of_joints(&fit.scale)),
-    }
-    found
+/// The best hypothesis, if it explains the logs. A hypothesis that explains nothing is no advice.
+fn explanation(search: &Search) -> Option<&Hypothesis> {
+    let most_left = MAX_LEFT.max(MAX_LEFT_RATIO * search.as_written.left_of_all);
+    search.best.as_ref().filter(|best| !best.is_unexplained() && best.left_of_all < most_left)
 }
 
-/// One body of the description is far too heavy or too light: no fit of base parameters suffers, but the nominal ones.
-fn wrong_mass(wrong: &WrongMass, model: &Model) -> CheckFinding {
-    let name = model.bodies()[wrong.body].name();
-    let mass_kg = model.inertials()[wrong.body].mass_kg();
-    let found = finding(
+/// Names of the joints and keys of the study, to which findings refer.
+#[derive(Clone, Copy)]
+struct Words<'a> {
+    joints: &'a [String],
+    keys: Option<&'a StudyKeys>,
+}
+
+impl Words<'_> {
+    /// One finding for each mistake of the best hypothesis; the last one names the hypotheses that the logs do not
+    /// distinguish from it.
+    fn mistakes(self, search: &Search, best: &Hypothesis) -> Vec<CheckFinding> {
+        let Self { joints, keys } = self;
+        let one = |(number, mistake): (usize, &Mistake)| {
+            let evidence = evidence(mistake, &search.as_written, best, joints);
+            let mut found = finding(mistake.key(), mistake.sentence(joints), evidence);
+            found.write = changes(mistake, keys);
+            if number + 1 == best.mistakes.len() {
+                let others = search.alike.iter().filter_map(|other| other.mistakes.last());
+                found.or = others.map(|other| alternative(other, joints, keys)).collect();
+            }
+            found
+        };
+        best.mistakes.iter().enumerate().map(one).collect()
+    }
+
+    /// A description of another robot. The mistakes of the best hypothesis are alternatives: some mistake always
+    /// explains a little more.
+    fn another_robot(self, fit: &DescriptionFit, best: Option<&Hypothesis>) -> CheckFinding {
+        let Self { joints, keys } = self;
+        let mut found = another_robot(fit, joints);
+        let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, best.factors_alike)));
+        let text = |(mistake, range): (&Mistake, Option<[f64; 2]>)| {
+            let range = range.map_or_else(String::new, |range| mistake.other_factors(range));
+            alternative(mistake, joints, keys) + &range
+        };
+        found.or = others.map(text).collect();
+        found
+    }
+
+    /// A wrong mass of one body, or torques in another unit.
+    fn wrong_scale(self, fit: &DescriptionFit, model: &Model) -> Option<CheckFinding> {
+        let far = fit.joints_in_another_unit();
+        match &fit.wrong_mass {
+            Some(wrong) => Some(wrong_mass(wrong, model)),
+            None => (!far.is_empty()).then(|| torque_unit(fit, &far, model, self.joints, self.keys)),
+        }
+    }
+}
+
+/// No hypothesis explains the logs: the description is wrong, or several mistakes were made.
+fn unexplained(search: &Search, joints: &[String]) -> CheckFinding {
+    let left = &search.as_written.left;
+    let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
+    finding(
         "description",
-        format!("the description's mass of `{name}` is not this robot's"),
+        "the description is not this robot's, or several mistakes were made at once".to_owned(),
         format!(
-            "with {:.4} kg in place of {mass_kg:.4} (times {:.3}, its inertia as well) its bodies leave {:.0} % of the torques, friction \
-             aside, where no units of the torques explain more; correct the description: `dynident inspect` looks at it, too",
-            wrong.factor * mass_kg,
-            wrong.factor,
-            100.0 * wrong.left
+            "none of {} readings of the logs (signs, orders, zeros, mounting) makes a robot of this description that explains them: {:.0} % of the torque of `{}` is left; \
+             check link lengths, axes and the kind of the robot",
+            search.tried,
+            100.0 * left[worst],
+            joints[worst]
         ),
-    );
-    CheckFinding { level: Level::Warning, ..found }
+    )
+}
+
+/// The best hypothesis explains almost no torque.
+fn unrelated_torques(search: &Search) -> CheckFinding {
+    finding(
+        "torque",
+        "the torques have nothing to do with the motion".to_owned(),
+        format!(
+            "the best of {} readings of the logs leaves {:.0} % of all torque: compare `columns` under torque and position with the log's \
+             header, and whether both are of one run; commanded positions, or positions that are held for many rows, are no measured ones",
+            search.tried,
+            100.0 * search.believed().left_of_all
+        ),
+    )
 }
 
 /// What the study alone says of units.
@@ -288,21 +231,6 @@ fn of_held_out_log(
     found.write = changes(mistake, Some(&keys));
     found.or = alike.iter().map(|other| alternative(other, joints, Some(&keys))).collect();
     found
-}
-
-/// The description's bodies explain no joint, and other bodies do.
-fn another_robot(fit: &DescriptionFit, joints: &[String]) -> CheckFinding {
-    let best = fit.best_explained().map_or_else(String::new, |(joint, share)| {
-        format!("{:.0} % of that of `{}`, which is the most of all joints", 100.0 * share, joints[joint])
-    });
-    finding(
-        "description",
-        "the description is of another robot, or its masses are placeholders".to_owned(),
-        format!(
-            "friction and drive inertia aside, its bodies, scaled as suits each joint, explain {best}, where bodies that could be explain nearly all of it: \
-             compare `file` under [robot] with the robot; where nobody knows a body, leave its <inertial> element out"
-        ),
-    )
 }
 
 /// A torque that the robot which explains the others does not explain.

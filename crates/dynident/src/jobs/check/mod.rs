@@ -1,6 +1,7 @@
 //! Before any fit is believed: do study, robot and logs fit together?
 
 mod changes;
+mod description;
 mod findings;
 mod wording;
 

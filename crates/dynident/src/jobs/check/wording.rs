@@ -1,11 +1,18 @@
-//! Alternatives and evidence of a mistake in words.
+//! A finding, and alternatives and evidence of a mistake, in words.
 
 use super::changes::changes;
+use crate::result::CheckFinding;
 use core::fmt::Write;
 use dynident_identification::diagnosis::{Hypothesis, Mistake, StudyKeys};
+use dynident_recording::Level;
 
 /// Logarithm of the ratio of a joint's unexplained shares from which it is evidence.
 const MIN_GAIN: f64 = 0.2;
+
+/// A problem without keys to write.
+pub(super) fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
+    CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
+}
 
 /// Another explanation, with the keys to write.
 pub(super) fn alternative(mistake: &Mistake, joints: &[String], keys: Option<&StudyKeys>) -> String {

@@ -1,4 +1,5 @@
-//! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
+//! The paper's criterion over windows with the settings of a study, solved by any optimiser and compared with the
+//! optimum.
 
 use super::search::SearchResult;
 use crate::error::{Expected, StudyError};
@@ -28,16 +29,8 @@ pub(crate) fn step_wise(
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, StudyError> {
-    // The problem: constants of every joint.
     let begun = Instant::now();
-    let FamilyChoice::SplicedLogistic(settings) = &section.family else {
-        let fix = "the criterion windowed-condition is for kind = \"spliced-logistic\", whose strokes have mid-points";
-        return Err(StudyError::conflict(format!("family.kind = \"{}\"", section.family.name()), fix));
-    };
-    if settings.periods_s.is_some() {
-        let fix = "with windowed-condition each period follows from period_times_omega; leave it out";
-        return Err(StudyError::conflict("family.periods_s", fix));
-    }
+    let settings = spliced_settings(section)?;
     let dof = robot.model().dof();
     settings.validate(dof, section.duration_s)?;
     let offsets = settings.offsets.clone().unwrap_or_else(|| vec![0.0; dof]);
@@ -48,8 +41,6 @@ pub(crate) fn step_wise(
     let problem = problem(section, windowed, robot, limits, settings, &offsets, &names)?;
     problem.validate()?;
 
-    // What the study's optimiser finds, or the strokes that the study gives.
-    let seed = section.search.seed;
     let late = || section.search.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let stop = |round: &'static str, progress: &Progress<'_>| {
         let progress = DesignProgress {
@@ -60,80 +51,158 @@ pub(crate) fn step_wise(
         };
         if watch(&progress).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    // The optimum stands beside every design: it takes a tenth of a second.
-    let optimum = problem.gradient_solution(seed, STARTS, |_| ControlFlow::Continue(()));
-    let (optimum, gradient_evaluations) = optimum?;
-    let bounds = problem.bounds();
-    let mut history = Vec::new();
-    let (x, evaluations, optimiser) = if section.parameters.is_empty() {
-        match &section.optimiser {
-            OptimiserChoice::Gradient => (optimum.clone(), gradient_evaluations, section.optimiser.name()),
-            OptimiserChoice::Genetic(own) => {
-                let own = BinaryGeneticSettings { seed, ..own.clone() };
-                let mut hear = |progress: &Progress<'_>| stop("generations", progress);
-                let result = binary_genetic(|x| problem.fitness(x), &bounds, &own, &mut hear);
-                let result = result.map_err(StudyError::at("optimiser"))?;
-                history = result.history;
-                (result.best, result.evaluations, section.optimiser.name())
-            }
-            OptimiserChoice::CmaEs(own) => {
-                let own = CmaEsSettings { seed, ..own.clone() };
-                let start: Vec<f64> = bounds.iter().map(|[low, high]| f64::midpoint(*low, *high)).collect();
-                let steps: Vec<f64> = bounds.iter().map(|[low, high]| 0.3 * (high - low)).collect();
-                let mut hear = |progress: &Progress<'_>| {
-                    let value = progress.value;
-                    history.push(Generation { best: value, best_so_far: value, mean: value });
-                    stop("generations", progress)
-                };
-                let result = cma_es(|x| problem.graded_fitness(x), &start, &steps, &bounds, &own, &mut hear);
-                let result = result.map_err(StudyError::at("optimiser"))?;
-                (result.best, result.evaluations, section.optimiser.name())
-            }
-        }
+    // The file lists the optimum next to every design: it takes a tenth of a second.
+    let (x, evaluations) = problem.gradient_solution(section.search.seed, STARTS, |_| ControlFlow::Continue(()))?;
+    let optimum = FoundStrokes { x, evaluations, optimiser: section.optimiser.name(), history: Vec::new() };
+    let found = if section.parameters.is_empty() {
+        searched(section, &problem, &optimum, stop)?
     } else {
-        (given(&section.parameters, &names)?, 0, "given")
+        let x = given(&section.parameters, &names)?;
+        FoundStrokes { x, evaluations: 0, optimiser: "given", history: Vec::new() }
     };
 
-    // The motion, and the file's account of it.
-    let strokes = problem.strokes(&x);
-    let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, robot);
-    let condition_sum = problem.condition_numbers(&strokes).iter().sum();
-    let optimum_strokes = files_of(&optimum);
-    let inside = optimum_strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept);
-    let best = inside.then(|| problem.fitness(&optimum));
-    let steps: Vec<Step> = problem
-        .joints
-        .iter()
-        .zip(&strokes)
-        .map(|(joint, stroke)| Step {
-            joint: joint.joint,
-            period_s: settings.period_times_omega / stroke.steepness_per_s,
-        })
-        .collect();
-    let family = StepWiseLogistic::new(&offsets, &steps, settings)?;
-    let parameters = strokes.iter().flat_map(|stroke| [stroke.amplitude_rad, stroke.steepness_per_s]).collect();
-    let file = WindowedFile {
-        problem: windowed.problem,
-        optimiser: optimiser.to_owned(),
-        fitness: problem.fitness(&x),
-        condition_sum,
-        optimum: best,
-        above_optimum_percent: best.map(|best| 100.0 * (condition_sum / best - 1.0)),
-        strokes: files_of(&x),
-        optimum_strokes: if inside { optimum_strokes } else { Vec::new() },
-    };
+    let motion = StrokeMotion { problem: &problem, settings, offsets: &offsets, robot };
+    let strokes = problem.strokes(&found.x);
+    let family = motion.family(&strokes)?;
     debug_assert_eq!(family.joints(), dof);
+    let file = motion.file(windowed, &found, &optimum.x);
     Ok(SearchResult {
         family: Box::new(family),
-        parameters,
+        parameters: strokes.iter().flat_map(|stroke| [stroke.amplitude_rad, stroke.steepness_per_s]).collect(),
         start_posture: Vec::new(),
-        figure: Some(condition_sum),
+        figure: Some(file.condition_sum),
         violation: 0.0,
         windowed: Some(file),
-        history,
-        evaluations,
+        history: found.history,
+        evaluations: found.evaluations,
         seconds: begun.elapsed().as_secs_f64(),
     })
+}
+
+/// The settings of the family, the only one whose strokes have mid-points.
+fn spliced_settings(section: &DesignSection) -> Result<&SplicedLogisticSettings, StudyError> {
+    let FamilyChoice::SplicedLogistic(settings) = &section.family else {
+        let fix = "the criterion windowed-condition is for kind = \"spliced-logistic\", whose strokes have mid-points";
+        return Err(StudyError::conflict(format!("family.kind = \"{}\"", section.family.name()), fix));
+    };
+    if settings.periods_s.is_some() {
+        let fix = "with windowed-condition each period follows from period_times_omega; leave it out";
+        return Err(StudyError::conflict("family.periods_s", fix));
+    }
+    Ok(settings)
+}
+
+/// The strokes of a design, as the vector of the problem, and the search for them.
+#[derive(Clone)]
+struct FoundStrokes {
+    x: Vec<f64>,
+    evaluations: usize,
+    optimiser: &'static str,
+    history: Vec<Generation>,
+}
+
+/// The strokes that the study's optimiser finds; `optimum` are those of the gradient.
+fn searched(
+    section: &DesignSection,
+    problem: &StepWiseProblem,
+    optimum: &FoundStrokes,
+    stop: impl Fn(&'static str, &Progress<'_>) -> ControlFlow<()>,
+) -> Result<FoundStrokes, StudyError> {
+    let (seed, bounds) = (section.search.seed, problem.bounds());
+    let mut history = Vec::new();
+    let (x, evaluations) = match &section.optimiser {
+        OptimiserChoice::Gradient => return Ok(optimum.clone()),
+        OptimiserChoice::Genetic(own) => {
+            let own = BinaryGeneticSettings { seed, ..own.clone() };
+            let mut hear = |progress: &Progress<'_>| stop("generations", progress);
+            let result = binary_genetic(|x| problem.fitness(x), &bounds, &own, &mut hear);
+            let result = result.map_err(StudyError::at("optimiser"))?;
+            history = result.history;
+            (result.best, result.evaluations)
+        }
+        OptimiserChoice::CmaEs(own) => {
+            let own = CmaEsSettings { seed, ..own.clone() };
+            let start: Vec<f64> = bounds.iter().map(|[low, high]| f64::midpoint(*low, *high)).collect();
+            let steps: Vec<f64> = bounds.iter().map(|[low, high]| 0.3 * (high - low)).collect();
+            let mut hear = |progress: &Progress<'_>| {
+                let value = progress.value;
+                history.push(Generation { best: value, best_so_far: value, mean: value });
+                stop("generations", progress)
+            };
+            let result = cma_es(|x| problem.graded_fitness(x), &start, &steps, &bounds, &own, &mut hear);
+            let result = result.map_err(StudyError::at("optimiser"))?;
+            (result.best, result.evaluations)
+        }
+    };
+    Ok(FoundStrokes { x, evaluations, optimiser: section.optimiser.name(), history })
+}
+
+/// A problem with what makes a motion of its strokes.
+struct StrokeMotion<'a> {
+    problem: &'a StepWiseProblem,
+    settings: &'a SplicedLogisticSettings,
+    /// Where each joint starts, rad (m).
+    offsets: &'a [f64],
+    robot: &'a StudyRobot,
+}
+
+impl StrokeMotion<'_> {
+    /// The motion: one stroke after another.
+    fn family(&self, strokes: &[Stroke]) -> Result<StepWiseLogistic, StudyError> {
+        let steps = self.problem.joints.iter().zip(strokes).map(|(joint, stroke)| Step {
+            joint: joint.joint,
+            period_s: self.settings.period_times_omega / stroke.steepness_per_s,
+        });
+        Ok(StepWiseLogistic::new(self.offsets, &steps.collect::<Vec<_>>(), self.settings)?)
+    }
+
+    /// The design as the file lists it, with the optimum if that is inside all limits.
+    fn file(&self, windowed: &WindowedCondition, found: &FoundStrokes, optimum: &[f64]) -> WindowedFile {
+        let problem = self.problem;
+        let strokes = problem.strokes(&found.x);
+        let condition_sum = problem.condition_numbers(&strokes).iter().sum();
+        let optimum_strokes = self.stroke_files(&problem.strokes(optimum));
+        let inside = optimum_strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept);
+        let best = inside.then(|| problem.fitness(optimum));
+        WindowedFile {
+            problem: windowed.problem,
+            optimiser: found.optimiser.to_owned(),
+            fitness: problem.fitness(&found.x),
+            condition_sum,
+            optimum: best,
+            above_optimum_percent: best.map(|best| 100.0 * (condition_sum / best - 1.0)),
+            strokes: self.stroke_files(&strokes),
+            optimum_strokes: if inside { optimum_strokes } else { Vec::new() },
+        }
+    }
+
+    /// Strokes as the file lists them.
+    fn stroke_files(&self, strokes: &[Stroke]) -> Vec<StrokeFile> {
+        let Self { problem, settings, offsets, robot } = *self;
+        let conditions = problem.condition_numbers(strokes);
+        let one = |place: usize| {
+            let (stroke, joint) = (&strokes[place], problem.joints[place].joint);
+            let limits = problem.limits(place, stroke).into_iter();
+            let limits = limits.filter(|limit| limit.limit < FREE_RAD).map(|limit| StrokeLimitFile {
+                quantity: limit.quantity,
+                value: limit.value,
+                limit: limit.limit,
+                excess_percent: 100.0 * limit.excess(),
+                kept: limit.kept(),
+            });
+            StrokeFile {
+                joint: robot.model().joints()[joint].name.clone(),
+                amplitude_rad: stroke.amplitude_rad,
+                steepness_per_s: stroke.steepness_per_s,
+                offset_rad: offsets[joint],
+                period_s: settings.period_times_omega / stroke.steepness_per_s,
+                window_s: stroke.window_s,
+                condition_number: conditions[place],
+                limits: limits.collect(),
+            }
+        };
+        (0..strokes.len()).map(one).collect()
+    }
 }
 
 /// The constants of every joint.
@@ -213,37 +282,4 @@ fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, StudyErr
         }
     }
     Ok(x)
-}
-
-/// Strokes as the file lists them.
-fn stroke_files(
-    problem: &StepWiseProblem,
-    strokes: &[Stroke],
-    settings: &SplicedLogisticSettings,
-    offsets: &[f64],
-    robot: &StudyRobot,
-) -> Vec<StrokeFile> {
-    let conditions = problem.condition_numbers(strokes);
-    let one = |place: usize| {
-        let (stroke, joint) = (&strokes[place], problem.joints[place].joint);
-        let limits = problem.limits(place, stroke).into_iter();
-        let limits = limits.filter(|limit| limit.limit < FREE_RAD).map(|limit| StrokeLimitFile {
-            quantity: limit.quantity,
-            value: limit.value,
-            limit: limit.limit,
-            excess_percent: 100.0 * limit.excess(),
-            kept: limit.kept(),
-        });
-        StrokeFile {
-            joint: robot.model().joints()[joint].name.clone(),
-            amplitude_rad: stroke.amplitude_rad,
-            steepness_per_s: stroke.steepness_per_s,
-            offset_rad: offsets[joint],
-            period_s: settings.period_times_omega / stroke.steepness_per_s,
-            window_s: stroke.window_s,
-            condition_number: conditions[place],
-            limits: limits.collect(),
-        }
-    };
-    (0..strokes.len()).map(one).collect()
 }

@@ -56,113 +56,135 @@ pub(super) struct Stage<'a> {
 }
 
 impl IterationReport<'_> {
+    /// The file of one stage.
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
-        let Stage { leg, robot, records, status, shortfalls, declined, known_std } = *stage;
-        // The truth of a simulated robot is one of the stated terms.
-        let stated = robot.terms() == self.robot.terms();
-        let (bound, truth) = (self.bound.as_deref().filter(|_| stated), self.truth.as_ref().filter(|_| stated));
-        let columns = robot.layout().columns();
-        let expressions = robot.base().expressions();
-        let parameters = |estimate: Option<&RunEstimate>| {
-            let Some(estimate) = estimate else { return Vec::new() };
-            let one = |k: usize| IterationParameter {
-                symbol: columns[k].symbol(),
-                expression: expressions[k].clone(),
-                unit: columns[k].unit().to_owned(),
-                value: estimate.values[k],
-                std: known_std
-                    .get(k)
-                    .copied()
-                    .flatten()
-                    .or_else(|| (!estimate.fixed.contains(&k)).then_some(estimate.std[k])),
-                error: truth.map(|truth| estimate.values[k] - truth[k]),
-            };
-            (0..columns.len()).map(one).collect()
-        };
-        let runs: Vec<IterationRun> = records
-            .iter()
-            .map(|record| IterationRun {
-                run: record.run,
-                leg,
-                controller: record.controller.name.clone(),
-                model_based: record.controller.model.is_some(),
-                model_of_run: model_of_run(record, records),
-                damping: record.controller.damping,
-                stiffness: record.controller.stiffness,
-                accepted: record.accepted,
-                outcome: record.outcome.clone(),
-                reason: record.reason.clone(),
-                max_tracking_error_rad: record.max_tracking_error_rad.clone(),
-                warm_up: record.warm_up.clone(),
-                held_out: record.held_out.clone(),
-                parameters: parameters(record.estimate.as_ref()),
-                pooled: parameters(record.pooled.as_ref()),
-                run_offsets: record.pooled.as_ref().map_or_else(Vec::new, |all| all.run_offsets.clone()),
-                evidence: record.evidence.clone(),
-                torque_check: record.torque_check.clone(),
-                differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
-                forecast: record.forecast.as_ref().map(|forecast| {
-                    let known = record.knowledge().filter(|_| record.accepted);
-                    run_forecast(forecast, known.and_then(|known| forecast.reached_gain_percent(known)))
-                }),
-                bound: bound.and_then(|_| self.own_bound(record)),
-                torque_lags: record.estimate.as_ref().map_or_else(Vec::new, |own| own.torque_lags.clone()),
-            })
-            .collect();
+        let Stage { records, status, shortfalls, declined, .. } = *stage;
+        let known = self.known(stage);
         let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
         let tracking_improvement = match good[..] {
             [first, .., last] if last.tracking_error() > 0.0 => Some(first.tracking_error() / last.tracking_error()),
             _ => None,
         };
         let last = good.last().and_then(|record| record.knowledge());
-        // The bound is one run's.
-        let own = good.last().and_then(|record| record.estimate.as_ref());
-        let last_bound = good.last().and_then(|record| self.own_bound(record));
-        let last_bound = bound.and(last_bound.as_deref().or(bound));
-        let error_over_bound = own.zip(truth).zip(last_bound).and_then(|((estimate, truth), bound)| {
-            let ratios: Vec<f64> = (0..bound.len())
-                .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
-                .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))
-                .collect();
-            (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt())
-        });
         IterationsFile {
             schema: ITERATIONS_SCHEMA.to_owned(),
             name: study_name(self.study, self.study_path),
             provenance: Some(self.provenance.clone()),
             converged: status.is_converged(),
-            status: match status {
-                IterationStatus::Converged => "converged",
-                IterationStatus::Settled => "settled",
-                IterationStatus::RunsUsedUp => "runs-used-up",
-                IterationStatus::Refused { .. } => "refused",
-                IterationStatus::Interrupted { .. } => INTERRUPTED,
-                IterationStatus::Waiting { .. } => "waiting",
-            }
-            .to_owned(),
+            status: status_key(status).to_owned(),
             reason: in_words(status, shortfalls, declined),
             declined: declined.map(|forecast| run_forecast(forecast, None)),
             unmet: shortfalls.iter().filter(|own| !is_noise(own, status)).map(unmet).collect(),
             joints: self.robot.parametric.joint_names(),
             lowered_bandwidths: self.lowered.clone(),
             duration_s: self.duration_s,
-            runs,
+            runs: records.iter().map(|record| self.run(record, stage, known)).collect(),
             tracking_improvement,
-            error_over_bound,
-            bound: bound.map(<[f64]>::to_vec),
+            error_over_bound: good.last().and_then(|record| self.error_over_bound(record, known)),
+            bound: known.bound.map(<[f64]>::to_vec),
             base_parameters: Vec::new(),
             no_result: None,
             possible_parameters: last.and_then(|estimate| estimate.possible.clone()),
         }
     }
-}
 
-impl IterationReport<'_> {
+    /// Truth and bound of a stage: both are for the stated torque terms only.
+    fn known(&self, stage: &Stage<'_>) -> Known<'_> {
+        let is_stated = stage.robot.terms() == self.robot.terms();
+        Known { truth: self.truth.as_deref().filter(|_| is_stated), bound: self.bound.as_deref().filter(|_| is_stated) }
+    }
+
+    /// One run of a stage.
+    fn run(&self, record: &RunRecord, stage: &Stage<'_>, known: Known<'_>) -> IterationRun {
+        let parameters = |estimate: Option<&RunEstimate>| {
+            estimate.map_or_else(Vec::new, |estimate| parameters(estimate, stage, known.truth))
+        };
+        IterationRun {
+            run: record.run,
+            leg: stage.leg,
+            controller: record.controller.name.clone(),
+            model_based: record.controller.model.is_some(),
+            model_of_run: model_of_run(record, stage.records),
+            damping: record.controller.damping,
+            stiffness: record.controller.stiffness,
+            accepted: record.accepted,
+            outcome: record.outcome.clone(),
+            reason: record.reason.clone(),
+            max_tracking_error_rad: record.max_tracking_error_rad.clone(),
+            warm_up: record.warm_up.clone(),
+            held_out: record.held_out.clone(),
+            parameters: parameters(record.estimate.as_ref()),
+            pooled: parameters(record.pooled.as_ref()),
+            run_offsets: record.pooled.as_ref().map_or_else(Vec::new, |all| all.run_offsets.clone()),
+            evidence: record.evidence.clone(),
+            torque_check: record.torque_check.clone(),
+            differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
+            forecast: record.forecast.as_ref().map(|forecast| {
+                let known = record.knowledge().filter(|_| record.accepted);
+                run_forecast(forecast, known.and_then(|known| forecast.reached_gain_percent(known)))
+            }),
+            bound: known.bound.and_then(|_| self.own_bound(record)),
+            torque_lags: record.estimate.as_ref().map_or_else(Vec::new, |own| own.torque_lags.clone()),
+        }
+    }
+
+    /// Root mean square of a run's parameter errors over their Cramér-Rao bound, which is for a single run.
+    fn error_over_bound(&self, record: &RunRecord, known: Known<'_>) -> Option<f64> {
+        let first_motion = known.bound?;
+        let own = self.own_bound(record);
+        let bound = own.as_deref().unwrap_or(first_motion);
+        let (estimate, truth) = record.estimate.as_ref().zip(known.truth)?;
+        let ratios: Vec<f64> = (0..bound.len())
+            .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
+            .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))
+            .collect();
+        (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt())
+    }
+
     /// The bound of a run along another motion than the first.
     fn own_bound(&self, record: &RunRecord) -> Option<Vec<f64>> {
         let references = &record.motion.as_ref()?.references;
         let legs: Result<Vec<Leg>, _> = references.iter().map(|reference| Leg::whole(reference.clone())).collect();
         cramer_rao(self.robot, &legs.ok()?, self.sensors)
+    }
+}
+
+/// Truth and Cramér-Rao bound of the base parameters, where they are known.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    truth: Option<&'a [f64]>,
+    bound: Option<&'a [f64]>,
+}
+
+/// The base parameters of an estimate, with the error bars of earlier legs where those determined them.
+fn parameters(estimate: &RunEstimate, stage: &Stage<'_>, truth: Option<&[f64]>) -> Vec<IterationParameter> {
+    let columns = stage.robot.layout().columns();
+    let expressions = stage.robot.base().expressions();
+    let one = |k: usize| IterationParameter {
+        symbol: columns[k].symbol(),
+        expression: expressions[k].clone(),
+        unit: columns[k].unit().to_owned(),
+        value: estimate.values[k],
+        std: stage
+            .known_std
+            .get(k)
+            .copied()
+            .flatten()
+            .or_else(|| (!estimate.fixed.contains(&k)).then_some(estimate.std[k])),
+        error: truth.map(|truth| estimate.values[k] - truth[k]),
+    };
+    (0..columns.len()).map(one).collect()
+}
+
+/// The key of a status in the file.
+fn status_key(status: &IterationStatus) -> &'static str {
+    match status {
+        IterationStatus::Converged => "converged",
+        IterationStatus::Settled => "settled",
+        IterationStatus::RunsUsedUp => "runs-used-up",
+        IterationStatus::Refused { .. } => "refused",
+        IterationStatus::Interrupted { .. } => INTERRUPTED,
+        IterationStatus::Waiting { .. } => "waiting",
     }
 }
 

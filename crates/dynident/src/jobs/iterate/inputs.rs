@@ -1,0 +1,66 @@
+//! The files and settings of the study, checked before any search starts.
+
+use super::job::Job;
+use crate::error::{Error, StudyError};
+use crate::inputs::InputFiles;
+use crate::study::{Folders, IterationSection, RobotChoice, SimulatedTruth, SimulationSection, Study, StudyRobot};
+use dynident_excitation::limits::Limits;
+use dynident_iteration::IterationSettings;
+use dynident_system::{PermittedProgram, ProgramPermission};
+use std::path::Path;
+
+/// The robot and the settings of a study.
+pub(super) struct Inputs {
+    pub(super) section: IterationSection,
+    pub(super) simulation: SimulationSection,
+    /// The files that are read, as they were before.
+    pub(super) files: InputFiles,
+    pub(super) folders: Folders,
+    pub(super) robot: StudyRobot,
+    pub(super) settings: IterationSettings,
+    /// The simulated robot, if the study's robot is the simulator.
+    pub(super) truth: Option<SimulatedTruth>,
+}
+
+impl Inputs {
+    /// Reads the robot and the settings.
+    pub(super) fn read(job: &Job<'_>, section: IterationSection) -> Result<Self, Error> {
+        let (study, study_path, data) = (job.study, job.study_path, job.options.data.as_deref());
+        let simulation = study.simulation.clone().unwrap_or_default();
+        let files = InputFiles::of(study, study_path, data);
+        let folders = Folders::new(study, study_path, data);
+        let robot = StudyRobot::new(study, study_path, &folders)?;
+        let identification = study.settings(study_path, &robot)?;
+        let settings = section.settings(study, identification).map_err(Error::study(study_path))?;
+        let truth = match section.robot {
+            RobotChoice::Simulation => {
+                Some(simulation.truth(&study.coupling, &robot).map_err(Error::section(study_path, "simulation"))?)
+            }
+            _ => None,
+        };
+        Ok(Self { section, simulation, files, folders, robot, settings, truth })
+    }
+
+    /// Checks the table `[iteration]`.
+    pub(super) fn check_section(&self, study: &Study) -> Result<(), StudyError> {
+        let Self { section, robot, .. } = self;
+        section.check_legs(robot)?;
+        section.check_gains(study, robot)?;
+        section.home_settings(robot, Limits::default())?;
+        section.check_warm_up()?;
+        section.check_held_out(study)?;
+        section.redesign(study)?;
+        Ok(())
+    }
+}
+
+/// The program that the study names as its robot, once its start is permitted.
+pub(super) fn permitted_program(
+    section: &IterationSection,
+    study_path: &Path,
+    programs: ProgramPermission<'_>,
+) -> Result<Option<PermittedProgram>, Error> {
+    let RobotChoice::Process(settings) = &section.robot else { return Ok(None) };
+    let refused = |source| Error::NotPermitted { path: study_path.to_owned(), source };
+    settings.permitted(programs).map(Some).map_err(refused)
+}

@@ -1,0 +1,42 @@
+//! Figures of the runs of an iteration, for its page.
+
+use crate::result::{IterationRun, IterationsFile};
+
+/// Curves of one plot: more cannot be distinguished.
+pub(super) const CURVES: usize = 6;
+
+/// A run's number, with its leg where each has an iteration of its own.
+pub(super) fn run_name(run: &IterationRun) -> String {
+    run.leg.map_or_else(|| run.run.to_string(), |leg| format!("{} of leg {leg}", run.run))
+}
+
+/// Whether the true parameters are known.
+pub(super) fn is_known(file: &IterationsFile) -> bool {
+    file.runs.iter().flat_map(|run| &run.parameters).any(|parameter| parameter.error.is_some())
+}
+
+/// The last good run with an estimate.
+pub(super) fn last_good(file: &IterationsFile) -> Option<&IterationRun> {
+    file.runs.iter().rev().find(|run| run.accepted && !run.parameters.is_empty())
+}
+
+/// Largest tracking error of all joints, rad (m).
+pub(super) fn worst(run: &IterationRun) -> f64 {
+    run.max_tracking_error_rad.iter().fold(0.0, |most, error| most.max(*error))
+}
+
+/// Root mean square error of the parameters that a run determines, in units of its own error bars.
+pub(super) fn error_in_bars(run: &IterationRun) -> Option<f64> {
+    let squares: Vec<f64> = run
+        .parameters
+        .iter()
+        .filter_map(|parameter| Some((parameter.error?, parameter.std.filter(|std| *std > 0.0)?)))
+        .map(|(error, std)| (error / std).powi(2))
+        .collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// Largest error of a parameter.
+pub(super) fn largest_error(run: &IterationRun) -> Option<f64> {
+    run.parameters.iter().filter_map(|parameter| parameter.error.map(f64::abs)).reduce(f64::max)
+}
