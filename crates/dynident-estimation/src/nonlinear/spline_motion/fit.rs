@@ -99,7 +99,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
         for _ in 0..again {
             paid = Some(fit.find_levels(&information, &state, &mut noise)?);
         }
-        let step = fit.solve(&information, &state, &noise)?;
+        let Solved { step, .. } = fit.solve(&information, &state, &noise)?;
         let before = cost(&fit.pieces, &state, &residuals, &noise);
         let better = fit.descended(model, &state, &step, &noise, before)?;
         let worse = better.is_none();
@@ -143,9 +143,14 @@ struct Fit<'a> {
     pieces: Vec<Piece<'a>>,
 }
 
-/// A Gauss-Newton step and the system that it solves.
-struct Step {
+/// A linearised system and its solution.
+struct Solved {
     system: System,
+    step: Step,
+}
+
+/// A Gauss-Newton step.
+struct Step {
     parameters: Vec<f64>,
     motion: Vec<Vec<f64>>,
     /// In error bars over all directions.
@@ -180,12 +185,12 @@ impl Fit<'_> {
         information: &[TorqueInformation],
         state: &State,
         noise: &[LogNoise],
-    ) -> Result<Step, EstimationError> {
+    ) -> Result<Solved, EstimationError> {
         let (pieces, names) = (&self.pieces, &self.problem.names);
         let system = System::new(pieces, information, &state.coefficients, noise, &self.free, names)?;
         let (parameters, length) = system.step();
         let motion = (0..pieces.len()).map(|k| system.motion_step(k, &parameters)).collect();
-        Ok(Step { system, parameters, motion, length })
+        Ok(Solved { system, step: Step { parameters, motion, length } })
     }
 
     /// Levels of positions and smoothness about the linearised optimum, which moves with them.
@@ -195,8 +200,8 @@ impl Fit<'_> {
         state: &State,
         noise: &mut [LogNoise],
     ) -> Result<Paid, EstimationError> {
-        let step = self.solve(information, state, noise)?;
-        let found = Paid::new(&step.system, &self.pieces, information, noise, &self.free);
+        let Solved { system, step } = self.solve(information, state, noise)?;
+        let found = Paid::new(&system, &self.pieces, information, noise, &self.free);
         let moved: Vec<Vec<f64>> =
             state.coefficients.iter().zip(&step.motion).map(|(c, step)| sum(c, step, 1.0)).collect();
         found.levels(&self.pieces, &moved, noise);
