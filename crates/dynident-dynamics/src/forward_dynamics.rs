@@ -1,11 +1,12 @@
 //! Forward dynamics: the articulated-body algorithm.
 
-use crate::hinge::{Hinge, symmetric, with_hinge};
+use crate::hinge::{Hinge, PlacedHinges, symmetric, with_hinge};
 use crate::inverse_dynamics::outward;
 use crate::motion_equation::mass_matrix_and_bias;
+use crate::states::{ArticulatedInertia, LinkMotion};
 use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
-use dynident_model::{Mat3, Model, Vec3};
+use dynident_model::{JointStep, Mat3, Model, Vec3};
 
 /// Joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
 ///
@@ -161,7 +162,20 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
             }
         }
     }
-    // Outward again, with what the joint accelerations add to each body's acceleration.
+    joint_accelerations(steps, hinges, articulated, motions, ddq);
+}
+
+/// Outward again: the joint accelerations, and what they add to each body's acceleration.
+#[inline(always)]
+fn joint_accelerations<T: Scalar>(
+    steps: &[JointStep],
+    hinges: PlacedHinges<'_, T>,
+    articulated: &[ArticulatedInertia<T>],
+    motions: &mut [LinkMotion<T>],
+    ddq: &mut [T],
+) {
+    let joints = steps.len();
+    let (articulated, motions, ddq) = (&articulated[..joints], &mut motions[..joints], &mut ddq[..joints]);
     for index in 0..joints {
         let step = &steps[index];
         let own = &articulated[index];

@@ -10,12 +10,12 @@
 use crate::body_frames::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
 use crate::sample_lanes::{put_lanes, take_lanes};
-use crate::states::{AdjointScratch, BodyAdjoint};
+use crate::states::{AdjointScratch, BodyAdjoint, BodyState};
 use crate::tree_scratch::{TreeBatch, expanded};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
 use dynident_model::terms::JointMotion;
-use dynident_model::{Mat3, Model, Transform, Vec3};
+use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 
 /// Derivatives of a cost by a block's motion, joint-major as the motion.
 #[derive(Debug)]
@@ -176,23 +176,9 @@ fn reverse_sweep<T: Lane>(
     core.place(maps);
     outward(model, core);
     let AdjointScratch { path, path_start, axes, by_axes, by_motion, joints } = adjoint;
-    for (index, map) in maps.iter().enumerate() {
-        let Transform { rotation, translation } = &core.bodies[index].parent_from_body;
-        let start = path_start[index];
-        let own = path_start[index + 1] - 1;
-        if let Some(parent) = map.parent {
-            let from = path_start[parent];
-            for k in 0..own - start {
-                let (angular, linear) = axes[from + k];
-                axes[start + k] = (
-                    rotation.transpose_mul_vec(angular),
-                    rotation.transpose_mul_vec(angular.cross_add(*translation, linear)),
-                );
-            }
-        }
-        let axis = map.axis.splat::<T>();
-        axes[own] = if map.turns { (axis, Vec3::ZERO) } else { (Vec3::ZERO, axis) };
-        by_motion[index] = BodyAdjoint { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
+    place_axes(maps, &core.bodies, path_start, axes);
+    for own in &mut by_motion[..maps.len()] {
+        *own = BodyAdjoint { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
     }
     for pair in by_axes.iter_mut() {
         *pair = (Vec3::ZERO, Vec3::ZERO);
@@ -269,6 +255,33 @@ fn reverse_sweep<T: Lane>(
             .omega
             .cross(*translation)
             .cross_add(by_swing, translation.cross_add(by_swing.cross(outer.omega), by_omega));
+    }
+}
+
+/// The axes of the joints on the path to each body, angular and linear, in the body's frame.
+#[inline(always)]
+fn place_axes<T: Lane>(
+    maps: &[JointMap],
+    bodies: &[BodyState<T>],
+    path_start: &[usize],
+    axes: &mut [(Vec3<T>, Vec3<T>)],
+) {
+    for (index, map) in maps.iter().enumerate() {
+        let Transform { rotation, translation } = &bodies[index].parent_from_body;
+        let start = path_start[index];
+        let own = path_start[index + 1] - 1;
+        if let Some(parent) = map.parent {
+            let from = path_start[parent];
+            for k in 0..own - start {
+                let (angular, linear) = axes[from + k];
+                axes[start + k] = (
+                    rotation.transpose_mul_vec(angular),
+                    rotation.transpose_mul_vec(angular.cross_add(*translation, linear)),
+                );
+            }
+        }
+        let axis = map.axis.splat::<T>();
+        axes[own] = if map.turns { (axis, Vec3::ZERO) } else { (Vec3::ZERO, axis) };
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::criteria::Criterion;
 use crate::design::assess::assess;
-use crate::design::{Design, DesignProgress, DesignSettings, DesignTask, grid, ranges};
+use crate::design::{Design, DesignProgress, DesignSettings, DesignTask, DesignWatch, grid, ranges};
 use crate::information::Information;
 use crate::limits::LimitWorkspace;
 use crate::motion::Motion;
@@ -59,6 +59,16 @@ pub fn design_without_gradients(
     optimiser: &DerivativeFree,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<(Design, Vec<Generation>), OptimiserError> {
+    evolved(task, settings, optimiser, &watch)
+}
+
+/// [`design_without_gradients()`], compiled once for all watchers.
+fn evolved(
+    task: &DesignTask<'_>,
+    settings: &DesignSettings,
+    optimiser: &DerivativeFree,
+    watch: &DesignWatch<'_>,
+) -> Result<(Design, Vec<Generation>), OptimiserError> {
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let criterion = task.criteria[task.criteria.len() - 1];
@@ -66,70 +76,31 @@ pub fn design_without_gradients(
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let fine = grid(task.family.duration_s(), 2 * times.len() - 1);
     let weight = logged.len() as f64 / times.len() as f64;
-    let (bounds, start) = search_box(task, settings.seed);
+    let search_box = search_box(task, settings.seed);
     let mut margins = vec![MARGIN; task.limits.constraints().len()];
     let mut kept = None;
     let (mut history, mut evaluations) = (Vec::new(), 0);
     // Searches with tighter limits while something is broken between the samples.
     for search in 0..SEARCHES {
         let objective = Objective { task, criterion, times: &times, weight, margins: &margins, idle: Mutex::default() };
-        // The rest of a generation is not evaluated once the search was ended.
-        let stopped = AtomicBool::new(false);
-        let best_so_far = Mutex::new(f64::INFINITY);
-        let ended = |progress: &DesignProgress| {
-            if !stopped.load(Ordering::Relaxed) && (watch(progress).is_break() || late()) {
-                stopped.store(true, Ordering::Relaxed);
-            }
-            stopped.load(Ordering::Relaxed)
-        };
-        let before = evaluations as u64;
-        let fitness = |parameters: &[f64]| {
-            let value = *best_so_far.lock().unwrap_or_else(PoisonError::into_inner);
-            let so_far = DesignProgress { round: ROUND, value, violation: 0.0, evaluations: before };
-            if ended(&so_far) { f64::INFINITY } else { objective.fitness(parameters) }
-        };
-        let mut curve = Vec::new();
-        let mut hear = |progress: &Progress<'_>| {
-            curve.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
-            let so_far = DesignProgress {
-                round: ROUND,
-                value: progress.value,
-                violation: 0.0,
-                evaluations: (evaluations + progress.evaluations) as u64,
-            };
-            *best_so_far.lock().unwrap_or_else(PoisonError::into_inner) = progress.value;
-            if ended(&so_far) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
+        let watched = Watched::new(watch, &late, evaluations);
         let seed = settings.seed.wrapping_add(search as u64);
-        let (best, used) = match optimiser {
-            DerivativeFree::Genetic(own) => {
-                let own = BinaryGeneticSettings { seed, ..own.clone() };
-                let result = binary_genetic(fitness, &bounds, &own, &mut hear)?;
-                curve = result.history;
-                (result.best, result.evaluations)
-            }
-            DerivativeFree::CmaEs(own) => {
-                let own = CmaEsSettings { seed, ..own.clone() };
-                let steps: Vec<f64> = bounds.iter().map(|[lower, upper]| 0.15 * (upper - lower)).collect();
-                let result = cma_es(fitness, &start, &steps, &bounds, &own, &mut hear)?;
-                (result.best, result.evaluations)
-            }
-        };
-        evaluations += used;
+        let found = searched(&objective, &search_box, optimiser, seed, &watched)?;
+        evaluations += found.evaluations;
         if search == 0 {
-            history = curve;
+            history = found.history;
         }
-        // What it is worth on the fine grid.
-        let (found, worst) = assess(task, criterion, best, &fine, &logged);
+        // Its figure and violation on the fine grid.
+        let found = assess(task, criterion, found.best, &fine, &logged);
         let whole = found.violation <= 0.0;
+        for (margin, c) in margins.iter_mut().zip(&found.extremes) {
+            *margin += 2.0 * c.max(0.0);
+        }
         if kept.as_ref().is_none_or(|kept| found.better_than(kept)) {
             kept = Some(found);
         }
-        if whole || stopped.load(Ordering::Relaxed) || late() {
+        if whole || watched.is_stopped() || late() {
             break;
-        }
-        for (margin, c) in margins.iter_mut().zip(&worst) {
-            *margin += 2.0 * c.max(0.0);
         }
     }
     let kept = kept.ok_or(OptimiserError::Start)?;
@@ -144,8 +115,94 @@ pub fn design_without_gradients(
     Ok((designed, history))
 }
 
+/// What one search found.
+struct Found {
+    best: Vec<f64>,
+    evaluations: usize,
+    history: Vec<Generation>,
+}
+
+/// One search with the optimiser's settings and this seed.
+fn searched(
+    objective: &Objective<'_>,
+    SearchBox { bounds, start }: &SearchBox,
+    optimiser: &DerivativeFree,
+    seed: u64,
+    watched: &Watched<'_>,
+) -> Result<Found, OptimiserError> {
+    // The rest of a generation is not evaluated once the search was ended.
+    let fitness = |parameters: &[f64]| if watched.ends_now() { f64::INFINITY } else { objective.fitness(parameters) };
+    match optimiser {
+        DerivativeFree::Genetic(own) => {
+            let own = BinaryGeneticSettings { seed, ..own.clone() };
+            let result = binary_genetic(fitness, bounds, &own, &mut |progress| watched.heard(progress))?;
+            Ok(Found { best: result.best, evaluations: result.evaluations, history: result.history })
+        }
+        DerivativeFree::CmaEs(own) => {
+            let own = CmaEsSettings { seed, ..own.clone() };
+            let steps: Vec<f64> = bounds.iter().map(|[lower, upper]| 0.15 * (upper - lower)).collect();
+            let mut history = Vec::new();
+            let mut hear = |progress: &Progress<'_>| {
+                history.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
+                watched.heard(progress)
+            };
+            let result = cma_es(fitness, start, &steps, bounds, &own, &mut hear)?;
+            Ok(Found { best: result.best, evaluations: result.evaluations, history })
+        }
+    }
+}
+
+/// Reports the progress of one search to the watcher, from any thread, and remembers when the search was ended.
+struct Watched<'a> {
+    watch: &'a DesignWatch<'a>,
+    late: &'a (dyn Fn() -> bool + Sync),
+    /// Evaluations of the searches before.
+    before: usize,
+    best_so_far: Mutex<f64>,
+    stopped: AtomicBool,
+}
+
+impl<'a> Watched<'a> {
+    fn new(watch: &'a DesignWatch<'a>, late: &'a (dyn Fn() -> bool + Sync), before: usize) -> Self {
+        Self { watch, late, before, best_so_far: Mutex::new(f64::INFINITY), stopped: AtomicBool::new(false) }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// Reports a value after so many evaluations; whether the search was ended, now or before.
+    fn reported(&self, value: f64, evaluations: usize) -> bool {
+        let progress = DesignProgress { round: ROUND, value, violation: 0.0, evaluations: evaluations as u64 };
+        if !self.is_stopped() && ((self.watch)(&progress).is_break() || (self.late)()) {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        self.is_stopped()
+    }
+
+    /// Whether the search ends before the next evaluation.
+    fn ends_now(&self) -> bool {
+        let value = *self.best_so_far.lock().unwrap_or_else(PoisonError::into_inner);
+        self.reported(value, self.before)
+    }
+
+    /// Reports a generation.
+    fn heard(&self, progress: &Progress<'_>) -> ControlFlow<()> {
+        *self.best_so_far.lock().unwrap_or_else(PoisonError::into_inner) = progress.value;
+        let ended = self.reported(progress.value, self.before + progress.evaluations);
+        if ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Where the searches look.
+struct SearchBox {
+    bounds: Vec<[f64; 2]>,
+    /// A random start of the family.
+    start: Vec<f64>,
+}
+
 /// The box, and a random start of the family in it.
-fn search_box(task: &DesignTask<'_>, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {
+fn search_box(task: &DesignTask<'_>, seed: u64) -> SearchBox {
     let mut random = Random::new(seed);
     let (positions, speeds) = ranges(task.limits);
     let starts: Vec<Vec<f64>> = (0..SIZED_BY).map(|_| task.family.random(&positions, &speeds, &mut random)).collect();
@@ -158,9 +215,7 @@ fn search_box(task: &DesignTask<'_>, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {
         let bound = [own[0].max(sized[0]), own[1].min(sized[1])];
         if own[0].is_finite() && own[1].is_finite() { own } else { bound }
     });
-    let bounds: Vec<[f64; 2]> = bounds.collect();
-    let start = starts.into_iter().next().unwrap_or_default();
-    (bounds, start)
+    SearchBox { bounds: bounds.collect(), start: starts.into_iter().next().unwrap_or_default() }
 }
 
 /// Fitness of parameters, with scratch for as many threads as ask at once.

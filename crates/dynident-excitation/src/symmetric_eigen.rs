@@ -171,22 +171,8 @@ impl Kernel for Decompose<'_> {
                 }
             }
         }
-        // Q = H_0 H_1 .., from the last; then its transpose, so that rotations act on rows.
-        let mut q = vec![0.0; n * stride];
-        for k in 0..n {
-            q[k * stride + k] = 1.0;
-        }
-        for k in (0..n.saturating_sub(2)).rev().filter(|&k| factors[k] != 0.0) {
-            let v = &reflections[k * stride..(k + 1) * stride];
-            let from = (k + 1) / WIDE * WIDE;
-            product.fill(0.0);
-            for (row, v_i) in q[(k + 1) * stride..].chunks_exact(stride).zip(&v[k + 1..]) {
-                add_times::<T>(&mut product[from..], *v_i, &row[from..]);
-            }
-            for (row, v_i) in q[(k + 1) * stride..].chunks_exact_mut(stride).zip(&v[k + 1..]) {
-                add_times::<T>(&mut row[from..], -factors[k] * v_i, &product[from..]);
-            }
-        }
+        let q = product_of_reflections::<T>(&reflections, &factors, &mut product);
+        // The transpose, so that rotations act on rows.
         for i in 0..n {
             for j in 0..n {
                 rows[j * stride + i] = q[i * stride + j];
@@ -198,6 +184,28 @@ impl Kernel for Decompose<'_> {
         ql::<T>(&mut diagonal, &mut beside, rows, stride)?;
         Some(diagonal)
     }
+}
+
+/// `Q = H_0 H_1 ..` of the reflections `1 - b v vᵀ`, from the last; `product` is scratch of one row.
+#[inline(always)]
+fn product_of_reflections<T: Lane>(reflections: &[f64], factors: &[f64], product: &mut [f64]) -> Vec<f64> {
+    let (n, stride) = (factors.len(), product.len());
+    let mut q = vec![0.0; n * stride];
+    for k in 0..n {
+        q[k * stride + k] = 1.0;
+    }
+    for k in (0..n.saturating_sub(2)).rev().filter(|&k| factors[k] != 0.0) {
+        let v = &reflections[k * stride..(k + 1) * stride];
+        let from = (k + 1) / WIDE * WIDE;
+        product.fill(0.0);
+        for (row, v_i) in q[(k + 1) * stride..].chunks_exact(stride).zip(&v[k + 1..]) {
+            add_times::<T>(&mut product[from..], *v_i, &row[from..]);
+        }
+        for (row, v_i) in q[(k + 1) * stride..].chunks_exact_mut(stride).zip(&v[k + 1..]) {
+            add_times::<T>(&mut row[from..], -factors[k] * v_i, &product[from..]);
+        }
+    }
+    q
 }
 
 /// Implicit QL steps on the three diagonals until the outer ones vanish; rotations turn the rows of `vectors` too.

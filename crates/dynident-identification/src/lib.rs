@@ -150,6 +150,7 @@ mod reducible;
 mod regressor_model;
 pub mod rows;
 mod settings;
+mod stages;
 mod task;
 mod training;
 
@@ -163,10 +164,7 @@ pub use drive_inertia::{DriveInertiaChoice, DriveInertiaEstimate, choose_drive_i
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;
-pub use identify::{
-    ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify, identify_payload,
-    identify_with_instruments,
-};
+pub use identify::{Identification, identify, identify_payload, identify_with_instruments};
 pub use likelihood::schwarz;
 pub use log_noise::LogNoise;
 pub use logs::Logs;
@@ -177,5 +175,6 @@ pub use reduced::{ReducedLog, identify_reduced, reduce, reduced_errors};
 pub use reducible::ReduceError;
 pub use regressor_model::RegressorModel;
 pub use settings::{DiagnosisChoice, GainChoice, IdentificationSettings, OffsetChoice};
+pub use stages::{ConsistentParameters, TrainingExamination, consistent_stage};
 pub use task::IdentificationTask;
 pub use training::{LogFactors, Training, log_factors, training_rows};

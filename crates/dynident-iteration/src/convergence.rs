@@ -1,10 +1,10 @@
 //! What an iteration still falls short of: converged is only what meets everything.
 
 use crate::estimate::RunEstimate;
-use crate::evidence::Clipping;
+use crate::evidence::{Clipping, JointEvidence};
 use crate::lengths::OtherLength;
 use crate::record::RunRecord;
-use crate::settings::IterationSettings;
+use crate::settings::{IterationSettings, SettledSettings};
 use crate::torque_check::TorqueCause;
 use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
@@ -321,41 +321,52 @@ fn unmet(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> 
             let (lag_s, before_s) = (now.lag_s, then.lag_s);
             found.push(Shortfall::LagChanges { joint: joint(place), lag_s, before_s, half_width_95_s });
         }
-        if let Some(Clipping { share, torque, stated }) =
-            shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
-        {
-            let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
-            // Without a stated limit a flat top is a matter of the drive only where the joint does not follow, and no
-            // more was commanded.
-            if stated || beyond && !last.has_commanded_torque(place) {
-                found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
-            }
-        }
-        let of_run = shown.prediction.filter(|_| !names.held_out);
-        if let Some(prediction) = of_run.filter(|prediction| prediction.inside < LEAST_INSIDE) {
-            found.push(Shortfall::Prediction {
-                joint: joint(place),
-                inside_percent: 100.0 * prediction.inside,
-                rms_error_nm: prediction.rms_error,
-                half_width_nm: prediction.half_width,
-            });
-        }
-        let sigma = own.map_or(0.0, |estimate| {
-            let (sigma, near_rest) = (estimate.joint_sigma[place], estimate.near_rest.get(place));
-            // What is left near rest is the friction's that holds the joint, up to what that can be.
-            near_rest.and_then(|found| found.as_ref()?.unexplained_nm(sigma)).unwrap_or(sigma)
-        });
-        let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
-        let (percent, allowed_percent) = (100.0 * beyond_noise / shown.torque_rms, limits.most_unexplained_percent);
-        if shown.torque_rms > 0.0 && percent > allowed_percent {
-            found.push(Shortfall::Unexplained { joint: joint(place), percent, allowed_percent });
-        }
+        of_joint(&mut found, last, shown, place, limits, names);
     }
     found.extend(evidence.other_length.clone().map(Shortfall::Length));
     if names.held_out {
         held_out(&mut found, last, names);
     }
     found
+}
+
+/// Clipping, prediction and unexplained torque of one joint of the last run.
+fn of_joint(
+    found: &mut Vec<Shortfall>,
+    last: &RunRecord,
+    shown: &JointEvidence,
+    place: usize,
+    limits: &SettledSettings,
+    names: &Names,
+) {
+    let joint = || names.joints[place].clone();
+    if let Some(Clipping { share, torque, stated }) = shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED) {
+        let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
+        // Without a stated limit a flat top is a matter of the drive only where the joint does not follow, and no
+        // more was commanded.
+        if stated || beyond && !last.has_commanded_torque(place) {
+            found.push(Shortfall::Clipping { joint: joint(), percent: 100.0 * share, torque, stated });
+        }
+    }
+    let of_run = shown.prediction.filter(|_| !names.held_out);
+    if let Some(prediction) = of_run.filter(|prediction| prediction.inside < LEAST_INSIDE) {
+        found.push(Shortfall::Prediction {
+            joint: joint(),
+            inside_percent: 100.0 * prediction.inside,
+            rms_error_nm: prediction.rms_error,
+            half_width_nm: prediction.half_width,
+        });
+    }
+    let sigma = last.estimate.as_ref().map_or(0.0, |estimate| {
+        let (sigma, near_rest) = (estimate.joint_sigma[place], estimate.near_rest.get(place));
+        // What is left near rest is the friction's that holds the joint, up to what that can be.
+        near_rest.and_then(|found| found.as_ref()?.unexplained_nm(sigma)).unwrap_or(sigma)
+    });
+    let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
+    let (percent, allowed_percent) = (100.0 * beyond_noise / shown.torque_rms, limits.most_unexplained_percent);
+    if shown.torque_rms > 0.0 && percent > allowed_percent {
+        found.push(Shortfall::Unexplained { joint: joint(), percent, allowed_percent });
+    }
 }
 
 /// What the held-out run after the last one speaks against.

@@ -1,21 +1,19 @@
-//! Robots, records and the policy together.
+//! The steps of an iteration: the next motion, its run, its examination and judgement.
 
 use crate::before_motion::motions;
 use crate::commanding::{Came, Prepared, folder_number};
-use crate::convergence::Shortfall;
 use crate::cut_short::CutShort;
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_runs};
 use crate::forecast::MotionForecast;
 use crate::good_log::GoodLog;
-use crate::held_out::HeldOutCame;
 use crate::identify_run::identify_run;
 use crate::iteration::Iteration;
 use crate::leg::{IterationTask, Leg};
 use crate::lengths::other_length;
 use crate::planner::PlannedMotion;
 use crate::planning::planned_motion;
-use crate::policy::{self, Next, RunPlan};
+use crate::policy::{self, RunPlan};
 use crate::record::{RunRecord, UsedController};
 use crate::robot::{Robot, RobotRun, RunPurpose, RunRequest, StopSignal, read_log_table};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
@@ -23,51 +21,38 @@ use crate::run_logs::RunLog;
 use crate::run_motion::{RunMotion, legs_along};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
-use crate::supervision::{Supervisor, Watching};
+use crate::supervision::Supervisor;
 use crate::warm_up::{WarmUpWatch, passes};
-use dynident_simulation::{Record, require_length};
+use dynident_simulation::Record;
 use std::borrow::Cow;
 use std::path::Path;
 use std::time::Instant;
 
-/// How an iteration went.
-#[derive(Clone, Debug, PartialEq)]
-pub struct IterationOutcome {
-    /// How it ended.
-    pub status: IterationStatus,
-    /// What is not met; nothing if it has converged.
-    pub shortfalls: Vec<Shortfall>,
-    /// Every run.
-    pub runs: Vec<RunRecord>,
-    /// Where motions are planned and everything is met: what a further run was expected to bring, too little for one.
-    pub declined: Option<MotionForecast>,
-}
-
 /// The motion of a run: its own trajectories, if they are not the task's, and what they are expected to bring.
 #[derive(Clone, Debug, Default)]
-struct NextRunMotion {
-    motion: Option<RunMotion>,
-    forecast: Option<MotionForecast>,
+pub(crate) struct NextRunMotion {
+    pub(crate) motion: Option<RunMotion>,
+    pub(crate) forecast: Option<MotionForecast>,
 }
 
-/// What came of a plan.
-enum PlannedRun {
+/// The result of a planned run.
+pub(crate) enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
-    /// It does not count: what was recorded of the run, and why.
+    /// Not counted: what was recorded of the run, and why.
     CutShort(Vec<RobotRun>, CutShort),
 }
 
 /// A log that was corrected after it had been read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum CorrectedLog {
+pub(crate) enum CorrectedLog {
     Run,
     HeldOut,
 }
 
 impl Iteration {
     /// The motion of the run after `records`, as an earlier call has planned it or planned now.
-    fn next_motion(
+    pub(crate) fn next_motion(
         &self,
         records: &[RunRecord],
         store: Option<&IterationStore>,
@@ -96,13 +81,13 @@ impl Iteration {
     }
 
     /// A run for its motion alone, if everything is met, motions are planned, and one is left.
-    fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
+    pub(crate) fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
         let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
         open.then(|| policy::further(records)).flatten()
     }
 
     /// Makes one run: every leg on its robot, then the identification.
-    fn made(
+    pub(crate) fn made(
         &self,
         robots: &mut [&mut dyn Robot],
         (plan, next): (&RunPlan, NextRunMotion),
@@ -288,7 +273,7 @@ impl Iteration {
     }
 
     /// Which log of the newest run a person has corrected since it was read, if any.
-    fn corrected_log(
+    pub(crate) fn corrected_log(
         &self,
         robots: &[&mut dyn Robot],
         last: &RunRecord,
@@ -318,7 +303,11 @@ impl Iteration {
     }
 
     /// The logs of the good runs among `records`, from the store: what further runs are identified together with.
-    fn good_logs(&self, records: &[RunRecord], store: Option<&IterationStore>) -> Result<Vec<GoodLog>, IterationError> {
+    pub(crate) fn good_logs(
+        &self,
+        records: &[RunRecord],
+        store: Option<&IterationStore>,
+    ) -> Result<Vec<GoodLog>, IterationError> {
         let Some(store) = store.filter(|_| self.settings.pool) else { return Ok(Vec::new()) };
         let good = |record: &&RunRecord| record.accepted && record.estimate.is_some();
         self.logs_of(&records.iter().filter(good).collect::<Vec<_>>(), store)
@@ -342,139 +331,5 @@ impl Iteration {
             Ok(GoodLog::new(record, legs, records))
         };
         records.iter().copied().map(one).collect()
-    }
-}
-
-/// Runs, identifies and runs again until all has settled: the first run by a controller without a model or by the
-/// prior, then by the model-based controller with the newest estimate. A run that got worse (its tracking, a broken
-/// limit, divergence) is rejected: the step from the last good parameters to the new ones is halved, and if that does
-/// not help the controller without a model comes back, stiffer.
-///
-/// `robots` holds one robot for all legs, or one for each. With a `store`, runs that it holds are not made again, and
-/// each new one is kept before the next begins. `watch` hears of every new run.
-///
-/// # Errors
-/// Settings that do not fit, files that cannot be written. What the robot does wrong is in the records and in the
-/// status.
-pub fn iterate(
-    iteration: &Iteration,
-    robots: &mut [&mut dyn Robot],
-    store: Option<&IterationStore>,
-    watch: &mut dyn FnMut(&RunRecord, &[RobotRun]),
-) -> Result<IterationOutcome, IterationError> {
-    iterate_supervised(iteration, robots, store, &mut Watching(watch))
-}
-
-/// [`iterate()`] under somebody's eyes, who may stop it, and is asked before every motion. A run that a stop cuts short
-/// does not count: what was recorded of it is kept in a folder of its own, and the run is made anew by the next call.
-///
-/// # Errors
-/// As [`iterate()`].
-pub fn iterate_supervised(
-    iteration: &Iteration,
-    robots: &mut [&mut dyn Robot],
-    store: Option<&IterationStore>,
-    supervisor: &mut dyn Supervisor,
-) -> Result<IterationOutcome, IterationError> {
-    let legs = iteration.task.legs.len();
-    if robots.len() != 1 {
-        require_length("robots", legs, robots.len())?;
-    }
-    let mut records = store.map_or_else(|| Ok(Vec::new()), IterationStore::records)?;
-    if let (Some(store), Some(last)) = (store, records.last())
-        && let Some(corrected) = iteration.corrected_log(robots, last, store)?
-    {
-        match corrected {
-            CorrectedLog::Run => store.forget_run(last.run)?,
-            CorrectedLog::HeldOut => store.forget_held_out(last.run)?,
-        }
-        records = store.records()?;
-    }
-    if let Some(store) = store {
-        let robot = iteration.robot(&records)?;
-        for record in &records {
-            record.check(&robot).map_err(|problem| store.refused(record.run, problem))?;
-        }
-    }
-    let outcome = |status, records: Vec<RunRecord>| {
-        let shortfalls = iteration.shortfalls(&records)?;
-        Ok(IterationOutcome { status, shortfalls, runs: records, declined: None })
-    };
-    let mut good: Option<Vec<GoodLog>> = None;
-    let mut stopped: Option<String> = None;
-    // By this call; what moved before nobody knows.
-    let mut last_motion: Option<Instant> = None;
-    loop {
-        if let Some(why) = stopped.as_ref().filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
-            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", records.len() + 1);
-            if !matches!(iteration.next(&records)?, Next::Finished(_)) {
-                return outcome(IterationStatus::Waiting { reason }, records);
-            }
-        }
-        // What is known is judged before it is used further.
-        if let Some(held_out) = iteration.held_out_due(&records)? {
-            match iteration.held_out_made(held_out, &mut *robots[0], &records, supervisor, &mut last_motion)? {
-                HeldOutCame::Stopped(status) => return outcome(status, records),
-                HeldOutCame::CutShort(runs, why) => {
-                    let run = records.len();
-                    let next = format!("the held-out run after run {run}");
-                    return outcome(why.kept(store, run, &runs, &next)?, records);
-                }
-                HeldOutCame::Run(found, came) => {
-                    if let (Some(store), Some(last)) = (store, records.last()) {
-                        store.keep_held_out(last.run, &found, &came)?;
-                    }
-                    stopped = (!found.done).then(|| {
-                        format!("the held-out run after run {} ended early: {}", records.len(), found.outcome)
-                    });
-                    if let Some(last) = records.last_mut() {
-                        last.held_out = Some(found);
-                    }
-                }
-            }
-            continue;
-        }
-        let stop = supervisor.stop().cloned();
-        let (plan, next) = match iteration.next(&records)? {
-            Next::Run(plan) => (plan, iteration.next_motion(&records, store, stop.as_ref())?),
-            Next::Finished(status) => {
-                let more = iteration.further(&status, &records);
-                let Some(plan) = more else { return outcome(status, records) };
-                let next = iteration.next_motion(&records, store, stop.as_ref())?;
-                if stop.as_ref().is_some_and(StopSignal::is_requested) {
-                    let reason = format!("while the motion of run {} was looked for", plan.run);
-                    return outcome(IterationStatus::Interrupted { reason }, records);
-                }
-                if !next.forecast.as_ref().is_some_and(|forecast| forecast.worth_a_run) {
-                    let declined = next.forecast;
-                    return Ok(IterationOutcome { declined, ..outcome(status, records)? });
-                }
-                (plan, next)
-            }
-        };
-        // Only now: an iteration that has ended needs no logs.
-        let good = match &mut good {
-            Some(good) => good,
-            None => good.insert(iteration.good_logs(&records, store)?),
-        };
-        match iteration.made(robots, (&plan, next), &records, good, supervisor, &mut last_motion)? {
-            PlannedRun::Stopped(status) => return outcome(status, records),
-            PlannedRun::CutShort(runs, why) => {
-                let next = format!("run {}", plan.run);
-                return outcome(why.kept(store, plan.run, &runs, &next)?, records);
-            }
-            PlannedRun::Run(record, runs) => {
-                if record.accepted && record.estimate.is_some() && iteration.settings.pool {
-                    let legs = iteration.legs_of(&record)?.into_owned();
-                    good.push(GoodLog::new(&record, legs, runs.iter().map(|run| run.record.clone()).collect()));
-                }
-                if let Some(store) = store {
-                    store.keep(&record, &runs)?;
-                }
-                supervisor.made(&record, &runs);
-                stopped = (!record.done).then(|| format!("run {} ended early: {}", record.run, record.outcome));
-                records.push(*record);
-            }
-        }
     }
 }

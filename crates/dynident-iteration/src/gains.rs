@@ -136,14 +136,7 @@ pub fn derived_controllers(
     let typical = with_typical_drives(robot);
     let parameters = typical.as_deref().unwrap_or(robot.nominal());
     let matrices = mass_matrices(robot, references, parameters)?;
-    let mut largest = vec![0.0_f64; dof];
-    for matrix in &matrices {
-        largest.iter_mut().enumerate().for_each(|(joint, most)| *most = most.max(matrix[(joint, joint)]));
-    }
-    for (joint, inertia) in robot.model().joints().iter().zip(&largest) {
-        let what = format!("nominal inertia about {}", joint.name);
-        require(*inertia > 0.0 && inertia.is_finite(), what, *inertia, "state the gains: the description has none")?;
-    }
+    let largest = largest_inertia(robot, &matrices)?;
     let left = 1.0 - 0.01 * uncertainty_percent;
     let asked: Vec<f64> = bandwidth.iter().map(|f| core::f64::consts::TAU * f).collect();
     let lowered = |ratio: &dyn Fn(usize) -> f64| -> Vec<f64> {
@@ -157,53 +150,97 @@ pub fn derived_controllers(
     let light = with_light_drives(robot, *lightest_drive).map(|light| mass_matrices(robot, references, &light));
     let light = light.transpose()?;
     let stiff = stiff_enough(robot, &matrices, left, tracking_error.as_deref());
-    // Natural frequencies and dampings.
-    let stable = |omega: Vec<f64>, ratios: &dyn Fn(&[DMatrix<f64>]) -> Vec<f64>| -> (Vec<f64>, Vec<f64>) {
-        let Some(light) = &light else { return (omega, vec![1.0; dof]) };
-        let of_joint = |((omega, ratio), stiff): ((f64, f64), &f64)| {
-            if omega <= highest_omega_if_light(ratio, *light_delay_s, 1.0) {
-                return (omega, 1.0);
-            }
-            let highest = highest_omega_if_light(ratio, *light_delay_s, LIGHT_DAMPING);
-            (omega.min(highest.max(*stiff)), LIGHT_DAMPING)
-        };
-        omega.into_iter().zip(ratios(light)).zip(&stiff).map(of_joint).unzip()
+    let stable = |omega: Vec<f64>, ratios: &dyn Fn(&[DMatrix<f64>]) -> Vec<f64>| match &light {
+        Some(light) => Loops::stable(omega, &ratios(light), &stiff, *light_delay_s),
+        None => Loops { omega, damping: vec![1.0; dof] },
     };
-    let (with_nominal, nominal_damping) = stable(lowered(&|_| drives), &|light| inertia_ratios(&matrices, light, dof));
+    let with_nominal = stable(lowered(&|_| drives), &|light| inertia_ratios(&matrices, light, dof));
     // Joint PD in the posture where the joint is lightest, the others free.
     let pd_ratios = |matrices: &[DMatrix<f64>]| -> Vec<f64> {
         largest.iter().zip(lightest_inertia(matrices, dof)).map(|(most, least)| (most / least).max(1.0)).collect()
     };
     let own_ratios = pd_ratios(&matrices);
-    let (mut alone, alone_damping) = stable(lowered(&|joint| own_ratios[joint]), &pd_ratios);
-    let kd: Vec<f64> = (0..dof).map(|joint| 2.0 * alone_damping[joint] * alone[joint] * largest[joint]).collect();
-    let share = matrices.iter().filter_map(|matrix| share_of_all(matrix, &kd, &alone, delay_s)).fold(1.0, f64::min);
-    for omega in &mut alone {
+    let mut alone = stable(lowered(&|joint| own_ratios[joint]), &pd_ratios);
+    let kd: Vec<f64> = (0..dof).map(|joint| 2.0 * alone.damping[joint] * alone.omega[joint] * largest[joint]).collect();
+    let shares = matrices.iter().filter_map(|matrix| share_of_all(matrix, &kd, &alone.omega, delay_s));
+    let share = shares.fold(1.0, f64::min);
+    for omega in &mut alone.omega {
         *omega *= share;
     }
+    let with_model = Loops { omega: with_model, damping: vec![1.0; dof] };
+    Ok(DerivedControllers {
+        model_free: alone.joint_pd(&largest, left),
+        first: with_nominal.computed_torque(left),
+        first_model,
+        model_based: with_model.computed_torque(1.0),
+        model_free_hz: alone.in_hz(),
+        first_hz: with_nominal.in_hz(),
+        model_based_hz: with_model.in_hz(),
+    })
+}
 
-    let each = |of: &dyn Fn(usize) -> f64| PerJoint::Each((0..dof).map(of).collect());
-    let pd = JointPdSettings {
-        kp: each(&|joint| alone[joint].powi(2) * left * largest[joint]),
-        kd: each(&|joint| 2.0 * alone_damping[joint] * alone[joint] * left * largest[joint]),
-    };
-    let computed = |omega: &[f64], damping: &[f64], share: f64| {
+/// The closed loops of all joints.
+struct Loops {
+    /// Natural frequencies, rad/s.
+    omega: Vec<f64>,
+    /// Damping ratios.
+    damping: Vec<f64>,
+}
+
+impl Loops {
+    /// Loops that stay stable with the lightest drives, whose inertia is the modelled one divided by `ratios`; not
+    /// slower than `stiff`.
+    fn stable(omega: Vec<f64>, ratios: &[f64], stiff: &[f64], light_delay_s: f64) -> Self {
+        let of_joint = |((omega, &ratio), stiff): ((f64, &f64), &f64)| {
+            if omega <= highest_omega_if_light(ratio, light_delay_s, 1.0) {
+                return (omega, 1.0);
+            }
+            let highest = highest_omega_if_light(ratio, light_delay_s, LIGHT_DAMPING);
+            (omega.min(highest.max(*stiff)), LIGHT_DAMPING)
+        };
+        let (omega, damping) = omega.into_iter().zip(ratios).zip(stiff).map(of_joint).unzip();
+        Self { omega, damping }
+    }
+
+    fn each(&self, of: &dyn Fn(usize) -> f64) -> PerJoint {
+        PerJoint::Each((0..self.omega.len()).map(of).collect())
+    }
+
+    /// Joint PD with this share of the joints' inertia.
+    fn joint_pd(&self, inertia: &[f64], share: f64) -> ControllerSettings {
+        let Self { omega, damping } = self;
+        ControllerSettings::JointPd(JointPdSettings {
+            kp: self.each(&|joint| omega[joint].powi(2) * share * inertia[joint]),
+            kd: self.each(&|joint| 2.0 * damping[joint] * omega[joint] * share * inertia[joint]),
+        })
+    }
+
+    /// Computed torque with this share of the stiffness.
+    fn computed_torque(&self, share: f64) -> ControllerSettings {
+        let Self { omega, damping } = self;
         ControllerSettings::ComputedTorque(ComputedTorqueSettings {
-            kp: each(&|joint| share * omega[joint].powi(2)),
-            kd: each(&|joint| 2.0 * damping[joint] * share.sqrt() * omega[joint]),
+            kp: self.each(&|joint| share * omega[joint].powi(2)),
+            kd: self.each(&|joint| 2.0 * damping[joint] * share.sqrt() * omega[joint]),
             friction: FrictionCompensation::Reference,
         })
-    };
-    let in_hz = |omega: &[f64]| omega.iter().map(|omega| omega / core::f64::consts::TAU).collect();
-    Ok(DerivedControllers {
-        model_free: ControllerSettings::JointPd(pd),
-        first: computed(&with_nominal, &nominal_damping, left),
-        first_model,
-        model_based: computed(&with_model, &vec![1.0; dof], 1.0),
-        model_free_hz: in_hz(&alone),
-        first_hz: in_hz(&with_nominal),
-        model_based_hz: in_hz(&with_model),
-    })
+    }
+
+    fn in_hz(&self) -> Vec<f64> {
+        self.omega.iter().map(|omega| omega / core::f64::consts::TAU).collect()
+    }
+}
+
+/// The largest inertia about each joint, the others held.
+fn largest_inertia(robot: &ParametricModel, matrices: &[DMatrix<f64>]) -> Result<Vec<f64>, SimulationError> {
+    let mut largest = vec![0.0_f64; robot.dof()];
+    for matrix in matrices {
+        largest.iter_mut().enumerate().for_each(|(joint, most)| *most = most.max(matrix[(joint, joint)]));
+    }
+    for (joint, inertia) in robot.model().joints().iter().zip(&largest) {
+        let what = format!("nominal inertia about {}", joint.name);
+        require(*inertia > 0.0 && inertia.is_finite(), what, *inertia, "state the gains: the description has none")?;
+    }
+    Ok(largest)
 }
 
 /// Natural frequency of each joint at which typical friction would hold it 80 % of the largest tracking error from its

@@ -69,6 +69,7 @@ mod before_motion;
 mod clipping;
 mod commanding;
 mod convergence;
+mod course;
 mod cut_short;
 mod differentiator_choice;
 mod drive;
@@ -129,8 +130,8 @@ mod typical_drives;
 mod warm_up;
 
 pub use convergence::Shortfall;
+pub use course::{IterationOutcome, iterate, iterate_supervised};
 pub use differentiator_choice::{DifferentiatorCandidate, DifferentiatorChoice};
-pub use drive::{IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
 pub use estimate::{RunEstimate, identify_runs};
 pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};

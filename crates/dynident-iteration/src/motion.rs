@@ -7,7 +7,9 @@ use crate::settings::RunIdentificationSettings;
 use core::ops::Range;
 use dynident_identification::MotionRecord;
 use dynident_recording::log::JointSamples;
-use dynident_recording::{Derivatives, DifferentiatorSettings, Log, MotionBlock, Place, RecordingError, cutoff};
+use dynident_recording::{
+    Derivatives, Differentiator, DifferentiatorSettings, FilterError, Log, MotionBlock, Place, RecordingError, cutoff,
+};
 use dynident_simulation::Record;
 use std::sync::Arc;
 
@@ -37,15 +39,9 @@ pub fn measured_motion(
     if record.samples < 4 {
         return Err(wrong(format!("{} samples are too few to differentiate", record.samples)));
     }
-    let (q, tau) = (on_uniform_clock(record, &record.q), on_uniform_clock(record, &record.tau));
-    let samples = record.samples;
-    let rate_hz = (samples - 1) as f64 / (record.times_s[samples - 1] - record.times_s[0]);
-    if !(rate_hz.is_finite() && rate_hz > 0.0) {
-        return Err(wrong("its times do not increase".to_owned()));
-    }
-    // The nominal rate where the times are its own: their last digits are not to matter.
-    let rate_hz = if (rate_hz / record.rate_hz - 1.0).abs() < UNIFORM { record.rate_hz } else { rate_hz };
-    let first_time_s = record.times_s[0];
+    let [q, tau] = [&record.q, &record.tau].map(|values| on_uniform_clock(record, values));
+    let (samples, first_time_s) = (record.samples, record.times_s[0]);
+    let rate_hz = rate_of(record).ok_or_else(|| wrong("its times do not increase".to_owned()))?;
     let chosen = differentiator(&settings.differentiator, &q, joints, rate_hz);
     let built;
     let (differentiator, cutoff_hz) = if let Some(own) = leg.differentiator() {
@@ -62,30 +58,11 @@ pub fn measured_motion(
             differentiator.minimum_samples()
         )));
     }
-    let empty = || vec![0.0; joints * samples];
-    let mut motion = MotionBlock {
-        rate_hz,
-        first_time_s,
-        rows: samples,
-        joints,
-        q: empty(),
-        dq: empty(),
-        ddq: empty(),
-        tau: empty(),
-        ..MotionBlock::default()
-    };
+    let mut motion = MotionBlock { rate_hz, first_time_s, rows: samples, joints, ..zeros(joints * samples) };
     let mut all_usable = vec![true; samples];
     for joint in 0..joints {
         let own = joint * samples..(joint + 1) * samples;
-        let out = Derivatives {
-            q: &mut motion.q[own.clone()],
-            dq: &mut motion.dq[own.clone()],
-            ddq: &mut motion.ddq[own.clone()],
-        };
-        let unusable: Vec<Range<usize>> =
-            differentiator.differentiate_at(Place { rate_hz, joint, first_time_s }, &q[own.clone()], out)?;
-        // A joint that nobody asks anything of where it rests does not spoil the rows of the others.
-        for sample in unusable.into_iter().flatten() {
+        for sample in differentiated(differentiator, &q[own.clone()], joint, &mut motion)?.into_iter().flatten() {
             all_usable[sample] = false;
         }
         let (from, to) = (&tau[own.clone()], &mut motion.tau[own.clone()]);
@@ -96,10 +73,7 @@ pub fn measured_motion(
             }
         }
         if let Some(margin) = margins.get(joint).copied().flatten() {
-            for rest in margin.samples(&motion.dq[own.clone()], smoothing) {
-                motion.set_aside.resize(joints * samples, false);
-                motion.set_aside[own.start + rest.start..own.start + rest.end].fill(true);
-            }
+            set_rests_aside(&mut motion, joint, margin, smoothing);
         }
     }
     if settings.held_torque {
@@ -120,6 +94,45 @@ pub fn measured_motion(
         windows: leg.windows().map(<[_]>::to_vec),
         raw: raw.transpose()?,
     })
+}
+
+/// Samples per second of a record; none if its times do not increase. The nominal rate where the times follow it: their
+/// last digits have no effect.
+fn rate_of(record: &Record) -> Option<f64> {
+    let samples = record.samples;
+    let rate_hz = (samples - 1) as f64 / (record.times_s[samples - 1] - record.times_s[0]);
+    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+        return None;
+    }
+    Some(if (rate_hz / record.rate_hz - 1.0).abs() < UNIFORM { record.rate_hz } else { rate_hz })
+}
+
+/// Motion and torque of as many samples of all joints together, all zero.
+fn zeros(count: usize) -> MotionBlock {
+    let zeros = || vec![0.0; count];
+    MotionBlock { q: zeros(), dq: zeros(), ddq: zeros(), tau: zeros(), ..MotionBlock::default() }
+}
+
+/// Sets the torques of a joint aside while it is near rest.
+fn set_rests_aside(motion: &mut MotionBlock, joint: usize, margin: RestMargin, smoothing: usize) {
+    let own = joint * motion.rows..(joint + 1) * motion.rows;
+    for rest in margin.samples(&motion.dq[own.clone()], smoothing) {
+        motion.set_aside.resize(motion.joints * motion.rows, false);
+        motion.set_aside[own.start + rest.start..own.start + rest.end].fill(true);
+    }
+}
+
+/// Writes a joint's motion with the positions `q`; the samples to which the differentiator does not apply.
+fn differentiated(
+    differentiator: &dyn Differentiator,
+    q: &[f64],
+    joint: usize,
+    motion: &mut MotionBlock,
+) -> Result<Vec<Range<usize>>, FilterError> {
+    let own = joint * motion.rows..(joint + 1) * motion.rows;
+    let place = Place { rate_hz: motion.rate_hz, joint, first_time_s: motion.first_time_s };
+    let out = Derivatives { q: &mut motion.q[own.clone()], dq: &mut motion.dq[own.clone()], ddq: &mut motion.ddq[own] };
+    differentiator.differentiate_at(place, q, out)
 }
 
 /// The record's samples on its uniform clock, for estimators that smooth or simulate anew.

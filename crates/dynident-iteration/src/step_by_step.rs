@@ -52,42 +52,8 @@ pub(crate) fn step_by_step(
         if unknown.is_empty() {
             continue;
         }
-        let mut factor = SegmentedFactor::new(unknown.len(), dynident_estimation::SegmentSettings::default())?;
-        let mut wide = TriangularFactor::new(unknown.len() + uncertain.len());
-        let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
-        let model = RegressorModel::from(task.robot.clone());
-        for (index, weights) in weights.iter().enumerate() {
-            let visit = |JointRows { joint: of, rows, panel, .. }: &JointRows<'_>| {
-                let rows = *rows;
-                if *of != joint {
-                    return Ok(());
-                }
-                let column = |place: usize| &panel[place * rows..(place + 1) * rows];
-                let mut torque = column(columns.len()).to_vec();
-                for &place in &known {
-                    let value = given[columns[place]].unwrap_or(steps.values[columns[place]]);
-                    torque.iter_mut().zip(column(place)).for_each(|(torque, w)| *torque -= value * w);
-                }
-                narrow_panel.clear();
-                wide_panel.clear();
-                for &place in &unknown {
-                    narrow_panel.extend_from_slice(column(place));
-                }
-                wide_panel.extend_from_slice(&narrow_panel);
-                for &place in &uncertain {
-                    wide_panel.extend_from_slice(column(place));
-                }
-                narrow_panel.extend_from_slice(&torque);
-                wide_panel.extend_from_slice(&torque);
-                for value in narrow_panel.iter_mut().chain(&mut wide_panel) {
-                    *value *= weights[joint];
-                }
-                factor.absorb(&narrow_panel, rows)?;
-                wide.absorb(&wide_panel, rows)?;
-                Ok(())
-            };
-            logs.pass(&model, index).run(&mut Visit(visit))?;
-        }
+        let places = Places { columns, known: &known, unknown: &unknown, uncertain: &uncertain };
+        let Factors { factor, wide } = joint_factors(task, logs, weights, joint, &places, &steps.values)?;
         if factor.rows() == 0 {
             continue;
         }
@@ -116,6 +82,74 @@ pub(crate) fn step_by_step(
         }
     }
     Ok(steps)
+}
+
+/// The columns of one joint, as places among them.
+struct Places<'a> {
+    columns: &'a [usize],
+    /// With a value that is stated or was found at an outer joint.
+    known: &'a [usize],
+    unknown: &'a [usize],
+    /// Those of the known that were found at an outer joint.
+    uncertain: &'a [usize],
+}
+
+/// One joint's rows, torque less what the known columns explain.
+struct Factors {
+    /// Of the unknown columns.
+    factor: SegmentedFactor,
+    /// Of the unknown and the uncertain columns.
+    wide: TriangularFactor,
+}
+
+/// The rows of one joint in all logs.
+fn joint_factors(
+    task: &IterationTask,
+    logs: &Logs<'_>,
+    weights: &[Vec<f64>],
+    joint: usize,
+    places: &Places<'_>,
+    values: &[f64],
+) -> Result<Factors, IterationError> {
+    let Places { columns, known, unknown, uncertain } = *places;
+    let given = task.known_values();
+    let mut factor = SegmentedFactor::new(unknown.len(), dynident_estimation::SegmentSettings::default())?;
+    let mut wide = TriangularFactor::new(unknown.len() + uncertain.len());
+    let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
+    let model = RegressorModel::from(task.robot.clone());
+    for (index, weights) in weights.iter().enumerate() {
+        let visit = |JointRows { joint: of, rows, panel, .. }: &JointRows<'_>| {
+            let rows = *rows;
+            if *of != joint {
+                return Ok(());
+            }
+            let column = |place: usize| &panel[place * rows..(place + 1) * rows];
+            let mut torque = column(columns.len()).to_vec();
+            for &place in known {
+                let value = given[columns[place]].unwrap_or(values[columns[place]]);
+                torque.iter_mut().zip(column(place)).for_each(|(torque, w)| *torque -= value * w);
+            }
+            narrow_panel.clear();
+            wide_panel.clear();
+            for &place in unknown {
+                narrow_panel.extend_from_slice(column(place));
+            }
+            wide_panel.extend_from_slice(&narrow_panel);
+            for &place in uncertain {
+                wide_panel.extend_from_slice(column(place));
+            }
+            narrow_panel.extend_from_slice(&torque);
+            wide_panel.extend_from_slice(&torque);
+            for value in narrow_panel.iter_mut().chain(&mut wide_panel) {
+                *value *= weights[joint];
+            }
+            factor.absorb(&narrow_panel, rows)?;
+            wide.absorb(&wide_panel, rows)?;
+            Ok(())
+        };
+        logs.pass(&model, index).run(&mut Visit(visit))?;
+    }
+    Ok(Factors { factor, wide })
 }
 
 /// Adds this step's covariance and what it inherits from earlier ones.

@@ -9,12 +9,7 @@ const SWING: f64 = 0.1;
 
 /// In the order of the paper; `genetic` and `optimum` are H of the genetic algorithm and of the optimum inside (18),
 /// `claim` the sentence on both methods.
-pub(crate) fn statements(
-    runs: &JointRuns,
-    figures: [f64; 2],
-    claim: &str,
-    quotient: f64,
-) -> Vec<PaperStatement> {
+pub(crate) fn statements(runs: &JointRuns, figures: [f64; 2], claim: &str, quotient: f64) -> Vec<PaperStatement> {
     let [optimum, genetic] = figures;
     let convergence = statement(
         "section 2.2, Fig. 7",

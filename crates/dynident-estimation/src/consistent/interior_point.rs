@@ -19,7 +19,7 @@ pub(super) use data_limit::{Iterate, Next, OnTheWay, interior_point_on_the_way, 
 
 use super::cone::Scaling;
 use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
-use super::coordinates::{Vector10, matrix_of, vector_of};
+use super::coordinates::{Matrix10, Vector10, matrix_of, vector_of};
 use super::precise::Precise;
 use super::stacked::{LocalRows, RightSide, Rows, Singles, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
@@ -373,6 +373,27 @@ impl State {
     }
 }
 
+/// Adds the rows of one block's barrier.
+fn add_block(rows: &mut Rows, map: &BlockMap, cone: &Cone, state: &State) {
+    let square = |matrix: &Matrix10| DMatrix::from_column_slice(10, 10, matrix.as_slice());
+    match (map, cone.owner) {
+        (BlockMap::Own(first), Some(_)) => {
+            rows.local.push(LocalRows { first: *first, matrix: square(&cone.scaling.scaled_frame()) });
+        }
+        (BlockMap::Own(first), None) => {
+            let matrix = match state.cones.iter().find(|cone| cone.owner == Some(*first)) {
+                Some(owner) => cone.scaling.scaled_frame_of(&owner.scaling),
+                None => cone.scaling.inverse_frame(),
+            };
+            rows.local.push(LocalRows { first: *first, matrix: square(&matrix) });
+        }
+        (BlockMap::General(map), _) => {
+            let framed = rows.framed(map);
+            rows.wide.push(square(&cone.scaling.inverse_frame()) * framed);
+        }
+    }
+}
+
 impl<'a> Newton<'a> {
     fn new(program: &'a Program, state: &'a State) -> Option<Self> {
         let mut rows = Rows::default();
@@ -381,7 +402,6 @@ impl<'a> Newton<'a> {
                 rows.frames.push((first, cone.scaling.frame()));
             }
         }
-        let frame_at = |first: usize| state.cones.iter().find(|cone| cone.owner == Some(first));
         // Squares that are limited count by their multiplier.
         let limiting = program.data_limit.and_then(|_| state.rows.last()).map(|pair| pair.force);
         let mut data = rows.framed(&program.data);
@@ -394,26 +414,7 @@ impl<'a> Newton<'a> {
             rows.local.push(LocalRows { first: term.first, matrix: framed });
         }
         for (block, cone) in program.blocks.iter().zip(&state.cones) {
-            match (&block.map, cone.owner) {
-                (BlockMap::Own(first), Some(_)) => {
-                    let matrix = cone.scaling.scaled_frame();
-                    let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
-                    rows.local.push(LocalRows { first: *first, matrix });
-                }
-                (BlockMap::Own(first), None) => {
-                    let matrix = match frame_at(*first) {
-                        Some(owner) => cone.scaling.scaled_frame_of(&owner.scaling),
-                        None => cone.scaling.inverse_frame(),
-                    };
-                    let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
-                    rows.local.push(LocalRows { first: *first, matrix });
-                }
-                (BlockMap::General(map), _) => {
-                    let framed = rows.framed(map);
-                    rows.wide
-                        .push(DMatrix::from_column_slice(10, 10, cone.scaling.inverse_frame().as_slice()) * framed);
-                }
-            }
+            add_block(&mut rows, &block.map, cone, state);
         }
         let of_limit = limiting.map(|_| program.data_slope(&state.x));
         let framed_rows: Vec<DVector<f64>> = program

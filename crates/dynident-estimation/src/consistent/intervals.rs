@@ -2,6 +2,7 @@
 //! inertia, a friction go before the data object, every body and term staying physically consistent?
 
 use super::assembly::AssembledProgram;
+use super::conic::Program;
 use super::description::{PhysicalProblem, expect, finite};
 use super::fit::{PhysicalFit, physical_fit_on_the_way};
 use super::interior_point::{Iterate, Next, OnTheWay, interior_point_within_limit};
@@ -116,6 +117,13 @@ pub struct ConsistentIntervals {
     sizes: Vec<f64>,
 }
 
+/// A program that moves one parameter.
+struct Farthest {
+    program: Program,
+    /// Largest factor of the parameter by a variable.
+    steepest: f64,
+}
+
 impl ConsistentIntervals {
     /// The best consistent set, from which intervals are then measured. `covariance` of the base parameters, shape
     /// (base, base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
@@ -210,6 +218,22 @@ impl ConsistentIntervals {
         Ok(ConsistentInterval { value, lower, upper, held_by: [below, above] })
     }
 
+    /// The program that moves a parameter as far as possible, without the data's limit; `weight` is the objective's
+    /// unit. It does not search far beyond the distance at which an end is open.
+    fn farthest(&self, index: usize, side: f64, weight: f64) -> Farthest {
+        let Self { problem, best, assembled, .. } = self;
+        let far = self.settings.open_beyond * self.sizes[index];
+        let functional = assembled.functional(problem, &[(index, side)]);
+        let steepest = functional.iter().map(|(_, factor)| factor.abs()).fold(0.0, f64::max);
+        let mut program = assembled.program.clone();
+        for &(variable, factor) in &functional {
+            program.linear[variable] -= weight * factor;
+        }
+        let end = side * best.parameters[index] + FARTHER * far;
+        program.rows.push(assembled.row(problem, &[(index, -side)], end, usize::MAX));
+        Farthest { program, steepest }
+    }
+
     /// One end: the farthest that the parameter goes while the data's cost stays below its threshold and everything is
     /// physically consistent, a convex program of its own.
     fn end(&self, index: usize, side: f64) -> (Option<f64>, IntervalEnd) {
@@ -229,18 +253,10 @@ impl ConsistentIntervals {
             return (None, IntervalEnd::Open);
         }
 
-        // The objective in units in which the limit's multiplier is about one. Nothing is looked for far beyond what
-        // counts as open.
+        // The objective in units in which the limit's multiplier is about one.
         let weight = quantile * inflation.sqrt() / softness;
-        let functional = assembled.functional(problem, &[(index, side)]);
-        let steepest = functional.iter().map(|(_, factor)| factor.abs()).fold(0.0, f64::max);
-        let mut program = assembled.program.clone();
-        for &(variable, factor) in &functional {
-            program.linear[variable] -= weight * factor;
-        }
-        program.rows.push(assembled.row(problem, &[(index, -side)], side * value + FARTHER * far, usize::MAX));
+        let Farthest { mut program, steepest } = self.farthest(index, side, weight);
         program.data_limit = Some(least + rise(inflation));
-
         let mut reached = 0.0;
         let mut held_by = IntervalEnd::Unsettled;
         let mut limits = 1;

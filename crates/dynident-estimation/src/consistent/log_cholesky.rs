@@ -125,6 +125,24 @@ struct Point {
     rows: Vec<f64>,
 }
 
+/// A Newton step in the bodies' own coordinates.
+struct NewtonStep {
+    step: DVector<f64>,
+    /// Decrease of the barrier that its quadratic model predicts.
+    predicted: f64,
+}
+
+/// Whether the k-th coordinate of a body is a logarithm on the diagonal, as a number.
+fn is_diagonal(k: usize) -> f64 {
+    f64::from(PAIRS[k].0 == PAIRS[k].1)
+}
+
+/// Rows whose squares are the Hessian of one body's barrier, exact in these coordinates: in −ln det V Vᵀ only the
+/// logarithms on the diagonal enter, and tr(G²) is 4 for them and 2 for the others.
+fn barrier_rows(mu: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(10, 10, |i, j| if i == j { ((2.0 + 2.0 * is_diagonal(i)) * mu).sqrt() } else { 0.0 })
+}
+
 impl Point {
     fn slacks(&self, program: &Program) -> Slacks {
         let mut factors = self.factors.iter();
@@ -178,6 +196,40 @@ impl Point {
 
     /// One step; gives the decrease that the model predicted, or none when no length of it goes down.
     fn step(&mut self, program: &Program, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
+        let newton = self.newton_step(program, bodies, mu, pull)?;
+        let now = self.barrier(program, mu, pull)?;
+        let slack = 4.0e-15 * (1.0 + now.abs());
+        // Armijo's rule: a tenth of the fall that the slope promises.
+        let better = |candidate: Option<Self>, alpha: f64, best: &mut Option<(f64, Self)>| {
+            if let Some(candidate) = candidate
+                && let Some(value) = candidate.barrier(program, mu, pull)
+                && value <= now - 0.2 * alpha * newton.predicted + slack
+                && best.as_ref().is_none_or(|(least, _)| value < *least)
+            {
+                *best = Some((value, candidate));
+            }
+        };
+        let step = &newton.step;
+        let mut best = None;
+        let mut alpha = 1.0;
+        for _ in 0..50 {
+            better(self.moved(program, bodies, &(step * alpha), curved), alpha, &mut best);
+            // Close by, both are the same but for digits that the curve keeps.
+            let short = bodies.iter().all(|(first, _)| (step.rows(*first, 10) * alpha).amax() < 0.1);
+            if best.is_none() || !short {
+                better(self.moved(program, bodies, &(step * alpha), straight), alpha, &mut best);
+            }
+            if let Some((_, next)) = best {
+                *self = next;
+                return Some(newton.predicted);
+            }
+            alpha *= 0.6;
+        }
+        None
+    }
+
+    /// The step to the lowest point of the barrier's quadratic model; none where the model has no decrease.
+    fn newton_step(&self, program: &Program, bodies: &[Body], mu: f64, pull: f64) -> Option<NewtonStep> {
         let frames = bodies.iter().zip(&self.factors).map(|((first, _), u)| (*first, jacobian(u))).collect();
         let mut rows = Rows { frames, ..Rows::default() };
         let mut outside = -&program.linear;
@@ -207,27 +259,14 @@ impl Point {
             place.axpy(-pull, &vector_of(&Matrix4::identity()), 1.0);
         }
         let mut direct = rows.framed_gradient(&outside);
-        // The bodies' own barrier is exact in these coordinates. Of −ln det V Vᵀ only the logarithms on the diagonal
-        // count, and tr(G²) is 4 for them and 2 for the others.
         for (first, _) in bodies {
-            let own = |k: usize| f64::from(PAIRS[k].0 == PAIRS[k].1);
-            let matrix = DMatrix::from_fn(10, 10, |i, j| if i == j { ((2.0 + 2.0 * own(i)) * mu).sqrt() } else { 0.0 });
-            rows.local.push(LocalRows { first: *first, matrix });
+            rows.local.push(LocalRows { first: *first, matrix: barrier_rows(mu) });
             local.push(DVector::zeros(10));
             for k in 0..10 {
-                direct[first + k] += 2.0 * mu * own(k);
+                direct[first + k] += 2.0 * mu * is_diagonal(k);
             }
         }
-        let limits: Vec<DVector<f64>> = program
-            .rows
-            .iter()
-            .zip(&self.rows)
-            .map(|(row, &s)| {
-                let mut dense = DVector::zeros(program.variables);
-                row.add_to(mu.sqrt() / s, &mut dense);
-                rows.framed_gradient(&dense)
-            })
-            .collect();
+        let limits = self.limit_rows(program, &rows, mu);
         rows.add_singles(&limits).append(&vec![0.0; limits.len()], &mut local, &mut wide);
         let right = RightSide { local, wide, direct };
         let system = StackedSystem::new(program.variables, rows)?;
@@ -236,34 +275,18 @@ impl Point {
         if predicted.is_nan() || predicted <= 0.0 {
             return None;
         }
-        let now = self.barrier(program, mu, pull)?;
-        let slack = 4.0e-15 * (1.0 + now.abs());
-        // Armijo's rule: a tenth of the fall that the slope promises.
-        let better = |candidate: Option<Self>, alpha: f64, best: &mut Option<(f64, Self)>| {
-            if let Some(candidate) = candidate
-                && let Some(value) = candidate.barrier(program, mu, pull)
-                && value <= now - 0.2 * alpha * predicted + slack
-                && best.as_ref().is_none_or(|(least, _)| value < *least)
-            {
-                *best = Some((value, candidate));
-            }
-        };
-        let mut best = None;
-        let mut alpha = 1.0;
-        for _ in 0..50 {
-            better(self.moved(program, bodies, &(&step * alpha), curved), alpha, &mut best);
-            // Close by, both are the same but for digits that the curve keeps.
-            let short = bodies.iter().all(|(first, _)| (step.rows(*first, 10) * alpha).amax() < 0.1);
-            if best.is_none() || !short {
-                better(self.moved(program, bodies, &(&step * alpha), straight), alpha, &mut best);
-            }
-            if let Some((_, next)) = best {
-                *self = next;
-                return Some(predicted);
-            }
-            alpha *= 0.6;
-        }
-        None
+        Some(NewtonStep { step, predicted })
+    }
+
+    /// Rows whose squares are the Hessian of the inequality constraints' barrier.
+    fn limit_rows(&self, program: &Program, rows: &Rows, mu: f64) -> Vec<DVector<f64>> {
+        let each = program.rows.iter().zip(&self.rows);
+        each.map(|(row, &s)| {
+            let mut dense = DVector::zeros(program.variables);
+            row.add_to(mu.sqrt() / s, &mut dense);
+            rows.framed_gradient(&dense)
+        })
+        .collect()
     }
 
     /// The point after a step, with V by `change`.

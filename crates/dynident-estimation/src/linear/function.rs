@@ -3,7 +3,7 @@
 use super::ordinary::OrdinarySettings;
 use super::weighted::{WeightedSettings, weighted_values};
 use crate::error::{EstimationError, expect};
-use crate::factor::{LinearProblem, solve, split};
+use crate::factor::{LinearProblem, Solution, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom, student_half_width};
 use nalgebra::{DMatrix, DVector};
 
@@ -62,34 +62,7 @@ pub fn estimate_by(
     let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
     let mut solution = solve(&triangle, &split, &settings.rank, problem.fallback());
 
-    let mut known = solution.values.clone();
-    split.free.iter().for_each(|&column| known[column] = 0.0);
-    let each = problem.columns().len() + 1;
-    let mut regressor = DMatrix::zeros(joints * each, split.free.len());
-    let mut torque = DVector::zeros(joints * each);
-    for joint in 0..joints {
-        let mut alone = vec![0.0; joints];
-        alone[joint] = 1.0;
-        let own = stacked.combined(&alone)?;
-        // What no θ explains: the last row, whose regressor is zero.
-        torque[joint * each + each - 1] = own.entry(each - 1, each - 1);
-        for (row, value) in own.residual(&known).iter().enumerate() {
-            torque[joint * each + row] = *value;
-            for (place, &column) in split.free.iter().enumerate() {
-                regressor[(joint * each + row, place)] = own.entry(row, column);
-            }
-        }
-    }
-    let weighted = WeightedSettings { rank: settings.rank, ..WeightedSettings::default() };
-    let rows = EstimatorRows {
-        names: split.free.iter().map(|&column| problem.columns()[column].clone()).collect(),
-        joints: problem.joints().to_vec(),
-        regressor,
-        torque,
-        joint_of_row: (0..joints).flat_map(|joint| core::iter::repeat_n(joint, each)).collect(),
-        samples: problem.joint_rows(),
-        joint_sigma: weighted_values(problem, &weighted)?.joint_sigma,
-    };
+    let rows = estimator_rows(problem, settings, &split, &solution)?;
     let own = rule(&rows);
     check(name, &own, rows.names.len())?;
     for (&column, value) in split.free.iter().zip(&own.values) {
@@ -116,6 +89,45 @@ pub fn estimate_by(
         with_covariance(&mut estimate, &free, &covariance);
     }
     Ok(estimate)
+}
+
+/// The rows of the free columns, joint by joint, less what the held columns explain.
+fn estimator_rows(
+    problem: &LinearProblem,
+    settings: &OrdinarySettings,
+    split: &Split,
+    solution: &Solution,
+) -> Result<EstimatorRows, EstimationError> {
+    let stacked = problem.stacked();
+    let joints = problem.joints().len();
+    let mut known = solution.values.clone();
+    split.free.iter().for_each(|&column| known[column] = 0.0);
+    let each = problem.columns().len() + 1;
+    let mut regressor = DMatrix::zeros(joints * each, split.free.len());
+    let mut torque = DVector::zeros(joints * each);
+    for joint in 0..joints {
+        let mut alone = vec![0.0; joints];
+        alone[joint] = 1.0;
+        let own = stacked.combined(&alone)?;
+        // What no θ explains: the last row, whose regressor is zero.
+        torque[joint * each + each - 1] = own.entry(each - 1, each - 1);
+        for (row, value) in own.residual(&known).iter().enumerate() {
+            torque[joint * each + row] = *value;
+            for (place, &column) in split.free.iter().enumerate() {
+                regressor[(joint * each + row, place)] = own.entry(row, column);
+            }
+        }
+    }
+    let weighted = WeightedSettings { rank: settings.rank, ..WeightedSettings::default() };
+    Ok(EstimatorRows {
+        names: split.free.iter().map(|&column| problem.columns()[column].clone()).collect(),
+        joints: problem.joints().to_vec(),
+        regressor,
+        torque,
+        joint_of_row: (0..joints).flat_map(|joint| core::iter::repeat_n(joint, each)).collect(),
+        samples: problem.joint_rows(),
+        joint_sigma: weighted_values(problem, &weighted)?.joint_sigma,
+    })
 }
 
 /// That values and covariance are numbers, and as many as there are columns.

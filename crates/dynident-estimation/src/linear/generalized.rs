@@ -233,14 +233,7 @@ pub fn generalized_least_squares(
         let (products, torque) = problem.residual_products(&solution.values);
         let squares: Vec<f64> = products.diagonal().iter().copied().collect();
         let sigma = noise_of_joints(&squares, &torque, &vec![degrees_of_freedom; joints]);
-        omega = DMatrix::from_fn(joints, joints, |i, j| {
-            if i == j {
-                sigma[i] * sigma[i]
-            } else {
-                let bound = HIGHEST_CORRELATION * sigma[i] * sigma[j];
-                (products[(i, j)] / degrees_of_freedom).clamp(-bound, bound)
-            }
-        });
+        omega = noise_covariance(&products, &sigma, degrees_of_freedom);
         if let Some(previous) = &previous {
             let change = |i: usize, j: usize| ((omega[(i, j)] - previous[(i, j)]) / (sigma[i] * sigma[j])).abs();
             let largest = (0..joints).flat_map(|i| (0..joints).map(move |j| (i, j))).map(|(i, j)| change(i, j));
@@ -276,6 +269,18 @@ pub fn generalized_least_squares(
     let noise_correlation = DMatrix::from_fn(joints, joints, |i, j| omega[(i, j)] / (sigma[i] * sigma[j]));
     estimate.joint_sigma = sigma;
     Ok(GeneralizedEstimate { estimate, noise_covariance: omega, noise_correlation })
+}
+
+/// Covariance of the joints' noise with the standard deviations `sigma`; correlations are bounded.
+fn noise_covariance(products: &DMatrix<f64>, sigma: &[f64], degrees_of_freedom: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(sigma.len(), sigma.len(), |i, j| {
+        if i == j {
+            sigma[i] * sigma[i]
+        } else {
+            let bound = HIGHEST_CORRELATION * sigma[i] * sigma[j];
+            (products[(i, j)] / degrees_of_freedom).clamp(-bound, bound)
+        }
+    })
 }
 
 /// L⁻¹ with L Lᵀ = Ω. A covariance that clamped correlations have made indefinite is drawn towards its diagonal until

@@ -4,8 +4,8 @@ use super::instrumental::{InstrumentalEstimate, noisy_columns};
 use super::projection::Projection;
 use super::weighted::noise_of_joints;
 use crate::error::{EstimationError, within};
-use crate::factor::{InstrumentedProblem, RankSettings, Unexcited, solve, split};
-use crate::uncertainty::{CovarianceMethod, PointEstimate, f_tail, joint_degrees_of_freedom};
+use crate::factor::{InstrumentedProblem, LinearProblem, RankSettings, Unexcited, solve, split};
+use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, f_tail, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -120,15 +120,7 @@ pub fn hausman_test(
             [0.0; 2],
         ));
     }
-    let names = problem.columns();
-    let all: Vec<String> = free
-        .iter()
-        .map(|&column| names[column].clone())
-        .chain(noisy.iter().map(|&column| format!("noise of {}", names[column])))
-        .collect();
-    let zeros = vec![0.0; all.len()];
-    let held: Vec<(usize, f64)> = fixed.iter().map(|&column| (column, estimate.estimate.values[column])).collect();
-    let augmented = problem.combined(all, zeros, |local| augmented_rows(&projection, local, &free, &noisy, &held))?;
+    let augmented = augmented(problem, &projection, &estimate.estimate, &free, &noisy)?;
     let stacked = augmented.stacked();
     let triangle = stacked.combined(&weights)?;
     let choice = split(&triangle, &settings.rank, &Unexcited::default());
@@ -156,21 +148,36 @@ pub fn hausman_test(
         converged: true,
     }
     .into_estimate(&stacked, &settings.rank, settings.covariance)?;
+    let names = tested.iter().map(|&column| problem.columns()[noisy[column - free.len()]].clone()).collect();
+    Ok(judged(&fit, &Tested { columns: tested, names }, degrees, settings.level))
+}
+
+/// The columns of `[W | V]` whose coefficients are tested.
+struct Tested {
+    columns: Vec<usize>,
+    /// Names of the columns of W whose noise they are.
+    names: Vec<String>,
+}
+
+/// The test of a fit of `[W | V]` with that many degrees of freedom.
+fn judged(fit: &Estimate, tested: &Tested, degrees: usize, level: f64) -> HausmanTest {
+    let Tested { columns: tested, names } = tested;
     let q = tested.len();
     let pieces = if fit.clusters > 0 { fit.clusters } else { degrees + q };
     let degrees_of_freedom = [q as f64, pieces.saturating_sub(q) as f64];
     let columns: Vec<HausmanColumn> = tested
         .iter()
-        .filter(|&&column| fit.std[column] > 0.0)
-        .map(|&column| HausmanColumn {
-            name: names[noisy[column - free.len()]].clone(),
+        .zip(names)
+        .filter(|&(&column, _)| fit.std[column] > 0.0)
+        .map(|(&column, name)| HausmanColumn {
+            name: name.clone(),
             contrast: fit.values[column],
             t: fit.values[column] / fit.std[column],
         })
         .collect();
     if pieces <= q {
         let reason = format!("{pieces} time segments for {q} tested columns: use shorter segments or longer logs");
-        return Ok(HausmanTest { columns, ..undecided(reason, degrees_of_freedom) });
+        return HausmanTest { columns, ..undecided(reason, degrees_of_freedom) };
     }
     // On the scale of the standard deviations, where units do not matter.
     let std: Vec<f64> = tested.iter().map(|&column| fit.std[column]).collect();
@@ -179,14 +186,33 @@ pub fn hausman_test(
     let square = correlation.cholesky().map(|factor| t.dot(&factor.solve(&t))).filter(|square| square.is_finite());
     let Some(square) = square else {
         let reason = "the covariance of the tested columns is singular: use shorter segments or longer logs".into();
-        return Ok(HausmanTest { columns, ..undecided(reason, degrees_of_freedom) });
+        return HausmanTest { columns, ..undecided(reason, degrees_of_freedom) };
     };
     let scale = if fit.clusters > 0 { degrees_of_freedom[1] / (pieces as f64 - 1.0) } else { 1.0 };
     let f = square * scale / q as f64;
     let p_value = f_tail(f, degrees_of_freedom[0], degrees_of_freedom[1]);
-    let verdict =
-        if p_value < settings.level { HausmanVerdict::RejectLeastSquares } else { HausmanVerdict::FilteringWasEnough };
-    Ok(HausmanTest { verdict, f: Some(f), degrees_of_freedom, p_value: Some(p_value), columns, reason: None })
+    let verdict = if p_value < level { HausmanVerdict::RejectLeastSquares } else { HausmanVerdict::FilteringWasEnough };
+    HausmanTest { verdict, f: Some(f), degrees_of_freedom, p_value: Some(p_value), columns, reason: None }
+}
+
+/// The regression of τ on the `free` columns of W and the `noisy` ones of V; the other columns of W keep their values.
+fn augmented(
+    problem: &InstrumentedProblem,
+    projection: &Projection,
+    estimate: &Estimate,
+    free: &[usize],
+    noisy: &[usize],
+) -> Result<LinearProblem, EstimationError> {
+    let names = problem.columns();
+    let all: Vec<String> = free
+        .iter()
+        .map(|&column| names[column].clone())
+        .chain(noisy.iter().map(|&column| format!("noise of {}", names[column])))
+        .collect();
+    let zeros = vec![0.0; all.len()];
+    let fixed = estimate.rank.fixed.iter().map(|fixed| fixed.column);
+    let held: Vec<(usize, f64)> = fixed.map(|column| (column, estimate.values[column])).collect();
+    problem.combined(all, zeros, |local| augmented_rows(projection, local, free, noisy, &held))
 }
 
 /// Coefficients of an equation's `[Z | W | τ]` in `[W_free | V_noisy | τ − W_fixed θ_fixed]`.

@@ -1,7 +1,9 @@
 //! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE, behind one seam.
 
 use crate::error::{EstimationError, expect, require, within};
-use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, Unexcited, report, solve, split};
+use crate::factor::{
+    FactorWorkspace, RankReport, RankSettings, Split, TriangularFactor, Unexcited, report, solve, split,
+};
 use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -159,58 +161,33 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
     settings.validate()?;
     problem.validate()?;
     let (columns, rows) = (problem.names.len(), problem.measured.len());
-    let mut run = Run { problem, simulation, simulations: 0 };
+    let mut run = Run { problem, settings, simulation, simulations: 0 };
     let mut theta = DVector::from_column_slice(&problem.start);
     let mut now = run.simulated(&theta)?.ok_or(EstimationError::NoSimulation)?;
     let (mut iterations, mut converged) = (0, false);
-    let (mut triangle, mut choice);
-    let (mut last_jacobian, mut last_residual);
+    let mut linear;
     loop {
-        let jacobian = match settings.criterion {
-            SimulatedCriterion::Didim => {
-                expect("rows of the simulated regressor", rows, now.rows.regressor.nrows())?;
-                expect("columns of the simulated regressor", columns, now.rows.regressor.ncols())?;
-                now.rows.regressor.clone()
-            }
-            SimulatedCriterion::Output => run.jacobian(&theta, &now, settings.difference)?,
-        };
-        // DIDIM compares with W θ, which is the simulated torque but for friction at rest and filters.
-        let residual = match settings.criterion {
-            SimulatedCriterion::Didim => &problem.measured - &jacobian * &theta,
-            SimulatedCriterion::Output => &problem.measured - &now.rows.output,
-        };
-        let panel: Vec<f64> = jacobian
-            .column_iter()
-            .flat_map(|column| column.iter().zip(&problem.noise_std).map(|(v, s)| v / s).collect::<Vec<_>>())
-            .chain(residual.iter().zip(&problem.noise_std).map(|(v, s)| v / s))
-            .collect();
-        (last_jacobian, last_residual) = (jacobian, residual);
-        triangle = TriangularFactor::new(columns);
-        triangle.absorb_with(&mut FactorWorkspace::default(), &panel, rows)?;
-        choice = split(&triangle, &settings.rank, &Unexcited::default());
-        if rows <= choice.free.len() {
-            let (what, parameters) = ("all channels".to_owned(), choice.free.len() as f64);
-            return Err(EstimationError::TooFewRows { what, rows, parameters }.into());
-        }
+        linear = run.linearised(&theta, &now)?;
         if converged || iterations == settings.max_iterations {
             break;
         }
         iterations += 1;
-        let step = DVector::from_vec(solve(&triangle, &choice, &settings.rank, &vec![0.0; columns]).values);
+        let Linearised { triangle, choice, .. } = &linear;
+        let step = DVector::from_vec(solve(triangle, choice, &settings.rank, &vec![0.0; columns]).values);
         let noise = (now.cost / (rows - choice.free.len()) as f64).sqrt().max(f64::MIN_POSITIVE);
         let length = (triangle.regressor_triangle() * &step).norm() / (choice.free.len().max(1) as f64).sqrt();
         converged = length <= settings.tolerance * noise;
+        // Within the tolerance costs differ by what the simulation's own accuracy leaves; and DIDIM's fixed point is
+        // not quite where the cost is least.
+        let most = match settings.criterion {
+            SimulatedCriterion::Didim => now.cost * DIDIM_RISE,
+            SimulatedCriterion::Output if converged => now.cost * (1.0 + settings.tolerance),
+            SimulatedCriterion::Output => now.cost,
+        };
         let mut better = None;
         let mut share = 1.0;
         while better.is_none() && share > 1.0e-4 {
             let candidate = &theta + &step * share;
-            // Within the tolerance costs differ by what the simulation's own accuracy leaves; and DIDIM's fixed point
-            // is not quite where the cost is least.
-            let most = match settings.criterion {
-                SimulatedCriterion::Didim => now.cost * DIDIM_RISE,
-                SimulatedCriterion::Output if converged => now.cost * (1.0 + settings.tolerance),
-                SimulatedCriterion::Output => now.cost,
-            };
             better = run.simulated(&candidate)?.filter(|found| found.cost <= most).map(|found| (candidate, found));
             share *= 0.5;
         }
@@ -218,6 +195,7 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         (theta, now) = (candidate, found);
     }
     let simulations = run.simulations;
+    let Linearised { jacobian, residual, triangle, choice } = linear;
     let solution = solve(&triangle, &choice, &settings.rank, &vec![0.0; columns]);
     let variance = now.cost / (rows - choice.free.len()) as f64;
     let small = &solution.inverse * solution.inverse.transpose() * variance;
@@ -233,8 +211,8 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         simulations,
         status: EstimateStatus::of(converged, &rank),
         rank,
-        jacobian: last_jacobian,
-        residual: last_residual,
+        jacobian,
+        residual,
     })
 }
 
@@ -260,6 +238,7 @@ const DIDIM_RISE: f64 = 1.05;
 
 struct Run<'a, S> {
     problem: &'a SimulatedProblem,
+    settings: &'a SimulatedSettings,
     simulation: &'a mut S,
     simulations: usize,
 }
@@ -269,7 +248,48 @@ struct SimulationPoint {
     cost: f64,
 }
 
+/// The linear problem of one step.
+struct Linearised {
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
+    /// Of the rows over their noise.
+    triangle: TriangularFactor,
+    choice: Split,
+}
+
 impl<S: SimulatedMotion> Run<'_, S> {
+    /// The linear problem about a simulation with parameters `theta`.
+    fn linearised(&mut self, theta: &DVector<f64>, now: &SimulationPoint) -> Result<Linearised, S::Error> {
+        let (problem, settings) = (self.problem, self.settings);
+        let (columns, rows) = (problem.names.len(), problem.measured.len());
+        let jacobian = match settings.criterion {
+            SimulatedCriterion::Didim => {
+                expect("rows of the simulated regressor", rows, now.rows.regressor.nrows())?;
+                expect("columns of the simulated regressor", columns, now.rows.regressor.ncols())?;
+                now.rows.regressor.clone()
+            }
+            SimulatedCriterion::Output => self.jacobian(theta, now, settings.difference)?,
+        };
+        // DIDIM compares with W θ, which is the simulated torque but for friction at rest and filters.
+        let residual = match settings.criterion {
+            SimulatedCriterion::Didim => &problem.measured - &jacobian * theta,
+            SimulatedCriterion::Output => &problem.measured - &now.rows.output,
+        };
+        let panel: Vec<f64> = jacobian
+            .column_iter()
+            .flat_map(|column| column.iter().zip(&problem.noise_std).map(|(v, s)| v / s).collect::<Vec<_>>())
+            .chain(residual.iter().zip(&problem.noise_std).map(|(v, s)| v / s))
+            .collect();
+        let mut triangle = TriangularFactor::new(columns);
+        triangle.absorb_with(&mut FactorWorkspace::default(), &panel, rows)?;
+        let choice = split(&triangle, &settings.rank, &Unexcited::default());
+        if rows <= choice.free.len() {
+            let (what, parameters) = ("all channels".to_owned(), choice.free.len() as f64);
+            return Err(EstimationError::TooFewRows { what, rows, parameters }.into());
+        }
+        Ok(Linearised { jacobian, residual, triangle, choice })
+    }
+
     fn simulated(&mut self, theta: &DVector<f64>) -> Result<Option<SimulationPoint>, S::Error> {
         self.simulations += 1;
         let Some(rows) = self.simulation.simulate(theta.as_slice())? else { return Ok(None) };

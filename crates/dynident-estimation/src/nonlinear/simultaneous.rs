@@ -4,7 +4,7 @@
 use super::autoregression::autoregression;
 use super::simultaneous_rows::{ChannelRows, WhiteRows, cost};
 use crate::error::{EstimationError, expect, require, within};
-use crate::factor::{RankSettings, solve, split};
+use crate::factor::{LinearProblem, RankSettings, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -166,32 +166,21 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
         let step = system.solve(&gradient);
         let length = (step.dot(&gradient).max(0.0) / step.len().max(1) as f64).sqrt();
         let before = cost(&residuals, &sigma);
-        let mut share = 1.0;
-        let mut better = None;
-        while better.is_none() && share > 1.0e-3 {
-            let candidate = &unknowns + &step * share;
-            let (c, p) = candidate.as_slice().split_at(motion);
-            let found = rows.filtered(&model.residuals(c, p)?)?;
-            // At the minimum costs differ by rounding.
-            if cost(&found, &sigma) <= before * (1.0 + 1.0e-10) {
-                better = Some((candidate, found));
-            }
-            share *= 0.5;
-        }
+        let better = descended(model, &rows, &sigma, &unknowns, &step, before)?;
         let worse = better.is_none();
         // A step of rounding may raise a sum of rounding errors.
         let settled = length <= settings.tolerance;
         if worse && !settled && unknowns == centre {
             break;
         }
-        if let Some((candidate, found)) = better {
-            (unknowns, residuals) = (candidate, found);
+        if let Some(better) = better {
+            (unknowns, residuals) = (better.unknowns, better.residuals);
         }
         let moved = rows.length(&(&unknowns - &centre), &sigma);
         converged = settled && moved <= FAR && iterations > 1;
         let leverage = rows.leverage(&system, &sigma);
         if iterations == 1 || (!converged && (worse || settled || length > SLOW * previous)) {
-            let (c, p) = unknowns.as_slice().split_at(motion);
+            let (c, p) = rows.parts(&unknowns);
             raw = model.linearised(c, p)?;
             let colour = |rows: &ChannelRows| autoregression(&rows.residual, settings.most_autoregression);
             colours = raw.iter().map(colour).collect();
@@ -205,16 +194,58 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
         }
         sigma = rows.sigma(&residuals, &leverage, &unknowns)?;
     }
+    let noise = sigma.iter().zip(colours).map(|(&std, autoregression)| ChannelNoise { std, autoregression });
+    let noise = noise.collect();
     let problem = rows.eliminated(names, channels, &sigma, &residuals, &unknowns)?;
+    let estimate = estimate_of(&problem, settings, sigma, iterations, converged)?;
+    Ok(SimultaneousEstimate { estimate, motion: unknowns.as_slice()[..motion].to_vec(), noise })
+}
+
+/// Unknowns and the whitened residuals there, channel by channel.
+struct Evaluated {
+    unknowns: DVector<f64>,
+    residuals: Vec<DVector<f64>>,
+}
+
+/// The unknowns after the whole step, or a half of it, a quarter and so on, whose cost is not above `before`; none if
+/// no share of the step has one.
+fn descended<M: SimultaneousModel>(
+    model: &mut M,
+    rows: &WhiteRows,
+    sigma: &[f64],
+    unknowns: &DVector<f64>,
+    step: &DVector<f64>,
+    before: f64,
+) -> Result<Option<Evaluated>, M::Error> {
+    let mut share = 1.0;
+    while share > 1.0e-3 {
+        let unknowns = unknowns + step * share;
+        let (c, p) = rows.parts(&unknowns);
+        let residuals = rows.filtered(&model.residuals(c, p)?)?;
+        // At the minimum costs differ by rounding.
+        if cost(&residuals, sigma) <= before * (1.0 + 1.0e-10) {
+            return Ok(Some(Evaluated { unknowns, residuals }));
+        }
+        share *= 0.5;
+    }
+    Ok(None)
+}
+
+/// The estimate of the parameters from rows without the motion, whose channels have the deviations `sigma`.
+fn estimate_of(
+    problem: &LinearProblem,
+    settings: &SimultaneousSettings,
+    sigma: Vec<f64>,
+    iterations: usize,
+    converged: bool,
+) -> Result<Estimate, EstimationError> {
     let stacked = problem.stacked();
     let weights: Vec<f64> = sigma.iter().map(|sigma| 1.0 / sigma).collect();
     let triangle = stacked.combined(&weights)?;
     let choice = split(&triangle, &settings.rank, problem.unexcited());
     joint_degrees_of_freedom(&stacked, choice.free.len())?;
     let solution = solve(&triangle, &choice, &settings.rank, problem.fallback());
-    let noise = sigma.iter().zip(colours).map(|(&std, autoregression)| ChannelNoise { std, autoregression });
-    let noise = noise.collect();
-    let estimate = PointEstimate {
+    PointEstimate {
         triangle,
         split: choice,
         solution,
@@ -224,8 +255,7 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
         iterations,
         converged,
     }
-    .into_estimate(&stacked, &settings.rank, settings.covariance)?;
-    Ok(SimultaneousEstimate { estimate, motion: unknowns.as_slice()[..motion].to_vec(), noise })
+    .into_estimate(&stacked, &settings.rank, settings.covariance)
 }
 
 /// The Cramér-Rao bound on the parameters' covariance when the motion is unknown as well: the parameters' block of

@@ -92,6 +92,11 @@ impl WhiteRows {
         self.motion + self.parameters
     }
 
+    /// The unknowns of the motion and the parameters.
+    pub(crate) fn parts<'a>(&self, unknowns: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
+        unknowns.as_slice().split_at(self.motion)
+    }
+
     /// Residuals through the channels' filters.
     pub(crate) fn filtered(&self, residuals: &[Vec<f64>]) -> Result<Vec<DVector<f64>>, EstimationError> {
         expect("channels of residuals", self.channels.len(), residuals.len())?;

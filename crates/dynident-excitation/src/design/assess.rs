@@ -16,7 +16,10 @@ pub(crate) struct Assessment {
     pub(crate) parameters: Vec<f64>,
     pub(crate) figure: Option<f64>,
     pub(crate) information: DMatrix<f64>,
+    /// Largest `ratio - 1` of all limits.
     pub(crate) violation: f64,
+    /// The largest value of every limit's row, refined between samples.
+    pub(crate) extremes: Vec<f64>,
 }
 
 impl Assessment {
@@ -30,23 +33,23 @@ impl Assessment {
     }
 }
 
-/// Judges a trajectory; also gives the largest value of every limit's row.
+/// Judges a trajectory.
 pub(crate) fn assess(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
     parameters: Vec<f64>,
     fine: &[f64],
     logged: &[f64],
-) -> (Assessment, Vec<f64>) {
+) -> Assessment {
     let mut motion = Motion::default();
     task.family.motion(&parameters, logged, &mut motion);
     let information =
         Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
     // Finer than any grid of a search: a peak that falls between samples is refined only if it is seen.
     let dense = grid(task.family.duration_s(), (4 * fine.len()).max(LEAST_SAMPLES));
-    let worst = extremes(task, &parameters, &dense);
-    let violation = worst.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (Assessment { figure: criterion.figure(&information), parameters, information, violation }, worst)
+    let extremes = extremes(task, &parameters, &dense);
+    let violation = extremes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Assessment { figure: criterion.figure(&information), parameters, information, violation, extremes }
 }
 
 /// The largest value of every limit's row, refined between samples.

@@ -2,7 +2,7 @@
 
 use super::assess::{Assessment, assess};
 use super::effort::most_of_restoration;
-use super::rounds::Rounds;
+use super::rounds::{Rounds, Stop};
 use super::shrunk::shrunk;
 use super::way_inside::way_inside;
 use super::{DesignSettings, DesignTask, ranges};
@@ -65,7 +65,7 @@ pub(crate) fn restored(
     settings: &DesignSettings,
     kept: Assessment,
     grids: [&[f64]; 2],
-    stop: &(dyn Fn(f64, f64) -> bool + Sync),
+    stop: &Stop<'_>,
 ) -> Result<(Assessment, usize), OptimiserError> {
     let [fine, logged] = grids;
     let criterion = task.criteria[task.criteria.len() - 1];
@@ -90,39 +90,28 @@ pub(crate) fn restored(
             // A part of what is left, so that other starts have their turn.
             let left = most.saturating_sub(evaluations);
             let budget = settings.polish_evaluations.max(EVALUATIONS).min(left.div_ceil(3).max(1));
-            let found = plain.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
+            let found = plain.polish(&Anything, &margins, parameters.into(), budget, &|value, violation| {
                 violation <= 0.0 || report(value, violation)
             })?;
             evaluations += found.evaluations;
-            parameters = found.best.feasible;
-            let (assessed, worst) = assess(task, criterion, parameters.clone(), fine, logged);
-            let (mut whole, on_samples) = (assessed.violation <= 0.0, found.best.violation <= MARGIN);
-            // Most of what the criterion had found is still there a hair away from it.
-            if let Some(between) = way_inside(task, criterion, &best, &assessed, [fine, logged], &over) {
-                parameters.clone_from(&between.parameters);
-                best = between;
-            } else if let Some(smaller) = shrunk(task, criterion, &assessed, &worst, [fine, logged], &over)
-                && smaller.better_than(&best)
-            {
-                parameters.clone_from(&smaller.parameters);
-                (best, whole) = (smaller, true);
-            } else if assessed.better_than(&best) {
-                best = assessed;
-            }
-            if whole && !over() {
+            let assessed = assess(task, criterion, found.best.feasible, fine, logged);
+            let on_samples = found.best.violation <= MARGIN;
+            let from = improve(&mut best, &assessed, task, [fine, logged], &over);
+            parameters = from.parameters;
+            if from.whole && !over() {
                 let budget = settings.polish_evaluations.min(most.saturating_sub(evaluations).max(1));
-                let found = rounds.polish(criterion, &margins, parameters.into(), budget, report)?;
+                let found = rounds.polish(criterion, &margins, parameters.into(), budget, &report)?;
                 evaluations += found.evaluations;
-                let (assessed, _) = assess(task, criterion, found.best.feasible, fine, logged);
+                let assessed = assess(task, criterion, found.best.feasible, fine, logged);
                 if assessed.better_than(&best) {
                     best = assessed;
                 }
                 return Ok((best, evaluations));
             }
-            if whole || !on_samples || evaluations >= most || over() {
+            if from.whole || !on_samples || evaluations >= most || over() {
                 break;
             }
-            for (margin, c) in margins.iter_mut().zip(&worst) {
+            for (margin, c) in margins.iter_mut().zip(&assessed.extremes) {
                 *margin += if *c > 0.0 { c.min(WIDEST) + 1e-6 } else { 0.0 };
             }
         }
@@ -131,4 +120,38 @@ pub(crate) fn restored(
         }
     }
     Ok((best, evaluations))
+}
+
+/// Where the next descent begins.
+struct NextStart {
+    parameters: Vec<f64>,
+    /// Whether this motion keeps all limits between samples.
+    whole: bool,
+}
+
+/// Improves `best` by a motion of a descent for the limits alone, or by one between both, or by a smaller one.
+fn improve(
+    best: &mut Assessment,
+    found: &Assessment,
+    task: &DesignTask<'_>,
+    grids: [&[f64]; 2],
+    stop: &dyn Fn() -> bool,
+) -> NextStart {
+    let criterion = task.criteria[task.criteria.len() - 1];
+    let whole = found.violation <= 0.0;
+    // Slightly away from the best motion most of what the criterion had found is still there.
+    if let Some(between) = way_inside(task, criterion, best, found, grids, stop) {
+        *best = between;
+        NextStart { parameters: best.parameters.clone(), whole }
+    } else if let Some(smaller) = shrunk(task, criterion, found, grids, stop)
+        && smaller.better_than(best)
+    {
+        *best = smaller;
+        NextStart { parameters: best.parameters.clone(), whole: true }
+    } else {
+        if found.better_than(best) {
+            *best = found.clone();
+        }
+        NextStart { parameters: found.parameters.clone(), whole }
+    }
 }

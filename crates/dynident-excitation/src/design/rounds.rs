@@ -49,6 +49,18 @@ const SAME: f64 = 1e-4;
 /// Weight of what is still violated when starts are compared, in the criterion's scale.
 const VIOLATION_WEIGHT: f64 = 10.0;
 
+/// Whether a descent ends after an evaluation with this value and violation; called from any thread.
+pub(super) type Stop<'a> = dyn Fn(f64, f64) -> bool + Sync + 'a;
+
+/// What ends a round early.
+#[derive(Clone, Copy)]
+pub(super) struct RoundEnd<'a> {
+    /// Ends all descents.
+    pub(super) stop: &'a Stop<'a>,
+    /// Ends the race of the starts, after which those ahead go on.
+    pub(super) race_is_over: &'a (dyn Fn() -> bool + Sync),
+}
+
 /// The grid of a round, and the samples that it stands for.
 pub(super) struct Rounds<'a> {
     task: &'a DesignTask<'a>,
@@ -104,12 +116,12 @@ impl Rounds<'_> {
         starts: &[AugmentedLagrangianState],
         budget: usize,
         worth: Worth,
-        (stop, race_is_over): (impl Fn(f64, f64) -> bool + Sync, impl Fn() -> bool + Sync),
+        end: RoundEnd<'_>,
     ) -> Result<RoundResult, OptimiserError> {
         let settings = self.descent(criterion, budget, LOOSE, 1e-4);
-        let stop_race = |value, violation| stop(value, violation) || race_is_over();
+        let stop_race = |value, violation| (end.stop)(value, violation) || (end.race_is_over)();
         let (ahead, raced) = self.race(criterion, margins, starts, &settings, &stop_race)?;
-        let first = self.all(criterion, margins, &ahead, &settings, &stop)?;
+        let first = self.all(criterion, margins, &ahead, &settings, end.stop)?;
         let mut evaluations = raced + evaluations(&first);
         let mut candidates = self.candidates(criterion, first);
         let better = match worth {
@@ -123,7 +135,7 @@ impl Rounds<'_> {
         }
         candidates.truncate(starts.len().div_ceil(FOLLOWED));
         let ends: Vec<AugmentedLagrangianState> = candidates.into_iter().map(|candidate| candidate.state).collect();
-        let last = self.all(criterion, margins, &ends, &self.descent(criterion, budget, 1e-6, 1e-7), &stop)?;
+        let last = self.all(criterion, margins, &ends, &self.descent(criterion, budget, 1e-6, 1e-7), end.stop)?;
         evaluations += self::evaluations(&last);
         let best = self.candidates(criterion, last).into_iter().next().ok_or(OptimiserError::Start)?;
         Ok(RoundResult { best, evaluations })
@@ -138,7 +150,7 @@ impl Rounds<'_> {
         margins: &[f64],
         starts: &[AugmentedLagrangianState],
         settings: &AugmentedLagrangianSettings,
-        stop: &(impl Fn(f64, f64) -> bool + Sync),
+        stop: &Stop<'_>,
     ) -> Result<(Vec<AugmentedLagrangianState>, usize), OptimiserError> {
         let (known, new): (Vec<_>, Vec<_>) = starts.iter().cloned().partition(|start| !start.multipliers.is_empty());
         let (least, share, followed) = if known.is_empty() {
@@ -171,10 +183,10 @@ impl Rounds<'_> {
         margins: &[f64],
         start: AugmentedLagrangianState,
         budget: usize,
-        stop: impl Fn(f64, f64) -> bool + Sync,
+        stop: &Stop<'_>,
     ) -> Result<RoundResult, OptimiserError> {
         let settings = self.descent(criterion, budget, POLISHED, POLISHED);
-        let runs = self.all(criterion, margins, &[start], &settings, &stop)?;
+        let runs = self.all(criterion, margins, &[start], &settings, stop)?;
         let evaluations = evaluations(&runs);
         let best = self.candidates(criterion, runs).into_iter().next().ok_or(OptimiserError::Start)?;
         Ok(RoundResult { best, evaluations })
@@ -186,7 +198,7 @@ impl Rounds<'_> {
         margins: &[f64],
         starts: &[AugmentedLagrangianState],
         settings: &AugmentedLagrangianSettings,
-        stop: &(impl Fn(f64, f64) -> bool + Sync),
+        stop: &Stop<'_>,
     ) -> Result<Vec<AugmentedLagrangianResult>, OptimiserError> {
         let weight = self.logged as f64 / self.times.len() as f64;
         let result = multi_start(

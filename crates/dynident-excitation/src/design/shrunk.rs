@@ -26,7 +26,7 @@ const FIRST_SHARE: f64 = 1.0 / 512.0;
 /// stays a motion of families that divide by their size.
 const STILL: f64 = 1e-6;
 
-/// `outside`, whose rows are at most `worst`, between it and standing still in the middle of each joint's own way,
+/// `outside`, between it and standing still in the middle of each joint's own way,
 /// with the smallest of the shares tried that keeps all limits between samples. None if it keeps them already, or if
 /// a tenth of the motion is not small enough, or once `stop` says so.
 ///
@@ -38,7 +38,6 @@ pub(super) fn shrunk(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
     outside: &Assessment,
-    worst: &[f64],
     grids: [&[f64]; 2],
     stop: &dyn Fn() -> bool,
 ) -> Option<Assessment> {
@@ -51,7 +50,7 @@ pub(super) fn shrunk(
     let joints = task.family.joints().max(1);
     let mut shares = vec![0.0; joints];
     for band in task.limits.bands() {
-        let (value, end) = (worst[band.row], at_rest[band.row]);
+        let (value, end) = (outside.extremes[band.row], at_rest[band.row]);
         if value > 0.0 {
             let share = if end < 0.0 { value / (value - end) + HAIR } else { MOST };
             shares[band.joint] = share.max(shares[band.joint]);
@@ -68,7 +67,7 @@ pub(super) fn shrunk(
         }
         let ways = outside.parameters.iter().zip(&still).enumerate();
         let between = ways.map(|(k, (from, to))| from + shares[(k / each).min(joints - 1)] * (to - from)).collect();
-        let (assessed, _) = assess(task, criterion, between, fine, logged);
+        let assessed = assess(task, criterion, between, fine, logged);
         if assessed.violation <= 0.0 {
             return Some(assessed);
         }
@@ -160,7 +159,7 @@ mod tests {
                     let elapsed = || if clock.fetch_add(1, Ordering::Relaxed) < asked { 0.0 } else { 1.0 };
                     let settings = DesignSettings { time_limit_s: Some(1.0), seed, ..DesignSettings::default() };
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-                    pool.install(|| timed(task, &settings, |_| ControlFlow::Continue(()), &elapsed)).unwrap()
+                    pool.install(|| timed(task, &settings, &|_| ControlFlow::Continue(()), &elapsed)).unwrap()
                 });
                 // Often enough that a peak of five harmonics between samples is below the check's tolerance.
                 let reports = check_limits(&robot.1, &robot.0, 10.0, 5_000.0, |times, out: &mut Motion| {
@@ -186,8 +185,8 @@ mod tests {
             let judged = |parameters: Vec<f64>| assess(task, &condition, parameters, &fine, &logged);
             let (positions, speeds) = ranges(task.limits);
             let start = family.random(&positions, &speeds, &mut Random::new(3));
-            let (first, worst) = judged(start.clone());
-            let inside = shrunk(task, &condition, &first, &worst, [&fine, &logged], &|| false).unwrap_or(first);
+            let first = judged(start.clone());
+            let inside = shrunk(task, &condition, &first, [&fine, &logged], &|| false).unwrap_or(first);
             assert!(inside.violation <= 0.0);
             // As much larger about its posture as breaks a limit by some hundredths.
             let still = standing_still(task, &inside.parameters, &fine);
@@ -197,18 +196,17 @@ mod tests {
             let (mut below, mut above) = (1.0, 8.0);
             for _ in 0..30 {
                 let middle = 0.5 * (below + above);
-                *(if larger(middle).0.violation <= 0.01 { &mut below } else { &mut above }) = middle;
+                *(if larger(middle).violation <= 0.01 { &mut below } else { &mut above }) = middle;
             }
-            let (outside, worst) = larger(below);
+            let outside = larger(below);
             assert!(outside.violation > 0.009, "{}", outside.violation);
-            let smaller =
-                shrunk(task, &condition, &outside, &worst, [&fine, &logged], &|| false).expect("a hundredth does");
+            let smaller = shrunk(task, &condition, &outside, [&fine, &logged], &|| false).expect("a hundredth does");
             assert!(smaller.violation <= 0.0);
             // The regressor goes with the motion, and its smallest singular value with the acceleration's square at
             // most: two hundredths of the figure, and as much for what position takes of a range that is not centred.
             let lost = smaller.figure.unwrap() / outside.figure.unwrap() - 1.0;
             assert!(lost < 0.04, "{lost}");
-            assert!(shrunk(task, &condition, &smaller, &worst, [&fine, &logged], &|| false).is_none());
+            assert!(shrunk(task, &condition, &smaller, [&fine, &logged], &|| false).is_none());
         });
     }
 }

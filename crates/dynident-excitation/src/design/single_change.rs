@@ -156,7 +156,7 @@ fn with_wider(
     for attempt in 0..=STARTS {
         let from = if attempt == 0 { start.to_vec() } else { task.family.random(&positions, &speeds, &mut random) };
         let found =
-            search.polish(&Anything, &margins, from.into(), EVALUATIONS, |_, violation| violation <= 0.0 || stop())?;
+            search.polish(&Anything, &margins, from.into(), EVALUATIONS, &|_, violation| violation <= 0.0 || stop())?;
         let parameters = found.best.feasible;
         let values = extremes(task, &parameters, fine);
         let kept = (0..values.len()).filter(|row| !rows.contains(row)).all(|row| values[row] <= 0.0);

@@ -36,7 +36,7 @@ pub(super) fn way_inside(
     };
     (0..DOUBLINGS)
         .take_while(|_| !stop())
-        .map(|doubling| assess(task, criterion, between(FIRST_SHARE * f64::from(1 << doubling)), fine, logged).0)
+        .map(|doubling| assess(task, criterion, between(FIRST_SHARE * f64::from(1 << doubling)), fine, logged))
         .find(|assessed| assessed.violation <= 0.0)
         .filter(|assessed| assessed.better_than(inside))
 }
@@ -70,7 +70,7 @@ mod tests {
             prior: None,
         };
         let (fine, logged) = (grid(10.0, 127), grid(10.0, 1001));
-        let judged = |parameters: Vec<f64>| assess(&task, &DOptimal, parameters, &fine, &logged).0;
+        let judged = |parameters: Vec<f64>| assess(&task, &DOptimal, parameters, &fine, &logged);
         let way = |outside, inside| way_inside(&task, &DOptimal, outside, inside, [&fine, &logged], &|| false);
         let (positions, speeds) = ranges(&limits);
         let start = family.random(&positions, &speeds, &mut Random::new(3));

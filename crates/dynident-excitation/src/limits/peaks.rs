@@ -57,6 +57,17 @@ pub fn peaks(
     settings: PeakSettings,
     mut motion: impl FnMut(&[f64], &mut Motion),
 ) -> Vec<Peak> {
+    peaks_of(set, workspace, times_s, settings, &mut motion)
+}
+
+/// [`peaks()`], compiled once for all motions.
+fn peaks_of(
+    set: &LimitSet,
+    workspace: &mut LimitWorkspace,
+    times_s: &[f64],
+    settings: PeakSettings,
+    motion: &mut dyn FnMut(&[f64], &mut Motion),
+) -> Vec<Peak> {
     let (mut block, mut values) = (Motion::default(), Vec::new());
     motion(times_s, &mut block);
     set.values(workspace, &block, &mut values);
@@ -64,29 +75,11 @@ pub fn peaks(
     if samples == 0 {
         return Vec::new();
     }
-    let mut found = Vec::new();
-    let mut brackets = Vec::new();
+    let (mut found, mut brackets) = (Vec::new(), Vec::new());
     for (row, values) in values.chunks_exact(samples).enumerate() {
-        let mut peak = Peak { row, value: f64::NEG_INFINITY, sampled: f64::NEG_INFINITY, at_s: times_s[0] };
-        for (&value, &at_s) in values.iter().zip(times_s) {
-            let value = if value.is_nan() { f64::INFINITY } else { value };
-            if value > peak.value {
-                peak = Peak { value, sampled: value, at_s, ..peak };
-            }
-        }
+        let peak = sampled_peak(row, values, times_s);
+        bracket_maxima(&peak, values, times_s, settings.band, &mut brackets);
         found.push(peak);
-        let worth = peak.value - settings.band;
-        for (sample, &value) in values.iter().enumerate() {
-            let before = sample.saturating_sub(1);
-            let after = (sample + 1).min(samples - 1);
-            // Nothing stands out of a flat stretch.
-            let stands_out = value > values[before] || value > values[after];
-            if value.is_finite() && stands_out && value >= worth && value >= values[before] && value >= values[after] {
-                let (from, to) = (times_s[before], times_s[after]);
-                let inner = [(to - GOLDEN * (to - from), f64::NAN), (from + GOLDEN * (to - from), f64::NAN)];
-                brackets.push(Bracket { row, from, to, inner, best: (value, times_s[sample]) });
-            }
-        }
     }
     let mut times = Vec::with_capacity(brackets.len() * 2);
     for step in 0..settings.steps {
@@ -124,6 +117,34 @@ pub fn peaks(
         }
     }
     found
+}
+
+/// The largest sample of a row.
+fn sampled_peak(row: usize, values: &[f64], times_s: &[f64]) -> Peak {
+    let mut peak = Peak { row, value: f64::NEG_INFINITY, sampled: f64::NEG_INFINITY, at_s: times_s[0] };
+    for (&value, &at_s) in values.iter().zip(times_s) {
+        let value = if value.is_nan() { f64::INFINITY } else { value };
+        if value > peak.value {
+            peak = Peak { value, sampled: value, at_s, ..peak };
+        }
+    }
+    peak
+}
+
+/// Adds a bracket around every sampled maximum of a row that is at most `band` below the row's largest sample.
+fn bracket_maxima(peak: &Peak, values: &[f64], times_s: &[f64], band: f64, brackets: &mut Vec<Bracket>) {
+    let worth = peak.value - band;
+    for (sample, &value) in values.iter().enumerate() {
+        let before = sample.saturating_sub(1);
+        let after = (sample + 1).min(values.len() - 1);
+        // A flat stretch has no maximum.
+        let stands_out = value > values[before] || value > values[after];
+        if value.is_finite() && stands_out && value >= worth && value >= values[before] && value >= values[after] {
+            let (from, to) = (times_s[before], times_s[after]);
+            let inner = [(to - GOLDEN * (to - from), f64::NAN), (from + GOLDEN * (to - from), f64::NAN)];
+            brackets.push(Bracket { row: peak.row, from, to, inner, best: (value, times_s[sample]) });
+        }
+    }
 }
 
 impl Bracket {

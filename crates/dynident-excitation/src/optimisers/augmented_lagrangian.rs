@@ -193,95 +193,33 @@ pub(crate) fn augmented_lagrangian(
     settings: &AugmentedLagrangianSettings,
     watch: &mut Watch<'_>,
 ) -> Result<AugmentedLagrangianResult, OptimiserError> {
-    let start = &state.x;
     settings.validate()?;
+    let bounds = checked_bounds(problem, state)?;
+    let mut x: Vec<f64> = state.x.iter().zip(&bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
+    let mut search = Search::new(problem, settings, watch);
+    search.begin(state, &x)?;
+    // A search that goes on starts near its end.
+    let tolerance = if state.multipliers.is_empty() { 0.1 } else { 1e-4 };
+    let status = search.descend(&bounds, &mut x, tolerance);
+    Ok(search.result(x, status))
+}
+
+/// The bounds of a problem, checked together with the state from which its search begins.
+fn checked_bounds(
+    problem: &impl ConstrainedProblem,
+    state: &AugmentedLagrangianState,
+) -> Result<Vec<[f64; 2]>, OptimiserError> {
     if !state.multipliers.is_empty() {
         check_length("multipliers", problem.constraints(), state.multipliers.len())?;
     }
     let bounds = problem.bounds();
-    check_length("start", problem.variables(), start.len())?;
+    check_length("start", problem.variables(), state.x.len())?;
     check_length("bounds", problem.variables(), bounds.len())?;
     check_bounds(&bounds, false)?;
-    if start.iter().any(|x| x.is_nan()) {
+    if state.x.iter().any(|x| x.is_nan()) {
         return Err(OptimiserError::Start);
     }
-    let mut x: Vec<f64> = start.iter().zip(&bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
-    let mut search = Search::new(problem, settings, watch);
-    if !state.multipliers.is_empty() {
-        search.multipliers.clone_from(&state.multipliers);
-    }
-    search.penalty = state.penalty.unwrap_or(search.penalty);
-    let first = search.value(&x);
-    if !first.is_finite() {
-        return Err(OptimiserError::Start);
-    }
-    search.penalty = state.penalty.or(settings.initial_penalty).unwrap_or_else(|| {
-        let squares: f64 = (0..search.c.len()).map(|i| search.violation_of(i).powi(2)).sum();
-        (2.0 * search.objective.abs() / squares.max(1e-12)).clamp(1e-6, 10.0)
-    });
-    // A search that goes on starts near its end.
-    let mut tolerance: f64 = if state.multipliers.is_empty() { 0.1 } else { 1e-4 };
-    let mut last_measure = f64::INFINITY;
-    let mut status = AugmentedLagrangianStatus::IterationLimit;
-    while search.outer < settings.max_outer_iterations {
-        let scale = search.problem.objective_scale(search.objective);
-        let wanted = tolerance.max(settings.optimality_tolerance) * scale;
-        let effort = Effort { tolerance: wanted, iterations: settings.max_inner_iterations, memory: settings.memory };
-        let (end, stationarity) = projected_lbfgs(&mut search, &bounds, &mut x, &effort);
-        if search.halted() {
-            break;
-        }
-        // Values and constraints at the point where the descent ended; the last evaluation may have been a rejected
-        // trial.
-        search.value(&x);
-        search.outer += 1;
-        let measure = search.update_multipliers();
-        let scale = search.problem.objective_scale(search.objective);
-        let within = measure <= settings.feasibility_tolerance;
-        if within && stationarity <= settings.optimality_tolerance * scale {
-            status = AugmentedLagrangianStatus::Converged;
-            break;
-        }
-        if within && end == End::NoDescent && tolerance <= settings.optimality_tolerance {
-            status = AugmentedLagrangianStatus::PrecisionLimit;
-            break;
-        }
-        if !within && measure > 0.5 * last_measure {
-            search.penalty *= settings.penalty_growth;
-            if search.penalty > settings.max_penalty {
-                status = AugmentedLagrangianStatus::Infeasible;
-                break;
-            }
-        }
-        last_measure = measure;
-        tolerance *= 0.1;
-    }
-    if search.stopped {
-        status = AugmentedLagrangianStatus::Stopped;
-    }
-    // The last evaluation may have been a rejected trial.
-    search.objective = search.problem.values(&x, &mut search.c);
-    let end_violation = (0..search.c.len()).fold(0.0, |worst: f64, i| worst.max(search.violation_of(i)));
-    // Slack is not counted: multipliers of a search that has not converged may weigh it absurdly.
-    let pushing =
-        search.multipliers.iter().zip(&search.c).map(|(multiplier, c)| (multiplier * c).max(0.0)).sum::<f64>();
-    let lagrangian = search.objective + pushing;
-    let feasible = search.best_violation <= settings.feasibility_tolerance;
-    if feasible && status == AugmentedLagrangianStatus::Infeasible {
-        status = AugmentedLagrangianStatus::PrecisionLimit;
-    }
-    Ok(AugmentedLagrangianResult {
-        status,
-        value: search.best_value,
-        violation: search.best_violation,
-        feasible,
-        outer_iterations: search.outer,
-        evaluations: search.evaluations,
-        best: search.best,
-        end: AugmentedLagrangianState { x, multipliers: search.multipliers, penalty: Some(search.penalty) },
-        lagrangian,
-        end_violation,
-    })
+    Ok(bounds)
 }
 
 /// The augmented Lagrangian as a function, and the record of what was seen.
@@ -324,6 +262,90 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
             outer: 0,
             evaluations: 0,
             stopped: false,
+        }
+    }
+
+    /// Takes over multipliers and penalty of `state`, or chooses a penalty at the first point `x`.
+    fn begin(&mut self, state: &AugmentedLagrangianState, x: &[f64]) -> Result<(), OptimiserError> {
+        if !state.multipliers.is_empty() {
+            self.multipliers.clone_from(&state.multipliers);
+        }
+        self.penalty = state.penalty.unwrap_or(self.penalty);
+        if !self.value(x).is_finite() {
+            return Err(OptimiserError::Start);
+        }
+        self.penalty = state.penalty.or(self.settings.initial_penalty).unwrap_or_else(|| {
+            let squares: f64 = (0..self.c.len()).map(|i| self.violation_of(i).powi(2)).sum();
+            (2.0 * self.objective.abs() / squares.max(1e-12)).clamp(1e-6, 10.0)
+        });
+        Ok(())
+    }
+
+    /// Descents of the augmented Lagrangian with updates of the multipliers between them; moves `x` to the end of the
+    /// last. `tolerance` is the first descent's.
+    fn descend(&mut self, bounds: &[[f64; 2]], x: &mut Vec<f64>, mut tolerance: f64) -> AugmentedLagrangianStatus {
+        let settings = self.settings;
+        let mut last_measure = f64::INFINITY;
+        while self.outer < settings.max_outer_iterations {
+            let scale = self.problem.objective_scale(self.objective);
+            let wanted = tolerance.max(settings.optimality_tolerance) * scale;
+            let effort =
+                Effort { tolerance: wanted, iterations: settings.max_inner_iterations, memory: settings.memory };
+            let (end, stationarity) = projected_lbfgs(self, bounds, x, &effort);
+            if self.halted() {
+                break;
+            }
+            // Values and constraints at the point where the descent ended; the last evaluation may have been a
+            // rejected trial.
+            self.value(x);
+            self.outer += 1;
+            let measure = self.update_multipliers();
+            let scale = self.problem.objective_scale(self.objective);
+            let within = measure <= settings.feasibility_tolerance;
+            if within && stationarity <= settings.optimality_tolerance * scale {
+                return AugmentedLagrangianStatus::Converged;
+            }
+            if within && end == End::NoDescent && tolerance <= settings.optimality_tolerance {
+                return AugmentedLagrangianStatus::PrecisionLimit;
+            }
+            if !within && measure > 0.5 * last_measure {
+                self.penalty *= settings.penalty_growth;
+                if self.penalty > settings.max_penalty {
+                    return AugmentedLagrangianStatus::Infeasible;
+                }
+            }
+            last_measure = measure;
+            tolerance *= 0.1;
+        }
+        AugmentedLagrangianStatus::IterationLimit
+    }
+
+    /// The result of a search that ended at `x`.
+    fn result(mut self, x: Vec<f64>, mut status: AugmentedLagrangianStatus) -> AugmentedLagrangianResult {
+        if self.stopped {
+            status = AugmentedLagrangianStatus::Stopped;
+        }
+        // The last evaluation may have been a rejected trial.
+        self.objective = self.problem.values(&x, &mut self.c);
+        let end_violation = (0..self.c.len()).fold(0.0, |worst: f64, i| worst.max(self.violation_of(i)));
+        // Slack is not included: multipliers of a search that has not converged may weigh it absurdly.
+        let pushing =
+            self.multipliers.iter().zip(&self.c).map(|(multiplier, c)| (multiplier * c).max(0.0)).sum::<f64>();
+        let feasible = self.best_violation <= self.settings.feasibility_tolerance;
+        if feasible && status == AugmentedLagrangianStatus::Infeasible {
+            status = AugmentedLagrangianStatus::PrecisionLimit;
+        }
+        AugmentedLagrangianResult {
+            status,
+            value: self.best_value,
+            violation: self.best_violation,
+            feasible,
+            outer_iterations: self.outer,
+            evaluations: self.evaluations,
+            best: self.best,
+            end: AugmentedLagrangianState { x, multipliers: self.multipliers, penalty: Some(self.penalty) },
+            lagrangian: self.objective + pushing,
+            end_violation,
         }
     }
 

@@ -1,6 +1,6 @@
 //! The paper's genetic algorithm: binary coding, roulette by 1/H, one-point crossover, mutation of single bits.
 
-use super::{OptimiserError, Progress, Watch, check_bounds, evaluate_all, setting};
+use super::{Objective, OptimiserError, Progress, Watch, check_bounds, evaluate_all, setting};
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
@@ -95,6 +95,16 @@ pub fn binary_genetic(
     settings: &BinaryGeneticSettings,
     watch: &mut Watch<'_>,
 ) -> Result<BinaryGeneticResult, OptimiserError> {
+    evolved(&objective, bounds, settings, watch)
+}
+
+/// [`binary_genetic()`], compiled once for all objectives.
+fn evolved(
+    objective: &Objective<'_>,
+    bounds: &[[f64; 2]],
+    settings: &BinaryGeneticSettings,
+    watch: &mut Watch<'_>,
+) -> Result<BinaryGeneticResult, OptimiserError> {
     settings.validate()?;
     check_bounds(bounds, true)?;
     let mut random = Random::new(settings.seed);
@@ -110,7 +120,7 @@ pub fn binary_genetic(
     };
     for generation in 1..=settings.generations {
         let points: Vec<Vec<f64>> = individuals.iter().map(|i| decode(i, bounds, settings.bits)).collect();
-        let values = evaluate_all(&objective, &points);
+        let values = evaluate_all(objective, &points);
         result.evaluations += values.len();
         let fittest = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
         if values[fittest] < result.value {

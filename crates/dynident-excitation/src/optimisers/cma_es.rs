@@ -1,6 +1,6 @@
 //! CMA-ES: evolution strategy with covariance matrix adaptation, for objectives without derivatives.
 
-use super::{OptimiserError, Progress, Watch, check_bounds, check_length, evaluate_all, setting};
+use super::{Objective, OptimiserError, Progress, Watch, check_bounds, check_length, evaluate_all, setting};
 use core::ops::ControlFlow;
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -131,6 +131,54 @@ pub fn cma_es(
     settings: &CmaEsSettings,
     watch: &mut Watch<'_>,
 ) -> Result<CmaEsResult, OptimiserError> {
+    minimised(&objective, start, steps, bounds, settings, watch)
+}
+
+/// [`cma_es()`], compiled once for all objectives.
+fn minimised(
+    objective: &Objective<'_>,
+    start: &[f64],
+    steps: &[f64],
+    bounds: &[[f64; 2]],
+    settings: &CmaEsSettings,
+    watch: &mut Watch<'_>,
+) -> Result<CmaEsResult, OptimiserError> {
+    check_input(start, steps, bounds, settings)?;
+    let mut from = clamped(start, bounds);
+    let result = CmaEsResult {
+        best: from.clone(),
+        value: f64::INFINITY,
+        evaluations: 0,
+        status: CmaEsStatus::EvaluationLimit,
+        runs: Vec::new(),
+    };
+    let random = Random::new(settings.seed);
+    let mut search = Search { objective, bounds, settings, random, generations: 0, result };
+    let smallest = settings.population.unwrap_or(4 + (3.0 * (start.len() as f64).ln()) as usize);
+    for run in 0..=settings.restarts {
+        let population = smallest << run;
+        if run > 0 && population > settings.max_evaluations.saturating_sub(search.result.evaluations) {
+            // The evaluations do not suffice for another generation.
+            search.result.status = CmaEsStatus::EvaluationLimit;
+            break;
+        }
+        let ended = search.run(Strategy::new(&from, steps, population), watch);
+        search.result.runs.push(ended);
+        search.result.status = ended.status;
+        if matches!(ended.status, CmaEsStatus::Stopped | CmaEsStatus::TargetReached | CmaEsStatus::EvaluationLimit) {
+            break;
+        }
+        from = search.random_place(start, steps);
+    }
+    Ok(search.result)
+}
+
+fn check_input(
+    start: &[f64],
+    steps: &[f64],
+    bounds: &[[f64; 2]],
+    settings: &CmaEsSettings,
+) -> Result<(), OptimiserError> {
     settings.validate()?;
     setting("variables", start.len() as f64, !start.is_empty(), "at least 1")?;
     check_length("steps", start.len(), steps.len())?;
@@ -142,34 +190,37 @@ pub fn cma_es(
     if start.iter().any(|x| !x.is_finite()) {
         return Err(OptimiserError::Start);
     }
-    let mut random = Random::new(settings.seed);
-    let clamped = |x: &[f64]| -> Vec<f64> { x.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect() };
-    let mut from = clamped(start);
-    let mut result = CmaEsResult {
-        best: from.clone(),
-        value: f64::INFINITY,
-        evaluations: 0,
-        status: CmaEsStatus::EvaluationLimit,
-        runs: Vec::new(),
-    };
-    let smallest = settings.population.unwrap_or(4 + (3.0 * (start.len() as f64).ln()) as usize);
-    let mut generations = 0;
-    for run in 0..=settings.restarts {
-        if run > 0 && smallest << run > settings.max_evaluations.saturating_sub(result.evaluations) {
-            // Not one generation more: nothing to start for.
-            result.status = CmaEsStatus::EvaluationLimit;
-            break;
-        }
-        // One run: generations until it ends by itself or the search does.
-        let mut strategy = Strategy::new(&from, steps, smallest << run);
-        let before = result.evaluations;
+    Ok(())
+}
+
+/// The nearest point inside the bounds.
+fn clamped(x: &[f64], bounds: &[[f64; 2]]) -> Vec<f64> {
+    x.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect()
+}
+
+/// All runs of a search, and their best point so far.
+struct Search<'a> {
+    objective: &'a Objective<'a>,
+    bounds: &'a [[f64; 2]],
+    settings: &'a CmaEsSettings,
+    random: Random,
+    generations: usize,
+    result: CmaEsResult,
+}
+
+impl Search<'_> {
+    /// One run: generations until the strategy or the search ends.
+    fn run(&mut self, mut strategy: Strategy, watch: &mut Watch<'_>) -> CmaEsRun {
+        let before = self.result.evaluations;
         let mut lowest_of_run = f64::INFINITY;
         let status = loop {
-            let candidates = strategy.sample(&mut random);
-            let inside: Vec<Vec<f64>> = candidates.iter().map(|y| clamped(&strategy.unscaled(y))).collect();
-            let values = evaluate_all(&objective, &inside);
+            let candidates = strategy.sample(&mut self.random);
+            let inside: Vec<Vec<f64>> =
+                candidates.iter().map(|y| clamped(&strategy.unscaled(y), self.bounds)).collect();
+            let values = evaluate_all(self.objective, &inside);
+            let result = &mut self.result;
             result.evaluations += values.len();
-            generations += 1;
+            self.generations += 1;
             let lowest = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
             lowest_of_run = lowest_of_run.min(values[lowest]);
             if values[lowest] < result.value {
@@ -180,44 +231,42 @@ pub fn cma_es(
                 best: &result.best,
                 value: result.value,
                 violation: 0.0,
-                iteration: generations,
+                iteration: self.generations,
                 evaluations: result.evaluations,
             };
             if let ControlFlow::Break(()) = watch(&progress) {
                 break CmaEsStatus::Stopped;
             }
-            if settings.target.is_some_and(|target| result.value <= target) {
+            if self.settings.target.is_some_and(|target| result.value <= target) {
                 break CmaEsStatus::TargetReached;
             }
             let ranked = strategy.penalised(&candidates, &inside, &values);
             strategy.update(&candidates, &ranked);
-            if let Some(status) = strategy.end(&values, settings) {
+            if let Some(status) = strategy.end(&values, self.settings) {
                 break status;
             }
-            if result.evaluations >= settings.max_evaluations {
+            if result.evaluations >= self.settings.max_evaluations {
                 break CmaEsStatus::EvaluationLimit;
             }
         };
-        let evaluations = result.evaluations - before;
-        result.runs.push(CmaEsRun { population: smallest << run, evaluations, value: lowest_of_run, status });
-        result.status = status;
-        if matches!(status, CmaEsStatus::Stopped | CmaEsStatus::TargetReached | CmaEsStatus::EvaluationLimit) {
-            break;
-        }
-        // The next run begins anywhere, with twice the population.
-        from = (0..start.len())
+        let evaluations = self.result.evaluations - before;
+        CmaEsRun { population: strategy.population, evaluations, value: lowest_of_run, status }
+    }
+
+    /// A random start of the next run: anywhere inside finite bounds, else around the first start.
+    fn random_place(&mut self, start: &[f64], steps: &[f64]) -> Vec<f64> {
+        (0..start.len())
             .map(|i| {
-                let [lower, upper] = bounds[i];
+                let [lower, upper] = self.bounds[i];
                 let anywhere = if (upper - lower).is_finite() {
-                    random.uniform(lower, upper)
+                    self.random.uniform(lower, upper)
                 } else {
-                    start[i] + steps[i] * random.normal()
+                    start[i] + steps[i] * self.random.normal()
                 };
                 anywhere.clamp(lower, upper)
             })
-            .collect();
+            .collect()
     }
-    Ok(result)
 }
 
 /// The distribution N(mean, σ² C) and its evolution paths, in variables divided by the first steps.

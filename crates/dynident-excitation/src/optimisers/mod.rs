@@ -44,6 +44,9 @@ pub struct Progress<'a> {
 /// What a search asks after every step: `Break` ends it with the best point so far.
 pub type Watch<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + 'a;
 
+/// An objective without derivatives, evaluated from any thread.
+type Objective<'a> = dyn Fn(&[f64]) -> f64 + Sync + 'a;
+
 /// What an optimiser cannot start with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -108,7 +111,7 @@ fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(),
 
 /// The objective of every candidate, in parallel, in the candidates' order; what is not a number counts as infinitely
 /// bad.
-fn evaluate_all(objective: &(impl Fn(&[f64]) -> f64 + Sync), candidates: &[Vec<f64>]) -> Vec<f64> {
+fn evaluate_all(objective: &Objective<'_>, candidates: &[Vec<f64>]) -> Vec<f64> {
     candidates
         .par_iter()
         .map(|candidate| {

@@ -96,7 +96,7 @@ pub fn choose_cutoff(
         return Ok(None);
     }
     // The first fit and what noise there is.
-    let Some(stand_in) = StandIn::of((logs, settings), model, training, highest)? else { return Ok(None) };
+    let Some(stand_in) = StandIn::of(logs, settings, model, training, highest)? else { return Ok(None) };
     let highest = highest.min(HIGHEST * stand_in.log_rate_hz());
     // The pilot itself is among the candidates.
     let below = ((motion_hz / lowest).ln() / STEP.ln()).floor() as i32;

@@ -88,75 +88,121 @@ impl Differentiator for JointByJoint {
     }
 }
 
+/// The recordings read so far: their motion without noise and their torque, thinned out.
+struct ReadLogs {
+    highest_hz: f64,
+    /// Of the first log; logs with another rate are left out.
+    log_rate_hz: f64,
+    thinning: usize,
+    blocks: Vec<MotionBlock>,
+    /// Largest variance of each joint's position noise.
+    noise_squares: Vec<f64>,
+    /// Highest frequency at which each joint's motion has faded into the noise.
+    reference_hz: Vec<f64>,
+    /// Samples that were read.
+    used: u64,
+    /// Samples of the whole logs.
+    seen: u64,
+}
+
+impl ReadLogs {
+    fn new(dof: usize, highest_hz: f64) -> Self {
+        Self {
+            highest_hz,
+            log_rate_hz: 0.0,
+            thinning: 1,
+            blocks: Vec::new(),
+            noise_squares: vec![0.0; dof],
+            reference_hz: vec![0.0; dof],
+            used: 0,
+            seen: 0,
+        }
+    }
+
+    /// Reads about `most` thinned samples of a log.
+    fn take(
+        &mut self,
+        logs: &Logs<'_>,
+        motion: &MotionSettings,
+        model: &RegressorModel,
+        log: &LogSpectrum,
+        most: usize,
+    ) -> Result<(), IdentificationError> {
+        let LogSpectrum { index, rate_hz, choice: spectrum, position_noise } = log;
+        let (recording, rate_hz, highest_hz) = (&logs.recordings[*index], *rate_hz, self.highest_hz);
+        let Samples::Log(log) = &recording.samples else { return Ok(()) };
+        let places = recording.places(model.model())?;
+        if self.log_rate_hz == 0.0 {
+            self.log_rate_hz = rate_hz;
+            self.thinning = (rate_hz / (RATE * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
+        } else if (rate_hz / self.log_rate_hz - 1.0).abs() > 0.01 {
+            return Ok(());
+        }
+        let thinning = self.thinning;
+        let motion = recording.in_log_order(model.model(), motion)?.into_owned();
+        let motion = MotionSettings { smooth_torque: false, ..motion };
+        let faded = &spectrum.faded_hz;
+        let asked = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let build = || -> Result<Box<dyn Differentiator>, FilterError> {
+            let of = |hz: &Option<f64>| {
+                let cutoff_hz = hz.unwrap_or(asked).min(highest_hz).min(0.4 * rate_hz);
+                ButterworthZeroPhase::new(4, cutoff_hz)
+            };
+            Ok(Box::new(JointByJoint(faded.iter().map(of).collect::<Result<_, _>>()?)))
+        };
+        let named = |source| LogError::recording(&recording.name, source);
+        let mut stream = MotionStream::with_differentiator(log, &motion, |_| build()).map_err(named)?;
+        if logs.execution.parallel() {
+            stream = stream.read_beside();
+        }
+        // One filter for the torque; the motion without its noise has nothing to lose by being thinned out.
+        let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
+        let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
+        let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
+        let mut pieces = Thinned::new(thinning, model.dof());
+        let mut block = MotionBlock::default();
+        let mut samples = 0;
+        while samples < most * thinning && stream.next_block(&mut block).map_err(named)? {
+            let rows = block.rows.min(most * thinning - samples);
+            pieces.take(&block, &places, rows, &decimator)?;
+            samples += rows;
+        }
+        self.used += samples as u64;
+        self.seen += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
+        for (joint, &place) in places.iter().enumerate() {
+            let reference_hz = faded[place].unwrap_or(asked).min(highest_hz);
+            self.reference_hz[joint] = self.reference_hz[joint].max(reference_hz);
+            let noise = position_noise.get(place).copied().unwrap_or(0.0);
+            self.noise_squares[joint] = self.noise_squares[joint].max(noise * noise);
+        }
+        self.blocks.extend(pieces.finished());
+        Ok(())
+    }
+}
+
 impl StandIn {
     /// Reads the recordings and fits to them; `highest_hz` is the highest candidate.
     pub(super) fn of(
-        (logs, settings): (&Logs<'_>, &IdentificationSettings),
+        logs: &Logs<'_>,
+        settings: &IdentificationSettings,
         model: &RegressorModel,
         training: &[usize],
         highest_hz: f64,
     ) -> Result<Option<Self>, IdentificationError> {
-        let dof = model.dof();
         let is_bare =
             |log: &&LogSpectrum| training.contains(&log.index) && logs.recordings[log.index].payload.is_none();
         let bare: Vec<&LogSpectrum> = logs.spectra().iter().filter(is_bare).collect();
-        let each = MOST_SAMPLES / bare.len().max(1);
-        let (mut log_rate_hz, mut thinning) = (0.0, 1);
-        let mut measured: Vec<MotionBlock> = Vec::new();
-        let (mut noise_squares, mut reference_hz) = (vec![0.0_f64; dof], vec![0.0_f64; dof]);
-        let (mut used, mut seen) = (0_u64, 0_u64);
-        for LogSpectrum { index, rate_hz, choice: spectrum, position_noise } in bare {
-            let (recording, rate_hz) = (&logs.recordings[*index], *rate_hz);
-            let Samples::Log(log) = &recording.samples else { continue };
-            let places = recording.places(model.model())?;
-            if log_rate_hz == 0.0 {
-                log_rate_hz = rate_hz;
-                thinning = (rate_hz / (RATE * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
-            } else if (rate_hz / log_rate_hz - 1.0).abs() > 0.01 {
-                continue;
-            }
-            let motion = recording.in_log_order(model.model(), &settings.motion)?.into_owned();
-            let motion = MotionSettings { smooth_torque: false, ..motion };
-            let faded = &spectrum.faded_hz;
-            let asked = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            let build = || -> Result<Box<dyn Differentiator>, FilterError> {
-                let of = |hz: &Option<f64>| {
-                    let cutoff_hz = hz.unwrap_or(asked).min(highest_hz).min(0.4 * rate_hz);
-                    ButterworthZeroPhase::new(4, cutoff_hz)
-                };
-                Ok(Box::new(JointByJoint(faded.iter().map(of).collect::<Result<_, _>>()?)))
-            };
-            let named = |source| LogError::recording(&recording.name, source);
-            let mut stream = MotionStream::with_differentiator(log, &motion, |_| build()).map_err(named)?;
-            if logs.execution.parallel() {
-                stream = stream.read_beside();
-            }
-            // One filter for the torque; the motion without its noise has nothing to lose by being thinned out.
-            let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
-            let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
-            let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
-            let mut pieces = Thinned::new(thinning, dof);
-            let mut block = MotionBlock::default();
-            let mut samples = 0;
-            while samples < each * thinning && stream.next_block(&mut block).map_err(named)? {
-                let rows = block.rows.min(each * thinning - samples);
-                pieces.take(&block, &places, rows, &decimator)?;
-                samples += rows;
-            }
-            used += samples as u64;
-            seen += recording.rows_of_whole().unwrap_or(samples as u64).max(samples as u64);
-            for (joint, &place) in places.iter().enumerate() {
-                reference_hz[joint] = reference_hz[joint].max(faded[place].unwrap_or(asked).min(highest_hz));
-                let noise = position_noise.get(place).copied().unwrap_or(0.0);
-                noise_squares[joint] = noise_squares[joint].max(noise * noise);
-            }
-            measured.extend(pieces.finished());
+        let most = MOST_SAMPLES / bare.len().max(1);
+        let mut read = ReadLogs::new(model.dof(), highest_hz);
+        for log in bare {
+            read.take(logs, &settings.motion, model, log, most)?;
         }
+        let ReadLogs { log_rate_hz, thinning, blocks, reference_hz, noise_squares, used, seen, .. } = read;
         // The filters of the reference invent what lies beyond the ends.
         let slowest_hz = reference_hz.iter().copied().fold(f64::INFINITY, f64::min);
         let ends = (INVENTED * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
         let measured: Vec<MotionBlock> =
-            measured.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= SHORTEST).collect();
+            blocks.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= SHORTEST).collect();
         if measured.is_empty() || used == 0 {
             return Ok(None);
         }

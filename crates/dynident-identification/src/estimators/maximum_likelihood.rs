@@ -141,23 +141,7 @@ pub(super) fn periodic(
         )));
     }
     rows.begin("periods");
-    let mut period_s = periods.period_s;
-    let mut means = Vec::new();
-    for &index in rows.training {
-        if period_s.is_none() {
-            let commanded = logs.recordings[index].commanded.as_ref();
-            period_s = commanded.and_then(|reference| reference.period_s());
-        }
-        let name = &logs.recordings[index].name;
-        let Some(period_s) = period_s else {
-            return Err(wrong(format!(
-                "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
-            )));
-        };
-        means.push(mean_period(rows, index, period_s, periods.skip_s, &|message| {
-            wrong(format!("log `{name}`: {message}"))
-        })?);
-    }
+    let Means { period_s, means } = mean_periods(rows, periods, &wrong)?;
     logs.end();
     let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
     let (dof, most) = (model.model().dof(), first.averaged.periods);
@@ -166,36 +150,16 @@ pub(super) fn periodic(
     let single = pooled(&means, |mean| matrix(&mean.averaged.sample_covariance));
     // Covariance of the mean of as many periods as the first log has; the other logs' rows are scaled to it.
     let mean_covariance = &sample_covariance / most as f64;
-    let motion_covariance = mean_covariance.view((0, 0), (3 * dof, 3 * dof)).into_owned();
-    let mut torque_covariance = mean_covariance.view((3 * dof, 3 * dof), (dof, dof)).into_owned();
-    for joint in 0..dof {
-        let (mut square, mut count) = (0.0, 0);
-        for mean in &means {
-            square += mean.averaged.mean[3 * dof + joint].iter().map(|tau| tau * tau).sum::<f64>();
-            count += mean.samples;
-        }
-        let least = LEAST_RELATIVE_SIGMA * LEAST_RELATIVE_SIGMA * square / count.max(1) as f64;
-        torque_covariance[(joint, joint)] += least.max(f64::MIN_POSITIVE);
-    }
     let settings = MaximumLikelihoodSettings {
-        motion_covariance,
-        torque_covariance,
+        motion_covariance: mean_covariance.view((0, 0), (3 * dof, 3 * dof)).into_owned(),
+        torque_covariance: torque_covariance(&means, &mean_covariance, dof),
         rank: rows.settings.rank,
         tolerance: 1e-6,
         max_iterations: 50,
     };
     let std = |place: usize| single[(place, place)].max(0.0).sqrt();
-    let own = model.model().own_scale();
-    let least = |order: usize, joint: usize| {
-        let turns = model.model().joints()[joint].turns();
-        let [position, velocity, acceleration] = LEAST_STEPS;
-        let of_order =
-            [own.position(turns, position), own.velocity(turns, velocity), own.acceleration(turns, acceleration)];
-        of_order[order]
-    };
-    let steps = |order: usize, joint: usize| least(order, joint).max(std(order * dof + joint) / (most as f64).sqrt());
-    let steps: Vec<f64> = (0..3 * dof).map(|variable| steps(variable / dof, variable % dof)).collect();
-    let mut instants = Instants::new(model, steps);
+    let steps = |variable: usize| least_step(model, variable).max(std(variable) / (most as f64).sqrt());
+    let mut instants = Instants::new(model, (0..3 * dof).map(steps).collect());
     let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {
         for mean in &means {
             let weight = (mean.averaged.periods as f64 / most as f64).sqrt();
@@ -215,6 +179,67 @@ pub(super) fn periodic(
     };
     let estimate = estimate_of(found, problem)?;
     Ok((estimate, fit))
+}
+
+/// The mean periods of all logs.
+struct Means {
+    /// The period; none without logs.
+    period_s: Option<f64>,
+    means: Vec<MeanPeriod>,
+}
+
+/// Averages the periods of all logs. The period is that of the settings, else of the first commanded motion.
+fn mean_periods(
+    rows: &TrainingRows<'_>,
+    periods: &PeriodSettings,
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<Means, EstimatorError> {
+    let mut period_s = periods.period_s;
+    let mut means = Vec::new();
+    for &index in rows.training {
+        let recording = &rows.logs.recordings[index];
+        if period_s.is_none() {
+            period_s = recording.commanded.as_ref().and_then(|reference| reference.period_s());
+        }
+        let name = &recording.name;
+        let Some(period_s) = period_s else {
+            return Err(wrong(format!(
+                "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+            )));
+        };
+        means.push(mean_period(rows, index, period_s, periods.skip_s, &|message| {
+            wrong(format!("log `{name}`: {message}"))
+        })?);
+    }
+    Ok(Means { period_s, means })
+}
+
+/// Covariance of the torques of a mean period, whose deviations are at least a small share of the torques.
+fn torque_covariance(means: &[MeanPeriod], mean_covariance: &DMatrix<f64>, dof: usize) -> DMatrix<f64> {
+    let mut covariance = mean_covariance.view((3 * dof, 3 * dof), (dof, dof)).into_owned();
+    for joint in 0..dof {
+        let (mut square, mut count) = (0.0, 0);
+        for mean in means {
+            square += mean.averaged.mean[3 * dof + joint].iter().map(|tau| tau * tau).sum::<f64>();
+            count += mean.samples;
+        }
+        let least = LEAST_RELATIVE_SIGMA * LEAST_RELATIVE_SIGMA * square / count.max(1) as f64;
+        covariance[(joint, joint)] += least.max(f64::MIN_POSITIVE);
+    }
+    covariance
+}
+
+/// Least step of the differences by a variable of the motion: positions of all joints, velocities, accelerations.
+fn least_step(model: &RegressorModel, variable: usize) -> f64 {
+    let (model, dof) = (model.model(), model.model().dof());
+    let own = model.own_scale();
+    let turns = model.joints()[variable % dof].turns();
+    let [position, velocity, acceleration] = LEAST_STEPS;
+    match variable / dof {
+        0 => own.position(turns, position),
+        1 => own.velocity(turns, velocity),
+        _ => own.acceleration(turns, acceleration),
+    }
 }
 
 fn matrix(rows: &[Vec<f64>]) -> DMatrix<f64> {
@@ -288,23 +313,28 @@ fn mean_period(
         )));
     }
     let averaged = averaged_periods(&views, samples).map_err(|error| wrong(error.to_string()))?;
-    let joints = model.model().joints();
-    for joint in 0..dof {
+    check_repeats(model, &averaged, period_s).map_err(wrong)?;
+    let covariance = filter.covariance(&views, &averaged);
+    let rows = filter.rows(model, &averaged);
+    Ok(MeanPeriod { averaged, samples, covariance, rows })
+}
+
+/// Checks that the positions of all periods are alike; else what is wrong.
+fn check_repeats(model: &RegressorModel, averaged: &AveragedPeriods, period_s: f64) -> Result<(), String> {
+    for (joint, described) in model.model().joints().iter().enumerate() {
         let mean = &averaged.mean[joint];
         let middle = mean.iter().sum::<f64>() / mean.len() as f64;
         let size = (mean.iter().map(|q| (q - middle).powi(2)).sum::<f64>() / mean.len() as f64).sqrt();
         let difference = averaged.sample_covariance[joint][joint].max(0.0).sqrt();
         if difference > MOST_DIFFERENCE * size.max(NO_MOTION) {
-            return Err(wrong(format!(
+            return Err(format!(
                 "the motion does not repeat every {period_s} s: positions of {} differ by {difference:.2e} rad from period to period, and move by {size:.2e} rad (root mean squares); \
                  fix period_s, or skip the start with skip_s",
-                joints[joint].name
-            )));
+                described.name
+            ));
         }
     }
-    let covariance = filter.covariance(&views, &averaged);
-    let rows = filter.rows(model, &averaged);
-    Ok(MeanPeriod { averaged, samples, covariance, rows })
+    Ok(())
 }
 
 /// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation

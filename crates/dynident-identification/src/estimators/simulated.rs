@@ -93,26 +93,7 @@ pub(super) fn simulated(
     let method = compared.method();
     let wrong = |message: String| EstimatorError::Requirement { method, message };
     let SimulatedLoopSettings { controller, rate_hz, .. } = experiment;
-    let mut settings = experiment.loop_settings.clone();
-    settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
-    let SensorSettings { speed, feedback_delay_samples, .. } = settings.sensors;
-    settings.sensors = SensorSettings { speed, feedback_delay_samples, ..SensorSettings::default() };
-    settings.accelerations = compared != ComparedSignal::Torque;
-    let controller_model = if controller.needs_model() {
-        let unknown = model.model().bodies_without_prior();
-        if !unknown.is_empty() {
-            return Err(wrong(format!(
-                "the controller \"{}\" needs the model that it had, and the description has no inertial of {}",
-                controller.name(),
-                unknown.join(", ")
-            )));
-        }
-        let nominal = model.parametric.nominal();
-        let described = ControllerModel::from_parameters(model.model(), model.terms(), nominal);
-        Some(described.map_err(|error| wrong(format!("[controller]: {error}")))?)
-    } else {
-        None
-    };
+    let controller_model = controller_model(rows, controller, &wrong)?;
     rows.begin("instants and commanded motion");
     let read = |&index: &usize| LoopLog::read(rows, index, compared, *rate_hz, &wrong);
     let loop_logs = training.iter().map(read).collect::<Result<Vec<_>, _>>()?;
@@ -121,7 +102,7 @@ pub(super) fn simulated(
         model,
         controller,
         controller_model,
-        settings,
+        settings: noiseless(experiment, compared),
         compared,
         logs: loop_logs,
         wrong: &wrong,
@@ -138,26 +119,79 @@ pub(super) fn simulated(
 
     let weighted = estimation.weighted();
     let plain = weighted_least_squares(problem, &weighted)?;
+    let best = best_outcome(rows, &mut simulated, experiment, &plain)?;
+    let found = best.found;
+    let mut estimate = weighted_least_squares(&linearised(rows, &simulated, &found)?, &weighted)?;
+    estimate.iterations = best.iterations;
+    if found.status == EstimateStatus::IterationLimit {
+        // The step that these rows ask for made the simulation worse: the last values that were simulated are kept.
+        estimate.status = EstimateStatus::IterationLimit;
+        estimate.values.clone_from(&found.values);
+        let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
+        estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
+    }
+    let residual_std = std::mem::take(&mut estimate.joint_sigma);
+    // The model's residual of the measured torque, also where positions were compared: the torque's band is made of it.
+    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
+    let fit = SimulatedFit {
+        controller: controller.name().to_owned(),
+        rate_hz: *rate_hz,
+        compared: if compared == ComparedSignal::Position { "position" } else { "torque" }.to_owned(),
+        start: best.start.to_owned(),
+        iterations: best.iterations,
+        simulations: best.simulations,
+        residual_std,
+    };
+    Ok((estimate, fit))
+}
+
+/// The loop of the experiment without noise, and with no limits but those of the torque.
+fn noiseless(experiment: &SimulatedLoopSettings, compared: ComparedSignal) -> LoopSettings {
+    let mut settings = experiment.loop_settings.clone();
+    settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
+    let SensorSettings { speed, feedback_delay_samples, .. } = settings.sensors;
+    settings.sensors = SensorSettings { speed, feedback_delay_samples, ..SensorSettings::default() };
+    settings.accelerations = compared != ComparedSignal::Torque;
+    settings
+}
+
+/// The model of a controller that needs one: the robot's description.
+fn controller_model(
+    rows: &TrainingRows<'_>,
+    controller: &ControllerSettings,
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<Option<ControllerModel>, EstimatorError> {
+    if !controller.needs_model() {
+        return Ok(None);
+    }
+    let model = rows.model;
+    let unknown = model.model().bodies_without_prior();
+    if !unknown.is_empty() {
+        return Err(wrong(format!(
+            "the controller \"{}\" needs the model that it had, and the description has no inertial of {}",
+            controller.name(),
+            unknown.join(", ")
+        )));
+    }
+    let described = ControllerModel::from_parameters(model.model(), model.terms(), model.parametric.nominal());
+    described.map(Some).map_err(|error| wrong(format!("[controller]: {error}")))
+}
+
+/// Iterates from the start whose simulation is nearest to the record, and from the others until one of them converges;
+/// the best outcome, with the iterations and simulations of all.
+fn best_outcome(
+    rows: &TrainingRows<'_>,
+    simulated: &mut SimulatedLoop<'_>,
+    experiment: &SimulatedLoopSettings,
+    plain: &Estimate,
+) -> Result<StartOutcome, EstimatorError> {
     let measured = simulated.measured();
-    let (mut begun, mut refused) = (Vec::new(), Vec::new());
-    for (values, name) in start_values(rows, experiment.start, &plain).map_err(|error| wrong(error.to_string()))? {
-        match simulated.simulate(&values)? {
-            Some(rows) => {
-                let sigma = deviations(&simulated, &(&measured - &rows.output), &measured, 0);
-                begun.push(SimulatedStart { values, name, sigma });
-            }
-            None => refused.push(format!("of the {name} ({})", failure(&simulated))),
-        }
-    }
-    if begun.is_empty() {
-        return Err(wrong(no_simulation(&refused.join(", nor "))));
-    }
-    begun.sort_by(|a, b| log_sum(&a.sigma).total_cmp(&log_sum(&b.sigma)));
-    logs.execution.progress.begin("simulating the closed loop", None);
+    let begun = simulated_starts(rows, simulated, experiment.start, &measured, plain)?;
+    rows.logs.execution.progress.begin("simulating the closed loop", None);
     let mut best: Option<StartOutcome> = None;
     let (mut iterations, mut simulations) = (0, 0);
     for start in begun {
-        let settled = settled(rows, &mut simulated, start, experiment, &measured, &plain.std)?;
+        let settled = settled(rows, simulated, start, experiment, &measured, &plain.std)?;
         iterations += settled.iterations;
         simulations += settled.simulations;
         let done = settled.found.status != EstimateStatus::IterationLimit;
@@ -168,33 +202,35 @@ pub(super) fn simulated(
             break;
         }
     }
-    logs.end();
-    let Some(StartOutcome { found, start: start_name, .. }) = best else {
-        return Err(EstimationError::NoSimulation.into());
-    };
-    let rows = linearised(rows, &simulated, &found)?;
-    let mut estimate = weighted_least_squares(&rows, &weighted)?;
-    estimate.iterations = iterations;
-    if found.status == EstimateStatus::IterationLimit {
-        // The step that these rows ask for made the simulation worse: the last values that were simulated stand.
-        estimate.status = EstimateStatus::IterationLimit;
-        estimate.values.clone_from(&found.values);
-        let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
-        estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
+    rows.logs.end();
+    let best = best.ok_or(EstimationError::NoSimulation)?;
+    Ok(StartOutcome { iterations, simulations, ..best })
+}
+
+/// The starts that can be simulated, the one nearest to the record first.
+fn simulated_starts(
+    rows: &TrainingRows<'_>,
+    simulated: &mut SimulatedLoop<'_>,
+    choice: SimulationStart,
+    measured: &DVector<f64>,
+    plain: &Estimate,
+) -> Result<Vec<SimulatedStart>, EstimatorError> {
+    let wrong = simulated.wrong;
+    let (mut begun, mut refused) = (Vec::new(), Vec::new());
+    for (values, name) in start_values(rows, choice, plain).map_err(|error| wrong(error.to_string()))? {
+        match simulated.simulate(&values)? {
+            Some(rows) => {
+                let sigma = deviations(simulated, &(measured - &rows.output), measured, 0);
+                begun.push(SimulatedStart { values, name, sigma });
+            }
+            None => refused.push(format!("of the {name} ({})", failure(simulated))),
+        }
     }
-    let residual_std = std::mem::take(&mut estimate.joint_sigma);
-    // What the model leaves of the measured torque, whatever was compared: that is what the torque's band is made of.
-    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
-    let fit = SimulatedFit {
-        controller: controller.name().to_owned(),
-        rate_hz: *rate_hz,
-        compared: if compared == ComparedSignal::Position { "position" } else { "torque" }.to_owned(),
-        start: start_name.to_owned(),
-        iterations,
-        simulations,
-        residual_std,
-    };
-    Ok((estimate, fit))
+    if begun.is_empty() {
+        return Err(wrong(no_simulation(&refused.join(", nor "))));
+    }
+    begun.sort_by(|a, b| log_sum(&a.sigma).total_cmp(&log_sum(&b.sigma)));
+    Ok(begun)
 }
 
 /// For each joint the standard deviation of its measured filtered torque from the model's, `√(RSS_j / (N_j − p/n))`.
@@ -216,7 +252,7 @@ struct SimulatedStart {
     sigma: Vec<f64>,
 }
 
-/// What came of one start.
+/// The result from one start.
 struct StartOutcome {
     found: SimulatedEstimate,
     start: &'static str,

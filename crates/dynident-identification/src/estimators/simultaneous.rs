@@ -6,8 +6,8 @@ use super::simulated::torque_sigma;
 use super::{EstimatorError, Findings, PeriodSettings, TrainingRows};
 use crate::recording::LogError;
 use dynident_estimation::{
-    Estimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings, simultaneous_least_squares,
-    weighted_least_squares,
+    Estimate, LinearProblem, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
+    simultaneous_least_squares, weighted_least_squares,
 };
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,12 @@ struct RawRecord {
     series: FourierSeries,
 }
 
+impl RawRecord {
+    fn samples_of_row(&self) -> usize {
+        self.series.samples_of_row(self.record.rate_hz)
+    }
+}
+
 /// The estimate, and what was found of each log's motion.
 pub(super) fn simultaneous(
     rows: &TrainingRows<'_>,
@@ -63,22 +69,9 @@ pub(super) fn simultaneous(
     let recorded: Vec<RawRecord> =
         rows.training.iter().map(|&index| read(rows, index, periods, &wrong)).collect::<Result<_, _>>()?;
     logs.end();
-    let of = |log: &RawRecord| log.series.samples_of_row(log.record.rate_hz);
-    let models = recorded.iter().map(|log| PeriodicModel::new(model, &log.record, log.series, of(log)));
+    let models = recorded.iter().map(|log| PeriodicModel::new(model, &log.record, log.series, log.samples_of_row()));
     let mut records = PeriodicRecords(models.collect());
-    let mut motion = Vec::new();
-    for (record, &index) in records.0.iter().zip(rows.training) {
-        let name = &logs.recordings[index].name;
-        let Some(fitted) = record.fitted_motion() else {
-            return Err(wrong(format!(
-                "log `{name}` does not distinguish the harmonics of its motion: give fewer with [estimator.periods] harmonics = ..., or a longer log"
-            )));
-        };
-        check_motion(record, &fitted).map_err(|(joint, message)| {
-            wrong(format!("log `{name}`: positions of {} {message}", model.joint_names()[joint]))
-        })?;
-        motion.extend(fitted);
-    }
+    let motion = fitted_motion(rows, &records, &wrong)?;
     let estimation = rows.settings;
     let start = weighted_least_squares(problem, &estimation.weighted())?;
     let channel = |log: &usize| {
@@ -96,8 +89,41 @@ pub(super) fn simultaneous(
         ..SimultaneousSettings::default()
     };
     let found = simultaneous_least_squares(&begun, &settings, &mut records)?;
+    let fits = series_fits(&recorded, &mut records, &found, model.dof())?;
+    let estimate = of_joints(found.estimate, problem, recorded.len(), model.dof())?;
+    Ok((estimate, Findings::Series(fits)))
+}
+
+/// The motion's unknowns of all logs as the positions alone give them.
+fn fitted_motion(
+    rows: &TrainingRows<'_>,
+    records: &PeriodicRecords<'_>,
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<Vec<f64>, EstimatorError> {
+    let mut motion = Vec::new();
+    for (record, &index) in records.0.iter().zip(rows.training) {
+        let name = &rows.logs.recordings[index].name;
+        let Some(fitted) = record.fitted_motion() else {
+            return Err(wrong(format!(
+                "log `{name}` does not distinguish the harmonics of its motion: give fewer with [estimator.periods] harmonics = ..., or a longer log"
+            )));
+        };
+        check_motion(record, &fitted).map_err(|(joint, message)| {
+            wrong(format!("log `{name}`: positions of {} {message}", rows.model.joint_names()[joint]))
+        })?;
+        motion.extend(fitted);
+    }
+    Ok(motion)
+}
+
+/// What the fit found of each log's motion and noise.
+fn series_fits(
+    recorded: &[RawRecord],
+    records: &mut PeriodicRecords<'_>,
+    found: &SimultaneousEstimate,
+    dof: usize,
+) -> Result<Vec<SeriesFit>, EstimatorError> {
     let left = records.residuals(&found.motion, &found.estimate.values)?;
-    let dof = model.dof();
     let std = |channel: usize| {
         let rows = &left[channel];
         (rows.iter().map(|x| x * x).sum::<f64>() / rows.len().max(1) as f64).sqrt()
@@ -108,27 +134,34 @@ pub(super) fn simultaneous(
             period_s: recorded.series.period_s,
             harmonics: recorded.series.harmonics,
             rows: records.0[log].rows(),
-            samples_of_row: of(recorded),
+            samples_of_row: recorded.samples_of_row(),
             position_std: position.map(std).collect(),
             torque_std: torque.clone().map(std).collect(),
             torque_autoregression: found.noise[torque].iter().map(|noise| noise.autoregression.len()).collect(),
         }
     };
-    let fits = recorded.iter().enumerate().map(series).collect();
-    // Channels are each log's positions and torques; an estimate speaks of joints, by their torque.
+    Ok(recorded.iter().enumerate().map(series).collect())
+}
+
+/// The estimate with joints, by their torque, in place of channels, which are each log's positions and torques.
+fn of_joints(
+    mut estimate: Estimate,
+    problem: &LinearProblem,
+    logs: usize,
+    dof: usize,
+) -> Result<Estimate, EstimatorError> {
+    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     let of_joints = |channels: &[f64]| -> Vec<f64> {
         let mean = |joint: usize| {
-            let of_logs = (0..recorded.len()).filter_map(|log| channels.get((2 * log + 1) * dof + joint));
-            of_logs.sum::<f64>() / recorded.len().max(1) as f64
+            let of_logs = (0..logs).filter_map(|log| channels.get((2 * log + 1) * dof + joint));
+            of_logs.sum::<f64>() / logs.max(1) as f64
         };
         (0..dof).map(mean).collect()
     };
-    let mut estimate = found.estimate;
-    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     estimate.score_inflation = of_joints(&estimate.score_inflation);
     estimate.effective_lag1 = of_joints(&estimate.effective_lag1);
     estimate.segment_correlation = of_joints(&estimate.segment_correlation);
-    Ok((estimate, Findings::Series(fits)))
+    Ok(estimate)
 }
 
 /// Log number `index` as it was recorded, and the series of its motion: the harmonics that stand out of the noise,

@@ -117,24 +117,6 @@ fn result(
             excited: excited(place),
         })
         .collect();
-    let mut not_identified: Vec<String> = parameters
-        .iter()
-        .filter(|p| !p.excited)
-        .map(|p| format!("{}: these logs do not separate it from the arm", p.expression))
-        .collect();
-    let open = |(_, dropped): &(usize, &usize)| columns.mass.is_none() || **dropped != 0;
-    not_identified.extend(columns.dropped.iter().enumerate().filter(open).map(|(place, &dropped)| {
-        let column = columns.regrouping.column(place);
-        let homes: Vec<&str> = (0..parameters.len())
-            .filter(|&row| column[row].abs() > 1.0e-9)
-            .map(|row| &parameters[row].expression[..])
-            .collect();
-        if homes.is_empty() {
-            format!("{}: no motion of this robot determines it", INERTIAL_NAMES[dropped])
-        } else {
-            format!("{}: determined only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
-        }
-    }));
     let figures = figures(columns, estimate, &excited);
     let (possible, failure) = match nearest_consistent_body(&section.name, columns, estimate) {
         Ok(fit) => {
@@ -167,12 +149,35 @@ fn result(
         mass_kg: figures[0],
         com_m: core::array::from_fn(|k| figures[1 + k]),
         inertia_at_com_kgm2: core::array::from_fn(|k| figures[4 + k]),
-        not_identified,
+        not_identified: not_identified(columns, &parameters),
         possible,
         failure,
         base_parameters_added: added.collect(),
         parameters,
     }
+}
+
+/// What the logs cannot determine, in words.
+fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> Vec<String> {
+    let mut not_identified: Vec<String> = parameters
+        .iter()
+        .filter(|p| !p.excited)
+        .map(|p| format!("{}: these logs do not separate it from the arm", p.expression))
+        .collect();
+    let open = |(_, dropped): &(usize, &usize)| columns.mass.is_none() || **dropped != 0;
+    not_identified.extend(columns.dropped.iter().enumerate().filter(open).map(|(place, &dropped)| {
+        let column = columns.regrouping.column(place);
+        let homes: Vec<&str> = (0..parameters.len())
+            .filter(|&row| column[row].abs() > 1.0e-9)
+            .map(|row| &parameters[row].expression[..])
+            .collect();
+        if homes.is_empty() {
+            format!("{}: no motion of this robot determines it", INERTIAL_NAMES[dropped])
+        } else {
+            format!("{}: determined only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
+        }
+    }));
+    not_identified
 }
 
 /// Mass, centre of mass and inertia about it, each where all that it is made of is determined alone.

@@ -93,6 +93,16 @@ enum Motion<'a> {
     Record(&'a MotionRecord),
 }
 
+impl Motion<'_> {
+    fn rate_hz(&self) -> f64 {
+        match self {
+            Self::Kept(kept) => kept.rate_hz,
+            Self::Stream(stream) => stream.rate_hz(),
+            Self::Record(record) => record.motion.rate_hz,
+        }
+    }
+}
+
 impl LogPass<'_> {
     /// Sends the recording's rows to `consumer`.
     ///
@@ -120,11 +130,7 @@ impl LogPass<'_> {
                 None => return Err(LogError::NoSamples { log: name.clone() }),
             },
         };
-        let rate_hz = match &motion {
-            Motion::Kept(kept) => kept.rate_hz,
-            Motion::Stream(stream) => stream.rate_hz(),
-            Motion::Record(record) => record.motion.rate_hz,
-        };
+        let rate_hz = motion.rate_hz();
         let filter = self.filter.decimation(rate_hz, self.torque_hz.or_else(|| motion_band_hz(self.motion)));
         if let (Motion::Kept(kept), Some(filter)) = (&motion, &filter)
             && self.may_keep_rows(filter, consumer)

@@ -26,28 +26,8 @@ pub(super) fn run(
     if request.ways.is_some() && !client.runs_ways {
         return Err(RobotFault::NoWays);
     }
-    let [trajectory, controller] = handover::write(request, joints, folder)?;
-    let paths = handover::write_ways(request, folder)?;
+    send_run(client, request, joints, folder)?;
     let reference = request.reference;
-    let text = |path: &Path| path.to_string_lossy().into_owned();
-    let home = request.ways.zip(paths).map(|(ways, [approach, back])| WayFiles {
-        approach: text(&approach),
-        approach_s: ways.approach.duration_s(),
-        back: text(&back),
-        return_s: ways.back.duration_s(),
-    });
-    client.send(
-        &ToClient::Run {
-            run: request.run,
-            rate_hz: reference.rate_hz(),
-            duration_s: reference.duration_s(),
-            trajectory: text(&trajectory),
-            controller: text(&controller),
-            envelope: request.envelope.map(|envelope| envelope.in_order(&client.places)),
-            home,
-        },
-        "sample",
-    )?;
     let all = request.ways.map_or(0, |ways| ways.approach.samples() + ways.back.samples()) + reference.samples();
     let most = FINEST * all + 1000;
     let mut stream = StreamWatch::new(client.silence_s());
@@ -73,13 +53,8 @@ pub(super) fn run(
                 let order = (&client.places[..], &client.torque_per_unit[..]);
                 let dq = keep_sample(order, recorder.record(), (t_s, &q, dq.as_deref(), &tau))?;
                 stream.arrived(Instant::now(), whole_s - recorder.left_s());
-                if let Some(breach) = recorder.look(dq.as_deref()) {
-                    let stopping = stopped(client, recorder, most, &breach.to_string());
-                    return Ok(RobotStatus::LeftEnvelope { breach, stopping });
-                }
-                if let Some(oscillation) = recorder.look_for_oscillation() {
-                    let stopping = stopped(client, recorder, most, &oscillation.to_string());
-                    return Ok(RobotStatus::Oscillated { oscillation, stopping });
+                if let Some(status) = stopped_if_unsafe(client, recorder, dq.as_deref(), most) {
+                    return Ok(status);
                 }
             }
             Heard::Message(ToHost::End { status: EndStatus::Stopped, reason }) => {
@@ -94,6 +69,49 @@ pub(super) fn run(
             }
         }
     }
+}
+
+/// Writes the files of a run and asks the client for it.
+fn send_run(client: &mut Client, request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<(), RobotFault> {
+    let [trajectory, controller] = handover::write(request, joints, folder)?;
+    let paths = handover::write_ways(request, folder)?;
+    let reference = request.reference;
+    let text = |path: &Path| path.to_string_lossy().into_owned();
+    let home = request.ways.zip(paths).map(|(ways, [approach, back])| WayFiles {
+        approach: text(&approach),
+        approach_s: ways.approach.duration_s(),
+        back: text(&back),
+        return_s: ways.back.duration_s(),
+    });
+    client.send(
+        &ToClient::Run {
+            run: request.run,
+            rate_hz: reference.rate_hz(),
+            duration_s: reference.duration_s(),
+            trajectory: text(&trajectory),
+            controller: text(&controller),
+            envelope: request.envelope.map(|envelope| envelope.in_order(&client.places)),
+            home,
+        },
+        "sample",
+    )
+}
+
+/// Stops the client if the newest sample leaves the envelope or the motion oscillates; the status of the run then.
+/// `most` is the number of samples that are kept at most.
+fn stopped_if_unsafe(
+    client: &mut Client,
+    recorder: &mut Recorder<'_>,
+    dq: Option<&[f64]>,
+    most: usize,
+) -> Option<RobotStatus> {
+    if let Some(breach) = recorder.look(dq) {
+        let stopping = stopped(client, recorder, most, &breach.to_string());
+        return Some(RobotStatus::LeftEnvelope { breach, stopping });
+    }
+    let oscillation = recorder.look_for_oscillation()?;
+    let stopping = stopped(client, recorder, most, &oscillation.to_string());
+    Some(RobotStatus::Oscillated { oscillation, stopping })
 }
 
 /// What a client's stop message says where a person asked for it.
@@ -193,13 +211,8 @@ pub(super) fn steps(
         record.tau.extend_from_slice(&tau);
         record.samples += 1;
         // Before the torque is sent: one beyond the envelope never is.
-        if let Some(breach) = recorder.look(Some(&dq)) {
-            let stopping = stopped(client, recorder, 0, &breach.to_string());
-            return Ok(RobotStatus::LeftEnvelope { breach, stopping });
-        }
-        if let Some(oscillation) = recorder.look_for_oscillation() {
-            let stopping = stopped(client, recorder, 0, &oscillation.to_string());
-            return Ok(RobotStatus::Oscillated { oscillation, stopping });
+        if let Some(status) = stopped_if_unsafe(client, recorder, Some(&dq), 0) {
+            return Ok(status);
         }
         let message = if sample + 1 < reference.samples() {
             ToClient::Torque { tau: in_client_order(client, &tau) }
@@ -208,6 +221,11 @@ pub(super) fn steps(
         };
         client.send(&message, "state")?;
     }
+    ended(client, recorder)
+}
+
+/// Waits for the end of a run whose last sample was answered.
+fn ended(client: &mut Client, recorder: &mut Recorder<'_>) -> Result<RobotStatus, RobotFault> {
     match client.next("end", client.message_s())? {
         Heard::Message(ToHost::End { status: EndStatus::Done, .. }) => Ok(RobotStatus::Done),
         Heard::Message(ToHost::End { reason, .. }) => Ok(RobotStatus::Stopped { reason }),

@@ -225,23 +225,7 @@ pub(super) fn causes(
         (0..named.len()).filter(|&joint| is_it(&named[joint])).collect()
     };
     let listed = |joints: &[usize]| joints.iter().map(|&joint| names[joint].clone()).collect::<Vec<_>>();
-    let mut found = Vec::new();
-    let scaled = of(TorqueCandidate::Scale);
-    let scale = |joint: usize| named[joint].map_or(1.0, |found| found.value);
-    let determined = explanations.iter().filter(|own| own.scale.is_some()).count();
-    let mean = scaled.iter().map(|&joint| scale(joint)).sum::<f64>() / scaled.len().max(1) as f64;
-    let is_common = scaled.len() > 1
-        && scaled.len() == determined
-        && scaled.iter().all(|&joint| (scale(joint) - mean).abs() < SAME_SCALE);
-    if is_common {
-        found.push(TorqueCause::CommonScale { factor: mean });
-    } else {
-        found.extend(scaled.iter().map(|&joint| TorqueCause::Scale {
-            joint: names[joint].clone(),
-            factor: scale(joint),
-            half_width_95: 1.96 * explanations[joint].scale_std.unwrap_or(0.0),
-        }));
-    }
+    let mut found = scale_causes(&of(TorqueCandidate::Scale), explanations, named, &names);
     for (candidate, cause) in [
         (
             TorqueCandidate::Sign,
@@ -285,6 +269,30 @@ pub(super) fn causes(
         found.extend(row_scale_causes(check, with.row_scales, &names));
     }
     found
+}
+
+/// A common scale of all joints, or the scale of each of the `scaled` ones.
+fn scale_causes(
+    scaled: &[usize],
+    explanations: &[Explanation],
+    named: &[Option<Fitted>],
+    names: &[String],
+) -> Vec<TorqueCause> {
+    let scale = |joint: usize| named[joint].map_or(1.0, |found| found.value);
+    let determined = explanations.iter().filter(|own| own.scale.is_some()).count();
+    let mean = scaled.iter().map(|&joint| scale(joint)).sum::<f64>() / scaled.len().max(1) as f64;
+    let is_common = scaled.len() > 1
+        && scaled.len() == determined
+        && scaled.iter().all(|&joint| (scale(joint) - mean).abs() < SAME_SCALE);
+    if is_common {
+        return vec![TorqueCause::CommonScale { factor: mean }];
+    }
+    let of_joint = |&joint: &usize| TorqueCause::Scale {
+        joint: names[joint].clone(),
+        factor: scale(joint),
+        half_width_95: 1.96 * explanations[joint].scale_std.unwrap_or(0.0),
+    };
+    scaled.iter().map(of_joint).collect()
 }
 
 /// What the timing shows. A controller that sees positions before the log does has them at their true instants: the log

@@ -126,22 +126,48 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     if !matters {
         return out;
     }
-    // Per independent row, so that many unknowns explain nothing by their number.
-    let independent = y.len() as f64 / CORRELATED_ROWS;
-    let fitted = |candidate, value, left: &[f64], unknowns: usize| {
-        let free = independent - unknowns as f64;
-        let explained = 1.0 - square(left) / total * independent / free;
-        (free >= LEAST_FREEDOM).then_some(Fitted { candidate, value, explained })
-    };
     if lacks_weight {
         out.candidates = vec![Fitted { candidate: TorqueCandidate::Gravity, value: 1.0, explained: 1.0 }];
         return out;
     }
+    let free = Free { coefficients: &free, has_scale: scale_std.is_finite(), pushes_away };
+    let candidates = candidates(data, joint, &free, &beside, total);
+    // Another joint that explains the torque alike is no rival of the best one.
+    for one in candidates {
+        if !out.candidates.iter().any(|other| other.candidate == one.candidate) {
+            out.candidates.push(one);
+        }
+    }
+    out
+}
+
+/// The fit of a joint's torque by all of its columns.
+struct Free<'a> {
+    coefficients: &'a [f64],
+    /// Whether the scale has an error bar.
+    has_scale: bool,
+    /// Whether the drive seems to push away from the path.
+    pushes_away: bool,
+}
+
+/// What may explain a joint's difference `beside` between logged and commanded torque, the best first. `total` is the
+/// squared difference beside the drives' own loop.
+fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64], total: f64) -> Vec<Fitted> {
+    let (y, columns) = (&data.torque[joint], &data.columns[joint]);
+    let own_loop = columns.get(1..).unwrap_or_default();
+    // Per independent row, so that many unknowns explain nothing by their number.
+    let independent = y.len() as f64 / CORRELATED_ROWS;
+    let fitted = |candidate, value, left: &[f64], unknowns: usize| {
+        let freedom = independent - unknowns as f64;
+        let explained = 1.0 - square(left) / total * independent / freedom;
+        (freedom >= LEAST_FREEDOM).then_some(Fitted { candidate, value, explained })
+    };
     let mut candidates = Vec::new();
-    let left = residual_of(columns, y, &free);
-    if pushes_away {
+    let left = residual_of(columns, y, free.coefficients);
+    if free.pushes_away {
         candidates.push(Fitted { candidate: TorqueCandidate::Sign, value: -1.0, explained: 1.0 });
-    } else if scale_std.is_finite() {
+    } else if free.has_scale {
+        let scale = free.coefficients[0];
         let candidate = if scale < 0.0 { TorqueCandidate::Sign } else { TorqueCandidate::Scale };
         candidates.extend(fitted(candidate, scale, &left, 1));
     }
@@ -149,8 +175,8 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     // What is missing, beside the drives' own loop as it then fits.
     let missing = |extra: &[Vec<f64>]| {
         let all: Vec<Vec<f64>> = extra.iter().chain(own_loop).cloned().collect();
-        let found = coefficients(&all, &beside);
-        let left = residual_of(&all, &beside, &found);
+        let found = coefficients(&all, beside);
+        let left = residual_of(&all, beside, &found);
         let sum = |row: usize| -extra.iter().zip(&found).map(|(column, value)| column[row] * value).sum::<f64>();
         ((0..y.len()).map(sum).collect::<Vec<f64>>(), left)
     };
@@ -170,13 +196,7 @@ pub(super) fn explain(data: &JointData<'_>, joint: usize, settings: &TorqueCheck
     }
     candidates.extend(clipped(y, columns, total));
     candidates.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    // Another joint that explains the torque alike is no rival of the best one.
-    for one in candidates {
-        if !out.candidates.iter().any(|other| other.candidate == one.candidate) {
-            out.candidates.push(one);
-        }
-    }
-    out
+    candidates
 }
 
 /// What may be missing in the torque of each joint: its gravity, and its friction.

@@ -164,39 +164,15 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
     let cutoff_hz = cutoff_hz(task, with.identification, newest);
     // The gains of drives with their own loop are the same in all runs.
     let used = if source == CommandSource::Controller { &runs[runs.len() - 1..] } else { runs };
-    let mut observed = Vec::new();
-    for run in used {
-        let law = law_of(run);
-        for (leg, record) in run.legs.iter().zip(run.records) {
-            observed.extend(ObservedLeg::new(leg, record, cutoff_hz).map(|leg| (law, leg)));
-        }
-    }
+    let observed = Observed::of(used, dof, cutoff_hz);
     let mut check = TorqueCheck::without_command(source, with.row_scales);
-    let rows: usize = observed.iter().map(|(_, leg)| leg.rows()).sum();
-    if rows < FEWEST_ROWS {
+    if observed.rows() < FEWEST_ROWS {
         return None;
     }
-    let joined = |of: &dyn Fn(&ObservedLeg<'_>) -> Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-        let mut out = vec![Vec::new(); dof];
-        for (_, leg) in &observed {
-            out.iter_mut().zip(of(leg)).for_each(|(out, values)| out.extend(values));
-        }
-        out
-    };
-    let torque = joined(&|leg| leg.torque.clone());
-    let motion = [0, 1, 2].map(|place| joined(&|leg| leg.filtered_motion()[place].clone()));
-    let columns = |timing: &[f64; SHARED]| {
-        let mut out: Vec<Vec<Vec<f64>>> = vec![Vec::new(); dof];
-        for (law, leg) in &observed {
-            for (own, of_joint) in out.iter_mut().zip(leg.columns(*law, timing)) {
-                own.resize(of_joint.len().max(own.len()), Vec::new());
-                own.iter_mut().zip(of_joint).for_each(|(out, values)| out.extend(values));
-            }
-        }
-        out
-    };
-    let (parameters, starts) = (shared_parameters(), observed[0].0.starts());
-    let mut fit = separable_fit(&torque, &parameters, &starts, &mut |timing| columns(timing));
+    let torque = observed.joined(&|leg| leg.torque.clone());
+    let motion = [0, 1, 2].map(|place| observed.joined(&|leg| leg.filtered_motion()[place].clone()));
+    let (parameters, starts) = (shared_parameters(), observed.legs[0].0.starts());
+    let mut fit = separable_fit(&torque, &parameters, &starts, &mut |timing| observed.columns(timing));
     if fit.columns.iter().zip(&torque).any(|(columns, y)| columns.iter().any(|column| column.len() != y.len())) {
         return None;
     }
@@ -212,7 +188,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
             JointData { task, torque: &torque, columns: &fit.columns, q: &motion[0], dq: &motion[1], ddq: &motion[2] };
         for extra in may_be_missing(&data) {
             let other = separable_fit(&torque, &parameters, &starts, &mut |timing| {
-                let own = columns(timing).into_iter().zip(&extra);
+                let own = observed.columns(timing).into_iter().zip(&extra);
                 own.map(|(own, extra)| own.into_iter().chain(extra.iter().cloned()).collect()).collect()
             });
             let own = other.columns.iter().zip(&fit.columns);
@@ -225,20 +201,7 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
             }
         }
     }
-    let [position_s, velocity_s, lag_s, clock, _] = fit.shared;
-    check.feedback_delay_s = [position_s, velocity_s];
-    check.torque_lag_s = lag_s;
-    check.clock_percent = 100.0 * clock;
-    check.clock_percent_std = Some(100.0 * fit.std_of([0.0, 0.0, 0.0, 1.0, 0.0]));
-    check.torque_lag_std_s = Some(fit.std_of([f64::from(position_s < 0.0), 0.0, 1.0, 0.0, 0.0]));
-    for (joint, explanation) in explanations.iter().enumerate() {
-        let shown = &mut check.joints[joint];
-        (shown.scale, shown.scale_std) = (explanation.scale, explanation.scale_std);
-        shown.difference_percent = Some(explanation.difference_percent);
-        let step = torque[joint].len().div_ceil(MOST_POINTS).max(1);
-        let commanded = explanation.commanded.iter().step_by(step);
-        shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
-    }
+    check.show(&fit, &explanations, &torque);
     check.causes = causes::causes(task, &check, &explanations, &found.named, with);
     // A drive at its limit also changes the scale of its joint's rows.
     let is_open = |cause: &TorqueCause| matches!(cause, TorqueCause::JointScale { .. });
@@ -251,6 +214,70 @@ fn compared(task: &IterationTask, runs: &[CheckedRun<'_>], with: &CheckWith<'_>)
         }
     }
     Some(check)
+}
+
+/// The legs that are compared, each with the law that commanded it.
+struct Observed<'a> {
+    dof: usize,
+    legs: Vec<(CommandLaw<'a>, ObservedLeg<'a>)>,
+}
+
+impl<'a> Observed<'a> {
+    fn of(runs: &[CheckedRun<'a>], dof: usize, cutoff_hz: f64) -> Self {
+        let mut legs = Vec::new();
+        for run in runs {
+            let law = law_of(run);
+            for (leg, record) in run.legs.iter().zip(run.records) {
+                legs.extend(ObservedLeg::new(leg, record, cutoff_hz).map(|leg| (law, leg)));
+            }
+        }
+        Self { dof, legs }
+    }
+
+    fn rows(&self) -> usize {
+        self.legs.iter().map(|(_, leg)| leg.rows()).sum()
+    }
+
+    /// A quantity of each joint, over all legs.
+    fn joined(&self, of: &dyn Fn(&ObservedLeg<'_>) -> Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let mut out = vec![Vec::new(); self.dof];
+        for (_, leg) in &self.legs {
+            out.iter_mut().zip(of(leg)).for_each(|(out, values)| out.extend(values));
+        }
+        out
+    }
+
+    /// The columns of each joint with this timing, over all legs.
+    fn columns(&self, timing: &[f64; SHARED]) -> Vec<Vec<Vec<f64>>> {
+        let mut out: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.dof];
+        for (law, leg) in &self.legs {
+            for (own, of_joint) in out.iter_mut().zip(leg.columns(*law, timing)) {
+                own.resize(of_joint.len().max(own.len()), Vec::new());
+                own.iter_mut().zip(of_joint).for_each(|(out, values)| out.extend(values));
+            }
+        }
+        out
+    }
+}
+
+impl TorqueCheck {
+    /// Takes over timing, scales and points of a fit.
+    fn show(&mut self, fit: &SeparableFit, explanations: &[Explanation], torque: &[Vec<f64>]) {
+        let [position_s, velocity_s, lag_s, clock, _] = fit.shared;
+        self.feedback_delay_s = [position_s, velocity_s];
+        self.torque_lag_s = lag_s;
+        self.clock_percent = 100.0 * clock;
+        self.clock_percent_std = Some(100.0 * fit.std_of([0.0, 0.0, 0.0, 1.0, 0.0]));
+        self.torque_lag_std_s = Some(fit.std_of([f64::from(position_s < 0.0), 0.0, 1.0, 0.0, 0.0]));
+        for (joint, explanation) in explanations.iter().enumerate() {
+            let shown = &mut self.joints[joint];
+            (shown.scale, shown.scale_std) = (explanation.scale, explanation.scale_std);
+            shown.difference_percent = Some(explanation.difference_percent);
+            let step = torque[joint].len().div_ceil(MOST_POINTS).max(1);
+            let commanded = explanation.commanded.iter().step_by(step);
+            shown.points = commanded.zip(torque[joint].iter().step_by(step)).map(|(a, b)| [*a, *b]).collect();
+        }
+    }
 }
 
 impl TorqueCheck {

@@ -81,29 +81,8 @@ pub(super) fn separable_fit(
     let mut covariance = None;
     for _ in 0..MOST_STEPS {
         let sigma = scale(&residuals);
-        let mut slopes: Vec<Vec<Vec<f64>>> = Vec::with_capacity(SHARED);
-        for (place, parameter) in parameters.iter().enumerate() {
-            let mut beside = shared;
-            beside[place] += parameter.difference;
-            let moved = projected(y, &columns(&beside));
-            let slope = |(moved, own): (&Vec<f64>, &Vec<f64>)| {
-                moved.iter().zip(own).map(|(a, b)| (a - b) / parameter.difference).collect()
-            };
-            slopes.push(moved.iter().zip(&residuals).map(slope).collect());
-        }
-        let mut normal = DMatrix::<f64>::zeros(SHARED, SHARED);
-        let mut right = DVector::<f64>::zeros(SHARED);
-        for (i, own) in slopes.iter().enumerate() {
-            normal[(i, i)] += parameters[i].expected.powi(-2);
-            right[i] -= shared[i] * parameters[i].expected.powi(-2);
-            for joint in 0..y.len() {
-                let weight = sigma[joint].powi(-2);
-                right[i] -= weight * dot(&own[joint], &residuals[joint]);
-                for (k, other) in slopes.iter().enumerate() {
-                    normal[(i, k)] += weight * dot(&own[joint], &other[joint]);
-                }
-            }
-        }
+        let slopes = slopes(y, parameters, &shared, &residuals, columns);
+        let NormalEquations { normal, right } = NormalEquations::new(parameters, &shared, &slopes, &residuals, &sigma);
         let Some(factor) = normal.cholesky() else { break };
         let step = factor.solve(&right);
         covariance = Some(factor.inverse());
@@ -127,6 +106,58 @@ pub(super) fn separable_fit(
         }
     }
     SeparableFit { shared, covariance, columns: at }
+}
+
+/// Derivatives of the projected residuals by the shared parameters, joint by joint, by finite differences.
+fn slopes(
+    y: &[Vec<f64>],
+    parameters: &[SharedParameter; SHARED],
+    shared: &[f64; SHARED],
+    residuals: &[Vec<f64>],
+    columns: &mut dyn FnMut(&[f64; SHARED]) -> Vec<JointColumns>,
+) -> Vec<Vec<Vec<f64>>> {
+    let mut slopes: Vec<Vec<Vec<f64>>> = Vec::with_capacity(SHARED);
+    for (place, parameter) in parameters.iter().enumerate() {
+        let mut beside = *shared;
+        beside[place] += parameter.difference;
+        let moved = projected(y, &columns(&beside));
+        let slope = |(moved, own): (&Vec<f64>, &Vec<f64>)| {
+            moved.iter().zip(own).map(|(a, b)| (a - b) / parameter.difference).collect()
+        };
+        slopes.push(moved.iter().zip(residuals).map(slope).collect());
+    }
+    slopes
+}
+
+/// The linear equations of one Gauss-Newton step.
+struct NormalEquations {
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl NormalEquations {
+    fn new(
+        parameters: &[SharedParameter; SHARED],
+        shared: &[f64; SHARED],
+        slopes: &[Vec<Vec<f64>>],
+        residuals: &[Vec<f64>],
+        sigma: &[f64],
+    ) -> Self {
+        let mut normal = DMatrix::<f64>::zeros(SHARED, SHARED);
+        let mut right = DVector::<f64>::zeros(SHARED);
+        for (i, own) in slopes.iter().enumerate() {
+            normal[(i, i)] += parameters[i].expected.powi(-2);
+            right[i] -= shared[i] * parameters[i].expected.powi(-2);
+            for joint in 0..residuals.len() {
+                let weight = sigma[joint].powi(-2);
+                right[i] -= weight * dot(&own[joint], &residuals[joint]);
+                for (k, other) in slopes.iter().enumerate() {
+                    normal[(i, k)] += weight * dot(&own[joint], &other[joint]);
+                }
+            }
+        }
+        Self { normal, right }
+    }
 }
 
 fn projected(y: &[Vec<f64>], columns: &[JointColumns]) -> Vec<Vec<f64>> {

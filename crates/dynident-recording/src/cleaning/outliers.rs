@@ -50,69 +50,13 @@ const NORMAL: f64 = 1.4826;
 /// medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups
 /// beside the sample and the step are this project's own.
 pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> Vec<usize> {
-    let n = x.len();
-    if n < FEWEST {
+    if x.len() < FEWEST {
         return Vec::new();
     }
-    // The ends are mirrored in the point where the line through the two groups inside ends: a slope goes on beyond it,
-    // and the last sample itself, which may be an outlier, has no say.
-    let end = |at: &dyn Fn(usize) -> f64| {
-        let [near, far] =
-            [1, 1 + GROUP].map(|from| median_of_five(&core::array::from_fn::<f64, GROUP, _>(|k| at(from + k))));
-        near + 0.6 * (near - far)
-    };
-    let (first, last) = (end(&|k| x[k]), end(&|k| x[n - 1 - k]));
-    let before = (1..=REACH).rev().map(|k| 2.0 * first - x[k]);
-    let behind = (1..=REACH).map(|k| 2.0 * last - x[n - 1 - k]);
-    let padded: Vec<f64> = before.chain(x.iter().copied()).chain(behind).collect();
-    let medians: Vec<f64> = padded.windows(GROUP).map(median_of_five).collect();
-    let around = |i: usize| {
-        let place = i + REACH;
-        [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| medians[from])
-    };
-    // The cubic through values at -8, -3, 3 and 8, at 0.
-    let smooth =
-        |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
-    let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
-    // How far sample k lies above all that is suggested for sample i, or below.
-    let signed = |i: usize, k: usize| {
-        let usual = usual_range(around(i), x[i] - off[i]);
-        (x[k] - usual.end).max(0.0) - (usual.start - x[k]).max(0.0)
-    };
-    let outside = |i: usize| signed(i, i).abs();
-    // Where one side alone is known: what swings from sample to sample is none either.
-    let at_an_end = |i: usize, least: f64| {
-        if (REACH..n - REACH).contains(&i) {
-            return 0.0;
-        }
-        let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
-        let nearby = nearby.filter(|k| *k != i && k + 1 != i);
-        let changes = middle_size(nearby.map(|k| x[k + 1] - x[k]));
-        f64::max(TIMES_AT_ENDS * least, TIMES_CHANGES * changes)
-    };
-    let overall = NORMAL * middle_size(off.iter().copied());
-    let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
-    let mut apart = Vec::new();
-    let half = NOISE_SPAN / 2;
-    let mut from = own.start;
-    while from < own.end {
-        let to = (from + half).min(own.end);
-        let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
-        let noise = f64::max(NORMAL * middle_size(off[low..high].iter().copied()), 0.5 * overall);
-        // Where most samples lie on a line there is no noise to go by, only the spread of the whole.
-        let share = if noise > 0.0 && !mostly_repeats { SHARE_OF_SPREAD } else { 2.0 };
-        let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
-        for i in from..to {
-            if off[i].abs() > 0.5 * least {
-                let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
-                let usual = (TIMES_NEIGHBOURS * middle_size(nearby.map(outside))).max(at_an_end(i, least));
-                apart.push((i, outside(i) / least.max(usual)));
-            }
-        }
-        from = to;
-    }
-    let limit = limit_of(apart.iter().map(|(_, times)| *times));
-    let mut found: Vec<usize> = apart.into_iter().filter(|(_, times)| *times > limit).map(|(i, _)| i).collect();
+    let around = Surroundings::of(x);
+    let apart = around.apart(own.clone(), spread);
+    let limit = limit_of(apart.iter().map(|apart| apart.times));
+    let mut found: Vec<usize> = apart.iter().filter(|apart| apart.times > limit).map(|apart| apart.sample).collect();
     if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
         return Vec::new();
     }
@@ -122,15 +66,116 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         return Vec::new();
     }
     if let Some(step) = quantisation_step(x) {
-        found.retain(|&i| outside(i) > QUANTA * step);
+        found.retain(|&i| around.outside(i) > QUANTA * step);
     }
-    found.retain(|&i| {
-        let beside = |k: &usize| signed(i, *k) / signed(i, i) > SHARE_OF_PULSE;
-        let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
-        let behind = (i + 1..n).take(SIDE_BY_SIDE).take_while(beside).count();
-        before + 1 + behind < SIDE_BY_SIDE
-    });
+    found.retain(|&i| !around.is_pulse(i));
     found
+}
+
+/// Samples and the torques that the medians of the groups around each suggest for it.
+struct Surroundings<'a> {
+    x: &'a [f64],
+    /// Medians of five successive samples, the ends continued.
+    medians: Vec<f64>,
+    /// Distance of each sample from its cubic.
+    off: Vec<f64>,
+}
+
+/// A sample that is far from its cubic.
+struct Apart {
+    sample: usize,
+    /// Distance in units of the least that an outlier has.
+    times: f64,
+}
+
+impl<'a> Surroundings<'a> {
+    fn of(x: &'a [f64]) -> Self {
+        let n = x.len();
+        // The ends are mirrored in the point where the line through the two groups inside ends: a slope goes on beyond
+        // it, and the last sample itself, which may be an outlier, has no effect.
+        let end = |at: &dyn Fn(usize) -> f64| {
+            let [near, far] =
+                [1, 1 + GROUP].map(|from| median_of_five(&core::array::from_fn::<f64, GROUP, _>(|k| at(from + k))));
+            near + 0.6 * (near - far)
+        };
+        let (first, last) = (end(&|k| x[k]), end(&|k| x[n - 1 - k]));
+        let before = (1..=REACH).rev().map(|k| 2.0 * first - x[k]);
+        let behind = (1..=REACH).map(|k| 2.0 * last - x[n - 1 - k]);
+        let padded: Vec<f64> = before.chain(x.iter().copied()).chain(behind).collect();
+        let medians = padded.windows(GROUP).map(median_of_five).collect();
+        let mut around = Self { x, medians, off: Vec::new() };
+        // The cubic through values at -8, -3, 3 and 8, at 0.
+        let smooth =
+            |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
+        around.off = (0..n).map(|i| x[i] - smooth(around.medians_around(i))).collect();
+        around
+    }
+
+    /// The medians of the two groups before sample `i` and of the two behind it.
+    fn medians_around(&self, i: usize) -> [f64; 4] {
+        let place = i + REACH;
+        [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| self.medians[from])
+    }
+
+    /// How far sample `k` lies above all that is suggested for sample `i`, or below.
+    fn signed(&self, i: usize, k: usize) -> f64 {
+        let x = self.x;
+        let usual = usual_range(self.medians_around(i), x[i] - self.off[i]);
+        (x[k] - usual.end).max(0.0) - (usual.start - x[k]).max(0.0)
+    }
+
+    fn outside(&self, i: usize) -> f64 {
+        self.signed(i, i).abs()
+    }
+
+    /// Least distance of an outlier near an end, where only one side is known: a signal that swings from sample to
+    /// sample has no outlier there.
+    fn least_at_an_end(&self, i: usize, least: f64) -> f64 {
+        let n = self.x.len();
+        if (REACH..n - REACH).contains(&i) {
+            return 0.0;
+        }
+        let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
+        let nearby = nearby.filter(|k| *k != i && k + 1 != i);
+        let changes = middle_size(nearby.map(|k| self.x[k + 1] - self.x[k]));
+        f64::max(TIMES_AT_ENDS * least, TIMES_CHANGES * changes)
+    }
+
+    /// The samples of `own` that are far from their cubics.
+    fn apart(&self, own: core::ops::Range<usize>, spread: f64) -> Vec<Apart> {
+        let (x, off, n) = (self.x, &self.off, self.x.len());
+        let overall = NORMAL * middle_size(off.iter().copied());
+        let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
+        let mut apart = Vec::new();
+        let half = NOISE_SPAN / 2;
+        let mut from = own.start;
+        while from < own.end {
+            let to = (from + half).min(own.end);
+            let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
+            let noise = f64::max(NORMAL * middle_size(off[low..high].iter().copied()), 0.5 * overall);
+            // Where most samples lie on a line there is no noise to go by, only the spread of the whole.
+            let share = if noise > 0.0 && !mostly_repeats { SHARE_OF_SPREAD } else { 2.0 };
+            let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
+            for i in from..to {
+                if off[i].abs() > 0.5 * least {
+                    let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
+                    let usual = TIMES_NEIGHBOURS * middle_size(nearby.map(|k| self.outside(k)));
+                    let usual = usual.max(self.least_at_an_end(i, least));
+                    apart.push(Apart { sample: i, times: self.outside(i) / least.max(usual) });
+                }
+            }
+            from = to;
+        }
+        apart
+    }
+
+    /// Whether sample `i` and its neighbours are a pulse of the torque.
+    fn is_pulse(&self, i: usize) -> bool {
+        let beside = |k: &usize| self.signed(i, *k) / self.signed(i, i) > SHARE_OF_PULSE;
+        let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
+        let behind = (i + 1..self.x.len()).take(SIDE_BY_SIDE).take_while(beside).count();
+        before + 1 + behind >= SIDE_BY_SIDE
+    }
 }
 
 /// Where outliers begin, for distances in units of the least that one can have: at one, or twice as far, and so on,

@@ -101,31 +101,13 @@ pub(crate) fn clock(
     q: &[Vec<f64>],
     max_gap_steps: f64,
 ) -> Result<Clock, String> {
-    let successive = || (1..time_s.len()).filter(|i| row[*i] == row[i - 1] + 1);
-    let all = successive().map(|i| time_s[i] - time_s[i - 1]);
-    let mut steps: Vec<f64> = all.filter(|step| *step > 0.0 && step.is_finite()).collect();
-    if steps.is_empty() {
-        return Err("no time step is positive".to_owned());
-    }
-    steps.sort_by(f64::total_cmp);
-    let median = steps[steps.len() / 2];
-    let usual = &steps[..steps.partition_point(|step| *step <= max_gap_steps * median)];
-    let equal: Vec<usize> = successive().filter(|i| time_s[*i] == time_s[i - 1]).collect();
-    let repeats_rows = !equal.is_empty() && repeat_the_one_before(q, &equal, successive());
-    let rounded = if repeats_rows { 0 } else { equal.len() };
-    let usual = [&vec![0.0; rounded], usual].concat();
-    let count = usual.len() as f64;
-    let mean = usual.iter().sum::<f64>() / count;
-    let deviation = (usual.iter().map(|step| (step - mean).powi(2)).sum::<f64>() / count).sqrt();
-    let rate_hz = mean.recip();
-    if !(rate_hz.is_finite() && rate_hz > 0.0 && rate_hz <= 1e9) {
-        return Err(format!("the mean step is {mean} s"));
-    }
-    let jitter = deviation / mean;
+    let steps = MeanStep::of(time_s, row, q, max_gap_steps)?;
+    let MeanStep { mean_s, median_s, rounded, repeats_rows, .. } = steps;
+    let rate_hz = mean_s.recip();
     let mut result = Clock {
         rate_hz,
         uniform: true,
-        median_step_s: median,
+        median_step_s: median_s,
         repeats_rows,
         misfit_uniform: None,
         misfit_stamps: None,
@@ -133,23 +115,19 @@ pub(crate) fn clock(
         smoothing_rows: 0,
         evidence: String::new(),
     };
-    let by_rows = match rounded {
-        0 => String::new(),
-        _ => format!("; {rounded} of {} stamps equal the one before: they are rounded, and all rows count", row.len()),
-    };
-    let share = format!("{:.3} % jitter{by_rows}", 100.0 * jitter);
-    if rule == ClockRule::Auto && jitter < NEGLIGIBLE_JITTER {
+    let share = steps.jitter_in_words(row.len());
+    if rule == ClockRule::Auto && steps.jitter < NEGLIGIBLE_JITTER {
         result.evidence = format!("even spacing: {share} is negligible");
         return Ok(result);
     }
-    let (uniform, stamps) = misfits(time_s, q, mean, max_gap_steps * median);
-    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median);
+    let (uniform, stamps) = misfits(time_s, q, mean_s, max_gap_steps * median_s);
+    let drift = drift(time_s, row, q, rate_hz, max_gap_steps * median_s);
     result.misfit_uniform = Some(uniform);
     result.misfit_stamps = Some(stamps);
     result.drift_steps = drift.map(|drift| drift.steps);
     let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
     // Rounding alone makes stamps stray by what they are rounded to, either way.
-    let by_rounding = if rounded > 0 { 2.0 * median / mean } else { 0.0 };
+    let by_rounding = if rounded > 0 { 2.0 * median_s / mean_s } else { 0.0 };
     let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
     (result.uniform, result.smoothing_rows) = match rule {
         ClockRule::Stamps => (false, 0),
@@ -160,26 +138,81 @@ pub(crate) fn clock(
         }
         ClockRule::Uniform | ClockRule::Auto => (true, 0),
     };
-    let believed = match result.spacing() {
+    let misfit = format!("misfit of a local cubic: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
+    result.evidence = decision_in_words(rule, &result, &misfit, drift);
+    Ok(result)
+}
+
+/// The steps between successive rows, without gaps.
+struct MeanStep {
+    mean_s: f64,
+    /// Median of the positive steps, gaps included.
+    median_s: f64,
+    /// Standard deviation over the mean.
+    jitter: f64,
+    /// Stamps that equal the one before because they are rounded.
+    rounded: usize,
+    /// Whether stamps that equal the one before belong to rows that repeat it.
+    repeats_rows: bool,
+}
+
+impl MeanStep {
+    fn of(time_s: &[f64], row: &[u64], q: &[Vec<f64>], max_gap_steps: f64) -> Result<Self, String> {
+        let successive = || (1..time_s.len()).filter(|i| row[*i] == row[i - 1] + 1);
+        let all = successive().map(|i| time_s[i] - time_s[i - 1]);
+        let mut steps: Vec<f64> = all.filter(|step| *step > 0.0 && step.is_finite()).collect();
+        if steps.is_empty() {
+            return Err("no time step is positive".to_owned());
+        }
+        steps.sort_by(f64::total_cmp);
+        let median_s = steps[steps.len() / 2];
+        let usual = &steps[..steps.partition_point(|step| *step <= max_gap_steps * median_s)];
+        let equal: Vec<usize> = successive().filter(|i| time_s[*i] == time_s[i - 1]).collect();
+        let repeats_rows = !equal.is_empty() && repeat_the_one_before(q, &equal, successive());
+        let rounded = if repeats_rows { 0 } else { equal.len() };
+        let usual = [&vec![0.0; rounded], usual].concat();
+        let count = usual.len() as f64;
+        let mean_s = usual.iter().sum::<f64>() / count;
+        let deviation = (usual.iter().map(|step| (step - mean_s).powi(2)).sum::<f64>() / count).sqrt();
+        let rate_hz = mean_s.recip();
+        if !(rate_hz.is_finite() && rate_hz > 0.0 && rate_hz <= 1e9) {
+            return Err(format!("the mean step is {mean_s} s"));
+        }
+        Ok(Self { mean_s, median_s, jitter: deviation / mean_s, rounded, repeats_rows })
+    }
+
+    /// The jitter, and how many of so many stamps are rounded.
+    fn jitter_in_words(&self, stamps: usize) -> String {
+        let by_rows = match self.rounded {
+            0 => String::new(),
+            rounded => {
+                format!("; {rounded} of {stamps} stamps equal the one before: they are rounded, and all rows count")
+            }
+        };
+        format!("{:.3} % jitter{by_rows}", 100.0 * self.jitter)
+    }
+}
+
+/// The decision in a sentence.
+fn decision_in_words(rule: ClockRule, clock: &Clock, misfit: &str, drift: Option<Drift>) -> String {
+    let spacing = match clock.spacing() {
         Spacing::Even => "even spacing".to_owned(),
         Spacing::Stamps => "stamps".to_owned(),
-        Spacing::Smoothed => format!("stamps smoothed over {} rows", result.smoothing_rows),
+        Spacing::Smoothed => format!("stamps smoothed over {} rows", clock.smoothing_rows),
     };
-    let misfit = format!("misfit of a local cubic: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
     let strays = drift.map_or_else(String::new, |drift| {
         let Drift { steps, variation, .. } = drift;
         format!("; the stamps stray {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
     });
-    result.evidence = match rule {
-        ClockRule::Auto if result.spacing() == Spacing::Smoothed => {
-            format!("{believed}, decided by the drift{strays}; {misfit}")
+    match rule {
+        ClockRule::Auto if clock.spacing() == Spacing::Smoothed => {
+            format!("{spacing}, decided by the drift{strays}; {misfit}")
         }
-        ClockRule::Auto => format!("{believed}, decided by the {misfit}{strays}"),
+        ClockRule::Auto => format!("{spacing}, decided by the {misfit}{strays}"),
         ClockRule::Uniform | ClockRule::Stamps | ClockRule::Smoothed => {
-            format!("{believed}, as asked; {misfit}{strays}")
+            format!("{spacing}, as asked; {misfit}{strays}")
         }
-    };
-    Ok(result)
+    }
 }
 
 /// Whether the rows `equal` have the positions of the row before, while `all` rows mostly have not.

@@ -1,7 +1,7 @@
 //! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
 
 use super::columns::ColumnSelection;
-use super::format::Missing;
+use super::format::{LogFormat, Missing};
 use super::found_rules::FoundRules;
 use super::mapping::Mapping;
 use super::source::LogSource;
@@ -100,59 +100,17 @@ impl LogReader {
             Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
             None => None,
         };
-
         let rules = FoundRules::new(format, |key, column| tables[0].want(key, column))?;
-
-        // Channel groups in files of their own: each file is opened once.
-        let mut paths = vec![main.path().map(Path::to_owned)];
-        let mut groups = Vec::new();
-        for (quantity, group) in format.groups() {
-            let key = quantity.key();
-            let path = match &group.file {
-                None => main.path().map(Path::to_owned),
-                Some(name) => {
-                    let beside = main.path().ok_or_else(|| RecordingError::NoFolder { log: main.label(), key })?;
-                    Some(beside.parent().unwrap_or(Path::new("")).join(name))
-                }
-            };
-            let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
-            if let (Some(path), true) = (&path, table == paths.len()) {
-                let source = FileLog::new(path, format);
-                tables.push(ColumnSelection::new(source.label(), source.open()?));
-                paths.push(Some(path.clone()));
-            }
-            let list = group.column_list(key)?;
-            let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
-            let slots = slots.collect::<Result<Vec<_>, _>>()?;
-            let mapping = Mapping::new(group, quantity, log.joints.len())?;
-            groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
-        }
+        let groups = channel_groups(log, &mut tables)?;
         tables.iter_mut().for_each(ColumnSelection::ready);
-
-        // The part of the log that is asked for, and what to call it in messages.
-        let mut selection = Vec::new();
         let rows = match (format.rows, format.fraction) {
-            (Some(rows), _) => {
-                selection.push(format!("rows = {rows:?}"));
-                rows
-            }
+            (Some(rows), _) => rows,
             (None, Some([from, to])) => {
-                selection.push(format!("fraction = [{from}, {to}]"));
                 let count = tables[0].count_rows(main, &log.row_count)? as f64;
                 [(from * count).round() as u64, (to * count).round() as u64]
             }
             (None, None) => [0, u64::MAX],
         };
-        let rules_in_force = [
-            (!format.drop_rows.is_empty()).then_some("drop_rows"),
-            (!format.drop_time_s.is_empty()).then_some("drop_time_s"),
-            (!format.drop_where.is_empty()).then_some("drop_where"),
-            (!format.keep_where.is_empty()).then_some("keep_where"),
-        ];
-        selection.extend(rules_in_force.into_iter().flatten().map(str::to_owned));
-        if let Some(range) = format.time_range_s {
-            selection.push(format!("time_range_s = {range:?}"));
-        }
         Ok(Self {
             label: main.label(),
             joints: log.joints.clone(),
@@ -164,7 +122,7 @@ impl LogReader {
             rows,
             time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             rules,
-            selection: selection.join(", "),
+            selection: selection_in_words(format),
             missing: format.missing,
             next_row: 0,
             delivered: 0,
@@ -252,15 +210,7 @@ impl LogReader {
         }
         // The first row is always read: times count from it.
         if self.next_row > 0 && self.next_row < self.rows[0] {
-            let mut ended = None;
-            for (index, table) in self.tables.iter_mut().enumerate() {
-                if !table.skip_row()? {
-                    ended = Some(index);
-                }
-            }
-            self.finished = ended.is_some();
-            self.next_row += u64::from(!self.finished);
-            return ended.map_or(Ok(()), |index| self.check_ends(index));
+            return self.skip_row();
         }
         let (mut ended, mut missing) = (None, None);
         for (index, table) in self.tables.iter_mut().enumerate() {
@@ -277,20 +227,7 @@ impl LogReader {
         let row = self.next_row;
         self.next_row += 1;
         if let Some(index) = missing {
-            let values = &self.tables[0].values;
-            let since =
-                |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
-            let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
-            // Rows that are left out may hold anything.
-            if self.rules.drops(row, time_s, values) {
-                self.dropped.by_rule += u64::from(row >= self.rows[0]);
-                return Ok(());
-            }
-            if self.missing == Missing::Error {
-                return Err(self.tables[index].missing_error());
-            }
-            self.dropped.missing += u64::from(row >= self.rows[0]);
-            return Ok(());
+            return self.leave_out_missing(row, index);
         }
         let time_s = match self.time {
             Some((slot, seconds)) => {
@@ -318,6 +255,36 @@ impl LogReader {
         Ok(())
     }
 
+    /// Passes over a row before the first that is asked for.
+    fn skip_row(&mut self) -> Result<(), RecordingError> {
+        let mut ended = None;
+        for (index, table) in self.tables.iter_mut().enumerate() {
+            if !table.skip_row()? {
+                ended = Some(index);
+            }
+        }
+        self.finished = ended.is_some();
+        self.next_row += u64::from(!self.finished);
+        ended.map_or(Ok(()), |index| self.check_ends(index))
+    }
+
+    /// Leaves out a row with a missing value in table `index`, if a rule or the settings allow it.
+    fn leave_out_missing(&mut self, row: u64, index: usize) -> Result<(), RecordingError> {
+        let values = &self.tables[0].values;
+        let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
+        let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
+        // Rows that are left out may hold anything.
+        if self.rules.drops(row, time_s, values) {
+            self.dropped.by_rule += u64::from(row >= self.rows[0]);
+            return Ok(());
+        }
+        if self.missing == Missing::Error {
+            return Err(self.tables[index].missing_error());
+        }
+        self.dropped.missing += u64::from(row >= self.rows[0]);
+        Ok(())
+    }
+
     /// The files of one log must end together; one cut-off last row is forgiven.
     fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
         for table in &self.tables {
@@ -335,4 +302,54 @@ impl LogReader {
         }
         Ok(())
     }
+}
+
+/// The channel groups of a log; opens the files of groups that have their own, each once.
+fn channel_groups(log: &Log, tables: &mut Vec<ColumnSelection>) -> Result<Vec<Group>, RecordingError> {
+    let (format, main) = (&log.format, log.source());
+    let mut paths = vec![main.path().map(Path::to_owned)];
+    let mut groups = Vec::new();
+    for (quantity, group) in format.groups() {
+        let key = quantity.key();
+        let path = match &group.file {
+            None => main.path().map(Path::to_owned),
+            Some(name) => {
+                let beside = main.path().ok_or_else(|| RecordingError::NoFolder { log: main.label(), key })?;
+                Some(beside.parent().unwrap_or(Path::new("")).join(name))
+            }
+        };
+        let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
+        if let (Some(path), true) = (&path, table == paths.len()) {
+            let source = FileLog::new(path, format);
+            tables.push(ColumnSelection::new(source.label(), source.open()?));
+            paths.push(Some(path.clone()));
+        }
+        let list = group.column_list(key)?;
+        let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
+        let slots = slots.collect::<Result<Vec<_>, _>>()?;
+        let mapping = Mapping::new(group, quantity, log.joints.len())?;
+        groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
+    }
+    Ok(groups)
+}
+
+/// The keys of a format that leave out rows, for messages.
+fn selection_in_words(format: &LogFormat) -> String {
+    let mut selection = Vec::new();
+    match (format.rows, format.fraction) {
+        (Some(rows), _) => selection.push(format!("rows = {rows:?}")),
+        (None, Some([from, to])) => selection.push(format!("fraction = [{from}, {to}]")),
+        (None, None) => {}
+    }
+    let rules_in_force = [
+        (!format.drop_rows.is_empty()).then_some("drop_rows"),
+        (!format.drop_time_s.is_empty()).then_some("drop_time_s"),
+        (!format.drop_where.is_empty()).then_some("drop_where"),
+        (!format.keep_where.is_empty()).then_some("keep_where"),
+    ];
+    selection.extend(rules_in_force.into_iter().flatten().map(str::to_owned));
+    if let Some(range) = format.time_range_s {
+        selection.push(format!("time_range_s = {range:?}"));
+    }
+    selection.join(", ")
 }

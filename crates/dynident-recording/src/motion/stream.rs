@@ -1,14 +1,15 @@
 //! From a log file to q, dq, ddq and torque on a uniform clock, block by block.
 
+mod giving;
+
 use super::block::{MotionBlock, MotionSettings};
-use super::marks::kept_runs;
 use super::opening::Opening;
 use super::torque_lag::TorqueShift;
 use crate::cleaning::{CleanBlock, CleanRows};
 use crate::clock::Clock;
 use crate::clock::segments::{PlacedRows, Segmenter};
 use crate::clock::timeline::Timeline;
-use crate::derivative::{Derivatives, Differentiator, Place};
+use crate::derivative::Differentiator;
 use crate::error::{FilterError, RecordingError};
 use crate::filter::CutoffChoice;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
@@ -145,28 +146,23 @@ impl MotionStream {
         settings: &MotionSettings,
         build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
     ) -> Result<Self, RecordingError> {
-        let Log { format, joints, .. } = log;
         let opening = Opening::of(log, settings.keep_outliers)?;
+        let differentiator = build(&opening.cutoff)?;
+        Self::opened(log, settings, &opening, differentiator)
+    }
+
+    /// The stream of an opened log, before its first row.
+    fn opened(
+        log: &Log,
+        settings: &MotionSettings,
+        opening: &Opening,
+        differentiator: Box<dyn Differentiator>,
+    ) -> Result<Self, RecordingError> {
+        let Log { format, joints, .. } = log;
         let (clock, cutoff) = (opening.clock.clone(), opening.cutoff.clone());
         let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
-        let position_noise = opening.noise.beyond(in_force_hz);
         let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
         let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
-        let differentiator = build(&cutoff)?;
-        // Rows that come twice are left out, and what remains repeats nothing.
-        let rows_to_a_value = if clock.repeats_rows { [None; 2] } else { opening.rows_to_a_value };
-        let mut checks = Vec::new();
-        for (quantity, _) in format.groups() {
-            for (index, joint) in joints.iter().enumerate() {
-                let mut check = ChannelCheck::new(quantity, joint);
-                check.quantisation_step = match quantity {
-                    Quantity::Position => opening.position_steps[index],
-                    Quantity::Torque => opening.torque_steps[index],
-                    Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature => None,
-                };
-                checks.push(check);
-            }
-        }
         let comparisons = |group: bool| -> Vec<Comparison> {
             joints.iter().filter(|_| group).map(|joint| Comparison::new(joint)).collect()
         };
@@ -175,6 +171,7 @@ impl MotionStream {
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
         let torque_shift = TorqueShift::new(settings.torque_lags_s(joints.len())?.into_iter(), clock.rate_hz);
         let context = differentiator.context_samples(clock.rate_hz);
+        let unsettled = ((UNSETTLED_PERIODS * clock.rate_hz / in_force_hz) as usize).min(context.unwrap_or(0));
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
             rows_in: CleanRows::new(LogReader::open(log)?, timeline, joints, settings.keep_outliers),
@@ -183,16 +180,15 @@ impl MotionStream {
             joints: joints.clone(),
             trim: (settings.trim_s * clock.rate_hz).round() as usize,
             context: context.map(|samples| samples.max(torque_shift.reach())),
-            unsettled: {
-                let reach = context.unwrap_or(0);
-                ((UNSETTLED_PERIODS * clock.rate_hz / in_force_hz) as usize).min(reach)
-            },
+            unsettled,
             segmenter: Segmenter::new(channels),
             in_force_hz,
             time_check: TimeCheck::new(clock.median_step_s),
+            position_noise: opening.noise.beyond(in_force_hz),
+            // Rows that come twice are left out, and what remains repeats nothing.
+            rows_to_a_value: if clock.repeats_rows { [None; 2] } else { opening.rows_to_a_value },
             clock,
             cutoff,
-            position_noise,
             differentiator,
             smooth_torque: settings.smooth_torque,
             torque_shift,
@@ -205,8 +201,7 @@ impl MotionStream {
             short_segments: [0; 2],
             longest_short: 0,
             rows: 0,
-            rows_to_a_value,
-            checks,
+            checks: channel_checks(log, opening),
             velocity,
             acceleration,
             window: Default::default(),
@@ -396,118 +391,6 @@ impl MotionStream {
         Ok(given)
     }
 
-    /// Differentiates and gives out the samples from the first not yet given to `end`; false if trimming leaves none.
-    fn give(&mut self, block: &mut MotionBlock, end: usize, last: bool) -> Result<bool, RecordingError> {
-        let context = self.context.unwrap_or(usize::MAX);
-        let window_from = self.done.saturating_sub(context);
-        let window_to = if last { self.uniform[0].len() } else { end + context };
-        let from = self.done.max(self.trim.saturating_sub(self.passed as usize));
-        let (joints, rows) = (self.joints.len(), end.saturating_sub(from));
-        let rate = self.clock.rate_hz;
-        block.rate_hz = rate;
-        block.segment = self.segments + self.cuts;
-        block.first_time_s = self.segmenter.first_time_s() + (self.passed as f64 + from as f64) / rate;
-        block.rows = rows;
-        block.joints = joints;
-        let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = block;
-        for values in [q, dq, ddq, tau, tau_smooth, temperature_c] {
-            values.clear();
-        }
-        block.set_aside.clear();
-        let total = (self.passed as usize + self.uniform[0].len()).max(1);
-        let settled_from = if last { self.unsettled.min(total / 4) } else { self.unsettled };
-        let first = self.passed as usize + from;
-        block.unsettled = [settled_from.saturating_sub(first).min(rows), 0];
-        if last {
-            let settled_to = total - settled_from;
-            block.unsettled[1] = (first + rows).saturating_sub(settled_to).min(rows);
-        }
-        let mut marked = Vec::new();
-        if rows > 0 {
-            let first = self.passed + from as u64;
-            while self.set_aside.front().is_some_and(|(sample, _)| *sample < first) {
-                self.set_aside.pop_front();
-            }
-            while let Some((sample, joint)) =
-                self.set_aside.front().copied().filter(|(sample, _)| *sample < first + rows as u64)
-            {
-                block.set_aside.resize(joints * rows, false);
-                block.set_aside[joint * rows + (sample - first) as usize] = true;
-                self.set_aside.pop_front();
-            }
-            let inside = from - window_from..end - window_from;
-            let [q, dq, ddq, other] = &mut self.window;
-            for values in [&mut *q, &mut *dq, &mut *ddq, &mut *other] {
-                values.resize(window_to - window_from, 0.0);
-            }
-            for joint in 0..joints {
-                let signal = &self.uniform[joint][window_from..window_to];
-                let before = self.passed as f64 + window_from as f64;
-                let first_time_s = self.segmenter.first_time_s() + before / rate;
-                let place = Place { rate_hz: rate, joint, first_time_s };
-                marked.extend(self.differentiator.differentiate_at(place, signal, Derivatives { q, dq, ddq })?);
-                block.q.extend_from_slice(&q[inside.clone()]);
-                block.dq.extend_from_slice(&dq[inside.clone()]);
-                block.ddq.extend_from_slice(&ddq[inside.clone()]);
-                let tau = &self.uniform[joints + joint];
-                for row in self.torque_shift.append(joint, tau, from..end, &mut block.tau) {
-                    block.set_aside.resize(joints * rows, false);
-                    block.set_aside[joint * rows + row] = true;
-                }
-                if self.smooth_torque {
-                    self.differentiator.smooth(rate, &tau[window_from..window_to], other)?;
-                    self.torque_shift.append(joint, other, inside.clone(), &mut block.tau_smooth);
-                }
-                let first = 2 * joints + self.velocity.len() + self.acceleration.len();
-                if let Some(temperature) = self.uniform.get(first + joint) {
-                    block.temperature_c.extend_from_slice(&temperature[from..end]);
-                }
-                let channel = 2 * joints + joint;
-                if let Some(comparison) = self.velocity.get_mut(joint) {
-                    self.differentiator.smooth(rate, &self.uniform[channel][window_from..window_to], other)?;
-                    comparison.see(&dq[inside.clone()], &other[inside.clone()]);
-                }
-                if let Some(comparison) = self.acceleration.get_mut(joint) {
-                    let channel = channel + self.velocity.len();
-                    self.differentiator.smooth(rate, &self.uniform[channel][window_from..window_to], other)?;
-                    comparison.see(&ddq[inside.clone()], &other[inside.clone()]);
-                }
-            }
-        }
-        self.done = end.max(self.done);
-        let unneeded = self.done.saturating_sub(context);
-        if unneeded > 0 {
-            self.uniform.iter_mut().for_each(|channel| drop(channel.drain(..unneeded)));
-            self.done -= unneeded;
-            self.passed += unneeded as u64;
-        }
-        self.given += rows as u64;
-        if marked.is_empty() {
-            self.in_cut &= rows == 0;
-            return Ok(rows > 0);
-        }
-        self.keep_unmarked(block, &marked, from - window_from);
-        Ok(false)
-    }
-
-    /// Leaves the marked samples out; what remains waits as blocks of pieces of their own. `first` is the place of the
-    /// block's first row in the window that the marks count in.
-    fn keep_unmarked(&mut self, block: &MotionBlock, marked: &[core::ops::Range<usize>], first: usize) {
-        let runs = kept_runs(marked, first, block.rows);
-        let kept: usize = runs.iter().map(ExactSizeIterator::len).sum();
-        self.unmapped += (block.rows - kept) as u64;
-        self.given -= (block.rows - kept) as u64;
-        for run in &runs {
-            // A run at the block's start goes on with the piece before it.
-            self.cuts += usize::from(run.start > 0 || self.in_cut);
-            let mut kept = block.part(run.clone());
-            kept.segment = self.segments + self.cuts;
-            self.waiting.push_back(kept);
-            self.in_cut = run.end < block.rows;
-        }
-        self.in_cut |= runs.is_empty() && block.rows > 0;
-    }
-
     /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
     pub fn report(&self) -> ImportReport {
         let cutoff_hz = self.in_force_hz;
@@ -540,4 +423,21 @@ impl MotionStream {
         report.find();
         report
     }
+}
+
+/// A check for each channel, in the order of [`LogFormat::groups`].
+fn channel_checks(log: &Log, opening: &Opening) -> Vec<ChannelCheck> {
+    let mut checks = Vec::new();
+    for (quantity, _) in log.format.groups() {
+        for (index, joint) in log.joints.iter().enumerate() {
+            let mut check = ChannelCheck::new(quantity, joint);
+            check.quantisation_step = match quantity {
+                Quantity::Position => opening.position_steps[index],
+                Quantity::Torque => opening.torque_steps[index],
+                Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature => None,
+            };
+            checks.push(check);
+        }
+    }
+    checks
 }

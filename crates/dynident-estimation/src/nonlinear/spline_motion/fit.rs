@@ -9,7 +9,7 @@ use super::problem::{
 };
 use super::rows::{FreeParameters, Piece};
 use super::smoothing::smoothed;
-use super::system::{Paid, System, torque_information};
+use super::system::{Paid, System, TorqueInformation, torque_information};
 use crate::error::EstimationError;
 use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
 use rayon::prelude::*;
@@ -36,7 +36,8 @@ const LEVELS_STAY: usize = 12;
 /// How often levels are found again from one linearisation: at first, when they are far off, and later.
 const EARLY: (usize, usize) = (3, 3);
 
-/// Where motion and parameters are.
+/// Motion and parameters of one step.
+#[derive(Clone)]
 struct State {
     coefficients: Vec<Vec<f64>>,
     parameters: Vec<f64>,
@@ -78,96 +79,45 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
 ) -> Result<SplineMotionEstimate, M::Error> {
     settings.validate()?;
     problem.check()?;
-    let free = FreeParameters::new(&problem.held);
     let (pieces, mut noise, coefficients) = begin(problem, settings)?;
+    let fit = Fit { problem, settings, free: FreeParameters::new(&problem.held), pieces };
     let mut state = State { coefficients, parameters: problem.parameters.clone() };
-    let mut residuals = all_residuals(&pieces, model, &state)?;
-    for (log, own) in noise.iter_mut().enumerate() {
-        let of_log = || pieces.iter().zip(&residuals).filter(move |(piece, _)| piece.record.log == log);
-        for joint in 0..own.torque_std.len() {
-            let (sum, rows) = of_log().fold((0.0, 0), |(sum, rows), (_, r)| {
-                (sum + r[joint].iter().map(|x| x * x).sum::<f64>(), rows + r[joint].len())
-            });
-            let sigma = (sum / rows.max(1) as f64).sqrt().max(least_sigma(&pieces, log, joint));
-            (own.torque_std[joint], own.torque_variance[joint]) = (sigma, sigma * sigma);
-        }
-    }
-    let first = State { coefficients: state.coefficients.clone(), parameters: state.parameters.clone() };
+    let mut residuals = all_residuals(&fit.pieces, model, &state)?;
+    first_torque_levels(&fit.pieces, &residuals, &mut noise);
+    let first = state.clone();
     let (mut iterations, mut converged) = (0, false);
     let mut paid = None;
     while !converged && iterations < settings.max_iterations {
         iterations += 1;
-        let information: Vec<_> = pieces
-            .iter()
-            .zip(&state.coefficients)
-            .map(|(piece, own)| {
-                let log = &noise[piece.record.log];
-                torque_information(piece, model, own, &state.parameters, &free, log, settings.most_autoregression)
-            })
-            .collect::<Result<_, _>>()?;
-        // Levels of positions and smoothness about the linearised optimum, which moves with them.
+        let information = fit.information(model, &state, &noise)?;
         let before_levels = noise.clone();
-        let solve = |noise: &[LogNoise]| {
-            let system = System::new(&pieces, &information, &state.coefficients, noise, &free, &problem.names)?;
-            let (of_parameters, length) = system.step();
-            let of_motion: Vec<_> = (0..pieces.len()).map(|k| system.motion_step(k, &of_parameters)).collect();
-            Ok::<_, EstimationError>((system, of_parameters, of_motion, length))
-        };
         let again = match iterations {
             early if early <= EARLY.0 => EARLY.1,
             late if late > LEVELS_STAY => 0,
             _ => 1,
         };
         for _ in 0..again {
-            let (system, _, of_motion, _) = solve(&noise)?;
-            let found = Paid::new(&system, &pieces, &information, &noise, &free);
-            let moved: Vec<Vec<f64>> =
-                state.coefficients.iter().zip(&of_motion).map(|(c, step)| sum(c, step, 1.0)).collect();
-            found.levels(&pieces, &moved, &mut noise);
-            paid = Some(found);
+            paid = Some(fit.find_levels(&information, &state, &mut noise)?);
         }
-        let (_, of_parameters, of_motion, length) = solve(&noise)?;
-        let before = cost(&pieces, &state, &residuals, &noise);
-        let mut share = 1.0;
-        let mut better = None;
-        while better.is_none() && share > 1e-3 {
-            let mut candidate = State {
-                coefficients: state.coefficients.iter().zip(&of_motion).map(|(c, step)| sum(c, step, share)).collect(),
-                parameters: state.parameters.clone(),
-            };
-            for (&place, step) in free.free.iter().zip(&of_parameters) {
-                candidate.parameters[place] += share * step;
-            }
-            let found = all_residuals(&pieces, model, &candidate)?;
-            let after = cost(&pieces, &candidate, &found, &noise);
-            // At the minimum costs differ by rounding.
-            if after <= before * (1.0 + 1e-9) {
-                better = Some((candidate, found));
-            }
-            share *= 0.5;
-        }
+        let Solved { step, .. } = fit.solve(&information, &state, &noise)?;
+        let before = cost(&fit.pieces, &state, &residuals, &noise);
+        let better = fit.descended(model, &state, &step, &noise, before)?;
         let worse = better.is_none();
-        if let Some((candidate, found)) = better {
-            (state, residuals) = (candidate, found);
+        if let Some(better) = better {
+            (state, residuals) = (better.state, better.residuals);
         }
         if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_STAY) {
             let longest_noise_s = LONGEST_NOISE_S * settings.own_second_s;
-            torque_levels(
-                &pieces,
-                &residuals,
-                paid,
-                &mut noise,
-                settings.most_autoregression,
-                iterations,
-                longest_noise_s,
-            );
+            let most = settings.most_autoregression;
+            torque_levels(&fit.pieces, &residuals, paid, &mut noise, most, iterations, longest_noise_s);
         }
         let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
-        converged = length <= settings.tolerance && change <= SETTLED && iterations > 2;
-        if worse && length > settings.tolerance && change <= SETTLED {
+        converged = step.length <= settings.tolerance && change <= SETTLED && iterations > 2;
+        if worse && step.length > settings.tolerance && change <= SETTLED {
             break;
         }
     }
+    let Fit { pieces, free, .. } = fit;
     let cost_now = cost(&pieces, &state, &residuals, &noise);
     let at_start = all_residuals(&pieces, model, &first)?;
     let cost_at_start = cost(&pieces, &first, &at_start, &noise);
@@ -183,6 +133,123 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     )?;
     let motion = pieces.iter().zip(&state.coefficients).map(|(piece, own)| piece.motion(own, 0, piece.samples()));
     Ok(SplineMotionEstimate { estimate, motion: motion.collect(), logs, cost_at_start, cost: cost_now })
+}
+
+/// What stays the same from step to step.
+struct Fit<'a> {
+    problem: &'a SplineMotionProblem,
+    settings: &'a SplineMotionSettings,
+    free: FreeParameters,
+    pieces: Vec<Piece<'a>>,
+}
+
+/// A linearised system and its solution.
+struct Solved {
+    system: System,
+    step: Step,
+}
+
+/// A Gauss-Newton step.
+struct Step {
+    parameters: Vec<f64>,
+    motion: Vec<Vec<f64>>,
+    /// In error bars over all directions.
+    length: f64,
+}
+
+/// A state with the torque's residuals there: piece by piece, joint by joint.
+struct Evaluated {
+    state: State,
+    residuals: Vec<Vec<Vec<f64>>>,
+}
+
+impl Fit<'_> {
+    /// The torque linearised at a state, piece by piece.
+    fn information<M: TorqueModel>(
+        &self,
+        model: &mut M,
+        state: &State,
+        noise: &[LogNoise],
+    ) -> Result<Vec<TorqueInformation>, M::Error> {
+        let most = self.settings.most_autoregression;
+        let each = self.pieces.iter().zip(&state.coefficients);
+        each.map(|(piece, own)| {
+            let log = &noise[piece.record.log];
+            torque_information(piece, model, own, &state.parameters, &self.free, log, most)
+        })
+        .collect()
+    }
+
+    fn solve(
+        &self,
+        information: &[TorqueInformation],
+        state: &State,
+        noise: &[LogNoise],
+    ) -> Result<Solved, EstimationError> {
+        let (pieces, names) = (&self.pieces, &self.problem.names);
+        let system = System::new(pieces, information, &state.coefficients, noise, &self.free, names)?;
+        let (parameters, length) = system.step();
+        let motion = (0..pieces.len()).map(|k| system.motion_step(k, &parameters)).collect();
+        Ok(Solved { system, step: Step { parameters, motion, length } })
+    }
+
+    /// Levels of positions and smoothness about the linearised optimum, which moves with them.
+    fn find_levels(
+        &self,
+        information: &[TorqueInformation],
+        state: &State,
+        noise: &mut [LogNoise],
+    ) -> Result<Paid, EstimationError> {
+        let Solved { system, step } = self.solve(information, state, noise)?;
+        let found = Paid::new(&system, &self.pieces, information, noise, &self.free);
+        let moved: Vec<Vec<f64>> =
+            state.coefficients.iter().zip(&step.motion).map(|(c, step)| sum(c, step, 1.0)).collect();
+        found.levels(&self.pieces, &moved, noise);
+        Ok(found)
+    }
+
+    /// The state after the whole step, or a half of it, a quarter and so on, whose cost is not above `before`; none if
+    /// no share of the step has one.
+    fn descended<M: TorqueModel>(
+        &self,
+        model: &mut M,
+        state: &State,
+        step: &Step,
+        noise: &[LogNoise],
+        before: f64,
+    ) -> Result<Option<Evaluated>, M::Error> {
+        let mut share = 1.0;
+        while share > 1e-3 {
+            let mut candidate = State {
+                coefficients: state.coefficients.iter().zip(&step.motion).map(|(c, s)| sum(c, s, share)).collect(),
+                parameters: state.parameters.clone(),
+            };
+            for (&place, step) in self.free.free.iter().zip(&step.parameters) {
+                candidate.parameters[place] += share * step;
+            }
+            let residuals = all_residuals(&self.pieces, model, &candidate)?;
+            // At the minimum costs differ by rounding.
+            if cost(&self.pieces, &candidate, &residuals, noise) <= before * (1.0 + 1e-9) {
+                return Ok(Some(Evaluated { state: candidate, residuals }));
+            }
+            share *= 0.5;
+        }
+        Ok(None)
+    }
+}
+
+/// The torque's first levels: the root mean squares of its residuals.
+fn first_torque_levels(pieces: &[Piece<'_>], residuals: &[Vec<Vec<f64>>], noise: &mut [LogNoise]) {
+    for (log, own) in noise.iter_mut().enumerate() {
+        let of_log = || pieces.iter().zip(residuals).filter(move |(piece, _)| piece.record.log == log);
+        for joint in 0..own.torque_std.len() {
+            let (sum, rows) = of_log().fold((0.0, 0), |(sum, rows), (_, r)| {
+                (sum + r[joint].iter().map(|x| x * x).sum::<f64>(), rows + r[joint].len())
+            });
+            let sigma = (sum / rows.max(1) as f64).sqrt().max(least_sigma(pieces, log, joint));
+            (own.torque_std[joint], own.torque_variance[joint]) = (sigma, sigma * sigma);
+        }
+    }
 }
 
 /// Pieces with their knots, levels of every log, and coefficients of every piece.

@@ -134,21 +134,9 @@ impl LimitsInForce {
             not_checked.push("floor (defaults.floor is off)".to_owned());
         }
         if settings.self_collision && given.self_collision.is_none() && !shapes.shapes.is_empty() {
-            let (closer, in_pieces) = if settings.mesh_pieces > 1 && clearance_m > 0.0 {
-                shapes.refined(model, clearance_m, settings.mesh_pieces)?
-            } else {
-                (shapes.shapes.clone(), Vec::new())
-            };
-            under.self_collision = Some(SelfCollision {
-                clearance_m,
-                shapes: closer,
-                leave_out_touching: true,
-                ..SelfCollision::default()
-            });
-            assumed.push(format!(
-                "links that are no neighbours keep {clearance_m:.3} m apart, by {} (defaults.self_collision)",
-                shapes.in_words(&in_pieces)
-            ));
+            let (limit, words) = assumed_self_collision(model, shapes, settings.mesh_pieces, clearance_m)?;
+            under.self_collision = Some(limit);
+            assumed.push(words);
         }
         let mut limits = under.overlaid(given);
         if let (Some(floor), Some(over)) = (&mut limits.floor, &given.floor)
@@ -169,6 +157,26 @@ impl LimitsInForce {
         );
         Ok(Self { limits, assumed, not_checked })
     }
+}
+
+/// The distance that links keep from each other, and its description in words.
+fn assumed_self_collision(
+    model: &Model,
+    shapes: &ShapesOfLinks,
+    mesh_pieces: usize,
+    clearance_m: f64,
+) -> Result<(SelfCollision, String), LimitError> {
+    let (closer, in_pieces) = if mesh_pieces > 1 && clearance_m > 0.0 {
+        shapes.refined(model, clearance_m, mesh_pieces)?
+    } else {
+        (shapes.shapes.clone(), Vec::new())
+    };
+    let words = format!(
+        "links that are no neighbours keep {clearance_m:.3} m apart, by {} (defaults.self_collision)",
+        shapes.in_words(&in_pieces)
+    );
+    let limit = SelfCollision { clearance_m, shapes: closer, leave_out_touching: true, ..SelfCollision::default() };
+    Ok((limit, words))
 }
 
 /// Narrows the description's ranges; whether there was one.

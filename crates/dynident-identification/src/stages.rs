@@ -1,0 +1,316 @@
+//! The stages after the estimate: consistent parameters, examination, tests on held-out recordings, diagnosis.
+
+use crate::consistent::{
+    ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
+    nearest_to_nominal, parameter_std,
+};
+use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
+use crate::doubt::{break_limits, have_jumps, is_doubtful};
+use crate::error::IdentificationError;
+use crate::examination::{
+    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
+    TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
+};
+use crate::execution::Execution;
+use crate::logs::Logs;
+use crate::recording::Role;
+use crate::settings::{DiagnosisChoice, IdentificationSettings};
+use crate::task::IdentificationTask;
+use crate::training::Training;
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::consistent::PhysicalFit;
+use dynident_estimation::{Estimate, LinearProblem, left_out_ratios};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Physically consistent parameters beside an estimate, or why there are none.
+#[derive(Clone, Debug)]
+pub struct ConsistentParameters {
+    /// The consistent set that explains the data best; none if it was not asked for or does not exist.
+    pub fit: Option<PhysicalFit>,
+    /// Why there is none although it was asked for.
+    pub failure: Option<String>,
+    /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
+    /// nominal one that has the estimated base parameters.
+    pub parameters: Vec<f64>,
+    /// Standard deviation of each of `parameters` ([`parameter_std`]); none where there is no consistent set, and for
+    /// bodies that are not described.
+    pub parameter_std: Vec<Option<f64>>,
+    /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
+    pub intervals: Option<Vec<ParameterInterval>>,
+    /// Bodies whose nominal parameters are no body's, with the least eigenvalue of their pseudo-inertia.
+    pub inconsistent_nominal: Vec<(String, f64)>,
+}
+
+/// What the training recordings say of the estimate.
+#[derive(Clone, Debug)]
+pub struct TrainingExamination {
+    /// For each training recording the delays of its torque, joint by joint; none where it does not determine one.
+    pub delays: Vec<Vec<Option<TorqueLag>>>,
+    /// Measured and predicted torque over time.
+    pub traces: Vec<LogTrace>,
+    /// The delays of all recordings together, joint by joint.
+    pub pooled_delays: Vec<Option<TorqueLag>>,
+    /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
+    pub sign: Option<TorqueSignCheck>,
+    /// The mean friction of every joint with friction of its own; empty for payloads on a known arm.
+    pub friction_signs: Vec<FrictionSign>,
+}
+
+/// An estimate and what it was made from.
+pub(crate) struct Stage<'a> {
+    pub(crate) task: &'a IdentificationTask,
+    pub(crate) execution: Execution<'a>,
+    pub(crate) logs: &'a Logs<'a>,
+    pub(crate) settings: &'a IdentificationSettings,
+    pub(crate) training: &'a Training,
+    pub(crate) estimate: &'a Estimate,
+    /// Rows and fit with friction as stated, where it was chosen.
+    pub(crate) stated_friction: Option<&'a (Training, Estimate)>,
+    /// Whether the arm's parameters are those of an earlier result.
+    pub(crate) arm_is_known: bool,
+    /// When the estimate was finished.
+    pub(crate) started: Instant,
+}
+
+/// The consistent parameters of an estimate, and its tests.
+pub(crate) struct Examined {
+    pub(crate) consistent: ConsistentParameters,
+    /// Seconds from the estimate to the consistent parameters.
+    pub(crate) estimation_s: f64,
+    pub(crate) held_out: Vec<HeldOutExamination>,
+    pub(crate) examination: TrainingExamination,
+}
+
+impl Stage<'_> {
+    /// Consistent parameters and all tests, side by side where the execution is parallel.
+    pub(crate) fn examined(&self) -> Result<Examined, IdentificationError> {
+        let Self { task, logs, settings, training, estimate, .. } = *self;
+        let bodies = || -> Result<_, IdentificationError> {
+            let consistent = if self.arm_is_known {
+                held_arm(task, training, estimate)
+            } else {
+                consistent_stage(logs, settings, training, estimate)?
+            };
+            let estimation_s = self.started.elapsed().as_secs_f64();
+            let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+            let held_out = examine_all_held_out(logs, settings, training, estimate, physical);
+            Ok((consistent, estimation_s, held_out))
+        };
+        // The stated terms determine the sign: chosen friction has no wrong one, for such terms are left out.
+        let signs = || match self.stated_friction {
+            _ if self.arm_is_known => Ok((None, Vec::new())),
+            Some((stated, plain)) => torque_signs(stated, plain),
+            None => torque_signs(training, estimate),
+        };
+        let examined = || examine_all_training(logs, settings, training, estimate);
+        let (bodies, (signs, examined)) = if self.execution.parallel() {
+            rayon::join(bodies, || rayon::join(signs, examined))
+        } else {
+            (bodies(), (signs(), examined()))
+        };
+        let (consistent, estimation_s, held_out) = bodies?;
+        let (sign, friction_signs) = signs?;
+        let examination = TrainingExamination { sign, friction_signs, ..examined? };
+        Ok(Examined { consistent, estimation_s, held_out: held_out?, examination })
+    }
+
+    /// What the recordings would be under another study, if the settings ask for it or something does not fit.
+    pub(crate) fn diagnosis(
+        &self,
+        examined: &Examined,
+        robot: &ParametricModel,
+        chosen: &[usize],
+    ) -> Result<Option<Diagnosis>, IdentificationError> {
+        let Self { logs, settings, training, estimate, .. } = *self;
+        let plain = training.columns.is_plain().then(|| &estimate.values[..training.columns.base()]);
+        let own_terms = training.friction_choice.is_empty();
+        match settings.diagnosis {
+            DiagnosisChoice::Never => Ok(None),
+            _ if self.arm_is_known || have_jumps(training) => Ok(None),
+            DiagnosisChoice::WhenDoubtful if !self.is_doubted(examined, robot) => Ok(None),
+            DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
+                let theta = plain.filter(|_| own_terms);
+                Ok(Some(diagnose(DiagnosisTask { logs, settings, robot, training: chosen, theta })?))
+            }
+        }
+    }
+
+    /// Whether an examination gives reason to doubt the study.
+    fn is_doubted(&self, examined: &Examined, robot: &ParametricModel) -> bool {
+        let Examined { consistent, held_out, examination, .. } = examined;
+        let training = self.training;
+        let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+        let agreements = || training.logs.iter().filter_map(|log| log.nominal_agreement.as_ref());
+        is_doubtful(training, theta)
+            || examination.friction_signs.iter().any(FrictionSign::is_reversed)
+            || agreements().any(PriorAgreement::is_reversed)
+            || agreements().any(PriorAgreement::is_poor)
+            || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
+            || break_limits(training, robot.model())
+            || held_out.iter().any(|log| is_far_worse(&log.validation, &self.estimate.joint_sigma))
+    }
+}
+
+/// Times the noise of the fit that a held-out log may be worse before it gives reason to doubt: friction that changes
+/// with the motion costs less.
+const FAR_WORSE: f64 = 1.7;
+
+/// Whether a held-out log is far worse explained than the training logs, joints in units of their own noise.
+fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
+    let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
+    let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
+    let squares: Vec<f64> = joints.map(|(joint, sigma)| (joint.rmse_nm / sigma).powi(2)).collect();
+    squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
+}
+
+/// The arm's bodies are those of the earlier result; what the estimate of payloads says of them is the set nearest to
+/// the nominal one.
+fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
+    let robot = &training.model.parametric;
+    let settings = task.settings.consistency.as_ref();
+    ConsistentParameters {
+        fit: None,
+        failure: Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()),
+        parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
+        parameter_std: vec![None; robot.nominal().len()],
+        intervals: None,
+        inconsistent_nominal: settings.map_or_else(Vec::new, |settings| inconsistent_nominal_bodies(robot, settings)),
+    }
+}
+
+/// Consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if asked for.
+///
+/// # Errors
+/// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
+/// the result.
+pub fn consistent_stage(
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<ConsistentParameters, IdentificationError> {
+    let robot = &training.model.parametric;
+    let (alone, arm) = arm_alone(training, estimate)?;
+    let problem = alone.as_ref().unwrap_or(&training.problem);
+    let plain = settings.estimation.estimator.is_plain();
+    let fit =
+        settings.consistency.as_ref().map(|knowledge| consistent_with_estimate(robot, problem, &arm, plain, knowledge));
+    let (fit, failure) = match fit.transpose() {
+        Ok(fit) => (fit, None),
+        Err(reason) => (None, Some(reason.to_string())),
+    };
+    let intervals = match &settings.consistency {
+        // Where there is no consistent set, `failure` says why.
+        Some(knowledge) if settings.intervals && fit.is_some() => {
+            let progress = logs.execution.progress;
+            let found = consistent_intervals(robot, problem, &arm, plain, knowledge, progress);
+            Some(found.map_err(|reason: ConsistencyError| IdentificationError::Intervals(reason))?)
+        }
+        _ => None,
+    };
+    let parameters = fit.as_ref().map(|fit| fit.parameters.clone());
+    let knowledge = settings.consistency.as_ref();
+    // A fit that succeeded has a problem that is one.
+    let parameter_std = match knowledge.filter(|_| fit.is_some()) {
+        Some(knowledge) => parameter_std(robot, problem, &arm, knowledge).map_err(IdentificationError::Consistency)?,
+        None => vec![None; robot.nominal().len()],
+    };
+    Ok(ConsistentParameters {
+        parameters: parameters.unwrap_or_else(|| nearest_to_nominal(robot, &arm.values)),
+        parameter_std,
+        inconsistent_nominal: knowledge
+            .map_or_else(Vec::new, |knowledge| inconsistent_nominal_bodies(robot, knowledge)),
+        fit,
+        failure,
+        intervals,
+    })
+}
+
+/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` where the problem
+/// has none.
+fn arm_alone(
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<(Option<LinearProblem>, Estimate), IdentificationError> {
+    let columns = &training.columns;
+    let alone = (!columns.is_plain()).then(|| columns.arm_problem(&training.problem, &estimate.values)).transpose()?;
+    Ok((alone, columns.arm_estimate(estimate)))
+}
+
+/// How well consistent sets explain the torque with either sign, none where a fit fails; and the sign of each joint's
+/// friction.
+fn torque_signs(
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<(Option<TorqueSignCheck>, Vec<FrictionSign>), IdentificationError> {
+    let (alone, arm) = arm_alone(training, estimate)?;
+    let problem = alone.as_ref().unwrap_or(&training.problem);
+    let frictions = friction_signs(&training.model, problem, &arm);
+    Ok((sign_evidence(&training.model.parametric, problem, &arm), frictions))
+}
+
+/// [`examine_training`] of every training recording, side by side.
+fn examine_all_training(
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<TrainingExamination, IdentificationError> {
+    let one = |log: &crate::training::LogFactors| {
+        let theta = training.columns.base_values(log.index, &estimate.values);
+        examine_training(logs, &settings.estimation, &training.model, log.index, &theta)
+    };
+    let found: Vec<_> = if logs.execution.parallel() {
+        training.logs.par_iter().map(one).collect::<Result<_, _>>()?
+    } else {
+        training.logs.iter().map(one).collect::<Result<_, _>>()?
+    };
+    let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
+    let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
+    let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
+    Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
+}
+
+/// Blocks of time that the training logs are cut into, for how well each is predicted by the fit to the others: large
+/// enough that warmth and other motion tell them apart.
+const LEFT_OUT_BLOCKS: usize = 4;
+
+/// [`examine_held_out`] of every recording to test on, side by side.
+fn examine_all_held_out(
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
+    training: &Training,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+) -> Result<Vec<HeldOutExamination>, IdentificationError> {
+    let columns = &training.columns;
+    let held_out = logs.of_role(Role::Validate);
+    let ratios =
+        if held_out.is_empty() { Vec::new() } else { left_out_ratios(&training.problem, estimate, LEFT_OUT_BLOCKS)? };
+    let one = |&index: &usize| -> Result<_, IdentificationError> {
+        let theta = columns.base_values(index, &estimate.values);
+        let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance), &ratios);
+        let physical =
+            physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
+        let tested = ModelUnderTest {
+            theta: &theta,
+            physical: physical.as_deref(),
+            uncertainty: Some(&uncertainty),
+            traced: true,
+        };
+        Ok(tested_on(logs, &settings.estimation, &training.model, index, &tested, held_out.len() == 1)?)
+    };
+    if held_out.is_empty() {
+        return Ok(Vec::new());
+    }
+    let names: Vec<&str> = held_out.iter().map(|&index| &logs.recordings[index].name[..]).collect();
+    logs.begin(&format!("testing on {}", names.join(", ")), &held_out);
+    let tested = if logs.execution.parallel() {
+        held_out.par_iter().map(one).collect()
+    } else {
+        held_out.iter().map(one).collect()
+    };
+    logs.end();
+    tested
+}

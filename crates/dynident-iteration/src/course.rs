@@ -1,0 +1,243 @@
+//! The course of an iteration: corrected logs, held-out runs, planned runs and stops, in turn.
+
+use crate::convergence::Shortfall;
+use crate::drive::{CorrectedLog, NextRunMotion, PlannedRun};
+use crate::error::IterationError;
+use crate::forecast::MotionForecast;
+use crate::good_log::GoodLog;
+use crate::held_out::HeldOutCame;
+use crate::held_out_motion::HeldOutMotion;
+use crate::iteration::Iteration;
+use crate::policy::{Next, RunPlan};
+use crate::record::RunRecord;
+use crate::robot::{Robot, RobotRun, StopSignal};
+use crate::status::IterationStatus;
+use crate::store::IterationStore;
+use crate::supervision::{Supervisor, Watching};
+use dynident_simulation::require_length;
+use std::time::Instant;
+
+/// How an iteration went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IterationOutcome {
+    /// How it ended.
+    pub status: IterationStatus,
+    /// What is not met; nothing if it has converged.
+    pub shortfalls: Vec<Shortfall>,
+    /// Every run.
+    pub runs: Vec<RunRecord>,
+    /// Where motions are planned and everything is met: what a further run was expected to bring, too little for one.
+    pub declined: Option<MotionForecast>,
+}
+
+/// Runs, identifies and repeats until tracking and parameters have converged: the first run by a controller without a
+/// model or by the prior, then by the model-based controller with the newest estimate. A run that got worse (its
+/// tracking, a broken limit, divergence) is rejected: the step from the last good parameters to the new ones is halved,
+/// and if that does not help the controller without a model comes back, stiffer.
+///
+/// `robots` holds one robot for all legs, or one for each. With a `store`, runs that it holds are not made again, and
+/// each new one is kept before the next begins. `watch` hears of every new run.
+///
+/// # Errors
+/// Settings that do not fit, files that cannot be written. What the robot does wrong is in the records and in the
+/// status.
+pub fn iterate(
+    iteration: &Iteration,
+    robots: &mut [&mut dyn Robot],
+    store: Option<&IterationStore>,
+    watch: &mut dyn FnMut(&RunRecord, &[RobotRun]),
+) -> Result<IterationOutcome, IterationError> {
+    iterate_supervised(iteration, robots, store, &mut Watching(watch))
+}
+
+/// [`iterate()`] under somebody's eyes, who may stop it, and is asked before every motion. A run that a stop cuts short
+/// does not count: what was recorded of it is kept in a folder of its own, and the run is made anew by the next call.
+///
+/// # Errors
+/// As [`iterate()`].
+pub fn iterate_supervised(
+    iteration: &Iteration,
+    robots: &mut [&mut dyn Robot],
+    store: Option<&IterationStore>,
+    supervisor: &mut dyn Supervisor,
+) -> Result<IterationOutcome, IterationError> {
+    let legs = iteration.task.legs.len();
+    if robots.len() != 1 {
+        require_length("robots", legs, robots.len())?;
+    }
+    let records = known_records(iteration, robots, store)?;
+    let mut course = Course { iteration, store, records, good: None, stopped: None, last_motion: None };
+    loop {
+        if let Some(status) = course.waits(supervisor)? {
+            return course.outcome(status);
+        }
+        // What is known is judged before it is used further.
+        if let Some(held_out) = iteration.held_out_due(&course.records)? {
+            if let Some(status) = course.run_held_out(held_out, &mut *robots[0], supervisor)? {
+                return course.outcome(status);
+            }
+            continue;
+        }
+        let stop = supervisor.stop().cloned();
+        let (plan, next) = match course.next(stop.as_ref())? {
+            NextStep::Run(plan, next) => (plan, next),
+            NextStep::Finished(status) => return course.outcome(status),
+            NextStep::Declined(status, declined) => {
+                return Ok(IterationOutcome { declined, ..course.outcome(status)? });
+            }
+        };
+        if let Some(status) = course.run(robots, &plan, next, supervisor)? {
+            return course.outcome(status);
+        }
+    }
+}
+
+/// The records of earlier calls, without those whose logs were corrected since.
+fn known_records(
+    iteration: &Iteration,
+    robots: &[&mut dyn Robot],
+    store: Option<&IterationStore>,
+) -> Result<Vec<RunRecord>, IterationError> {
+    let Some(store) = store else { return Ok(Vec::new()) };
+    let mut records = store.records()?;
+    if let Some(last) = records.last()
+        && let Some(corrected) = iteration.corrected_log(robots, last, store)?
+    {
+        match corrected {
+            CorrectedLog::Run => store.forget_run(last.run)?,
+            CorrectedLog::HeldOut => store.forget_held_out(last.run)?,
+        }
+        records = store.records()?;
+    }
+    let robot = iteration.robot(&records)?;
+    for record in &records {
+        record.check(&robot).map_err(|problem| store.refused(record.run, problem))?;
+    }
+    Ok(records)
+}
+
+/// What follows the runs so far.
+enum NextStep {
+    Run(RunPlan, NextRunMotion),
+    Finished(IterationStatus),
+    /// Everything is met; a further run was expected to bring too little.
+    Declined(IterationStatus, Option<MotionForecast>),
+}
+
+/// An iteration between two runs.
+struct Course<'a> {
+    iteration: &'a Iteration,
+    store: Option<&'a IterationStore>,
+    records: Vec<RunRecord>,
+    /// Logs of the good runs, once they are needed.
+    good: Option<Vec<GoodLog>>,
+    /// Why the newest run ended early, if it did.
+    stopped: Option<String>,
+    /// When the robot last moved in this call; earlier motions are not known.
+    last_motion: Option<Instant>,
+}
+
+impl Course<'_> {
+    /// The outcome of an iteration that ends here.
+    fn outcome(self, status: IterationStatus) -> Result<IterationOutcome, IterationError> {
+        let shortfalls = self.iteration.shortfalls(&self.records)?;
+        Ok(IterationOutcome { status, shortfalls, runs: self.records, declined: None })
+    }
+
+    /// Whether somebody has to look at the robot before the next run.
+    fn waits(&self, supervisor: &dyn Supervisor) -> Result<Option<IterationStatus>, IterationError> {
+        let Some(why) = self.stopped.as_ref().filter(|_| self.iteration.settings.safety.outside && !supervisor.asks())
+        else {
+            return Ok(None);
+        };
+        let next = self.records.len() + 1;
+        let reason = format!("{why}. Look at the robot; the same command goes on with run {next}");
+        let is_finished = matches!(self.iteration.next(&self.records)?, Next::Finished(_));
+        Ok((!is_finished).then_some(IterationStatus::Waiting { reason }))
+    }
+
+    /// Makes a held-out run; the status of the iteration if it ends there.
+    fn run_held_out(
+        &mut self,
+        held_out: &HeldOutMotion,
+        robot: &mut dyn Robot,
+        supervisor: &mut dyn Supervisor,
+    ) -> Result<Option<IterationStatus>, IterationError> {
+        let run = self.records.len();
+        let came = self.iteration.held_out_made(held_out, robot, &self.records, supervisor, &mut self.last_motion)?;
+        match came {
+            HeldOutCame::Stopped(status) => Ok(Some(status)),
+            HeldOutCame::CutShort(runs, why) => {
+                let next = format!("the held-out run after run {run}");
+                why.kept(self.store, run, &runs, &next).map(Some)
+            }
+            HeldOutCame::Run(found, came) => {
+                if let (Some(store), Some(last)) = (self.store, self.records.last()) {
+                    store.keep_held_out(last.run, &found, &came)?;
+                }
+                self.stopped =
+                    (!found.done).then(|| format!("the held-out run after run {run} ended early: {}", found.outcome));
+                if let Some(last) = self.records.last_mut() {
+                    last.held_out = Some(found);
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// The next run and its motion, or how the iteration ends.
+    fn next(&self, stop: Option<&StopSignal>) -> Result<NextStep, IterationError> {
+        let (iteration, records) = (self.iteration, &self.records);
+        match iteration.next(records)? {
+            Next::Run(plan) => Ok(NextStep::Run(plan, iteration.next_motion(records, self.store, stop)?)),
+            Next::Finished(status) => {
+                let Some(plan) = iteration.further(&status, records) else { return Ok(NextStep::Finished(status)) };
+                let next = iteration.next_motion(records, self.store, stop)?;
+                if stop.is_some_and(StopSignal::is_requested) {
+                    let reason = format!("while the motion of run {} was looked for", plan.run);
+                    return Ok(NextStep::Finished(IterationStatus::Interrupted { reason }));
+                }
+                if !next.forecast.as_ref().is_some_and(|forecast| forecast.worth_a_run) {
+                    return Ok(NextStep::Declined(status, next.forecast));
+                }
+                Ok(NextStep::Run(plan, next))
+            }
+        }
+    }
+
+    /// Makes a planned run; the status of the iteration if it ends there.
+    fn run(
+        &mut self,
+        robots: &mut [&mut dyn Robot],
+        plan: &RunPlan,
+        next: NextRunMotion,
+        supervisor: &mut dyn Supervisor,
+    ) -> Result<Option<IterationStatus>, IterationError> {
+        let Self { iteration, store, records, .. } = self;
+        // Only now: an iteration that has ended needs no logs.
+        let good = match &mut self.good {
+            Some(good) => good,
+            None => self.good.insert(iteration.good_logs(records, *store)?),
+        };
+        match iteration.made(robots, (plan, next), records, good, supervisor, &mut self.last_motion)? {
+            PlannedRun::Stopped(status) => Ok(Some(status)),
+            PlannedRun::CutShort(runs, why) => {
+                let next = format!("run {}", plan.run);
+                why.kept(*store, plan.run, &runs, &next).map(Some)
+            }
+            PlannedRun::Run(record, runs) => {
+                if record.accepted && record.estimate.is_some() && iteration.settings.pool {
+                    let legs = iteration.legs_of(&record)?.into_owned();
+                    good.push(GoodLog::new(&record, legs, runs.iter().map(|run| run.record.clone()).collect()));
+                }
+                if let Some(store) = store {
+                    store.keep(&record, &runs)?;
+                }
+                supervisor.made(&record, &runs);
+                self.stopped = (!record.done).then(|| format!("run {} ended early: {}", record.run, record.outcome));
+                records.push(*record);
+                Ok(None)
+            }
+        }
+    }
+}
