@@ -217,8 +217,8 @@ impl<'a> Loops<'a> {
     }
 }
 
-/// The joints of the tree on the way to a link, and where it stands in the frame of the last one's body (of the base
-/// where there is none).
+/// The joints of the tree on the way to a link, and the place of the link in the frame of the last joint's body, or of
+/// the base if there is no joint.
 pub(crate) fn way_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
     let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
     let mut all = core::iter::once((None, model.base())).chain(bodies);

@@ -47,11 +47,11 @@ pub(crate) struct CurvePicture<'a> {
     pub(crate) log_y: bool,
     /// Name of the difference, and which curve less which.
     pub(crate) difference: Option<(&'a str, [usize; 2])>,
-    /// Whole numbers on the axis, and some room beside the first and the last.
+    /// Whole numbers on the axis, with some room before the first and after the last.
     pub(crate) counts: bool,
 }
 
-/// Where a picture stands.
+/// Where a picture appears.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Place {
     /// Alone: on white, with its title and colours of its own.

@@ -21,7 +21,7 @@ const STEPS: usize = 10;
 const SPOKEN: usize = 5;
 
 /// A matrix in colours: blue below zero, red above, as strong as the value against the largest, with a scale; gaps stay
-/// empty, and so does the upper half of a symmetric one. The value stands under the pointer.
+/// empty, and so does the upper half of a symmetric one. The value appears under the pointer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
     /// Headline.

@@ -43,7 +43,7 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     let carriers = Carriers::of(found, &connections)?;
     let root = carriers.root(found, &links)?;
     let walk = Walk { found, frames, connections: &connections, under: &carriers.under };
-    let Walked { tree, reached } = walk.from_root(root, notices)?;
+    let Walked { tree, reached } = walk.walked(root, notices)?;
     if let Some(lost) = links.iter().find(|link| !reached.contains(link)) {
         let item = &found.items[*lost];
         return Err(fault_at(item.node, SdfFault::Loop { link: item.name.clone() }));
@@ -123,7 +123,7 @@ struct Ahead {
 
 impl Walk<'_, '_, '_> {
     /// Walks from the root, `None` for the world.
-    fn from_root(&self, root: Option<usize>, notices: &mut Notices) -> Result<Walked, SdfError> {
+    fn walked(&self, root: Option<usize>, notices: &mut Notices) -> Result<Walked, SdfError> {
         let base = match root {
             // The base's own link is at the identity: the frame of the model, to which the link is fixed. The inertial
             // of a link that does not move may be unknown.
@@ -225,7 +225,9 @@ impl Walk<'_, '_, '_> {
     ) -> Result<Link, SdfError> {
         let item = &self.found.items[index];
         let mut collision = shapes(item.node);
-        collision.iter_mut().for_each(|shape| shape.placement = shift.then(&shape.placement));
+        for shape in &mut collision {
+            shape.placement = shift.then(&shape.placement);
+        }
         let stays = shift == Transform::IDENTITY;
         // Exact numbers stay exact where nothing is shifted.
         let shifted = |inertial: InertialParameters| if stays { inertial } else { inertial.expressed_in(&shift) };

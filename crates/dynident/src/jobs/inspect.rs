@@ -12,7 +12,7 @@ use dynident_model::{
 };
 use std::path::Path;
 
-/// What is known of the robot beside its description.
+/// What is known of the robot in addition to its description.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InspectSettings {
     /// What all masses, the base's with them, should add up to, kg; by default what a comment of the file says.
@@ -70,7 +70,7 @@ fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, 
     Ok(Some(found.map_err(fault)?))
 }
 
-/// As [`inspect`], with what is known beside the description.
+/// As [`inspect`], with what is known in addition to the description.
 ///
 /// # Errors
 /// If the description cannot be read.

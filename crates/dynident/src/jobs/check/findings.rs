@@ -224,8 +224,7 @@ fn of_held_out_log(
         mistake.key(),
         format!("in log `{}` {}", study.log_name(*log), mistake.sentence(joints)),
         format!(
-            "the training logs' parameters leave {:.3} Nm of its torque as the study is written and {:.3} Nm so corrected; the training logs have no such mistake",
-            left_as_written, left_without
+            "the training logs' parameters leave {left_as_written:.3} Nm of its torque as the study is written and {left_without:.3} Nm so corrected; the training logs have no such mistake"
         ),
     );
     found.write = changes(mistake, Some(&keys));

@@ -67,12 +67,12 @@ pub fn design_study(
     // The best motion of the family.
     let found = match &setup.section.criterion {
         CriterionChoice::WindowedCondition(windowed) => {
-            let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, &watch)
+            let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, watch)
                 .map_err(Error::section(study_path, "design"))?;
             setup.notes.push(WINDOWED.to_owned());
             found
         }
-        _ => search(&setup, study_path, &watch)?,
+        _ => search(&setup, study_path, watch)?,
     };
 
     // Its limits, by a check that shares nothing with the search, and what it says about the parameters.
@@ -81,7 +81,7 @@ pub fn design_study(
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let single = || match found.windowed {
         Some(_) => Ok(Vec::new()),
-        None => changes(&setup, study_path, &found, &watch),
+        None => changes(&setup, study_path, &found, watch),
     };
     let rates = (duration_s, check_rate_hz);
     let stop = || watch(&found.progress("check")).is_break();

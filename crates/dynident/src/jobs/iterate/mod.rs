@@ -36,14 +36,14 @@ use std::path::Path;
 use std::time::Instant;
 use trajectories::{Trajectories, kept};
 
-/// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectories at the controller's
-/// rate), `runs/run_k/` (each run whole or not at all; of legs one after another `leg_n/runs/run_k/`),
-/// `iterations.json` after every run and `report.html` in the end. With `resume`, runs that are there already are not
-/// made again: who is killed at any moment goes on to the same result.
+/// Iterates a study's robot and writes the results into `out`: `trajectory.json` (the trajectories at the controller's
+/// rate), `runs/run_k/` (each run is written completely or not at all; for legs one after another
+/// `leg_n/runs/run_k/`), `iterations.json` after every run, and `report.html` at the end. With `resume`, runs that are
+/// already in the folder are not repeated: a call that continues after an interruption reaches the same result.
 ///
 /// # Errors
-/// Files, study, settings, and files of another study's iteration in `out`. How the robot and the iteration did is in
-/// the file.
+/// Files, study, settings, and files of another study's iteration in `out`. The file itself reports how the robot and
+/// the iteration did.
 pub fn iterate_study(
     study: &Study,
     study_path: &Path,
@@ -55,8 +55,8 @@ pub fn iterate_study(
     iterated(Job { study, study_path, out, resume, options }, watch, None)
 }
 
-/// As [`iterate_study`] with a robot of the caller's own in place of the study's: `robot` is given the joints' names,
-/// and what it makes is run as it is.
+/// As [`iterate_study`] with the caller's robot in place of the study's: `robot` gets the names of the joints and makes
+/// the robot.
 ///
 /// # Errors
 /// As [`iterate_study`], and legs that hold joints locked, which only the simulator does.
