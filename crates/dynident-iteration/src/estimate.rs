@@ -203,7 +203,7 @@ impl RunsFit<'_> {
             if !rounds.again(fit.as_ref(), &mut found) {
                 let schwarz = schwarz(&training.problem, &found);
                 let found = chosen.with_error_of_constants(training.problem.columns(), found);
-                let estimate = all_joints(&logs, &identification, training, &all[..], found, rounds.choice(), runs)?;
+                let estimate = all_joints(&logs, &identification, training, &all[..], &found, rounds.choice(), runs)?;
                 return Ok(RunsEstimate { estimate, schwarz });
             }
         }
@@ -226,13 +226,13 @@ fn all_joints(
     settings: &IdentificationSettings,
     training: Training,
     all: &[usize],
-    estimate: Estimate,
+    estimate: &Estimate,
     lag: LagChoice,
     runs: &[RunLog<'_>],
 ) -> Result<RunEstimate, IterationError> {
-    let consistent = consistent_stage(logs, settings, &training, &estimate)?;
-    let arm = training.columns.arm_estimate(&estimate);
-    let run_offsets = deviations(&training.columns.offsets, &estimate, runs);
+    let consistent = consistent_stage(logs, settings, &training, estimate)?;
+    let arm = training.columns.arm_estimate(estimate);
+    let run_offsets = deviations(&training.columns.offsets, estimate, runs);
     let mut joint_sigma = vec![0.0; training.model.dof()];
     training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
     let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();
