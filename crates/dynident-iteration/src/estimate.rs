@@ -207,7 +207,7 @@ impl RunsFit<'_> {
                     .with(ErrorSource::Lag, rounds.error(fit.as_ref(), &found))
                     .with(ErrorSource::FrictionConstants, of_constants);
                 let total = bars.total(&found);
-                let estimate = all_joints(&logs, &identification, training, &all, total, rounds.choice(), runs)?;
+                let estimate = all_joints(&logs, &identification, training, &all, &total, rounds.choice(), runs)?;
                 return Ok(RunsEstimate { estimate, schwarz });
             }
         }
@@ -230,13 +230,13 @@ fn all_joints(
     settings: &IdentificationSettings,
     training: Training,
     all: &[usize],
-    estimate: Estimate,
+    estimate: &Estimate,
     lag: LagChoice,
     runs: &[RunLog<'_>],
 ) -> Result<RunEstimate, IterationError> {
-    let consistent = consistent_stage(logs, settings, &training, &estimate)?;
-    let arm = training.columns.arm_estimate(&estimate);
-    let run_offsets = deviations(&training.columns.offsets, &estimate, runs);
+    let consistent = consistent_stage(logs, settings, &training, estimate)?;
+    let arm = training.columns.arm_estimate(estimate);
+    let run_offsets = deviations(&training.columns.offsets, estimate, runs);
     let mut joint_sigma = vec![0.0; training.model.dof()];
     training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
     let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();

@@ -74,7 +74,7 @@ impl<'a> Starts<'a> {
                     .iter()
                     .zip(&posture)
                     .zip(&shares)
-                    .map(|((limits, position), share)| about(limits, position, share))
+                    .map(|((limits, position), share)| about(*limits, *position, *share))
                     .collect();
                 let start = self.task.family.random(&narrowed, &self.speeds, random);
                 let broken = self.broken_places(&start);
@@ -115,7 +115,7 @@ impl<'a> Starts<'a> {
 }
 
 /// The part of a range about a position that is `share` of it.
-fn about(range: &[f64; 2], position: &f64, share: &f64) -> [f64; 2] {
+fn about(range: [f64; 2], position: f64, share: f64) -> [f64; 2] {
     let [low, high] = range;
     let half = 0.5 * share * (high - low);
     let middle = position.max(low + half).min(high - half);

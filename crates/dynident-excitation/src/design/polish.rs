@@ -168,7 +168,7 @@ pub(super) fn taken_inside(
     let grids: [&[f64]; 2] = [&run.fine, &run.logged];
     if kept.violation > 0.0 && !interruption.is_overdue() {
         let inside = run.assess(feasible);
-        if let Some(between) = way_inside(*task, *criterion, &kept, &inside, grids, &|| interruption.is_overdue()) {
+        if let Some(between) = way_inside(task, *criterion, &kept, &inside, grids, &|| interruption.is_overdue()) {
             kept = between;
         }
     }

@@ -283,7 +283,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
 
     /// Descents of the augmented Lagrangian with updates of the multipliers between them; moves `x` to the end of the
     /// last. `tolerance` is the first descent's.
-    fn descend(&mut self, bounds: &[[f64; 2]], x: &mut Vec<f64>, mut tolerance: f64) -> AugmentedLagrangianStatus {
+    fn descend(&mut self, bounds: &[[f64; 2]], x: &mut [f64], mut tolerance: f64) -> AugmentedLagrangianStatus {
         let settings = self.settings;
         let mut last_measure = f64::INFINITY;
         while self.outer < settings.max_outer_iterations {
