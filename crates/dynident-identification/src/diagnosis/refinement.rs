@@ -3,7 +3,7 @@
 
 use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
 use super::mistakes::Mistake;
-use super::step_width::{with_steps_of, with_widths};
+use super::step_width::with_widths;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 
@@ -48,11 +48,8 @@ fn refined_with_own_steps(
     first: &Mistake,
     consistency: &ConsistencySettings,
 ) -> Option<Explained> {
-    let explained = |mistake: &Mistake| {
-        let study = at.without(mistake);
-        let robot = with_steps_of(&study.robot, &study.rows).ok()?;
-        CorrectedStudy { robot, ..study }.explained(consistency).ok()
-    };
+    let explained =
+        |mistake: &Mistake| at.without(mistake).with_own_steps().and_then(|study| study.explained(consistency)).ok();
     let as_tried = explained(first)?;
     let number = first.facts().number?;
     let bound = |mistake: &Mistake| free_bound(at, &as_tried.study.robot, first, mistake);

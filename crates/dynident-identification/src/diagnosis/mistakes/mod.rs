@@ -156,17 +156,3 @@ impl Mistake {
         self.kind().with_channels(self.facts().likelier_channels?)
     }
 }
-
-/// Robot and rows with these mistakes corrected, one after the other.
-pub(super) fn without_mistakes(
-    mistakes: &[Mistake],
-    robot: &ParametricModel,
-    rows: &MotionRows,
-) -> (ParametricModel, MotionRows) {
-    let (mut robot, mut rows) = (robot.clone(), rows.clone());
-    for mistake in mistakes {
-        rows = mistake.corrected(&robot, &rows);
-        robot = mistake.corrected_robot(&robot).unwrap_or(robot);
-    }
-    (robot, rows)
-}
