@@ -78,15 +78,27 @@ impl Residual {
     fn is_explained(&self) -> bool {
         self.left.iter().zip(&self.trained).all(|(left, trained)| *left < MIN_UNEXPLAINED_RATIO * trained)
     }
+}
+
+/// A mistake of the log and what is unexplained without it.
+struct Candidate {
+    mistake: Mistake,
+    rarity: f64,
+    residual: Residual,
+}
+
+impl Candidate {
+    fn score(&self) -> f64 {
+        self.residual.score + self.rarity
+    }
 
     /// Whether it is clearly better than the log `as_written`, and closes half of the gap to the training logs or
     /// explains every joint; otherwise the cause is another one.
-    fn explains(&self, rarity: f64, as_written: &Self) -> bool {
+    fn is_clear(&self, as_written: &Residual) -> bool {
         let trained: f64 = as_written.trained.iter().map(|left| left.ln()).sum();
-        let score = self.score + rarity;
-        (score < 0.5 * (as_written.score + trained) || self.is_explained())
-            && score <= as_written.score - CLEARLY_BETTER
-            && self.rms < as_written.rms
+        (self.score() < 0.5 * (as_written.score + trained) || self.residual.is_explained())
+            && self.score() <= as_written.score - CLEARLY_BETTER
+            && self.residual.rms < as_written.rms
     }
 }
 
@@ -108,51 +120,36 @@ pub(super) fn held_out_hypothesis(
     let breadths = [Breadth::Usual, Breadth::Rare, Breadth::KnownRobot(&explained)];
     let all = breadths.iter().flat_map(|breadth| Mistake::candidates(setup, *breadth));
     let all: Vec<Mistake> = all.filter(|mistake| !mistake.facts().is_of_all_logs).collect();
-    let without = |mistake: &Mistake| Residual::new(known, &mistake.corrected(known.robot, rows));
-    let scored = |mistake: Mistake| {
-        let score = without(&mistake).score + mistake.facts().rarity;
-        (mistake, score)
+    let without = |mistake: Mistake| {
+        let residual = Residual::new(known, &mistake.corrected(known.robot, rows));
+        Candidate { rarity: mistake.facts().rarity, mistake, residual }
     };
-    let mut others: Vec<(Mistake, f64)> = all.into_par_iter().map(scored).collect();
-    others.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let least = others.first().map_or(f64::INFINITY, |first| first.1);
-    let late = clock.and_then(|clock| late_torque(known, clock)).filter(|(mistake, residual)| {
-        let rarity = mistake.facts().rarity;
-        residual.score + rarity < least && residual.explains(rarity, &as_written)
-    });
-    let (mistake, residual, score) = match late {
-        Some((mistake, residual)) => {
-            let score = residual.score + mistake.facts().rarity;
-            (mistake, residual, score)
-        }
-        None if others.is_empty() => return None,
-        None => {
-            let (first, score) = others.remove(0);
-            let residual = without(&first);
-            if !residual.explains(first.facts().rarity, &as_written) {
-                return None;
-            }
-            // Known parameters determine every number to within the noise.
-            let between = first.between(|mistake| without(mistake).score).map(|between| (without(&between), between));
-            match between.filter(|(better, _)| better.score < residual.score - MIN_IMPROVEMENT) {
-                Some((better, between)) => (between, better, score),
-                None => (first, residual, score),
-            }
-        }
-    };
-    let alike = others.into_iter().take_while(|(_, other)| *other < score + INDISTINGUISHABLE);
-    let alike = alike.map(|(other, _)| other).collect();
+    let mut tried: Vec<Candidate> = all.into_par_iter().map(without).collect();
+    tried.sort_by(|a, b| a.score().total_cmp(&b.score()));
+    let least = tried.first().map_or(f64::INFINITY, Candidate::score);
+    let late = clock.and_then(|clock| late_torque(known, clock));
+    let late = late.filter(|late| late.score() < least && late.is_clear(&as_written));
+    let others = if late.is_some() { &tried[..] } else { tried.get(1..)? };
+    let best = late.as_ref().or(tried.first()).filter(|best| best.is_clear(&as_written))?;
+    // Known parameters determine every number to within the noise.
+    let between = best.mistake.between(|mistake| without(mistake.clone()).residual.score).map(without);
+    let between = between.filter(|found| found.residual.score < best.residual.score - MIN_IMPROVEMENT);
+    let alike = others.iter().take_while(|other| other.score() < best.score() + INDISTINGUISHABLE);
+    let alike = alike.map(|other| other.mistake.clone()).collect();
+    let Candidate { mistake, residual, .. } = between.as_ref().unwrap_or(best);
+    let mistake = mistake.clone();
     Some(HeldOutHypothesis { log, mistake, alike, left_as_written: as_written.rms, left_without: residual.rms })
 }
 
 /// The log with the torque of all joints at the moment that the parameters explain best; none where that is a lag that
 /// a fit compensates.
-fn late_torque(known: KnownRobot<'_>, clock: &TorqueClock<'_>) -> Option<(Mistake, Residual)> {
+fn late_torque(known: KnownRobot<'_>, clock: &TorqueClock<'_>) -> Option<Candidate> {
     let joints: Vec<usize> = (0..known.robot.dof()).collect();
     let at = |lag_s: f64| Residual::new(known, &clock.rows(&joints, Channels::Torque, lag_s, INSTANTS));
     let tried: Vec<f64> = clock.lags_s().collect();
     let scores: Vec<f64> = tried.par_iter().map(|&lag_s| at(lag_s).score).collect();
     let best = (0..tried.len()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]))?;
     let lag_s = clock.least_near(tried[best], |lag_s| at(lag_s).score);
-    Some((clock.mistake(&joints, Channels::Torque, lag_s)?, at(lag_s)))
+    let mistake = clock.mistake(&joints, Channels::Torque, lag_s)?;
+    Some(Candidate { rarity: mistake.facts().rarity, mistake, residual: at(lag_s) })
 }

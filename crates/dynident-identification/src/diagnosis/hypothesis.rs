@@ -5,6 +5,7 @@ use super::joint_fits::{JointFits, SharedMotion, score};
 use super::mistakes::{Mistake, Proof};
 use super::motion_rows::MotionRows;
 use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
+use super::step_width::with_steps_of;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
@@ -143,7 +144,7 @@ pub(super) struct Explained {
 }
 
 impl CorrectedStudy {
-    /// A robot and rows with these mistakes corrected.
+    /// A robot and rows in which these mistakes are corrected already.
     pub(super) fn new(robot: ParametricModel, rows: MotionRows, mistakes: Vec<Mistake>) -> Self {
         Self { robot, rows, mistakes, torque_growth: 0.0 }
     }
@@ -160,6 +161,19 @@ impl CorrectedStudy {
         let grown = if mistake.facts().adds_torques { 0..rows.tau.len() } else { 0..0 };
         let growth: f64 = grown.map(growth_of).sum();
         Self { robot, rows, mistakes, torque_growth: self.torque_growth + growth }
+    }
+
+    /// The same with the friction steps that its rows need.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(super) fn with_own_steps(&self) -> Result<Self, EstimationError> {
+        Ok(Self { robot: with_steps_of(&self.robot, &self.rows)?, ..self.clone() })
+    }
+
+    /// The same with these mistakes corrected as well, one after the other.
+    pub(super) fn without_all(&self, mistakes: &[Mistake]) -> Self {
+        mistakes.iter().fold(self.clone(), |study, mistake| study.without(mistake))
     }
 
     /// The [lower bound of the score](Hypothesis::lower_bound) if it is at most `limit`. The separate parameters of

@@ -145,25 +145,25 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
 
 /// [`diagnose`] at one cut-off.
 fn diagnosed(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
-    let SearchedLogs { search, robot, rows, consistency, compensated_s } = searched_logs(task)?;
+    let SearchedLogs { search, study, consistency, compensated_s } = searched_logs(task)?;
     let DiagnosisTask { logs, training, theta, .. } = task;
-    let model = RegressorModel::from(robot.clone());
+    let (robot, model) = (&study.robot, RegressorModel::from(study.robot.clone()));
     // Units of torque are compared with the best hypothesis, payloads only where the study is believed.
-    let (robot_of_best, rows_of_best) = search.corrected(&robot, &rows);
-    let description_fit = description_fit(&robot_of_best, &rows_of_best, &search.believed().left);
+    let best = search.corrected(&study);
+    let description_fit = description_fit(&best.robot, &best.rows, &search.believed().left);
     let as_written = &search.as_written;
     let is_explained = search.best.is_none() && as_written.left_of_all < MOSTLY_NOISE;
     let HeldOutLogs { payloads, hypotheses } = match theta.filter(|_| is_explained) {
         Some(theta) => {
             let theta = (robot.terms() == task.robot.terms()).then_some(theta);
             let (consistency, compensated_s) = (&consistency, &compensated_s[..]);
-            let trained = Trained { model: &model, rows: &rows, as_written, theta, consistency, compensated_s };
+            let trained = Trained { model: &model, rows: &study.rows, as_written, theta, consistency, compensated_s };
             held_out_logs(logs, &trained)?
         }
         None => HeldOutLogs::default(),
     };
-    let duplicate_channels = duplicate_channels(&rows, &as_written.left);
-    let lost_signs = has_lost_signs(&rows, as_written.left_of_all);
+    let duplicate_channels = duplicate_channels(&study.rows, &as_written.left);
+    let lost_signs = has_lost_signs(&study.rows, as_written.left_of_all);
     // A corrected hypothesis has other columns, whose noise is not known.
     let noise = |explained: &Explanation| {
         if search.best.is_some() {
@@ -173,7 +173,7 @@ fn diagnosed(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
         let share = |(noise, torque): (&f64, &f64)| if *torque > 0.0 { noise / torque } else { 0.0 };
         Ok::<_, DiagnosisError>(noise.iter().zip(&explained.torque).map(share).collect())
     };
-    let inconsistent_torques = inconsistent_torques(search.believed(), &robot_of_best, &rows_of_best, noise)?;
+    let inconsistent_torques = inconsistent_torques(search.believed(), &best.robot, &best.rows, noise)?;
     Ok(Diagnosis {
         search,
         description_fit,

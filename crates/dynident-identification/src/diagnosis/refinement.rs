@@ -2,13 +2,15 @@
 //! from it.
 
 use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis};
-use super::mistakes::{Mistake, Number, REACH_OF_UNITS};
-use super::step_width::{with_steps_of, with_widths};
+use super::mistakes::Mistake;
+use super::step_width::with_widths;
 use crate::consistent::ConsistencySettings;
 use dynident_dynamics::ParametricModel;
 
 /// Improvement from which a number replaces a round one: as much as for a mistake.
 const MIN_IMPROVEMENT: f64 = CLEARLY_BETTER;
+/// Units of positions that are fitted, those with the least residuals of free parameters.
+const MAX_VALLEYS: usize = 4;
 /// Steps of a factor's logarithm in which its range is searched, and the accuracy of the ends.
 const EDGE_STEP: f64 = 0.2;
 const EDGE_WIDTH: f64 = 0.03;
@@ -31,7 +33,7 @@ pub(super) fn refined(at: &CorrectedStudy, first: &Explained, consistency: &Cons
     let free = |mistake: &Mistake| at.without(mistake).hypothesis(None).map_or(f64::INFINITY, |found| value(&found));
     let found = at.without(&last.between(free)?).explained(consistency).ok()?;
     // Free numbers follow the noise: a round number stays unless the exact one is clearly better.
-    let is_better = if facts.number.is_none_or(Number::is_round) {
+    let is_better = if facts.number.is_none_or(|number| number.is_round) {
         found.hypothesis.score() < first.hypothesis.score() - MIN_IMPROVEMENT
     } else {
         value(&found.hypothesis) < value(&first.hypothesis)
@@ -46,18 +48,22 @@ fn refined_with_own_steps(
     first: &Mistake,
     consistency: &ConsistencySettings,
 ) -> Option<Explained> {
-    let explained = |mistake: &Mistake| {
-        let study = at.without(mistake);
-        let robot = with_steps_of(&study.robot, &study.rows).ok()?;
-        CorrectedStudy { robot, ..study }.explained(consistency).ok()
-    };
+    let explained =
+        |mistake: &Mistake| at.without(mistake).with_own_steps().and_then(|study| study.explained(consistency)).ok();
     let as_tried = explained(first)?;
+    let number = first.facts().number?;
+    let bound = |mistake: &Mistake| free_bound(at, &as_tried.study.robot, first, mistake);
     // Inconsistent bodies explain positions in a unit that is too small as well, so the consistent fit selects the
     // valley.
-    let valleys = first.valleys(|mistake| free_bound(at, &as_tried.study.robot, first, mistake));
-    let found = valleys.into_iter().filter_map(|mistake| explained(&mistake));
-    let best = found.min_by(|a, b| a.hypothesis.score().total_cmp(&b.hypothesis.score()));
-    let needed = if first.facts().number.is_none_or(Number::is_round) { MIN_IMPROVEMENT } else { 0.0 };
+    let found: Vec<Mistake> = if number.is_round {
+        first.between(bound).into_iter().collect()
+    } else {
+        let valleys = number.valleys(|factor| bound(&first.with_number(factor)));
+        valleys.take(MAX_VALLEYS).map(|factor| first.with_number(factor)).collect()
+    };
+    let best = found.iter().filter_map(explained);
+    let best = best.min_by(|a, b| a.hypothesis.score().total_cmp(&b.hypothesis.score()));
+    let needed = if number.is_round { MIN_IMPROVEMENT } else { 0.0 };
     let limit = as_tried.hypothesis.score() - needed;
     let mut best = best.filter(|best| best.hypothesis.score() < limit).unwrap_or(as_tried);
     let last = best.hypothesis.mistakes.last()?;
@@ -80,12 +86,13 @@ fn free_bound(at: &CorrectedStudy, robot: &ParametricModel, of: &Mistake, mistak
 /// Least and greatest factor of positions around that of `mistake` that explain the samples not clearly worse. Other
 /// friction, or usual errors of the description, move the best factor by more than [`CLEARLY_BETTER`] does.
 fn factors_alike(mistake: &Mistake, value: impl Fn(&Mistake) -> f64) -> Option<[f64; 2]> {
-    let factor = mistake.facts().position_factor?;
+    let facts = mistake.facts();
+    let (factor, reach) = (facts.position_factor?, facts.number?.reach);
     let at = |log: f64| value(&mistake.with_number(factor * log.exp()));
     let limit = at(0.0) + 2.0 * CLEARLY_BETTER;
     let edge = |direction: f64| {
         let [mut inside, mut outside] = [0.0, EDGE_STEP];
-        while outside < REACH_OF_UNITS && at(direction * outside) <= limit {
+        while outside < reach && at(direction * outside) <= limit {
             [inside, outside] = [outside, outside + EDGE_STEP];
         }
         while outside - inside > EDGE_WIDTH {

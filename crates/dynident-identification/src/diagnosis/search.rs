@@ -5,12 +5,10 @@
 //! come close to the best are named with it.
 
 use super::hypothesis::{CLEARLY_BETTER, CorrectedStudy, Explained, Hypothesis, INDISTINGUISHABLE};
-use super::mistakes::{Breadth, Mistake, without_mistakes};
-use super::motion_rows::MotionRows;
+use super::mistakes::{Breadth, Mistake};
 use super::refinement::refined;
 use super::round::Round;
 use crate::consistent::ConsistencySettings;
-use dynident_dynamics::ParametricModel;
 
 /// Number of other hypotheses from which a second mistake is searched, once the best one has a second mistake.
 const MAX_RUNNERS_UP: usize = 8;
@@ -38,9 +36,9 @@ impl Search {
         self.best.as_ref().unwrap_or(&self.as_written)
     }
 
-    /// Robot and rows of the believed hypothesis.
-    pub(super) fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> (ParametricModel, MotionRows) {
-        without_mistakes(&self.believed().mistakes, robot, rows)
+    /// The study with the mistakes of the believed hypothesis corrected.
+    pub(super) fn corrected(&self, study: &CorrectedStudy) -> CorrectedStudy {
+        study.without_all(&self.believed().mistakes)
     }
 }
 

@@ -35,10 +35,8 @@ pub struct DiagnosisTask<'a> {
 /// The training recordings after the search.
 pub(super) struct SearchedLogs {
     pub(super) search: Search,
-    /// The robot of the study, with the friction steps and drives that the logs determine.
-    pub(super) robot: ParametricModel,
-    /// Instants of the study as written, except for a lag.
-    pub(super) rows: MotionRows,
+    /// The study as written, except for a lag: its robot has the friction steps and drives that the logs determine.
+    pub(super) study: CorrectedStudy,
     /// Settings of the consistent fits.
     pub(super) consistency: ConsistencySettings,
     /// The lag that is compensated in each joint's torque, s.
@@ -65,38 +63,36 @@ pub(super) fn searched_logs(task: DiagnosisTask<'_>) -> Result<SearchedLogs, Dia
     let consistency = ConsistencySettings { tolerance: 1e-2, max_iterations: 100, ..known };
     let compensated_s = |joint| logs.motion.torque_lag_s.as_ref().and_then(|lag_s| lag_s.at(joint)).unwrap_or(0.0);
     let compensated_s: Vec<f64> = (0..robot.dof()).map(compensated_s).collect();
-    let as_written = CorrectedStudy::new(robot.clone(), rows, Vec::new()).explained(&consistency)?;
     let clock = TorqueClock::new(&robot, &samples, compensated_s.clone());
-    let found = with_clock(&as_written, clock.as_ref(), &consistency);
-    let search = likelier(found.searches, &robot, &found.rows);
-    let believed = search.corrected(&robot, &found.rows);
-    let again = as_written_instead(&robot, &found.written, &believed, &search, &consistency)?;
-    Ok(match again {
-        Some((robot, search)) => SearchedLogs { search, robot, rows: found.written, consistency, compensated_s },
-        None => SearchedLogs { search, robot, rows: found.rows, consistency, compensated_s },
-    })
+    let as_written = CorrectedStudy::new(robot, rows, Vec::new()).explained(&consistency)?;
+    let Found { searches, study, written } = with_clock(&as_written, clock.as_ref(), &consistency);
+    let search = likelier(searches, &study);
+    let again = as_written_instead(&written, &search.corrected(&study), &search, &consistency)?;
+    let (study, search) = again.unwrap_or((study, search));
+    Ok(SearchedLogs { search, study, consistency, compensated_s })
 }
 
 /// The searches with the instants that they were made on.
 struct Found {
     /// For common mistakes, and for rarer ones as well.
     searches: [Search; 2],
-    /// Instants of the searches.
-    rows: MotionRows,
-    /// Instants of the study as written.
-    written: MotionRows,
+    /// The study with the instants of the searches.
+    study: CorrectedStudy,
+    /// The study as written.
+    written: CorrectedStudy,
 }
 
 /// Searches with the torque at the moment that explains the logs best: a torque of another moment hides every other
 /// mistake, and another mistake may look like one.
 fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consistency: &ConsistencySettings) -> Found {
-    let (robot, written) = (&as_written.study.robot, as_written.study.rows.clone());
-    let late = clock.and_then(|clock| clock.late_channel(robot, &as_written.hypothesis, consistency, INSTANTS));
+    let written = as_written.study.clone();
+    let late =
+        clock.and_then(|clock| clock.late_channel(&written.robot, &as_written.hypothesis, consistency, INSTANTS));
     // A fit compensates such a lag.
     if let Some(late) = late.as_ref().filter(|late| late.explained.study.mistakes.is_empty()) {
-        let rows = late.explained.study.rows.clone();
+        let study = late.explained.study.clone();
         let searches = searches(&late.explained.hypothesis, &late.explained, consistency);
-        return Found { searches, rows: rows.clone(), written: rows };
+        return Found { searches, study: study.clone(), written: study };
     }
     let in_time = searches(&as_written.hypothesis, as_written, consistency);
     let believed = in_time[1].believed();
@@ -106,9 +102,10 @@ fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consisten
     match late.filter(|late| explains_more(&late.explained) && late.gain > gain + CLEARLY_BETTER) {
         Some(late) => {
             let searches = searches(&as_written.hypothesis, &late.explained, consistency);
-            Found { searches, rows: late.explained.study.rows, written }
+            let study = CorrectedStudy { mistakes: Vec::new(), ..late.explained.study };
+            Found { searches, study, written }
         }
-        None => Found { searches: in_time, rows: written.clone(), written },
+        None => Found { searches: in_time, study: written.clone(), written },
     }
 }
 
@@ -116,7 +113,7 @@ fn with_clock(as_written: &Explained, clock: Option<&TorqueClock<'_>>, consisten
 /// the former: a smaller unit of one joint breaks fewer limits, and these limits may be wrong. A joint that travels far
 /// beyond its range is an exception. Where most torques are still in another unit, the unit of one joint or another
 /// rate only compensates for that.
-fn likelier(searches: [Search; 2], robot: &ParametricModel, rows: &MotionRows) -> Search {
+fn likelier(searches: [Search; 2], study: &CorrectedStudy) -> Search {
     let [usual, all] = searches;
     let (best, tried) = (all.believed(), all.tried);
     let gains = |of: fn(&Hypothesis) -> f64| of(best) < of(usual.believed()) - CLEARLY_BETTER;
@@ -127,8 +124,8 @@ fn likelier(searches: [Search; 2], robot: &ParametricModel, rows: &MotionRows) -
         facts.torque_gain.is_some() || facts.is_other_rate
     });
     let is_in_another_unit = || {
-        let (robot, rows) = all.corrected(robot, rows);
-        let fit = description_fit(&robot, &rows, &best.left);
+        let study = all.corrected(study);
+        let fit = description_fit(&study.robot, &study.rows, &best.left);
         fit.is_some_and(|fit| !fit.joints_in_another_unit().is_empty())
     };
     let is_likelier = gains(Hypothesis::score) && is_shown_by_torque && !(has_free_factor && is_in_another_unit());

@@ -1,7 +1,8 @@
 //! Another gravity: mounting, unit, compensation.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, with_model};
-use super::numbers::least_in;
+use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys, list, number};
 use dynident_dynamics::ParametricModel;
 use dynident_model::Vec3;
@@ -67,12 +68,12 @@ impl MistakeKind for Gravity {
         lines.map(|line| KeyChange { table: "robot".to_owned(), line }).collect()
     }
 
-    fn subject(&self) -> Self {
-        Self { gravity_m_s2: [0.0; 3] }
+    fn subject(&self) -> Option<Mistake> {
+        Some(Self { gravity_m_s2: [0.0; 3] }.into())
     }
 
     /// Turned about two axes across it, twice over.
-    fn between(&self, value: &dyn Fn(&Self) -> f64) -> Option<Self> {
+    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
         let mut gravity = self.gravity_m_s2;
         if gravity == [0.0; 3] {
             return None;
@@ -81,10 +82,10 @@ impl MistakeKind for Gravity {
             for axis in across(gravity) {
                 let start = gravity;
                 let with = |angle: f64| Self { gravity_m_s2: turned(start, axis, angle) };
-                gravity = turned(start, axis, least_in(0.0, reach, |angle| value(&with(angle))));
+                gravity = turned(start, axis, Number::angle(0.0, reach).least(|angle| value(&with(angle).into())));
             }
         }
-        Some(Self { gravity_m_s2: gravity })
+        Some(Self { gravity_m_s2: gravity }.into())
     }
 }
 

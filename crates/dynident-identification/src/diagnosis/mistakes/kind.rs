@@ -1,6 +1,7 @@
 //! What each kind of mistake states about itself.
 
-use super::numbers::{Number, least_number};
+use super::Mistake;
+use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
@@ -108,9 +109,11 @@ impl Facts {
 }
 
 /// One kind of mistake: everything that depends on the kind.
-pub(super) trait MistakeKind: Clone + PartialEq {
+pub(super) trait MistakeKind {
     /// Mistakes of this kind to try, the likelier ones first.
-    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self>;
+    fn candidates(setup: Setup<'_>, breadth: Breadth<'_>) -> Vec<Self>
+    where
+        Self: Sized;
 
     /// Its row of the table.
     fn facts(&self) -> Facts;
@@ -136,30 +139,25 @@ pub(super) trait MistakeKind: Clone + PartialEq {
         None
     }
 
-    /// The same with another number.
-    fn with_number(&self, _number: f64) -> Self {
-        self.clone()
-    }
-
-    /// The same without its number: what the mistake is about.
-    fn subject(&self) -> Self {
-        self.with_number(1.0)
-    }
-
-    /// The same of other channels.
-    fn with_channels(&self, _channels: Channels) -> Option<Self> {
+    /// The same with another number; none where it has no number.
+    fn with_number(&self, _number: f64) -> Option<Mistake> {
         None
     }
 
-    /// The same with the number near its own at which `value` is least; none where it has no number.
-    fn between(&self, value: &dyn Fn(&Self) -> f64) -> Option<Self> {
-        let number = least_number(self.facts().number?, |number| value(&self.with_number(number)));
-        Some(self.with_number(number))
+    /// The same without its number: what the mistake is about; none where it has no number.
+    fn subject(&self) -> Option<Mistake> {
+        self.with_number(1.0)
     }
 
-    /// The same with the numbers whose `value` is less than around them, the least first.
-    fn valleys(&self, value: &dyn Fn(&Self) -> f64) -> Vec<Self> {
-        self.between(value).into_iter().collect()
+    /// The same of other channels; none where it cannot be made in others.
+    fn with_channels(&self, _channels: Channels) -> Option<Mistake> {
+        None
+    }
+
+    /// The same with the number near its own at which `value` is least; none where it has no free number.
+    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+        let of_number = |number| self.with_number(number).map_or(f64::INFINITY, |mistake| value(&mistake));
+        self.with_number(self.facts().number?.least(of_number))
     }
 }
 

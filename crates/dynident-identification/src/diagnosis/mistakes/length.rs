@@ -1,5 +1,6 @@
 //! A joint at another distance from the one before it.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, with_model};
 use super::numbers::Number;
 use dynident_dynamics::ParametricModel;
@@ -43,7 +44,7 @@ impl MistakeKind for Length {
             joints: Some(vec![self.joint]),
             is_of_all_logs: true,
             proof: Proof::BaseParameters,
-            number: Some(Number::Factor { at: self.factor, reach: 0.7, is_round: true }),
+            number: Some(Number { is_round: true, ..Number::factor(self.factor, 0.7) }),
             ..Facts::of("description")
         }
     }
@@ -60,7 +61,7 @@ impl MistakeKind for Length {
         )
     }
 
-    fn with_number(&self, factor: f64) -> Self {
-        Self { factor, ..*self }
+    fn with_number(&self, factor: f64) -> Option<Mistake> {
+        Some(Self { factor, ..*self }.into())
     }
 }

@@ -21,8 +21,7 @@ pub mod torque_unit;
 pub use study_keys::{KeyChange, StudyKeys};
 
 pub(super) use kind::{Breadth, Proof, Setup, TorqueSource};
-pub(super) use numbers::{Number, least_by_thirds};
-pub(super) use position_unit::REACH as REACH_OF_UNITS;
+pub(super) use numbers::least_by_thirds;
 
 use super::channels::Channels;
 use super::motion_rows::MotionRows;
@@ -51,72 +50,8 @@ macro_rules! mistake_kinds {
                 all
             }
 
-            /// What its kind states.
-            pub(super) fn facts(&self) -> Facts {
-                match self { $(Self::$kind(mistake) => mistake.facts(),)* }
-            }
-
-            /// The mistake in a sentence with the names of the joints.
-            pub fn sentence(&self, names: &[String]) -> String {
-                match self { $(Self::$kind(mistake) => mistake.sentence(names),)* }
-            }
-
-            /// Keys that correct the study; none where no key does.
-            pub fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
-                match self { $(Self::$kind(mistake) => mistake.changes(keys),)* }
-            }
-
-            /// The range of factors that the logs do not distinguish from its own, as the end of a sentence; empty
-            /// where the range is narrow, or the mistake has no such factor.
-            pub fn other_factors(&self, range: [f64; 2]) -> String {
-                match self { $(Self::$kind(mistake) => mistake.other_factors(range),)* }
-            }
-
-            /// The motion of a robot without this mistake. Rows of a lag are not changed: its instants are chosen anew.
-            pub fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> MotionRows {
-                let mut rows = rows.clone();
-                match self { $(Self::$kind(mistake) => mistake.correct(robot, &mut rows),)* }
-                rows
-            }
-
-            /// The robot without this mistake; `None` where it is the same.
-            pub fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
-                match self { $(Self::$kind(mistake) => mistake.corrected_robot(robot),)* }
-            }
-
-            /// Whether two mistakes are about the same, their numbers aside.
-            pub(super) fn is_alike(&self, other: &Self) -> bool {
-                match (self, other) {
-                    $((Self::$kind(a), Self::$kind(b)) => a.subject() == b.subject(),)*
-                    _ => false,
-                }
-            }
-
-            /// The same with another number.
-            pub(super) fn with_number(&self, number: f64) -> Self {
-                match self { $(Self::$kind(mistake) => mistake.with_number(number).into(),)* }
-            }
-
-            /// The same of other channels, where the mistake can be made in these.
-            fn with_channels(&self, channels: Channels) -> Option<Self> {
-                match self { $(Self::$kind(mistake) => mistake.with_channels(channels).map(Self::$kind),)* }
-            }
-
-            /// The same with the number near its own at which `value` is least; none where it has no number.
-            pub(super) fn between(&self, value: impl Fn(&Self) -> f64) -> Option<Self> {
-                match self {
-                    $(Self::$kind(mistake) => mistake.between(&|other| value(&other.clone().into())).map(Self::$kind),)*
-                }
-            }
-
-            /// The same with the numbers whose `value` is less than around them, the least first.
-            pub(super) fn valleys(&self, value: impl Fn(&Self) -> f64) -> Vec<Self> {
-                match self {
-                    $(Self::$kind(mistake) => {
-                        let all = mistake.valleys(&|other| value(&other.clone().into()));
-                        all.into_iter().map(Self::$kind).collect()
-                    })*
-                }
+            fn kind(&self) -> &dyn MistakeKind {
+                match self { $(Self::$kind(mistake) => mistake,)* }
             }
         }
     };
@@ -144,9 +79,58 @@ impl Mistake {
         self.facts().key
     }
 
+    /// The mistake in a sentence with the names of the joints.
+    pub fn sentence(&self, names: &[String]) -> String {
+        self.kind().sentence(names)
+    }
+
+    /// Keys that correct the study; none where no key does.
+    pub fn changes(&self, keys: &StudyKeys) -> Vec<KeyChange> {
+        self.kind().changes(keys)
+    }
+
+    /// The range of factors that the logs do not distinguish from its own, as the end of a sentence; empty where the
+    /// range is narrow, or the mistake has no such factor.
+    pub fn other_factors(&self, range: [f64; 2]) -> String {
+        self.kind().other_factors(range)
+    }
+
+    /// The motion of a robot without this mistake. Rows of a lag are not changed: its instants are chosen anew.
+    pub fn corrected(&self, robot: &ParametricModel, rows: &MotionRows) -> MotionRows {
+        let mut rows = rows.clone();
+        self.kind().correct(robot, &mut rows);
+        rows
+    }
+
+    /// The robot without this mistake; `None` where it is the same.
+    pub fn corrected_robot(&self, robot: &ParametricModel) -> Option<ParametricModel> {
+        self.kind().corrected_robot(robot)
+    }
+
     /// The joints that it is about, of `dof`.
     pub fn joints(&self, dof: usize) -> Vec<usize> {
         self.facts().joints.unwrap_or_else(|| (0..dof).collect())
+    }
+
+    /// What its kind states.
+    pub(super) fn facts(&self) -> Facts {
+        self.kind().facts()
+    }
+
+    /// Whether two mistakes are about the same, their numbers aside.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        let [own, other] = [self, other].map(|mistake| mistake.kind().subject().unwrap_or_else(|| mistake.clone()));
+        own == other
+    }
+
+    /// The same with another number; itself where it has none.
+    pub(super) fn with_number(&self, number: f64) -> Self {
+        self.kind().with_number(number).unwrap_or_else(|| self.clone())
+    }
+
+    /// The same with the number near its own at which `value` is least; none where it has no free number.
+    pub(super) fn between(&self, value: impl Fn(&Self) -> f64) -> Option<Self> {
+        self.kind().between(&value)
     }
 
     /// The torque columns that change, if nothing else does.
@@ -164,25 +148,11 @@ impl Mistake {
 
     /// The same mistake of the other one of position and torque, which is hard to distinguish.
     pub(super) fn twin(&self) -> Option<Self> {
-        self.with_channels(self.facts().channels?.other()?)
+        self.kind().with_channels(self.facts().channels?.other()?)
     }
 
     /// The mistake that is named first of those that logs hardly distinguish from it.
     pub(super) fn likelier(&self) -> Option<Self> {
-        self.with_channels(self.facts().likelier_channels?)
+        self.kind().with_channels(self.facts().likelier_channels?)
     }
-}
-
-/// Robot and rows with these mistakes corrected, one after the other.
-pub(super) fn without_mistakes(
-    mistakes: &[Mistake],
-    robot: &ParametricModel,
-    rows: &MotionRows,
-) -> (ParametricModel, MotionRows) {
-    let (mut robot, mut rows) = (robot.clone(), rows.clone());
-    for mistake in mistakes {
-        rows = mistake.corrected(&robot, &rows);
-        robot = mistake.corrected_robot(&robot).unwrap_or(robot);
-    }
-    (robot, rows)
 }

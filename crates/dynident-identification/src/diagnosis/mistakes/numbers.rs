@@ -4,39 +4,45 @@
 /// ratio and the next.
 const PLACES: usize = 17;
 
-/// The free number of a mistake, and how far from it others are tried.
+/// The free number of a mistake, and where others are tried.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::diagnosis) enum Number {
-    /// An angle, rad.
-    Angle { at: f64, reach: f64, is_round: bool },
-    /// A factor; the reach is that of its logarithm.
-    Factor { at: f64, reach: f64, is_round: bool },
+pub(in crate::diagnosis) struct Number {
+    /// The number.
+    pub(super) at: f64,
+    /// How far from it others are tried; of a factor in its logarithm.
+    pub(in crate::diagnosis) reach: f64,
+    pub(super) is_factor: bool,
+    /// Whether it is a number that people write, so that another one has to be clearly better.
+    pub(in crate::diagnosis) is_round: bool,
 }
 
 impl Number {
-    /// Whether it is a number that people write, so that another one has to be clearly better.
-    pub(in crate::diagnosis) fn is_round(self) -> bool {
-        let (Self::Angle { is_round, .. } | Self::Factor { is_round, .. }) = self;
-        is_round
+    /// An angle, rad.
+    pub(super) fn angle(at: f64, reach: f64) -> Self {
+        Self { at, reach, is_factor: false, is_round: false }
     }
-}
 
-/// The number whose `value` is least.
-pub(super) fn least_number(number: Number, value: impl Fn(f64) -> f64) -> f64 {
-    match number {
-        Number::Angle { at, reach, .. } => least_in(at, reach, value),
-        Number::Factor { at, reach, .. } => at * least_in(0.0, reach, |log| value(at * log.exp())).exp(),
+    /// A factor.
+    pub(super) fn factor(at: f64, reach: f64) -> Self {
+        Self { at, reach, is_factor: true, is_round: false }
     }
-}
 
-/// Where `value` is least within `reach` of `centre`, to a hundredth of the reach.
-pub(super) fn least_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> f64 {
-    valleys_in(centre, reach, value).next().unwrap_or(centre)
+    /// The number at which `value` is least.
+    pub(super) fn least(self, value: impl Fn(f64) -> f64) -> f64 {
+        self.valleys(value).next().unwrap_or(self.at)
+    }
+
+    /// Numbers whose `value` is less than around them, the least first.
+    pub(in crate::diagnosis) fn valleys(self, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+        let Self { at, reach, is_factor, .. } = self;
+        let number = move |place: f64| if is_factor { at * place.exp() } else { place };
+        valleys_in(if is_factor { 0.0 } else { at }, reach, move |place| value(number(place))).map(number)
+    }
 }
 
 /// Local minima of `value` within `reach` of `centre`, the least first: of [`PLACES`] places those with less than their
 /// neighbours, then by thirds around each, to a hundredth of the reach.
-pub(super) fn valleys_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
+fn valleys_in(centre: f64, reach: f64, value: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
     let spacing = 2.0 * reach / (PLACES - 1) as f64;
     let place = move |k: usize| centre - reach + spacing * k as f64;
     let values: Vec<f64> = (0..PLACES).map(|k| value(place(k))).collect();

@@ -1,5 +1,6 @@
 //! A zero of a position that is elsewhere.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup};
 use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys, at, number};
@@ -46,7 +47,7 @@ impl MistakeKind for Offset {
             rarity: 0.15,
             joints: Some(vec![self.joint]),
             proof: Proof::Torque,
-            number: Some(Number::Angle { at: self.offset_rad, reach: 0.5, is_round }),
+            number: Some(Number { is_round, ..Number::angle(self.offset_rad, 0.5) }),
             other_numbers: OTHER_OFFSETS.map(|times| times * self.offset_rad).to_vec(),
             ..Facts::of("offset")
         }
@@ -69,7 +70,7 @@ impl MistakeKind for Offset {
         vec![keys.per_column(Channels::Position, "offset", with)]
     }
 
-    fn with_number(&self, offset_rad: f64) -> Self {
-        Self { offset_rad, ..*self }
+    fn with_number(&self, offset_rad: f64) -> Option<Mistake> {
+        Some(Self { offset_rad, ..*self }.into())
     }
 }

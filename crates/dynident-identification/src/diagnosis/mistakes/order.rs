@@ -1,5 +1,6 @@
 //! Columns in another order.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, TorqueSource};
 use super::study_keys::{KeyChange, StudyKeys, list};
 use crate::diagnosis::channels::Channels;
@@ -85,7 +86,7 @@ impl MistakeKind for Order {
         self.channels.each().filter_map(of).collect()
     }
 
-    fn with_channels(&self, channels: Channels) -> Option<Self> {
-        Some(Self { channels, ..self.clone() })
+    fn with_channels(&self, channels: Channels) -> Option<Mistake> {
+        Some(Self { channels, ..self.clone() }.into())
     }
 }

@@ -1,7 +1,8 @@
 //! Positions in another unit.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, joint_list, scale};
-use super::numbers::{Number, least_number, valleys_in};
+use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys, significant};
 use crate::diagnosis::channels::Channels;
 use crate::diagnosis::motion_rows::MotionRows;
@@ -20,9 +21,8 @@ const EXACT_UNITS: [f64; 8] = [PI / 180.0, TAU, 180.0 / PI, 1.0 / TAU, PI, 0.5, 
 
 /// Travel beyond which a joint's unit is far too small, in ranges of the joint.
 const MAX_TRAVEL: f64 = 2.0;
-/// Reach of the logarithm of a factor in which gears and counts of encoders are searched, and the number of valleys.
-pub(in crate::diagnosis) const REACH: f64 = 2.0;
-const MAX_VALLEYS: usize = 4;
+/// Reach of the logarithm of a factor in which gears and counts of encoders are searched.
+const REACH: f64 = 2.0;
 /// Ratio of two factors from which they are different in words.
 const SAME_FACTOR: f64 = 1.1;
 
@@ -36,8 +36,8 @@ pub struct PositionUnit {
 }
 
 impl PositionUnit {
-    fn free_factor(&self) -> Number {
-        Number::Factor { at: self.factor, reach: REACH, is_round: EXACT_UNITS.contains(&self.factor) }
+    fn number(&self) -> Number {
+        Number { is_round: EXACT_UNITS.contains(&self.factor), ..Number::factor(self.factor, REACH) }
     }
 
     fn is_shown_by_travel(&self) -> bool {
@@ -86,7 +86,7 @@ impl MistakeKind for PositionUnit {
                 [joint] => Proof::JointGain(joint),
                 _ => Proof::Score,
             },
-            number: Some(self.free_factor()),
+            number: Some(self.number()),
             ..Facts::of("unit")
         }
     }
@@ -124,22 +124,15 @@ impl MistakeKind for PositionUnit {
         )
     }
 
-    fn with_number(&self, factor: f64) -> Self {
-        Self { factor, ..self.clone() }
+    fn with_number(&self, factor: f64) -> Option<Mistake> {
+        Some(Self { factor, ..self.clone() }.into())
     }
 
     /// A gear ratio may be near a unit.
-    fn between(&self, value: &dyn Fn(&Self) -> f64) -> Option<Self> {
-        let found = least_number(self.free_factor(), |factor| value(&self.with_number(factor)));
-        let is_unit = self.free_factor().is_round() && (found / self.factor).ln().abs() < 0.1;
-        (!is_unit).then(|| self.with_number(found))
-    }
-
-    fn valleys(&self, value: &dyn Fn(&Self) -> f64) -> Vec<Self> {
-        if self.free_factor().is_round() {
-            return self.between(value).into_iter().collect();
-        }
-        let with = |log: f64| self.with_number(self.factor * log.exp());
-        valleys_in(0.0, REACH, |log| value(&with(log))).take(MAX_VALLEYS).map(with).collect()
+    fn between(&self, value: &dyn Fn(&Mistake) -> f64) -> Option<Mistake> {
+        let with = |factor: f64| Self { factor, ..self.clone() }.into();
+        let found = self.number().least(|factor| value(&with(factor)));
+        let is_unit = self.number().is_round && (found / self.factor).ln().abs() < 0.1;
+        (!is_unit).then(|| with(found))
     }
 }

@@ -1,5 +1,6 @@
 //! A reversed sign.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, TorqueSource, joint_list, scale};
 use super::study_keys::{KeyChange, StudyKeys, at, list};
 use crate::diagnosis::channels::Channels;
@@ -76,7 +77,7 @@ impl MistakeKind for Sign {
         self.channels.each().map(of).collect()
     }
 
-    fn with_channels(&self, channels: Channels) -> Option<Self> {
-        Some(Self { channels, ..self.clone() })
+    fn with_channels(&self, channels: Channels) -> Option<Mistake> {
+        Some(Self { channels, ..self.clone() }.into())
     }
 }

@@ -1,5 +1,6 @@
 //! Time stamps in another unit, or another rate.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Setup, scale};
 use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys, significant};
@@ -46,11 +47,8 @@ impl MistakeKind for TimeUnit {
 
     fn facts(&self) -> Facts {
         let is_other_rate = !UNITS.contains(&self.factor);
-        Facts {
-            is_other_rate,
-            number: is_other_rate.then_some(Number::Factor { at: self.factor, reach: 0.4, is_round: true }),
-            ..Facts::of("unit")
-        }
+        let factor = Number { is_round: true, ..Number::factor(self.factor, 0.4) };
+        Facts { is_other_rate, number: is_other_rate.then_some(factor), ..Facts::of("unit") }
     }
 
     fn sentence(&self, _: &[String]) -> String {
@@ -81,7 +79,7 @@ impl MistakeKind for TimeUnit {
         vec![KeyChange { table: format!("{}.time", keys.table), line }]
     }
 
-    fn with_number(&self, factor: f64) -> Self {
-        Self { factor }
+    fn with_number(&self, factor: f64) -> Option<Mistake> {
+        Some(Self { factor }.into())
     }
 }

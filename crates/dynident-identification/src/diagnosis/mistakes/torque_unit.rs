@@ -1,5 +1,6 @@
 //! The torque of one joint in another unit.
 
+use super::Mistake;
 use super::kind::{Breadth, Facts, MistakeKind, Proof, Setup, TorqueSource, scale};
 use super::numbers::Number;
 use super::study_keys::{KeyChange, StudyKeys};
@@ -48,6 +49,7 @@ impl MistakeKind for TorqueUnit {
     }
 
     fn facts(&self) -> Facts {
+        let is_round = EXACT_UNITS.contains(&self.factor);
         Facts {
             rarity: 0.15,
             channels: Some(Channels::Torque),
@@ -55,7 +57,7 @@ impl MistakeKind for TorqueUnit {
             torques: vec![TorqueSource { joint: self.joint, from: self.joint, factor: self.factor }],
             torque_gain: Some(self.joint),
             proof: Proof::JointGain(self.joint),
-            number: Some(Number::Factor { at: self.factor, reach: 1.2, is_round: EXACT_UNITS.contains(&self.factor) }),
+            number: Some(Number { is_round, ..Number::factor(self.factor, 1.2) }),
             ..Facts::of("unit")
         }
     }
@@ -76,7 +78,7 @@ impl MistakeKind for TorqueUnit {
         vec![keys.scales(Channels::Torque, &[self.joint], self.factor)]
     }
 
-    fn with_number(&self, factor: f64) -> Self {
-        Self { factor, ..*self }
+    fn with_number(&self, factor: f64) -> Option<Mistake> {
+        Some(Self { factor, ..*self }.into())
     }
 }
