@@ -99,8 +99,9 @@ impl Identification {
 
 /// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others: rows
 /// and factors, estimate, consistent parameters, examination, held-out examination. Each of these stages can be called
-/// alone: [`Logs::new`], [`training_rows`](crate::training_rows), [`estimate`](crate::estimators::estimate()),
-/// [`consistent_stage`](crate::consistent_stage), [`examine_training`](crate::examination::examine_training),
+/// alone: [`Logs::new`](crate::Logs::new), [`training_rows`](crate::training_rows),
+/// [`estimate`](crate::estimators::estimate()), [`consistent_stage`](crate::consistent_stage),
+/// [`examine_training`](crate::examination::examine_training),
 /// [`examine_held_out`](crate::examination::examine_held_out).
 ///
 /// # Errors
