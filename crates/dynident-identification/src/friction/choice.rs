@@ -108,10 +108,10 @@ pub struct FrictionCandidate {
 
 /// The kinds of some terms, as candidates are named.
 fn name_of(terms: &[TorqueTerm]) -> String {
-    let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(FrictionKind::of).collect();
-    kinds.sort();
+    let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(TorqueTerm::candidate).collect();
+    kinds.sort_by_key(|kind| kind.rank());
     kinds.dedup();
-    let names: Vec<&str> = kinds.into_iter().map(FrictionKind::name).collect();
+    let names: Vec<&str> = kinds.into_iter().map(|kind| kind.name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
 }
 

@@ -7,7 +7,9 @@
 //! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
 
 use super::kind::{MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
+use super::law::{Law, VelocityLaw};
 use super::{CoulombShape, JointMotion, TermInput};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// What the shared drive adds.
@@ -42,6 +44,27 @@ pub struct Coupling {
 impl Coupling {
     /// Sizes that a ratio may have: gears turn by less, and products of two stay far inside the range of `f64`.
     pub const RATIOS: core::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
+    /// For joint `row` the other joint and its own ratio.
+    fn as_seen_by(&self, row: usize) -> (usize, f64) {
+        if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) }
+    }
+}
+
+impl VelocityLaw for Coupling {}
+
+impl Law for Coupling {
+    fn torque<S: Real>(&self, row: usize, dq: &[S]) -> Result<S, &'static str> {
+        let (other, own_ratio) = self.as_seen_by(row);
+        let [first, second] = self.ratios.map(S::splat);
+        Ok(match self.effect {
+            CouplingEffect::Inertia => S::ZERO,
+            CouplingEffect::Viscous => first * second * dq[other],
+            CouplingEffect::Coulomb(shape) => {
+                S::splat(own_ratio) * shape.of(first * dq[self.first] + second * dq[self.second])
+            }
+        })
+    }
 }
 
 impl TermKind for Coupling {
@@ -84,8 +107,7 @@ impl TermKind for Coupling {
     }
 
     fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        let (other, own_ratio) =
-            if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
+        let (other, own_ratio) = self.as_seen_by(row);
         let cross = self.ratios[0] * self.ratios[1];
         match self.effect {
             CouplingEffect::Inertia => {
@@ -114,8 +136,7 @@ impl TermKind for Coupling {
         weights: &[f64],
         [_, by_dq, by_ddq]: [&mut [f64]; 3],
     ) {
-        let (other, own_ratio) =
-            if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
+        let (other, own_ratio) = self.as_seen_by(row);
         let cross = self.ratios[0] * self.ratios[1];
         let start = |joint: usize| joint * motion.samples;
         for (s, w) in weights.iter().enumerate() {
@@ -130,6 +151,13 @@ impl TermKind for Coupling {
                     by_dq[start(self.second) + s] += self.ratios[1] * slope;
                 }
             }
+        }
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        match &mut self.effect {
+            CouplingEffect::Coulomb(shape) => Some(shape),
+            CouplingEffect::Inertia | CouplingEffect::Viscous => None,
         }
     }
 

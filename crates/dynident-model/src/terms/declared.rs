@@ -5,7 +5,8 @@
 //! own code ([`TorqueFunction`]). As for every term, the torque is what the drive has to give: a spring that pulls the
 //! joint back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
 
-use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermKind, TermLabel, one_joint};
+use super::law::{Law, VelocityLaw};
 use super::{Expression, JointMotion, JointNames, TermInput, TorqueFunction, TorqueTable};
 use crate::joint::{Joint, JointSpring};
 use crate::tree::Model;
@@ -153,14 +154,16 @@ impl StateFunction for Declared {
     }
 }
 
+impl VelocityLaw for Declared {}
+
+impl Law for Declared {}
+
 impl TermKind for Declared {
     fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "declared", symbol: self.name.clone(), unit: &self.unit }
     }
 
-    fn joints(&self) -> TermJoints {
-        TermJoints::One(self.joint)
-    }
+    one_joint!();
 
     fn is_nonnegative(&self) -> bool {
         false

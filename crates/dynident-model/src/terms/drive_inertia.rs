@@ -1,6 +1,7 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
-use super::kind::{JointProperty, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::kind::{JointProperty, TermAction, TermKind, TermLabel, one_joint};
+use super::law::{Law, VelocityLaw};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -13,18 +14,16 @@ pub struct DriveInertia {
     pub joint: usize,
 }
 
+impl VelocityLaw for DriveInertia {}
+
+impl Law for DriveInertia {}
+
 impl TermKind for DriveInertia {
     fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "drive-inertia", symbol: format!("Ia{}", self.joint + 1), unit: "kg m^2" }
     }
 
-    fn joints(&self) -> TermJoints {
-        TermJoints::One(self.joint)
-    }
-
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
+    one_joint!();
 
     fn property(&self) -> Option<JointProperty> {
         Some(JointProperty::DriveInertia)
@@ -32,10 +31,6 @@ impl TermKind for DriveInertia {
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Inertia { factor: 1.0 }
-    }
-
-    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        Vec::new()
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
