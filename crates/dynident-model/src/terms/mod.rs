@@ -1,6 +1,7 @@
 //! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each term is one parameter
-//! and one regressor column per joint that feels it. Each kind is one file, which holds everything about it, and a row of
-//! [`TorqueTerm`]; a law that a study can state has a row of [`FrictionTerm`] as well. No other code lists the kinds.
+//! and one regressor column per joint that feels it. Each kind is one file, which holds everything about it, and a row
+//! of [`TorqueTerm`]; a law that a study can state has a row of [`FrictionTerm`] as well. No other code lists friction
+//! laws.
 
 mod candidate;
 mod coulomb;

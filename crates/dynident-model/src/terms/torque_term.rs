@@ -46,7 +46,7 @@ impl TorqueTerm {
 
     /// Width of the step at rest, rad/s (m/s), 0 for a sign; `None` for a law without one.
     pub fn step_width(&self) -> Option<f64> {
-        self.kind().step_width().or(match self.step()? {
+        self.kind().step_width().or_else(|| match self.step()? {
             CoulombShape::Smooth { width } => Some(width),
             CoulombShape::Sign { .. } => Some(0.0),
         })
