@@ -43,7 +43,7 @@ pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
     let reference = |(term, _): (&TorqueTerm, f64)| {
         let constants = term.constants().into_iter().filter(|_| term.needs_temperature());
         let reference_c = constants.into_iter().find_map(|(name, constant)| match constant {
-            TermConstant::Number(value) if name == "reference_c" => Some(value),
+            TermConstant::Number(value, _) if name == "reference_c" => Some(value),
             _ => None,
         })?;
         Some((term.symbol(), reference_c))

@@ -1,7 +1,7 @@
 //! Friction of a simulated robot whose step at rest is narrower than runs can tell: it is dry friction.
 
 use crate::rests::MOVING;
-use dynident_identification::friction::{FrictionConstant, JointFriction};
+use dynident_identification::friction::JointFriction;
 use dynident_model::terms::{CoulombShape, TorqueTerm};
 
 /// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
@@ -31,10 +31,12 @@ pub(crate) fn with_sticking_joints(
 ) -> Option<(Vec<TorqueTerm>, Vec<f64>)> {
     let sticks = |joint: usize| {
         let own = terms.iter().filter(|term| term.is_joint_friction() && term.own_joint() == Some(joint));
-        let of_model = own.filter_map(TorqueTerm::step_width);
-        let of_choice = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| &one.constants);
-        let of_choice = of_choice.filter_map(FrictionConstant::narrowest_step);
-        of_model.chain(of_choice).fold(f64::INFINITY, f64::min) <= MOVING * fastest[joint]
+        let chosen = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| &one.constants);
+        let of_choice = |term: &TorqueTerm| {
+            chosen.clone().filter_map(|constant| constant.narrowest_step(term)).min_by(f64::total_cmp)
+        };
+        let widths = own.flat_map(|term| [term.step_width(), of_choice(term)]).flatten();
+        widths.fold(f64::INFINITY, f64::min) <= MOVING * fastest[joint]
     };
     let sticking: Vec<bool> = (0..fastest.len()).map(sticks).collect();
     let dry = |(term, &parameter): (&TorqueTerm, &f64)| {
@@ -52,6 +54,7 @@ pub(crate) fn with_sticking_joints(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dynident_identification::friction::FrictionConstant;
     use dynident_model::terms::{Coulomb, Sigmoid, Stribeck, Viscous};
 
     const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };

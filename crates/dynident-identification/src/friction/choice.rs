@@ -75,15 +75,11 @@ pub struct FrictionConstant {
 }
 
 impl FrictionConstant {
-    /// The narrowest step at rest that its 95 % interval leaves, rad/s (m/s): the lower end of a `width`; of a
-    /// `steepness` `φ₂` what half a Coulomb step of width `2/φ₂` has at the upper end. `None` for other constants.
-    pub fn narrowest_step(&self) -> Option<f64> {
-        let [least, most] = self.interval_95;
-        match &self.constant[..] {
-            "width" => Some(least),
-            "steepness" => Some(2.0 / most),
-            _ => None,
-        }
+    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if it is a constant of another
+    /// term, or does not set the width of the step.
+    pub fn narrowest_step(&self, term: &TorqueTerm) -> Option<f64> {
+        let widths = self.interval_95.iter().filter_map(|&end| term.kind().step_width_by(&self.constant, end));
+        widths.reduce(f64::min).filter(|_| term.kind_name() == self.term)
     }
 }
 

@@ -182,7 +182,7 @@ fn add_terms(
     let mut additions: Vec<FrictionKind> = columns
         .iter()
         .map(|column| column.kind)
-        .filter(|kind| !matches!(kind.role, CandidateRole::Base | CandidateRole::Start))
+        .filter(|kind| matches!(kind.role, CandidateRole::InPlaceOf(_) | CandidateRole::Addition))
         .collect();
     additions.dedup();
     let mut at = met.len();

@@ -3,8 +3,8 @@
 use super::TorqueTerm;
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{
-    JointProperty, MotionFunction, StepRole, TermAction, TermConstant, TermKind, TermLabel, VelocityCurve,
-    VelocityFriction, VelocityFunction, halves, one_joint,
+    JointProperty, MotionFunction, StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
+    VelocityFriction, VelocityFunction, halves,
 };
 use super::law::{Law, VelocityLaw};
 use dynident_lanes::Real;
@@ -106,7 +106,9 @@ impl TermKind for Coulomb {
         TermLabel { kind: "coulomb", symbol: format!("fc{}", self.joint + 1), unit: "Nm" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Friction(VelocityFriction::of(self.shape.curve()))

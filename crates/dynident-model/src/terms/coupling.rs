@@ -8,7 +8,7 @@
 
 use super::kind::{MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::{CoulombShape, JointMotion, TermInput};
+use super::{Coulomb, CoulombShape, DriveInertia, JointMotion, TermInput, TorqueTerm, Viscous};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,18 @@ pub enum CouplingEffect {
     Viscous,
     /// Coulomb friction on the drive's own velocity, Nm.
     Coulomb(CoulombShape),
+}
+
+impl CouplingEffect {
+    /// The term of a drive with this effect that turns with one joint, by `ratio` times the joint's velocity, and the
+    /// term's parameter per unit of the drive's.
+    pub fn of_joint(self, joint: usize, ratio: f64) -> (TorqueTerm, f64) {
+        match self {
+            Self::Inertia => (TorqueTerm::DriveInertia(DriveInertia { joint }), ratio * ratio),
+            Self::Viscous => (TorqueTerm::Viscous(Viscous { joint }), ratio * ratio),
+            Self::Coulomb(shape) => (TorqueTerm::Coulomb(Coulomb { joint, shape }), ratio.abs()),
+        }
+    }
 }
 
 /// One effect of one drive that turns with two joints.

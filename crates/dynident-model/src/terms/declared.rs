@@ -5,7 +5,7 @@
 //! own code ([`TorqueFunction`]). As for every term, the torque is what the drive has to give: a spring that pulls the
 //! joint back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
 
-use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermKind, TermLabel, one_joint};
+use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
 use super::{Expression, JointMotion, JointNames, TermInput, TorqueFunction, TorqueTable};
 use crate::joint::{Joint, JointSpring};
@@ -163,7 +163,9 @@ impl TermKind for Declared {
         TermLabel { kind: "declared", symbol: self.name.clone(), unit: &self.unit }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn is_nonnegative(&self) -> bool {
         false

@@ -6,11 +6,11 @@
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{
-    MotionFunction, StepRole, TermAction, TermConstant, TermKind, TermLabel, VelocityCurve, VelocityFriction, halves,
-    one_joint, smooth_friction,
+    MotionFunction, StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
+    VelocityFriction, halves,
 };
 use super::law::{Law, VelocityLaw};
-use super::stated::plain_law;
+use super::stated::{StatedJoint, StatedLaw};
 use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm, Viscous};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -92,11 +92,17 @@ impl Law for DirectionalViscous {
         })];
 }
 
-plain_law!(
-    /// The law `asymmetric-viscous` of a study.
-    AsymmetricViscous,
-    |own| DirectionalViscous::both(own.joint)
-);
+/// The law `asymmetric-viscous` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct AsymmetricViscous {}
+
+impl StatedLaw for AsymmetricViscous {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        DirectionalViscous::both(own.joint)
+    }
+}
 
 impl TermKind for DirectionalViscous {
     fn label(&self) -> TermLabel<'_> {
@@ -107,7 +113,13 @@ impl TermKind for DirectionalViscous {
         }
     }
 
-    smooth_friction!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+    }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("direction", self.direction.constant())]
@@ -169,11 +181,17 @@ impl Law for DirectionalCoulomb {
     }];
 }
 
-plain_law!(
-    /// The law `asymmetric-coulomb` of a study.
-    AsymmetricCoulomb,
-    |own| DirectionalCoulomb::both(own.joint, own.step)
-);
+/// The law `asymmetric-coulomb` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct AsymmetricCoulomb {}
+
+impl StatedLaw for AsymmetricCoulomb {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        DirectionalCoulomb::both(own.joint, own.step)
+    }
+}
 
 impl TermKind for DirectionalCoulomb {
     fn label(&self) -> TermLabel<'_> {
@@ -184,7 +202,9 @@ impl TermKind for DirectionalCoulomb {
         }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn action(&self) -> TermAction<'_> {
         let forward = self.direction == Direction::Forward;

@@ -1,6 +1,6 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
-use super::kind::{JointProperty, TermAction, TermKind, TermLabel, one_joint};
+use super::kind::{JointProperty, TermAction, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,9 @@ impl TermKind for DriveInertia {
         TermLabel { kind: "drive-inertia", symbol: format!("Ia{}", self.joint + 1), unit: "kg m^2" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn property(&self) -> Option<JointProperty> {
         Some(JointProperty::DriveInertia)

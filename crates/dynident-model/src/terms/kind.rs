@@ -1,6 +1,5 @@
-//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`];
-//! [`TorqueTerm`](super::TorqueTerm) hands every question on to it, so that nobody else has to know which kinds there
-//! are.
+//! What every kind of torque term states about itself. A kind is one type in one file that implements [`TermKind`];
+//! [`TorqueTerm`](super::TorqueTerm) passes every question on to it, so that no other code has to know the kinds.
 
 use super::candidate::velocity_within;
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
@@ -134,7 +133,7 @@ pub struct MotionFunction {
     pub factor: f64,
 }
 
-/// What a robot's description can say of a term, by its name in URDF (MJCF).
+/// The property of a joint by which a robot description states a term, by its name in URDF (MJCF).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointProperty {
     /// `damping`.
@@ -166,8 +165,9 @@ pub enum StepRole {
 /// A constant of a term, such as a velocity or an exponent, for programs that are not this one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TermConstant {
-    /// A number.
-    Number(f64),
+    /// A number, and its unit at a revolute joint as names in files have it (`rad_s`); empty without a unit, or with
+    /// the unit in its name.
+    Number(f64, &'static str),
     /// One number per joint.
     Numbers([f64; 2]),
     /// One of a few words.
@@ -253,9 +253,10 @@ pub trait TermKind: VelocityFunction {
         StepRole::Fixed
     }
 
-    /// Width of a step at rest that is not a [`TermConstant::Step`], rad/s (m/s).
-    fn step_width(&self) -> Option<f64> {
-        None
+    /// Width of the step at rest where the constant of this name has this value, rad/s (m/s); `None` for a constant that
+    /// does not set the width.
+    fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
+        (constant == "width").then_some(value)
     }
 
     /// The dry friction that it is where a joint rests below the velocity `rest`, and that term's parameter per unit.
@@ -292,28 +293,6 @@ pub trait TermKind: VelocityFunction {
         }
     }
 }
-
-/// The joint of a term that one joint feels.
-macro_rules! one_joint {
-    () => {
-        fn joints(&self) -> super::TermJoints {
-            super::TermJoints::One(self.joint)
-        }
-    };
-}
-pub(super) use one_joint;
-
-/// Joint and action of friction that follows one joint's velocity by a smooth curve: the term itself.
-macro_rules! smooth_friction {
-    () => {
-        super::kind::one_joint!();
-
-        fn action(&self) -> super::TermAction<'_> {
-            super::TermAction::Friction(super::VelocityFriction::of(super::VelocityCurve::Smooth(self)))
-        }
-    };
-}
-pub(super) use smooth_friction;
 
 /// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative velocity.
 pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {

@@ -5,7 +5,7 @@
 //! Hamon, Gautier and Garrec, IROS 2010, 6187.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
-use super::kind::{StepRole, TermAction, TermConstant, TermKind, TermLabel, VelocityFriction, one_joint};
+use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
@@ -64,7 +64,9 @@ impl TermKind for LoadFriction {
         TermLabel { kind: "load", symbol: format!("fl{}", self.joint + 1), unit: "1" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Friction(VelocityFriction { by_load: true, ..VelocityFriction::of(self.shape.curve()) })

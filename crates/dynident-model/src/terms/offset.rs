@@ -1,6 +1,6 @@
 //! A constant torque: sensor bias, unmodelled spring, asymmetric friction. `τ = τ_0`.
 
-use super::kind::{TermAction, TermKind, TermLabel, one_joint};
+use super::kind::{TermAction, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,9 @@ impl TermKind for Offset {
         TermLabel { kind: "offset", symbol: format!("off{}", self.joint + 1), unit: "Nm" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn is_nonnegative(&self) -> bool {
         false

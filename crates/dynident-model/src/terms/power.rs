@@ -5,9 +5,9 @@
 //! finite at rest, where that of a cube root is not.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
-use super::kind::{TermConstant, TermKind, TermLabel, smooth_friction};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedJoint, plain_law};
+use super::stated::{StatedJoint, StatedLaw};
 use super::{FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -89,17 +89,29 @@ impl Law for Power {
     }
 }
 
-plain_law!(
-    /// The law `cube-root` of a study.
-    CubeRoot,
-    |own| Power::usual(own, PowerExponent::CubeRoot)
-);
+/// The law `cube-root` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct CubeRoot {}
 
-plain_law!(
-    /// The law `quadratic` of a study.
-    Quadratic,
-    |own| Power::usual(own, PowerExponent::Quadratic)
-);
+impl StatedLaw for CubeRoot {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        Power::usual(own, PowerExponent::CubeRoot)
+    }
+}
+
+/// The law `quadratic` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Quadratic {}
+
+impl StatedLaw for Quadratic {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        Power::usual(own, PowerExponent::Quadratic)
+    }
+}
 
 impl TermKind for Power {
     fn label(&self) -> TermLabel<'_> {
@@ -110,12 +122,18 @@ impl TermKind for Power {
         TermLabel { kind: "power", symbol: format!("{letters}{}", self.joint + 1), unit }
     }
 
-    smooth_friction!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+    }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![
-            ("exponent", TermConstant::Number(self.exponent.value())),
-            ("rounding", TermConstant::Number(self.rounding)),
+            ("exponent", TermConstant::Number(self.exponent.value(), "")),
+            ("rounding", TermConstant::Number(self.rounding, "rad_s")),
         ]
     }
 

@@ -5,7 +5,7 @@
 //! RA-L 4 (2019) 4147.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within};
-use super::kind::{TermConstant, TermKind, TermLabel, smooth_friction};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
 use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm};
@@ -93,12 +93,18 @@ impl TermKind for Sigmoid {
         TermLabel { kind: "sigmoid", symbol: format!("sig{}", self.joint + 1), unit: "Nm" }
     }
 
-    smooth_friction!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+    }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![
-            ("steepness", TermConstant::Number(self.steepness)),
-            ("offset_speed", TermConstant::Number(self.offset_speed)),
+            ("steepness", TermConstant::Number(self.steepness, "s_per_rad")),
+            ("offset_speed", TermConstant::Number(self.offset_speed, "rad_s")),
         ]
     }
 
@@ -107,8 +113,8 @@ impl TermKind for Sigmoid {
         Some(FrictionTerm::Sigmoid(StatedSigmoid { steepness, offset_speed }))
     }
 
-    fn step_width(&self) -> Option<f64> {
-        Some(2.0 / self.steepness)
+    fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
+        (constant == "steepness").then_some(2.0 / value)
     }
 
     /// Without offset it is half a Coulomb step.

@@ -8,7 +8,7 @@
 //! sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
-use super::kind::{TermAction, TermConstant, TermKind, TermLabel, one_joint};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
 use super::{FrictionTerm, JointMotion, TermInput, TorqueTerm};
@@ -107,14 +107,16 @@ impl TermKind for MaxwellSlip {
         }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Hysteresis
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        vec![("yield_displacement", TermConstant::Number(self.yield_displacement))]
+        vec![("yield_displacement", TermConstant::Number(self.yield_displacement, "rad"))]
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {

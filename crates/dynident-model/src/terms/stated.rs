@@ -78,25 +78,6 @@ pub trait StatedLaw: Debug {
     }
 }
 
-/// A law without constants, by its terms at a joint.
-macro_rules! plain_law {
-    ($(#[$documentation:meta])* $name:ident, $terms:expr) => {
-        $(#[$documentation])*
-        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-        #[serde(deny_unknown_fields)]
-        pub struct $name {}
-
-        impl super::stated::StatedLaw for $name {
-            fn terms(&self, joint: &super::StatedJoint) -> Vec<super::TorqueTerm> {
-                let terms: fn(&super::StatedJoint) -> Vec<super::TorqueTerm> = $terms;
-                terms(joint)
-            }
-        }
-    };
-}
-pub(super) use plain_law;
-
 /// The smooth step of this width, or else the joint's.
 pub(super) fn step_or(width: Option<f64>, joint: &StatedJoint) -> CoulombShape {
     width.map_or(joint.step, |width| CoulombShape::Smooth { width })

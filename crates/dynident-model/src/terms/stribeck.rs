@@ -4,7 +4,7 @@
 //! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within, within};
-use super::kind::{StepRole, TermAction, TermConstant, TermKind, TermLabel, VelocityFriction, one_joint};
+use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
@@ -95,7 +95,9 @@ impl TermKind for Stribeck {
         TermLabel { kind: "stribeck", symbol: format!("fs{}", self.joint + 1), unit: "Nm" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Friction(VelocityFriction {
@@ -106,8 +108,8 @@ impl TermKind for Stribeck {
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![
-            ("speed", TermConstant::Number(self.speed)),
-            ("exponent", TermConstant::Number(self.exponent)),
+            ("speed", TermConstant::Number(self.speed, "rad_s")),
+            ("exponent", TermConstant::Number(self.exponent, "")),
             ("shape", TermConstant::Step(self.shape)),
         ]
     }

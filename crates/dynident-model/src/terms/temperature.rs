@@ -7,7 +7,7 @@
 //! Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC PapersOnLine 48
 //! (2015) 183.
 
-use super::kind::{TermAction, TermConstant, TermKind, TermLabel, one_joint};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
@@ -107,7 +107,9 @@ impl TermKind for TemperatureViscous {
         TermLabel { kind: "temperature-viscous", symbol: format!("fvT{}", self.joint + 1), unit: "Nm s/(rad K)" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn is_nonnegative(&self) -> bool {
         false
@@ -118,7 +120,7 @@ impl TermKind for TemperatureViscous {
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        vec![("reference_c", TermConstant::Number(self.reference_c))]
+        vec![("reference_c", TermConstant::Number(self.reference_c, ""))]
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
@@ -136,7 +138,9 @@ impl TermKind for TemperatureCoulomb {
         TermLabel { kind: "temperature-coulomb", symbol: format!("fcT{}", self.joint + 1), unit: "Nm/K" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn is_nonnegative(&self) -> bool {
         false
@@ -147,7 +151,7 @@ impl TermKind for TemperatureCoulomb {
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        vec![("reference_c", TermConstant::Number(self.reference_c)), ("shape", TermConstant::Step(self.shape))]
+        vec![("reference_c", TermConstant::Number(self.reference_c, "")), ("shape", TermConstant::Step(self.shape))]
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {

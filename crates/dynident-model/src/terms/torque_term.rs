@@ -46,9 +46,11 @@ impl TorqueTerm {
 
     /// Width of the step at rest, rad/s (m/s), 0 for a sign; `None` for a law without one.
     pub fn step_width(&self) -> Option<f64> {
-        self.kind().step_width().or_else(|| match self.step()? {
-            CoulombShape::Smooth { width } => Some(width),
-            CoulombShape::Sign { .. } => Some(0.0),
+        self.constants().into_iter().find_map(|(name, constant)| match constant {
+            TermConstant::Step(CoulombShape::Smooth { width }) => Some(width),
+            TermConstant::Step(CoulombShape::Sign { .. }) => Some(0.0),
+            TermConstant::Number(value, _) => self.kind().step_width_by(name, value),
+            _ => None,
         })
     }
 
@@ -63,7 +65,7 @@ impl TorqueTerm {
     /// Name of the constant behind a coordinate, and its value at these coordinates.
     pub fn constant_at(&self, place: usize, coordinates: &[f64], velocity: f64) -> (&'static str, f64) {
         match self.at(coordinates, velocity).constants().get(place) {
-            Some((name, TermConstant::Number(value))) => (name, *value),
+            Some((name, TermConstant::Number(value, _))) => (name, *value),
             _ => ("width", coordinates[place].exp()),
         }
     }

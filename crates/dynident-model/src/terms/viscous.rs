@@ -2,7 +2,7 @@
 
 use super::TorqueTerm;
 use super::candidate::{CandidateLaw, CandidateRole, GridPoint};
-use super::kind::{JointProperty, MotionFunction, TermAction, TermKind, TermLabel, halves, one_joint};
+use super::kind::{JointProperty, MotionFunction, TermAction, TermJoints, TermKind, TermLabel, halves};
 use super::law::{Law, VelocityLaw};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -33,7 +33,9 @@ impl TermKind for Viscous {
         TermLabel { kind: "viscous", symbol: format!("fv{}", self.joint + 1), unit: "Nm s/rad" }
     }
 
-    one_joint!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Damping { factor: 1.0 }
