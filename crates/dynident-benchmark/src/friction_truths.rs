@@ -66,56 +66,51 @@ impl FrictionTruth {
 
     /// Its terms at a joint.
     pub(crate) fn terms(self, joint: usize) -> Vec<TorqueTerm> {
+        self.terms_with_shares(joint).into_iter().map(|(term, _)| term).collect()
+    }
+
+    /// Its terms at a joint, each with the ratio of its parameter to a usual one.
+    fn terms_with_shares(self, joint: usize) -> Vec<(TorqueTerm, f64)> {
         let shape = CoulombShape::Smooth { width: WIDTH };
-        let (viscous, coulomb) =
-            (TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape }));
+        let viscous = (TorqueTerm::Viscous(Viscous { joint }), 1.0);
+        let coulomb = (TorqueTerm::Coulomb(Coulomb { joint, shape }), 1.0);
         let mut terms = match self {
             Self::Plain => vec![viscous, coulomb],
-            Self::Asymmetric => [Direction::Forward, Direction::Backward]
-                .into_iter()
-                .flat_map(|direction| {
+            Self::Asymmetric => {
+                let of_direction = |(direction, [of_viscous, of_coulomb]): (Direction, [f64; 2])| {
                     [
-                        TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }),
-                        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape }),
+                        (TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }), of_viscous),
+                        (TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape }), of_coulomb),
                     ]
-                })
-                .collect(),
+                };
+                [(Direction::Forward, [1.0, 1.0]), (Direction::Backward, [1.3, 1.4])].map(of_direction).concat()
+            }
             Self::Stribeck => {
                 let (speed, exponent) = STRIBECK;
-                vec![viscous, coulomb, TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })]
+                vec![viscous, coulomb, (TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape }), 0.5)]
             }
             Self::Sigmoid => {
                 let (steepness, offset_speed) = SIGMOID;
-                vec![viscous, TorqueTerm::Sigmoid(Sigmoid { joint, steepness, offset_speed })]
+                vec![viscous, (TorqueTerm::Sigmoid(Sigmoid { joint, steepness, offset_speed }), 1.0)]
             }
-            Self::Load => vec![viscous, coulomb, TorqueTerm::Load(LoadFriction { joint, shape })],
+            Self::Load => vec![viscous, coulomb, (TorqueTerm::Load(LoadFriction { joint, shape }), LOAD)],
         };
-        terms.push(TorqueTerm::Offset(Offset { joint }));
+        terms.push((TorqueTerm::Offset(Offset { joint }), 1.0));
         terms
     }
 
-    /// The term by which this truth is told from others.
-    pub(crate) fn is_told_by(self, term: &TorqueTerm) -> bool {
-        match self {
-            Self::Plain => matches!(term, TorqueTerm::Coulomb(_)),
-            Self::Asymmetric => {
-                matches!(term, TorqueTerm::DirectionalViscous(_) | TorqueTerm::DirectionalCoulomb(_))
-            }
-            Self::Stribeck => matches!(term, TorqueTerm::Stribeck(_)),
-            Self::Sigmoid => matches!(term, TorqueTerm::Sigmoid(_)),
-            Self::Load => matches!(term, TorqueTerm::Load(_)),
-        }
+    /// Ratio of the parameter of one of its terms to a usual one.
+    pub(crate) fn share(self, term: &TorqueTerm) -> f64 {
+        let mut own = term.own_joint().into_iter().flat_map(|joint| self.terms_with_shares(joint));
+        own.find(|(own, _)| own == term).map_or(1.0, |(_, share)| share)
     }
-}
 
-/// How much larger than usual a term of the truth is.
-pub(crate) fn share(term: &TorqueTerm) -> f64 {
-    match term {
-        TorqueTerm::DirectionalViscous(DirectionalViscous { direction: Direction::Backward, .. }) => 1.3,
-        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { direction: Direction::Backward, .. }) => 1.4,
-        TorqueTerm::Stribeck(_) => 0.5,
-        TorqueTerm::Load(_) => LOAD,
-        _ => 1.0,
+    /// Whether the term distinguishes this truth from others: its law is not part of plain friction. Plain friction is
+    /// distinguished by its step.
+    pub(crate) fn is_told_by(self, term: &TorqueTerm) -> bool {
+        let Some(law) = term.candidate() else { return false };
+        let has_law = |truth: Self| truth.terms(0).iter().any(|own| own.candidate() == Some(law));
+        if self == Self::Plain { law.is_common_step() } else { has_law(self) && !has_law(Self::Plain) }
     }
 }
 
@@ -239,7 +234,7 @@ impl Made {
         let mut bodies = model.parameter_vector();
         bodies.resize(bodies.len() + robot.terms().len(), 0.0);
         let regressor = regressor.clone().with_load_of(&regressor, &robot.base().values(&bodies));
-        let theta = truth(&regressor, &motion, share);
+        let theta = truth(&regressor, &motion, |term| cell.truth.share(term));
         let exact = torque(&regressor, &motion, &theta);
         let (log, _) = recording(made, model, &motion, &exact, 77 + run)?;
         let other_exact = torque(&regressor, &other, &theta);

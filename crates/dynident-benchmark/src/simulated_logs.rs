@@ -113,7 +113,7 @@ pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(
         let own = motion.of(term.joints()[0]);
         let torque = rms(&bodies[own.clone()]).max(LEAST_TORQUE);
         let usual = match term.action() {
-            _ if matches!(term, TorqueTerm::Load(_)) => 1.0,
+            _ if term.needs_load() => 1.0,
             TermAction::Damping { .. } => VISCOUS * torque / rms(&motion.dq[own]),
             TermAction::Friction(_) => DRY * torque,
             _ => OFFSET * torque,

@@ -4,7 +4,7 @@ use crate::error::ExportError;
 use crate::graph::{Function, Function2};
 use crate::robot_model::RobotModel;
 use crate::symbol::Symbol;
-use dynident_lanes::Scalar;
+use dynident_lanes::{Real, Scalar};
 use dynident_model::terms::{
     DeclaredLaw, Expression, ExpressionFunction, ExpressionFunction2, ExpressionNode, TorqueTable, TorqueTerm,
 };

@@ -7,7 +7,7 @@ use crate::nearest_friction::{ComparedOver, NearestFriction};
 use crate::robot_model::RobotModel;
 use crate::rotation::quaternion;
 use core::fmt::Write;
-use dynident_model::terms::{CouplingEffect, StateFunction, TorqueTerm};
+use dynident_model::terms::{JointProperty, TorqueTerm};
 use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, write_urdf};
 use dynident_text::xml::{self, escaped};
 use std::borrow::Cow;
@@ -106,40 +106,23 @@ pub(crate) fn left_out(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
         let (symbol, unit) = (term.symbol(), term.unit());
-        match term {
-            TorqueTerm::Coupling(coupling) => {
-                let effect = match coupling.effect {
-                    CouplingEffect::Inertia => "inertia",
-                    CouplingEffect::Viscous | CouplingEffect::Coulomb(_) => "friction",
-                };
-                notes.push(format!(
-                    "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
-                ));
-            }
-            TorqueTerm::Declared(declared) if declared.is_spring && holds_springs => {}
-            TorqueTerm::Declared(_) => {
-                let law = term.state_function().map_or_else(String::new, StateFunction::description);
+        if term.own_joint().is_none() {
+            let effect = if term.is_friction() { "friction" } else { "inertia" };
+            notes.push(format!(
+                "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
+            ));
+        } else if let Some(law) = term.state_function() {
+            if !(holds_springs && is_spring(term)) {
+                let law = law.description();
                 notes.push(format!("Torque {symbol} of joint {}, {value:?} {unit} times {law}, is left out: add it to the simulator's control.", joint_name(robot, term)));
             }
-            TorqueTerm::Load(_) => {
-                notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
-            }
-            TorqueTerm::MaxwellSlip(slip) => notes.push(format!(
-                "{symbol} = {value:?} {unit} ({}) counts as the Coulomb friction that it is once the joint has moved on by {:?} rad (m).",
+        } else if term.needs_load() {
+            notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
+        } else if let Some(distance) = term.kind().sliding_distance() {
+            notes.push(format!(
+                "{symbol} = {value:?} {unit} ({}) counts as the Coulomb friction that it is once the joint has moved on by {distance:?} rad (m).",
                 term.kind_name(),
-                2.0 * slip.yield_displacement
-            )),
-            TorqueTerm::Viscous(_)
-            | TorqueTerm::Coulomb(_)
-            | TorqueTerm::DirectionalViscous(_)
-            | TorqueTerm::DirectionalCoulomb(_)
-            | TorqueTerm::Stribeck(_)
-            | TorqueTerm::Sigmoid(_)
-            | TorqueTerm::Power(_)
-            | TorqueTerm::TemperatureViscous(_)
-            | TorqueTerm::TemperatureCoulomb(_)
-            | TorqueTerm::Offset(_)
-            | TorqueTerm::DriveInertia(_) => {}
+            ));
         }
     }
     notes
@@ -149,11 +132,16 @@ fn joint_name<'a>(robot: &'a RobotModel, term: &TorqueTerm) -> &'a str {
     term.own_joint().map_or("", |joint| &robot.model().joints()[joint].name)
 }
 
+/// Whether it is the spring of its joint in the robot's description.
+fn is_spring(term: &TorqueTerm) -> bool {
+    term.property() == Some(JointProperty::Stiffness)
+}
+
 /// Stiffness and reference of the spring at a joint of the tree.
 pub(crate) fn spring(robot: &RobotModel, tree_joint: usize) -> Option<(f64, f64)> {
     let model = robot.model();
     let (joint, described) = (model.joint_of(tree_joint)?, model.tree_joints()[tree_joint].spring?);
-    let is_it = |term: &TorqueTerm| matches!(term, TorqueTerm::Declared(own) if own.is_spring && own.joint == joint);
+    let is_it = |term: &TorqueTerm| is_spring(term) && term.own_joint() == Some(joint);
     robot.terms().find(|(term, _)| is_it(term)).map(|(_, stiffness)| (stiffness, described.reference))
 }
 

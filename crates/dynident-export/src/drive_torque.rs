@@ -1,11 +1,10 @@
 //! Torque terms as symbols: friction, offsets and the inertia of drives.
 
 use crate::error::ExportError;
-use crate::graph::Function;
 use crate::robot_model::RobotModel;
 use crate::symbol::Symbol;
 use dynident_lanes::Scalar;
-use dynident_model::terms::{CoulombShape, CouplingEffect, Direction, JointMotion, PowerExponent, TorqueTerm};
+use dynident_model::terms::{JointMotion, TermConstant, TorqueTerm};
 
 /// Torque of friction and offsets of every joint at the velocities `dq`: what the terms add that does not follow
 /// accelerations. Terms that change with temperature count as being at their reference.
@@ -15,65 +14,11 @@ use dynident_model::terms::{CoulombShape, CouplingEffect, Direction, JointMotion
 pub(crate) fn friction(robot: &RobotModel, dq: &[Symbol]) -> Result<Vec<Symbol>, ExportError> {
     let mut torque = vec![Symbol::ZERO; robot.model().dof()];
     for (term, value) in robot.terms() {
-        let value = Symbol::splat(value);
-        let needs = |needs| ExportError::Term { symbol: term.symbol(), kind: term.kind_name(), needs };
-        match term {
-            TorqueTerm::Viscous(term) => torque[term.joint] += value * dq[term.joint],
-            TorqueTerm::Coulomb(term) => torque[term.joint] += value * step(term.shape, dq[term.joint]),
-            TorqueTerm::DirectionalViscous(term) => {
-                torque[term.joint] += value * part(term.direction, dq[term.joint]);
-            }
-            TorqueTerm::DirectionalCoulomb(term) => {
-                torque[term.joint] += value * part(term.direction, step(term.shape, dq[term.joint]));
-            }
-            TorqueTerm::Stribeck(term) => {
-                let dq = dq[term.joint];
-                let ratio = (dq * Symbol::splat(1.0 / term.speed)).call(Function::Abs);
-                let fading = (-power(ratio, term.exponent)).call(Function::Exp);
-                torque[term.joint] += value * (fading * step(term.shape, dq));
-            }
-            TorqueTerm::Sigmoid(term) => {
-                let logistic = |speed: Symbol| {
-                    let middle = speed + Symbol::splat(term.offset_speed);
-                    let half = Symbol::splat(0.5);
-                    half * (Symbol::ONE + (Symbol::splat(0.5 * term.steepness) * middle).call(Function::Tanh))
-                };
-                torque[term.joint] += value * (logistic(dq[term.joint]) - logistic(Symbol::ZERO));
-            }
-            TorqueTerm::Power(term) => {
-                let dq = dq[term.joint];
-                let exponent = match term.exponent {
-                    PowerExponent::CubeRoot => 1.0 / 3.0,
-                    PowerExponent::Quadratic => 2.0,
-                };
-                // Half of the exponent, for the size stands squared.
-                let square = dq * dq + Symbol::splat(term.rounding * term.rounding);
-                torque[term.joint] += value * (dq * square.power(0.5 * (exponent - 1.0)));
-            }
-            TorqueTerm::Offset(term) => torque[term.joint] += value,
-            TorqueTerm::Coupling(term) => {
-                let (a, b) = (term.first, term.second);
-                let [ka, kb] = term.ratios.map(Symbol::splat);
-                match term.effect {
-                    CouplingEffect::Inertia => {}
-                    CouplingEffect::Viscous => {
-                        let cross = value * ka * kb;
-                        torque[a] += cross * dq[b];
-                        torque[b] += cross * dq[a];
-                    }
-                    CouplingEffect::Coulomb(shape) => {
-                        let felt = value * step(shape, ka * dq[a] + kb * dq[b]);
-                        torque[a] += ka * felt;
-                        torque[b] += kb * felt;
-                    }
-                }
-            }
-            TorqueTerm::DriveInertia(_)
-            | TorqueTerm::TemperatureViscous(_)
-            | TorqueTerm::TemperatureCoulomb(_)
-            | TorqueTerm::Declared(_) => {}
-            TorqueTerm::Load(_) => return Err(needs("the torque that the gear carries")),
-            TorqueTerm::MaxwellSlip(_) => return Err(needs("the motion before")),
+        for row in term.joints() {
+            let unit = term.torque(row, dq);
+            let unit =
+                unit.map_err(|needs| ExportError::Term { symbol: term.symbol(), kind: term.kind_name(), needs })?;
+            torque[row] += Symbol::splat(value) * unit;
         }
     }
     Ok(torque)
@@ -95,36 +40,15 @@ pub(crate) fn drive_inertia(robot: &RobotModel) -> Vec<f64> {
 
 /// Temperatures at which terms are written, with their symbols: a function of the motion cannot hold more.
 pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
-    robot
-        .terms()
-        .filter_map(|(term, _)| match term {
-            TorqueTerm::TemperatureViscous(changes) => Some((term.symbol(), changes.reference_c)),
-            TorqueTerm::TemperatureCoulomb(changes) => Some((term.symbol(), changes.reference_c)),
+    let reference = |(term, _): (&TorqueTerm, f64)| {
+        let constants = term.constants().into_iter().filter(|_| term.needs_temperature());
+        let reference_c = constants.into_iter().find_map(|(name, constant)| match constant {
+            TermConstant::Number(value, _) if name == "reference_c" => Some(value),
             _ => None,
-        })
-        .collect()
-}
-
-fn step(shape: CoulombShape, dq: Symbol) -> Symbol {
-    match shape {
-        CoulombShape::Sign { dead_band } => dq.step(dead_band),
-        CoulombShape::Smooth { width } => (dq * Symbol::splat(1.0 / width)).call(Function::Tanh),
-    }
-}
-
-/// `max(x, 0)` forward, `min(x, 0)` backward, exactly: halves and doubles do not round.
-fn part(direction: Direction, x: Symbol) -> Symbol {
-    let size = x.call(Function::Abs);
-    let twice = match direction {
-        Direction::Forward => x + size,
-        Direction::Backward => x - size,
+        })?;
+        Some((term.symbol(), reference_c))
     };
-    Symbol::splat(0.5) * twice
-}
-
-/// Powers of one and two, which are usual, without a call.
-fn power(x: Symbol, exponent: f64) -> Symbol {
-    if exponent == 2.0 { x * x } else { x.power(exponent) }
+    robot.terms().filter_map(reference).collect()
 }
 
 /// Friction and offset of a joint at the velocity `dq`, by its own terms alone: couplings, load and changes with
@@ -144,9 +68,10 @@ pub(crate) fn own_friction_terms(robot: &RobotModel, joint: usize, dq: f64, only
     let own = robot.terms().enumerate().filter(|(place, (term, _))| is_own(term) && only.is_none_or(|it| it == *place));
     own.map(|(_, (term, value))| {
         let mut column = [0.0];
-        match term {
-            TorqueTerm::MaxwellSlip(_) => column[0] = if dq == 0.0 { 0.0 } else { dq.signum() },
-            _ => term.column(joint, &motion, &mut column),
+        if term.has_memory() {
+            column[0] = if dq == 0.0 { 0.0 } else { dq.signum() };
+        } else {
+            term.column(joint, &motion, &mut column);
         }
         if only.is_some() { column[0] } else { value * column[0] }
     })

@@ -253,9 +253,10 @@ impl Graph {
     }
 
     pub(crate) fn recip(&mut self, a: Id) -> Id {
-        match self.number(a) {
-            Some(value) => self.constant(1.0 / value),
-            None => self.place(Node::Recip(a)),
+        match self.node(a) {
+            Node::Constant(bits) => self.constant(1.0 / f64::from_bits(bits)),
+            Node::Power(inner, exponent) => self.power(inner, -f64::from_bits(exponent)),
+            _ => self.place(Node::Recip(a)),
         }
     }
 

@@ -268,16 +268,8 @@ fn constants(name: &'static str, value: TermConstant, turns: bool) -> Vec<(Strin
             let position = with_unit(&format!("{name}_position"), "_rad");
             vec![(position, column(0)), (format!("{name}_torque"), column(1))]
         }
-        TermConstant::Number(value) => {
-            let at_revolute = match name {
-                "speed" | "offset_speed" | "rounding" => "_rad_s",
-                "steepness" => "_s_per_rad",
-                "yield_displacement" => "_rad",
-                // Without a unit, or with it in its name.
-                _ => "",
-            };
-            vec![number(with_unit(name, at_revolute), value)]
-        }
+        TermConstant::Number(value, "") => vec![number(name.to_owned(), value)],
+        TermConstant::Number(value, unit) => vec![number(with_unit(name, &format!("_{unit}")), value)],
         TermConstant::Step(shape) => {
             let (word, width, value) = match shape {
                 CoulombShape::Sign { dead_band } => ("sign", "dead_band", dead_band),

@@ -2,7 +2,7 @@
 
 use crate::graph::{Function, Function2, Graph, Id, Input};
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
-use dynident_lanes::Scalar;
+use dynident_lanes::{Real, Scalar};
 use std::cell::RefCell;
 
 thread_local! {
@@ -51,16 +51,6 @@ impl Symbol {
     pub(crate) fn call2(self, function: Function2, other: Self) -> Self {
         in_graph(|graph| graph.call2(function, self.0, other.0))
     }
-
-    /// `self^exponent`, for positive values.
-    pub(crate) fn power(self, exponent: f64) -> Self {
-        in_graph(|graph| graph.power(self.0, exponent))
-    }
-
-    /// The sign, zero while the size is at most `dead_band`.
-    pub(crate) fn step(self, dead_band: f64) -> Self {
-        in_graph(|graph| graph.step(self.0, dead_band))
-    }
 }
 
 impl Scalar for Symbol {
@@ -81,6 +71,46 @@ impl Scalar for Symbol {
 
     fn recip(self) -> Self {
         in_graph(|graph| graph.recip(self.0))
+    }
+}
+
+impl Real for Symbol {
+    fn over(self, divisor: Self) -> Self {
+        self * divisor.recip()
+    }
+
+    fn abs(self) -> Self {
+        self.call(Function::Abs)
+    }
+
+    fn min(self, other: Self) -> Self {
+        Self::splat(0.5) * (self + other - (self - other).abs())
+    }
+
+    /// Exact where `other` is zero: halves and doubles do not round.
+    fn max(self, other: Self) -> Self {
+        Self::splat(0.5) * (self + other + (self - other).abs())
+    }
+
+    fn sign(self, dead_band: f64) -> Self {
+        in_graph(|graph| graph.step(self.0, dead_band))
+    }
+
+    fn smooth_step(self, width: f64) -> Self {
+        (self * Self::splat(1.0 / width)).call(Function::Tanh)
+    }
+
+    fn decay(self) -> Self {
+        (-self).call(Function::Exp)
+    }
+
+    fn ln(self) -> Self {
+        self.call(Function::Ln)
+    }
+
+    /// A square, which is usual, without a call.
+    fn power(self, exponent: f64) -> Self {
+        if exponent == 2.0 { self * self } else { in_graph(|graph| graph.power(self.0, exponent)) }
     }
 }
 

@@ -14,7 +14,6 @@
 use crate::training::Training;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem, WeightedSettings, weighted_least_squares};
-use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -134,7 +133,7 @@ fn fit_alone(
 
 /// Whether a base parameter is a joint's own torque: what may be another on another day.
 pub(crate) fn of_friction(column: &Column) -> bool {
-    !matches!(column, Column::Body { .. } | Column::Term(TorqueTerm::DriveInertia(_)))
+    matches!(column, Column::Term(term) if !term.is_drive_inertia())
 }
 
 /// k of some parameters: the root of the mean of z² over pairs of logs, each by what Student's distribution makes of

@@ -1,8 +1,8 @@
 //! Friction of a simulated robot whose step at rest is narrower than runs can tell: it is dry friction.
 
 use crate::rests::MOVING;
-use dynident_identification::friction::{FrictionConstant, JointFriction};
-use dynident_model::terms::{Coulomb, CoulombShape, Sigmoid, TermConstant, TorqueTerm};
+use dynident_identification::friction::JointFriction;
+use dynident_model::terms::{CoulombShape, TorqueTerm};
 
 /// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
 /// than the speed below which a joint rests is dry friction with stiction. Runs cannot tell it from one, it holds a
@@ -31,43 +31,31 @@ pub(crate) fn with_sticking_joints(
 ) -> Option<(Vec<TorqueTerm>, Vec<f64>)> {
     let sticks = |joint: usize| {
         let own = terms.iter().filter(|term| term.is_joint_friction() && term.own_joint() == Some(joint));
-        let of_model = own.filter_map(width_of_step);
-        let of_choice = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| &one.constants);
-        let of_choice = of_choice.filter_map(FrictionConstant::narrowest_step);
-        of_model.chain(of_choice).fold(f64::INFINITY, f64::min) <= MOVING * fastest[joint]
+        let chosen = chose.iter().filter(|one| one.joint == names[joint]).flat_map(|one| &one.constants);
+        let of_choice = |term: &TorqueTerm| {
+            chosen.clone().filter_map(|constant| constant.narrowest_step(term)).min_by(f64::total_cmp)
+        };
+        let widths = own.flat_map(|term| [term.step_width(), of_choice(term)]).flatten();
+        widths.fold(f64::INFINITY, f64::min) <= MOVING * fastest[joint]
     };
     let sticking: Vec<bool> = (0..fastest.len()).map(sticks).collect();
-    let dry = |(term, &parameter): (&TorqueTerm, &f64)| match term {
-        TorqueTerm::Sigmoid(own) if sticking[own.joint] && own.offset_speed.abs() <= MOVING * fastest[own.joint] => {
-            let shape = CoulombShape::Sign { dead_band: 0.0 };
-            (TorqueTerm::Coulomb(Coulomb { joint: own.joint, shape }), 0.5 * parameter)
+    let dry = |(term, &parameter): (&TorqueTerm, &f64)| {
+        let Some(joint) = term.own_joint().filter(|&joint| sticking[joint]) else { return (term.clone(), parameter) };
+        match term.kind().dry(MOVING * fastest[joint]) {
+            Some((dry, share)) => (dry, share * parameter),
+            None => (term.clone().with_step(|_| CoulombShape::Sign { dead_band: 0.0 }), parameter),
         }
-        term if term.own_joint().is_some_and(|joint| sticking[joint]) => {
-            (term.clone().with_step(|_| CoulombShape::Sign { dead_band: 0.0 }), parameter)
-        }
-        term => (term.clone(), parameter),
     };
     let (found, parameters): (Vec<TorqueTerm>, Vec<f64>) = terms.iter().zip(parameters).map(dry).unzip();
     let found = with_dry_steps(&found, fastest);
     (found != with_dry_steps(terms, fastest)).then_some((found, parameters))
 }
 
-/// The width of the step of a term that has one, 0 for dry friction. A sigmoid without offset is half a Coulomb step.
-fn width_of_step(term: &TorqueTerm) -> Option<f64> {
-    if let TorqueTerm::Sigmoid(Sigmoid { steepness, .. }) = term {
-        return Some(2.0 / steepness);
-    }
-    term.constants().into_iter().find_map(|(_, constant)| match constant {
-        TermConstant::Step(CoulombShape::Smooth { width }) => Some(width),
-        TermConstant::Step(CoulombShape::Sign { .. }) => Some(0.0),
-        _ => None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_model::terms::{Stribeck, Viscous};
+    use dynident_identification::friction::FrictionConstant;
+    use dynident_model::terms::{Coulomb, Sigmoid, Stribeck, Viscous};
 
     const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 

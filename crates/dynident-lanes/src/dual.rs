@@ -1,5 +1,6 @@
 //! Dual numbers: a value and its derivative along one direction.
 
+use crate::real::Real;
 use crate::scalar::Scalar;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
@@ -102,5 +103,54 @@ impl Scalar for Dual {
     fn recip(self) -> Self {
         let value = 1.0 / self.value;
         Self { value, derivative: -value * value * self.derivative }
+    }
+}
+
+impl Dual {
+    /// `value` of a function with this slope. A slope that is not finite counts only where the argument changes: a root
+    /// at zero has one.
+    fn through(self, value: f64, slope: f64) -> Self {
+        Self { value, derivative: if self.derivative == 0.0 { 0.0 } else { slope * self.derivative } }
+    }
+}
+
+impl Real for Dual {
+    fn over(self, divisor: Self) -> Self {
+        let value = self.value / divisor.value;
+        Self { value, derivative: (self.derivative - value * divisor.derivative) / divisor.value }
+    }
+
+    fn abs(self) -> Self {
+        self.through(self.value.abs(), self.value.sign(0.0))
+    }
+
+    fn min(self, other: Self) -> Self {
+        if self.value < other.value { self } else { other }
+    }
+
+    fn max(self, other: Self) -> Self {
+        if self.value > other.value { self } else { other }
+    }
+
+    fn sign(self, dead_band: f64) -> Self {
+        Self::constant(self.value.sign(dead_band))
+    }
+
+    fn smooth_step(self, width: f64) -> Self {
+        let step = self.value.smooth_step(width);
+        self.through(step, (1.0 - step * step) / width)
+    }
+
+    fn decay(self) -> Self {
+        let value = self.value.decay();
+        if value == 0.0 { Self::ZERO } else { self.through(value, -value) }
+    }
+
+    fn ln(self) -> Self {
+        self.through(self.value.ln(), 1.0 / self.value)
+    }
+
+    fn power(self, exponent: f64) -> Self {
+        self.through(self.value.power(exponent), exponent * self.value.power(exponent - 1.0))
     }
 }

@@ -1,14 +1,15 @@
 //! Lanes: one, four or eight `f64` that take every step together.
 
 use crate::exponential::{decay, tanh};
+use crate::real::Real;
 use crate::register::Register;
 use crate::scalar::Scalar;
 use crate::sin_cos::sin_cos;
 use core::marker::PhantomData;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// A [`Scalar`] that is a row of samples.
-pub trait Lane: Scalar {
+/// A [`Real`] that is a row of samples. Its step and decay are within 4 units of the last place.
+pub trait Lane: Real {
     /// How many samples stand side by side.
     const LANES: usize;
 
@@ -50,26 +51,8 @@ pub trait Lane: Scalar {
         Self::load(&lanes)
     }
 
-    /// Every lane divided by a number.
-    fn divided_by(self, divisor: f64) -> Self;
-
-    /// Magnitude of every lane.
-    fn abs(self) -> Self;
-
-    /// The lesser of the two, lane by lane; that of `other` where one of them is not a number.
-    fn min(self, other: Self) -> Self;
-
-    /// The greater of the two, lane by lane; that of `other` where one of them is not a number.
-    fn max(self, other: Self) -> Self;
-
     /// True when every lane is at most that of `bound`; false when one of them is not a number.
     fn all_at_most(self, bound: Self) -> bool;
-
-    /// Hyperbolic tangent of every lane, within 4 units of the last place.
-    fn tanh(self) -> Self;
-
-    /// `e^-x` of every lane, none of which is negative, within 4 units of the last place.
-    fn decay(self) -> Self;
 
     /// Sum over the lanes, from first to last.
     #[inline(always)]
@@ -236,23 +219,21 @@ fn sin_cos_bundle<R: Register, B: Register>(
     }
 }
 
-impl<R: Register, B: Register> Lane for Wide<R, B> {
-    const LANES: usize = R::LANES;
-    type Bundle = Wide<B>;
-
+impl<R: Register, B: Register> Wide<R, B> {
+    /// A function of every lane that has no lanes of its own.
     #[inline(always)]
-    fn load(values: &[f64]) -> Self {
-        Self::of(R::load(values))
+    fn each(self, function: impl Fn(f64) -> f64) -> Self {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        lanes[..R::LANES].iter_mut().for_each(|lane| *lane = function(*lane));
+        Self::load(&lanes)
     }
+}
 
+impl<R: Register, B: Register> Real for Wide<R, B> {
     #[inline(always)]
-    fn store(self, out: &mut [f64]) {
-        self.0.store(out);
-    }
-
-    #[inline(always)]
-    fn divided_by(self, divisor: f64) -> Self {
-        Self::of(self.0.div(R::splat(divisor)))
+    fn over(self, divisor: Self) -> Self {
+        Self::of(self.0.div(divisor.0))
     }
 
     #[inline(always)]
@@ -271,18 +252,48 @@ impl<R: Register, B: Register> Lane for Wide<R, B> {
     }
 
     #[inline(always)]
-    fn all_at_most(self, bound: Self) -> bool {
-        self.0.all_at_most(bound.0)
+    fn sign(self, dead_band: f64) -> Self {
+        self.each(|lane| lane.sign(dead_band))
     }
 
     #[inline(always)]
-    fn tanh(self) -> Self {
-        Self::of(tanh(self.0))
+    fn smooth_step(self, width: f64) -> Self {
+        Self::of(tanh(self.0.div(R::splat(width))))
     }
 
     #[inline(always)]
     fn decay(self) -> Self {
         Self::of(decay(self.0))
+    }
+
+    #[inline(always)]
+    fn ln(self) -> Self {
+        self.each(f64::ln)
+    }
+
+    #[inline(always)]
+    fn power(self, exponent: f64) -> Self {
+        self.each(|lane| lane.power(exponent))
+    }
+}
+
+impl<R: Register, B: Register> Lane for Wide<R, B> {
+    const LANES: usize = R::LANES;
+    type Bundle = Wide<B>;
+
+    #[inline(always)]
+    fn load(values: &[f64]) -> Self {
+        Self::of(R::load(values))
+    }
+
+    #[inline(always)]
+    fn store(self, out: &mut [f64]) {
+        self.0.store(out);
+    }
+
+    #[inline(always)]
+    fn all_at_most(self, bound: Self) -> bool {
+        self.0.all_at_most(bound.0)
     }
 
     #[inline(always)]

@@ -7,6 +7,8 @@
 //!   chosen at run time, so that one portable binary is fast everywhere),
 //! * on dual numbers ([`Dual`]: exact derivatives, and the oracle for hand-written ones).
 //!
+//! Friction laws, which need more functions, are written over [`Real`].
+//!
 //! This is the only crate of the core that contains `unsafe`, in one file: `x86.rs`.
 
 #![deny(unsafe_code)]
@@ -21,6 +23,7 @@ mod kernel;
 mod lanes;
 mod many_values;
 mod portable;
+mod real;
 mod register;
 mod scalar;
 mod sin_cos;
@@ -34,5 +37,6 @@ pub use dispatch::{Level, dispatch, dispatch_single};
 pub use dual::Dual;
 pub use kernel::Kernel;
 pub use lanes::Lane;
-pub use many_values::{decay_all, tanh_all};
+pub use many_values::{LaneFunction, map_all};
+pub use real::Real;
 pub use scalar::Scalar;

@@ -4,51 +4,25 @@ use crate::dispatch::{Level, dispatch};
 use crate::kernel::Kernel;
 use crate::lanes::Lane;
 
-/// Writes `tanh(values / width)` to `out`, as many as there are in the shorter of the two; within 4 units of the last
-/// place, the same wherever in the slice a value stands.
-pub fn tanh_all(values: &[f64], width: f64, out: &mut [f64]) {
-    dispatch(Level::detect(), All { values, out, of: Tanh { width } });
+/// A function of one value, written over lanes.
+pub trait LaneFunction {
+    /// Its value at `x`. Implementations are marked `#[inline(always)]`, as those of [`Kernel::run`].
+    fn of<T: Lane>(&self, x: T) -> T;
 }
 
-/// Writes `e^{-values}` to `out`, as many as there are in the shorter of the two, for values that are not negative;
-/// within 4 units of the last place, and `e^-708` beyond 708.
-pub fn decay_all(values: &[f64], out: &mut [f64]) {
-    dispatch(Level::detect(), All { values, out, of: Decay });
-}
-
-trait OfLane: Copy {
-    fn of<T: Lane>(self, x: T) -> T;
-}
-
-#[derive(Clone, Copy)]
-struct Tanh {
-    width: f64,
-}
-
-impl OfLane for Tanh {
-    #[inline(always)]
-    fn of<T: Lane>(self, x: T) -> T {
-        x.divided_by(self.width).tanh()
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Decay;
-
-impl OfLane for Decay {
-    #[inline(always)]
-    fn of<T: Lane>(self, x: T) -> T {
-        x.decay()
-    }
+/// Writes `function` of the values to `out`, as many as there are in the shorter of the two; the same wherever in the
+/// slice a value stands.
+pub fn map_all(values: &[f64], out: &mut [f64], function: &impl LaneFunction) {
+    dispatch(Level::detect(), All { values, out, function });
 }
 
 struct All<'a, F> {
     values: &'a [f64],
     out: &'a mut [f64],
-    of: F,
+    function: &'a F,
 }
 
-impl<F: OfLane> Kernel for All<'_, F> {
+impl<F: LaneFunction> Kernel for All<'_, F> {
     type Output = ();
 
     #[inline(always)]
@@ -57,18 +31,36 @@ impl<F: OfLane> Kernel for All<'_, F> {
         let whole = count - count % T::LANES;
         let (values, out) = (&self.values[..count], &mut self.out[..count]);
         for (from, to) in values.chunks_exact(T::LANES).zip(out.chunks_exact_mut(T::LANES)) {
-            self.of.of(T::load(from)).store(to);
+            self.function.of(T::load(from)).store(to);
         }
-        let mut last = [0.0; 8];
-        last[..count - whole].copy_from_slice(&values[whole..]);
-        self.of.of(T::load(&last)).store(&mut last);
-        out[whole..].copy_from_slice(&last[..count - whole]);
+        if whole < count {
+            let mut last = [0.0; 8];
+            last[..count - whole].copy_from_slice(&values[whole..]);
+            self.function.of(T::load(&last)).store(&mut last);
+            out[whole..].copy_from_slice(&last[..count - whole]);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    struct Step(f64);
+
+    impl LaneFunction for Step {
+        fn of<T: Lane>(&self, x: T) -> T {
+            x.smooth_step(self.0)
+        }
+    }
+
+    struct Decay;
+
+    impl LaneFunction for Decay {
+        fn of<T: Lane>(&self, x: T) -> T {
+            x.decay()
+        }
+    }
 
     /// What four units of the last place are of a value.
     fn near(found: f64, expected: f64) -> bool {
@@ -87,12 +79,12 @@ mod tests {
         let values = values();
         for level in Level::available() {
             let mut out = vec![0.0; values.len()];
-            dispatch(level, All { values: &values, out: &mut out, of: Tanh { width: 0.3 } });
+            dispatch(level, All { values: &values, out: &mut out, function: &Step(0.3) });
             for (x, y) in values.iter().zip(&out) {
                 assert!(near(*y, (x / 0.3).tanh()), "{}: tanh({x} / 0.3) = {y}", level.name());
             }
             let sizes: Vec<f64> = values.iter().map(|x| x.abs().min(700.0)).collect();
-            dispatch(level, All { values: &sizes, out: &mut out, of: Decay });
+            dispatch(level, All { values: &sizes, out: &mut out, function: &Decay });
             for (x, y) in sizes.iter().zip(&out) {
                 assert!(near(*y, (-x).exp()), "{}: e^-{x} = {y}", level.name());
             }
@@ -102,10 +94,10 @@ mod tests {
     #[test]
     fn the_ends_are_right_and_what_is_no_number_stays_none() {
         let mut out = [0.0; 6];
-        tanh_all(&[0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e300], 1.0, &mut out);
+        map_all(&[0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e300], &mut out, &Step(1.0));
         assert_eq!(out[..4], [0.0, -0.0, 1.0, -1.0]);
         assert!(out[1].is_sign_negative() && out[4].is_nan() && out[5] == 1.0);
-        decay_all(&[0.0, f64::INFINITY, f64::NAN, 1e300], &mut out);
+        map_all(&[0.0, f64::INFINITY, f64::NAN, 1e300], &mut out, &Decay);
         assert!(out[0] == 1.0 && out[1] < 1e-300 && out[2].is_nan() && out[3] < 1e-300);
     }
 
@@ -113,9 +105,9 @@ mod tests {
     fn a_value_is_the_same_wherever_it_stands() {
         let values = values();
         let (mut all, mut one) = (vec![0.0; values.len()], [0.0]);
-        tanh_all(&values, 0.02, &mut all);
+        map_all(&values, &mut all, &Step(0.02));
         for (x, y) in values.iter().zip(&all).step_by(97) {
-            tanh_all(&[*x], 0.02, &mut one);
+            map_all(&[*x], &mut one, &Step(0.02));
             assert_eq!(y.to_bits(), one[0].to_bits(), "{x}");
         }
     }

@@ -1,7 +1,7 @@
 //! One recording of a case, with all that is true of it.
 
 use super::cases::DefaultCase;
-use crate::friction_truths::{FrictionTruth, TOLD, share, usual_drive};
+use crate::friction_truths::{FrictionTruth, TOLD, usual_drive};
 use crate::simulated_logs::{PERIOD_S, left_unsaid, model_error, panels, random_series, rms, sampled, torque, truth};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
@@ -86,6 +86,7 @@ impl Simulated {
         let (family, parameters) = designed(described, &robot.described, case.motion.harmonics, &mut random("motion"))?;
         let motion = sampled(&family, &parameters, duration_s, rate_hz, 0.0);
         let before = sampled(&family, &parameters, duration_s, rate_hz, case.lag_s);
+        let share = |term: &TorqueTerm| term.own_joint().map_or(1.0, |joint| case.friction.of(joint).share(term));
         let theta = truth(&regressor, &motion, share);
         let exact = torque(&regressor, &before, &theta);
         let (family, parameters) = random_series(described, case.motion.harmonics, &mut random("test"))?;

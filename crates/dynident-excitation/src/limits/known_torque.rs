@@ -3,8 +3,8 @@
 
 use dynident_model::Model;
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Coupling, CouplingEffect, Declared, DriveInertia, HysteresisState, JointMotion, TermAction,
-    TermInput, TorqueTerm, VelocityCurve, VelocityFriction, Viscous,
+    CoulombShape, Coupling, CouplingEffect, Declared, HysteresisState, JointMotion, TermAction, TermInput, TorqueTerm,
+    VelocityCurve, VelocityFriction,
 };
 
 /// Torque terms with their values. Together with the rigid bodies they give the torque that torque and power limits
@@ -59,15 +59,8 @@ impl KnownTorque {
         // A coupling holds the cross terms of inertia and viscous friction, and all of Coulomb friction.
         if drivers.len() == 1 || (drivers.len() == 2 && !is_coulomb) {
             for &(joint, share) in drivers {
-                match effect {
-                    CouplingEffect::Inertia => {
-                        self.add(TorqueTerm::DriveInertia(DriveInertia { joint }), share * share * value);
-                    }
-                    CouplingEffect::Viscous => self.add(TorqueTerm::Viscous(Viscous { joint }), share * share * value),
-                    CouplingEffect::Coulomb(shape) => {
-                        self.add(TorqueTerm::Coulomb(Coulomb { joint, shape }), share.abs() * value);
-                    }
-                }
+                let (term, factor) = effect.of_joint(joint, share);
+                self.add(term, factor * value);
             }
         }
     }
@@ -172,7 +165,7 @@ fn step(term: &TorqueTerm, friction: &VelocityFriction<'_>, joint: usize, dq: &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_model::terms::{Offset, Stribeck};
+    use dynident_model::terms::{Coulomb, Offset, Stribeck};
 
     /// Two joints that a third follows: `q3 = 2 q1 - q2`. Its torque acts on the first by 2 and on the second by -1.
     #[test]

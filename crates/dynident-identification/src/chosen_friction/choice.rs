@@ -8,7 +8,7 @@ use crate::error::IdentificationError;
 use crate::estimators::Estimator;
 use crate::friction::{
     CandidateColumn, ConstantsError, FrictionSearch, JointFriction, JointScale, candidate_columns,
-    choose_friction as choose_terms, smooth_width, step_columns,
+    choose_friction as choose_terms, is_coulomb, smooth_width, step_columns,
 };
 use crate::logs::Logs;
 use crate::payload::{Payload, free_gains};
@@ -128,7 +128,7 @@ pub(crate) enum GridTerms {
 
 impl GridTerms {
     fn may_be(self, term: &TorqueTerm) -> bool {
-        self == Self::All || !matches!(term, TorqueTerm::MaxwellSlip(_))
+        self == Self::All || !term.has_memory()
     }
 }
 
@@ -281,5 +281,5 @@ pub(crate) fn constants_of_all_rows(
 
 /// The width of the smooth step that a joint's friction has.
 fn smooth_step_width(joint: &JointFriction) -> Option<f64> {
-    joint.terms.iter().flatten().filter(|term| matches!(term, TorqueTerm::Coulomb(_))).find_map(smooth_width)
+    joint.terms.iter().flatten().filter(|term| is_coulomb(term)).find_map(smooth_width)
 }

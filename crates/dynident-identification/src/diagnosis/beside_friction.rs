@@ -2,8 +2,9 @@
 
 use super::motion_rows::MotionRows;
 use super::span::Span;
+use crate::friction;
 use dynident_dynamics::ParametricModel;
-use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Stribeck, TorqueTerm};
+use dynident_model::terms::CoulombShape;
 use nalgebra::{DMatrix, DVector};
 
 /// For each joint what `1, q̇, s(q̇), q̈` span over the rows, with the step `s` of the joint's terms; of a joint at
@@ -39,13 +40,6 @@ impl BesideFriction {
 
 /// The step of the joint's dry friction; that of the sign where its terms have none.
 pub(super) fn step_of(robot: &ParametricModel, joint: usize) -> CoulombShape {
-    let shape = |term: &TorqueTerm| match term {
-        TorqueTerm::Coulomb(Coulomb { shape, .. })
-        | TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape, .. })
-        | TorqueTerm::Stribeck(Stribeck { shape, .. })
-        | TorqueTerm::Load(LoadFriction { shape, .. }) => Some(*shape),
-        _ => None,
-    };
     let mut own = robot.terms().iter().filter(|term| term.own_joint() == Some(joint));
-    own.find_map(shape).unwrap_or(CoulombShape::Sign { dead_band: 0.0 })
+    own.find_map(friction::step_of).unwrap_or(CoulombShape::Sign { dead_band: 0.0 })
 }

@@ -7,7 +7,7 @@ use dynident_estimation::{
     Estimate, Normality, NormalityReport, SpeedRanges, SpeedRangesReport, Whiteness, WhitenessReport,
     student_half_width,
 };
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{JointProperty, TorqueTerm};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -102,8 +102,16 @@ impl JointWatch {
                 .map(|(place, _)| place)
                 .collect()
         };
-        let viscous = places(&|term| matches!(term, TorqueTerm::Viscous(term) if term.joint == joint));
-        let directions = places(&|term| matches!(term, TorqueTerm::DirectionalViscous(term) if term.joint == joint));
+        let is_own = |term: &TorqueTerm| term.own_joint() == Some(joint);
+        let viscous = places(&|term| is_own(term) && term.property() == Some(JointProperty::Damping));
+        let halves = columns.iter().find_map(|&column| match &all[column] {
+            Column::Term(term) if is_own(term) => {
+                let [other, of_both] = term.kind().both_directions()?;
+                (of_both.property() == Some(JointProperty::Damping)).then(|| [term.clone(), other])
+            }
+            _ => None,
+        });
+        let directions = halves.map_or_else(Vec::new, |halves| places(&|term| halves.contains(term)));
         let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
         // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are
         // singular, so by eigenvalues.

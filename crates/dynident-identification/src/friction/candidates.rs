@@ -3,157 +3,29 @@
 
 use dynident_model::Model;
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power,
-    PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
+    CandidateJoint, CandidateLaw, CandidateRole, Coulomb, CoulombShape, GridPoint, TorqueTerm,
 };
 
-/// Widths of the smooth Coulomb step, rad/s or m/s of a usual arm, as all velocities here; beside them the sign and
-/// what the study states.
-const WIDTHS: [f64; 7] = [NARROWEST, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
-const NARROWEST: f64 = 0.002;
-/// Stribeck velocities.
-const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
-const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
-/// Width of the step under the Stribeck term as a share of its velocity, at most, while it is chosen: beyond
-/// half its velocity the step is done.
-pub(super) const STRIBECK_WIDTH: f64 = 0.25;
-const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
-/// Yield displacements of the Maxwell-slip elements, rad, or m of a usual arm.
-const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
-
 /// What a candidate model is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum FrictionKind {
-    Viscous,
-    AsymmetricViscous,
-    Coulomb,
-    AsymmetricCoulomb,
-    Sigmoid,
-    Stribeck,
-    CubeRoot,
-    Quadratic,
-    Load,
-    MaxwellSlip,
+pub(super) type FrictionKind = &'static CandidateLaw;
+
+/// True when its constants are found on the grid; else all of its columns are taken.
+pub(super) fn takes_one(kind: FrictionKind) -> bool {
+    kind.constants > 0
 }
 
-impl FrictionKind {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Viscous => "viscous",
-            Self::AsymmetricViscous => "asymmetric viscous",
-            Self::Coulomb => "coulomb",
-            Self::AsymmetricCoulomb => "asymmetric coulomb",
-            Self::Sigmoid => "sigmoid",
-            Self::Stribeck => "stribeck",
-            Self::CubeRoot => "cube-root",
-            Self::Quadratic => "quadratic",
-            Self::Load => "load",
-            Self::MaxwellSlip => "maxwell-slip",
-        }
+/// Which of the columns are tried together: neighbours on the grid, all columns where there is no grid.
+pub(super) fn options(kind: FrictionKind, columns: &[CandidateColumn]) -> Vec<Vec<usize>> {
+    let of_kind: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].kind == kind).collect();
+    if !takes_one(kind) {
+        return vec![of_kind];
     }
-
-    /// Constants that are tuned for it: they count as parameters.
-    pub(crate) fn constants(self) -> usize {
-        match self {
-            Self::Coulomb | Self::AsymmetricCoulomb => 1,
-            Self::Sigmoid | Self::Stribeck => 2,
-            Self::Viscous
-            | Self::AsymmetricViscous
-            | Self::CubeRoot
-            | Self::Quadratic
-            | Self::Load
-            | Self::MaxwellSlip => 0,
-        }
-    }
-
-    /// The candidate that a torque term belongs to; none where data do not choose it.
-    pub(super) fn of(term: &TorqueTerm) -> Option<Self> {
-        match term {
-            TorqueTerm::Viscous(_) => Some(Self::Viscous),
-            TorqueTerm::Coulomb(_) => Some(Self::Coulomb),
-            TorqueTerm::DirectionalViscous(_) => Some(Self::AsymmetricViscous),
-            TorqueTerm::DirectionalCoulomb(_) => Some(Self::AsymmetricCoulomb),
-            TorqueTerm::Stribeck(_) => Some(Self::Stribeck),
-            TorqueTerm::Sigmoid(_) => Some(Self::Sigmoid),
-            TorqueTerm::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot),
-            TorqueTerm::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic),
-            TorqueTerm::Load(_) => Some(Self::Load),
-            TorqueTerm::MaxwellSlip(_) => Some(Self::MaxwellSlip),
-            TorqueTerm::TemperatureViscous(_)
-            | TorqueTerm::TemperatureCoulomb(_)
-            | TorqueTerm::Offset(_)
-            | TorqueTerm::DriveInertia(_)
-            | TorqueTerm::Coupling(_)
-            | TorqueTerm::Declared(_) => None,
-        }
-    }
-
-    /// True when it is tried in addition to the two models that a search begins with.
-    pub(crate) fn is_addition(self) -> bool {
-        match self {
-            Self::Viscous | Self::Coulomb | Self::Sigmoid => false,
-            Self::AsymmetricViscous
-            | Self::AsymmetricCoulomb
-            | Self::Stribeck
-            | Self::CubeRoot
-            | Self::Quadratic
-            | Self::Load
-            | Self::MaxwellSlip => true,
-        }
-    }
-
-    /// The candidate in whose place it is tried; none for one that is tried beside all others.
-    pub(crate) fn replaces(self) -> Option<Self> {
-        match self {
-            Self::AsymmetricViscous => Some(Self::Viscous),
-            Self::AsymmetricCoulomb => Some(Self::Coulomb),
-            Self::Viscous
-            | Self::Coulomb
-            | Self::Sigmoid
-            | Self::Stribeck
-            | Self::CubeRoot
-            | Self::Quadratic
-            | Self::Load
-            | Self::MaxwellSlip => None,
-        }
-    }
-
-    /// True when its constants are found on the grid; else all of its columns are taken.
-    pub(crate) fn takes_one(self) -> bool {
-        self.constants() > 0
-    }
-
-    /// True for what is told from other friction by rows near rest alone.
-    fn is_of_rest(self) -> bool {
-        match self {
-            Self::Sigmoid | Self::Stribeck | Self::CubeRoot | Self::MaxwellSlip => true,
-            Self::Viscous
-            | Self::AsymmetricViscous
-            | Self::Coulomb
-            | Self::AsymmetricCoulomb
-            | Self::Quadratic
-            | Self::Load => false,
-        }
-    }
-
-    /// True for the step at rest, whose width is found anew with every further term.
-    pub(crate) fn is_step(self) -> bool {
-        matches!(self, Self::Coulomb | Self::AsymmetricCoulomb)
-    }
-
-    /// Which of the columns are tried together: neighbours on the grid, all columns where there is no grid.
-    pub(crate) fn options(self, columns: &[CandidateColumn]) -> Vec<Vec<usize>> {
-        let of_kind: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].kind == self).collect();
-        if !self.takes_one() {
-            return vec![of_kind];
-        }
-        let (alone, of_grid): (Vec<usize>, Vec<usize>) =
-            of_kind.into_iter().partition(|&place| columns[place].grid.is_none());
-        let steps: Vec<&[usize]> = of_grid.chunk_by(|&a, &b| columns[a].grid == columns[b].grid).collect();
-        let pairs = steps.windows(2).map(<[&[usize]]>::concat);
-        let only = steps.first().filter(|_| steps.len() == 1).map(|only| only.to_vec());
-        alone.into_iter().map(|place| vec![place]).chain(pairs).chain(only).collect()
-    }
+    let (alone, of_grid): (Vec<usize>, Vec<usize>) =
+        of_kind.into_iter().partition(|&place| columns[place].grid.is_none());
+    let steps: Vec<&[usize]> = of_grid.chunk_by(|&a, &b| columns[a].grid == columns[b].grid).collect();
+    let pairs = steps.windows(2).map(<[&[usize]]>::concat);
+    let only = steps.first().filter(|_| steps.len() == 1).map(|only| only.to_vec());
+    alone.into_iter().map(|place| vec![place]).chain(pairs).chain(only).collect()
 }
 
 /// One column that a joint may have.
@@ -226,7 +98,7 @@ impl JointScale {
 
     /// The narrowest step that is looked for beside the sign, rad/s (m/s).
     pub(super) fn narrowest_width(self) -> f64 {
-        NARROWEST * self.velocity
+        Coulomb::WIDTHS[0] * self.velocity
     }
 
     pub(crate) fn of(model: &Model, joint: usize) -> Self {
@@ -237,7 +109,7 @@ impl JointScale {
 
 /// Viscous friction with a Coulomb step: the columns that tell how wide the step is before anything else is chosen.
 pub(crate) fn step_columns(search: &FrictionSearch, joint: JointScale) -> Vec<CandidateColumn> {
-    let is_step = |column: &CandidateColumn| matches!(column.kind, FrictionKind::Viscous | FrictionKind::Coulomb);
+    let is_step = |column: &CandidateColumn| column.kind.role == CandidateRole::Base || column.kind.is_common_step();
     candidate_columns(search, joint, None).into_iter().filter(is_step).collect()
 }
 
@@ -250,7 +122,7 @@ pub(crate) fn candidate_columns(
     width: Option<f64>,
 ) -> Vec<CandidateColumn> {
     let sign = CoulombShape::Sign { dead_band: search.dead_band };
-    let mut widths = WIDTHS.map(|width| width * velocity).to_vec();
+    let mut widths = Coulomb::WIDTHS.map(|width| width * velocity).to_vec();
     let mut alone = vec![sign];
     match search.coulomb {
         Some(CoulombShape::Smooth { width }) if !widths.contains(&width) => widths.push(width),
@@ -270,48 +142,15 @@ pub(crate) fn candidate_columns(
             None => (vec![load_width], Vec::new()),
         };
     }
-    let mut columns = Vec::new();
-    let mut add = |terms: Vec<TorqueTerm>, grid: Option<usize>| {
-        let column = |term: &TorqueTerm| {
-            Some(CandidateColumn { kind: FrictionKind::of(term)?, term: term.clone(), stated: terms.clone(), grid })
-        };
-        columns.extend(terms.iter().filter_map(column));
+    let own = CandidateJoint { joint, velocity, position, alone, widths, width: load_width };
+    let columns_at = |kind: FrictionKind, GridPoint { terms: stated, step: grid }: GridPoint| {
+        let column = |term: &TorqueTerm| CandidateColumn { kind, term: term.clone(), stated: stated.clone(), grid };
+        stated.iter().map(column).collect::<Vec<_>>()
     };
-    add(vec![TorqueTerm::Viscous(Viscous { joint })], None);
-    for shape in alone {
-        add(vec![TorqueTerm::Coulomb(Coulomb { joint, shape })], None);
-    }
-    for (step, &width) in widths.iter().enumerate() {
-        add(vec![TorqueTerm::Coulomb(Coulomb { joint, shape: CoulombShape::Smooth { width } })], Some(step));
-    }
-    let both = [Direction::Forward, Direction::Backward];
-    let directions = both.map(|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }));
-    add(directions.to_vec(), None);
-    for (step, &width) in widths.iter().enumerate() {
-        let shape = CoulombShape::Smooth { width };
-        let of = |direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape });
-        add(both.map(of).to_vec(), Some(step));
-    }
-    for (step, width) in SIGMOID_WIDTHS.map(|width| width * velocity).into_iter().enumerate() {
-        for offset_speed in [-0.5 * width, 0.5 * width] {
-            add(vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })], Some(step));
-        }
-    }
-    for (step, speed) in STRIBECK_SPEEDS.map(|speed| speed * velocity).into_iter().enumerate() {
-        for exponent in STRIBECK_EXPONENTS {
-            let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
-            add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })], Some(step));
-        }
-    }
-    for exponent in [PowerExponent::CubeRoot, PowerExponent::Quadratic] {
-        add(vec![TorqueTerm::Power(Power { joint, exponent, rounding: Power::ROUNDING * velocity })], None);
-    }
-    add(vec![TorqueTerm::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })], None);
-    for yield_displacement in YIELDS.map(|displacement| displacement * position) {
-        add(vec![TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement })], None);
-    }
-    columns.retain(|column: &CandidateColumn| search.rows_near_rest || !column.kind.is_of_rest());
-    columns
+    TorqueTerm::candidates()
+        .filter(|kind| search.rows_near_rest || !kind.is_near_rest)
+        .flat_map(|kind| (kind.grid)(&own).into_iter().flat_map(move |point| columns_at(kind, point)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -321,11 +160,10 @@ mod tests {
     /// Without rows near rest: one step, as wide as stated, and no friction that is told by them alone.
     #[test]
     fn what_rows_near_rest_alone_show_is_no_candidate_without_them() {
-        use FrictionKind::{AsymmetricCoulomb, AsymmetricViscous, Coulomb, Load, Quadratic, Viscous};
         let scale = JointScale::usual(0);
         let kinds = |search: &FrictionSearch| -> Vec<FrictionKind> {
             let mut kinds: Vec<_> = candidate_columns(search, scale, None).iter().map(|column| column.kind).collect();
-            kinds.sort();
+            kinds.sort_by_key(|kind| kind.rank());
             kinds.dedup();
             kinds
         };
@@ -333,13 +171,14 @@ mod tests {
         let coulomb = Some(CoulombShape::Smooth { width: 0.03 });
         let far = FrictionSearch { rows_near_rest: false, coulomb, ..all.clone() };
         assert_eq!(kinds(&all).len(), 10);
-        assert_eq!(kinds(&far), [Viscous, AsymmetricViscous, Coulomb, AsymmetricCoulomb, Quadratic, Load]);
+        let names: Vec<_> = kinds(&far).into_iter().map(|kind| kind.name).collect();
+        assert_eq!(names, ["viscous", "asymmetric viscous", "coulomb", "asymmetric coulomb", "quadratic", "load"]);
         // The one step is a choice of its own, though it has no neighbour on a grid.
         let columns = candidate_columns(&far, scale, None);
-        let options = Coulomb.options(&columns);
+        let options = options(kinds(&far)[2], &columns);
         assert_eq!(options.len(), 1, "{options:?}");
         let step = CoulombShape::Smooth { width: 0.03 };
-        let stated = TorqueTerm::Coulomb(dynident_model::terms::Coulomb { joint: 0, shape: step });
+        let stated = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: step });
         assert_eq!(columns[options[0][0]].term, stated);
     }
 }

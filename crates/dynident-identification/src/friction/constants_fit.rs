@@ -10,7 +10,7 @@
 //! `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`: their error bars have to hold it.
 
 use super::candidates::JointScale;
-use super::constants::{at, coordinates, step_of, value_at};
+use super::constants::step_of;
 use super::joint_friction::{FrictionConstant, JointFriction};
 use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
 use crate::regressor_model::RegressorModel;
@@ -132,13 +132,13 @@ impl FrictionConstants {
         let mut moved = self.joints.clone();
         for (place, (_, terms)) in moved.iter_mut().enumerate() {
             for (number, term) in terms.iter_mut().enumerate() {
-                let mut own = coordinates(term);
+                let mut own = term.kind().coordinates();
                 let of_term = |axis: &Axis| axis.joint == place && axis.terms.contains(&number);
                 for (axis, step) in self.axes.iter().zip(steps).filter(|(axis, _)| of_term(axis)) {
                     own[axis.place] += step;
                 }
                 if !own.is_empty() {
-                    *term = at(term, &own, self.scales[place]);
+                    *term = term.at(&own, self.scales[place].velocity);
                 }
             }
         }
@@ -210,9 +210,9 @@ impl FrictionConstants {
     /// The term on one side of the centre along an axis.
     fn beside(&self, axis: &Axis, number: usize, step: f64) -> TorqueTerm {
         let term = &self.joints[axis.joint].1[number];
-        let mut own = coordinates(term);
+        let mut own = term.kind().coordinates();
         own[axis.place] += step;
-        at(term, &own, self.scales[axis.joint])
+        term.at(&own, self.scales[axis.joint].velocity)
     }
 
     /// The terms on both sides of the centre along every axis: columns that a pass has to have beside the model's.
@@ -359,11 +359,11 @@ impl FrictionConstants {
         let of_joint = |(place, (joint, terms)): (usize, &(usize, Vec<TorqueTerm>))| {
             let of_axis = |(axis, std): (&Axis, &f64)| {
                 let term = &terms[axis.terms[0]];
-                let own = DVector::from_vec(coordinates(term));
+                let own = DVector::from_vec(term.kind().coordinates());
                 let value = |sigmas: f64| {
                     let mut moved = own.clone();
                     moved[axis.place] += sigmas * std;
-                    value_at(term, axis.place, moved.as_slice(), self.scales[place])
+                    term.constant_at(axis.place, moved.as_slice(), self.scales[place].velocity)
                 };
                 let (name, middle) = value(0.0);
                 let mut ends = [value(-HALF_WIDTH_95).1, value(HALF_WIDTH_95).1];
@@ -387,7 +387,7 @@ fn axes_of(joint: usize, terms: &[TorqueTerm]) -> Vec<Axis> {
     let mut axes: Vec<Axis> = Vec::new();
     for (number, term) in terms.iter().enumerate() {
         let is_smooth = matches!(step_of(term), Some(CoulombShape::Smooth { .. }));
-        for place in 0..coordinates(term).len() {
+        for place in 0..term.kind().coordinates().len() {
             let has_same_step = |axis: &Axis| axis.place == 0 && step_of(&terms[axis.terms[0]]) == step_of(term);
             let same = axes.iter_mut().find(|axis| place == 0 && is_smooth && has_same_step(axis));
             match same {

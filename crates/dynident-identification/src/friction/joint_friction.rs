@@ -59,15 +59,11 @@ pub struct FrictionConstant {
 }
 
 impl FrictionConstant {
-    /// The narrowest step at rest that its 95 % interval leaves, rad/s (m/s): the lower end of a `width`; of a
-    /// `steepness` `φ₂` what half a Coulomb step of width `2/φ₂` has at the upper end. `None` for other constants.
-    pub fn narrowest_step(&self) -> Option<f64> {
-        let [least, most] = self.interval_95;
-        match &self.constant[..] {
-            "width" => Some(least),
-            "steepness" => Some(2.0 / most),
-            _ => None,
-        }
+    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if it is a constant of another
+    /// term, or does not set the width of the step.
+    pub fn narrowest_step(&self, term: &TorqueTerm) -> Option<f64> {
+        let widths = self.interval_95.iter().filter_map(|&end| term.kind().step_width_by(&self.constant, end));
+        widths.reduce(f64::min).filter(|_| term.kind_name() == self.term)
     }
 }
 
@@ -92,9 +88,9 @@ pub struct FrictionCandidate {
 
 /// The kinds of some terms, as candidates are named.
 fn name_of(terms: &[TorqueTerm]) -> String {
-    let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(FrictionKind::of).collect();
-    kinds.sort();
+    let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(TorqueTerm::candidate).collect();
+    kinds.sort_by_key(|kind| kind.rank());
     kinds.dedup();
-    let names: Vec<&str> = kinds.into_iter().map(FrictionKind::name).collect();
+    let names: Vec<&str> = kinds.into_iter().map(|kind| kind.name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
 }

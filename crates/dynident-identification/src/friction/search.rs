@@ -12,11 +12,11 @@
 //! A constant of a term (a width, a velocity) is taken between two neighbours of its grid, whose columns together say
 //! what the column between them would: so no further term is needed to patch up a grid that is too coarse.
 
-use super::candidates::{CandidateColumn, FrictionKind, JointScale};
+use super::candidates::{CandidateColumn, FrictionKind, JointScale, options, takes_one};
 use super::constants::{mean_term, with_one_step};
 use super::joint_friction::{FrictionCandidate, JointFriction};
 use dynident_estimation::{FoldErrors, JointFolds};
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{CandidateRole, TorqueTerm};
 
 /// Terms added at most to viscous friction and a step.
 const MOST_ADDED: usize = 3;
@@ -43,7 +43,7 @@ impl ScoredCandidate {
 
     fn terms_of(&self, columns: &[CandidateColumn], kind: FrictionKind, scale: JointScale) -> Vec<TorqueTerm> {
         let present = self.present(columns, kind);
-        if !kind.takes_one() {
+        if !takes_one(kind) {
             let mut stated: Vec<TorqueTerm> = Vec::new();
             for term in present.iter().flat_map(|&(place, _)| &columns[place].stated) {
                 if !stated.contains(term) {
@@ -73,20 +73,20 @@ impl ScoredCandidate {
     }
 
     fn complexity(&self, columns: &[CandidateColumn]) -> usize {
-        let is_present = |kind: &&FrictionKind| !self.present(columns, **kind).is_empty();
-        let constants = self.kinds.iter().filter(is_present).map(|kind| kind.constants());
+        let is_present = |kind: &&FrictionKind| !self.present(columns, kind).is_empty();
+        let constants = self.kinds.iter().filter(is_present).map(|kind| kind.constants);
         self.parameters(columns).len() + constants.sum::<usize>()
     }
 
     /// Its terms that have a value at all.
     fn present_name(&self, columns: &[CandidateColumn]) -> String {
-        let is_present = |kind: &&FrictionKind| !self.present(columns, **kind).is_empty();
-        let names: Vec<&str> = self.kinds.iter().filter(is_present).map(|kind| kind.name()).collect();
+        let is_present = |kind: &&FrictionKind| !self.present(columns, kind).is_empty();
+        let names: Vec<&str> = self.kinds.iter().filter(is_present).map(|kind| kind.name).collect();
         if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
     }
 
     fn name(&self) -> String {
-        self.kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(" + ")
+        self.kinds.iter().map(|kind| kind.name).collect::<Vec<_>>().join(" + ")
     }
 }
 
@@ -100,8 +100,8 @@ fn tuned(
 ) -> ScoredCandidate {
     let mut choices: Vec<Vec<usize>> = vec![Vec::new()];
     for &kind in &kinds {
-        let options = kind.options(columns);
-        let kept = before.filter(|_| !kind.is_step()).and_then(|before| {
+        let options = options(kind, columns);
+        let kept = before.filter(|_| !kind.is_step).and_then(|before| {
             let of_kind = |place: &&usize| columns[**place].kind == kind;
             let places: Vec<usize> = before.places.iter().filter(of_kind).copied().collect();
             options.contains(&places).then_some(places)
@@ -134,14 +134,18 @@ fn tuned(
 /// columns and the common ones in the fit: `|s|` is constant except near rest, and so may be gravity. 1 for a model
 /// without that step.
 fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &ScoredCandidate) -> f64 {
-    let steps = model.present(columns, FrictionKind::Coulomb);
+    let steps: Vec<(usize, f64)> = model
+        .kinds
+        .iter()
+        .filter(|kind| kind.is_common_step())
+        .flat_map(|&kind| model.present(columns, kind))
+        .collect();
     let whole: f64 = steps.iter().map(|(_, value)| value).sum();
     let (mut difference, mut sum) = (Vec::new(), Vec::new());
     for (place, value) in steps {
         // A sign has no number on the grid: the narrowest smooth step is taken in its place.
         let step = columns[place].grid.unwrap_or(0);
-        let is_direction =
-            |at: &usize| columns[*at].kind == FrictionKind::AsymmetricCoulomb && columns[*at].grid == Some(step);
+        let is_direction = |at: &usize| is_step_by_direction(columns[*at].kind) && columns[*at].grid == Some(step);
         let mut directions = (0..columns.len()).filter(is_direction);
         let (Some(forward), Some(backward)) = (directions.next(), directions.next()) else { continue };
         let share = value / whole;
@@ -154,11 +158,16 @@ fn asymmetry_inflation(folds: &JointFolds, columns: &[CandidateColumn], model: &
     let others: Vec<[(usize, f64); 1]> = model
         .places
         .iter()
-        .filter(|&&place| columns[place].kind != FrictionKind::Coulomb)
+        .filter(|&&place| !columns[place].kind.is_common_step())
         .map(|&place| [(place, 1.0)])
         .collect();
     let others: Vec<&[(usize, f64)]> = others.iter().map(|one| &one[..]).chain([&sum[..]]).collect();
     folds.variance_inflation(&difference, &others)
+}
+
+/// Whether it is the step at rest with a parameter for each direction.
+fn is_step_by_direction(kind: FrictionKind) -> bool {
+    kind.is_step && !kind.is_common_step()
 }
 
 /// Terms added one at a time to `start`, each time the one that lowers the error most; all that was tried goes into
@@ -170,14 +179,17 @@ fn add_terms(
     most_inflation: f64,
     met: &mut Vec<ScoredCandidate>,
 ) {
-    let mut additions: Vec<FrictionKind> =
-        columns.iter().map(|column| column.kind).filter(|kind| kind.is_addition()).collect();
+    let mut additions: Vec<FrictionKind> = columns
+        .iter()
+        .map(|column| column.kind)
+        .filter(|kind| matches!(kind.role, CandidateRole::InPlaceOf(_) | CandidateRole::Addition))
+        .collect();
     additions.dedup();
     let mut at = met.len();
     met.push(tuned(folds, columns, start, None));
     let is_distinct =
         most_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &met[at]) <= most_inflation;
-    additions.retain(|kind| is_distinct || *kind != FrictionKind::AsymmetricCoulomb);
+    additions.retain(|kind| is_distinct || !is_step_by_direction(*kind));
     for _ in 0..MOST_ADDED {
         let start = met.len();
         for &added in &additions {
@@ -189,7 +201,7 @@ fn add_terms(
             let mut kinds: Vec<FrictionKind> =
                 met[at].kinds.iter().copied().filter(|kind| Some(*kind) != replaced).collect();
             kinds.push(added);
-            kinds.sort();
+            kinds.sort_by_key(|kind| kind.rank());
             let with_constants_kept = tuned(folds, columns, kinds, Some(&met[at]));
             met.push(with_constants_kept);
         }
@@ -215,8 +227,10 @@ pub(super) fn search(
     columns: &[CandidateColumn],
 ) -> (JointFriction, Vec<usize>) {
     let mut met = Vec::new();
-    for step in [FrictionKind::Coulomb, FrictionKind::Sigmoid] {
-        add_terms(folds, columns, vec![FrictionKind::Viscous, step], most_inflation, &mut met);
+    let of_role = |role: CandidateRole| TorqueTerm::candidates().filter(move |kind| kind.role == role);
+    for start in of_role(CandidateRole::Start) {
+        let kinds = of_role(CandidateRole::Base).chain([start]).collect();
+        add_terms(folds, columns, kinds, most_inflation, &mut met);
     }
     let least =
         (0..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a }).unwrap_or(0);

@@ -6,50 +6,40 @@
 //! its own it takes up what is at rest.) And a Coulomb step wider than half the velocity at which Stribeck friction
 //! has fallen off leaves the step at rest to the Stribeck term: the two have changed places.
 
-use super::candidates::{JointScale, STRIBECK_WIDTH};
-use super::constants::{smooth_width, step_of, with_one_step};
-use dynident_model::terms::{CoulombShape, TorqueTerm};
+use super::candidates::JointScale;
+use super::constants::{is_coulomb, smooth_width, step_of, with_one_step};
+use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
-/// A Coulomb step this part of the Stribeck velocity wide is done where Stribeck friction begins to fall off.
-const WIDE: f64 = 0.5;
+/// A Coulomb step this many times as wide as the Stribeck term's own step, half the Stribeck velocity, is done where
+/// Stribeck friction begins to fall off.
+const WIDE: f64 = 2.0;
 /// Part of the Stribeck term's own step that a Coulomb step of the same friction has at least.
 const NARROW: f64 = 0.5;
 
 /// The same terms with the step at rest where the other valley is; `None` where they are in it already.
 pub(crate) fn second_start(terms: &[TorqueTerm], scale: JointScale) -> Option<Vec<TorqueTerm>> {
     let step = step_of(terms.iter().find(|term| is_coulomb(term))?)?;
-    let stribeck = terms.iter().find_map(|term| match term {
-        TorqueTerm::Stribeck(own) => Some(STRIBECK_WIDTH * own.speed),
+    let own_width = |term: &TorqueTerm| match term.kind().step_role() {
+        StepRole::Own { width } => Some(width),
         _ => None,
-    });
+    };
+    let stribeck = terms.iter().find_map(own_width);
     let width = match (step, stribeck) {
         (CoulombShape::Sign { dead_band: 0.0 }, None) => scale.narrowest_width(),
-        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > WIDE / STRIBECK_WIDTH * of_stribeck => {
-            of_stribeck
-        }
+        (CoulombShape::Smooth { width }, Some(of_stribeck)) if width > WIDE * of_stribeck => of_stribeck,
         _ => return None,
     };
     let moved = |term: &TorqueTerm| {
-        let mut term = term.clone();
-        match &mut term {
-            TorqueTerm::Coulomb(own) => own.shape = CoulombShape::Smooth { width },
-            TorqueTerm::DirectionalCoulomb(own) => own.shape = CoulombShape::Smooth { width },
-            _ => {}
-        }
-        term
+        if is_coulomb(term) { term.clone().with_step(|_| CoulombShape::Smooth { width }) } else { term.clone() }
     };
     Some(with_one_step(terms.iter().map(moved).collect()))
-}
-
-fn is_coulomb(term: &TorqueTerm) -> bool {
-    matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_))
 }
 
 /// Whether Coulomb and Stribeck friction can be one friction: with a Coulomb step far narrower than that of the
 /// Stribeck term the joint is dry, and Stribeck friction that is not comes out too large.
 pub(crate) fn is_one_friction(terms: &[TorqueTerm]) -> bool {
     let width = |is_wanted: fn(&TorqueTerm) -> bool| terms.iter().filter(|term| is_wanted(term)).find_map(smooth_width);
-    match (width(is_coulomb), width(|term| matches!(term, TorqueTerm::Stribeck(_)))) {
+    match (width(is_coulomb), width(|term| matches!(term.kind().step_role(), StepRole::Own { .. }))) {
         (Some(coulomb), Some(stribeck)) => coulomb >= NARROW * stribeck,
         _ => true,
     }

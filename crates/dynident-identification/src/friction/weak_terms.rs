@@ -9,7 +9,7 @@
 
 use dynident_dynamics::Column;
 use dynident_estimation::Estimate;
-use dynident_model::terms::{Coulomb, Direction, DirectionalCoulomb, DirectionalViscous, TorqueTerm, Viscous};
+use dynident_model::terms::{CandidateRole, TermAction, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
 /// Squares in units of their variance that a further term needs, with 1, 2, 3 numbers of its own: chance goes beyond
@@ -60,7 +60,7 @@ fn further_terms(
         let further = |square: f64, numbers: usize, left: Vec<TorqueTerm>| {
             Some(Further { square, numbers, term: term.clone(), left })
         };
-        if let Some((other, of_both)) = other_direction(term) {
+        if let Some([other, of_both]) = term.kind().both_directions() {
             let other_place = place(&other)?;
             let difference = estimate.values[own] - estimate.values[other_place];
             let covariance = |a: usize, b: usize| estimate.covariance[(a, b)];
@@ -70,15 +70,11 @@ fn further_terms(
             left.push(of_both);
             return further(difference * difference / variance.max(f64::MIN_POSITIVE), 1, left);
         }
-        if !matches!(
-            term,
-            TorqueTerm::Stribeck(_) | TorqueTerm::Power(_) | TorqueTerm::Load(_) | TorqueTerm::MaxwellSlip(_)
-        ) {
-            return None;
-        }
+        term.candidate().filter(|law| law.role == CandidateRole::Addition)?;
         let left = without(&[term]);
         // Friction that drives the joint is none, and what no row shows is none that is known.
-        let is_shown = !matches!(term, TorqueTerm::Stribeck(_)) || norms[own] * norms[own] >= SHOWN;
+        let fades = matches!(term.action(), TermAction::Friction(friction) if friction.fading.is_some());
+        let is_shown = !fades || norms[own] * norms[own] >= SHOWN;
         if !is_shown || (term.is_nonnegative() && estimate.values[own] <= 0.0) {
             return further(0.0, 1, left);
         }
@@ -132,29 +128,13 @@ pub(super) fn has_doubtful_term(
     further.iter().any(|further| is_new(further) && further.in_units_of(&SEEN_AT_SECOND_LOOK) < 1.0)
 }
 
-/// For a forward term that of the other direction, and the one that is the same for both.
-fn other_direction(term: &TorqueTerm) -> Option<(TorqueTerm, TorqueTerm)> {
-    match term {
-        TorqueTerm::DirectionalViscous(own) if own.direction == Direction::Forward => {
-            let other = DirectionalViscous { direction: Direction::Backward, ..*own };
-            Some((TorqueTerm::DirectionalViscous(other), TorqueTerm::Viscous(Viscous { joint: own.joint })))
-        }
-        TorqueTerm::DirectionalCoulomb(own) if own.direction == Direction::Forward => {
-            let other = DirectionalCoulomb { direction: Direction::Backward, ..*own };
-            let of_both = Coulomb { joint: own.joint, shape: own.shape };
-            Some((TorqueTerm::DirectionalCoulomb(other), TorqueTerm::Coulomb(of_both)))
-        }
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use dynident_estimation::{
         CovarianceMethod, LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor, ordinary_least_squares,
     };
-    use dynident_model::terms::{CoulombShape, Stribeck};
+    use dynident_model::terms::{Coulomb, CoulombShape, Direction, DirectionalCoulomb, Stribeck};
 
     /// Rows at velocities from 0.05 to 1 rad/s of a joint with 5 Nm of Coulomb and, where that is seen, 2 Nm of
     /// Stribeck friction, and what an iteration's search made of such rows: a term that has faded to 1e-4 at the

@@ -10,7 +10,7 @@ pub(super) fn describe(model: &Model, term: &TorqueTerm, value: f64) -> Value {
     let mut out = json!({ "kind": term.kind_name() });
     for (key, constant) in term.constants() {
         out[key] = match constant {
-            TermConstant::Number(number) => json!(number),
+            TermConstant::Number(number, _) => json!(number),
             TermConstant::Numbers(numbers) => json!(numbers),
             TermConstant::Word(word) => json!(word),
             TermConstant::Text(text) => json!(text),

@@ -1,11 +1,13 @@
 //! Coulomb friction: `τ = F_c s(q̇)` with a sign or a smooth step `s`.
 
-use super::JointMotion;
+use super::TorqueTerm;
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{
-    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
-    VelocityFriction, VelocityFunction, column_of_velocity, halves,
+    JointProperty, MotionFunction, StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
+    VelocityFriction, VelocityFunction, halves,
 };
-use dynident_lanes::tanh_all;
+use super::law::{Law, VelocityLaw};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// The step near zero velocity.
@@ -33,31 +35,13 @@ impl CoulombShape {
     /// The step at velocity `dq`.
     #[inline]
     pub fn step(self, dq: f64) -> f64 {
-        match self {
-            Self::Sign { dead_band } if dq.abs() <= dead_band => 0.0,
-            Self::Sign { .. } => dq.signum(),
-            Self::Smooth { width } => (dq / width).tanh(),
-        }
-    }
-
-    /// The steps at the velocities `dq`, several at a time.
-    pub(super) fn steps(self, dq: &[f64], out: &mut [f64]) {
-        match self {
-            Self::Sign { .. } => out.iter_mut().zip(dq).for_each(|(to, &dq)| *to = self.step(dq)),
-            Self::Smooth { width } => tanh_all(dq, width, out),
-        }
+        self.of(dq)
     }
 
     /// The step's derivative by the velocity; zero for the sign, which has none at the step.
     #[inline]
     pub fn slope(self, dq: f64) -> f64 {
-        match self {
-            Self::Sign { .. } => 0.0,
-            Self::Smooth { width } => {
-                let step = (dq / width).tanh();
-                (1.0 - step * step) / width
-            }
-        }
+        VelocityFunction::slope(&self, dq)
     }
 
     /// As friction of a robot. The dead band of a sign is a device for noisy velocities of a log: a robot has none.
@@ -69,17 +53,13 @@ impl CoulombShape {
     }
 }
 
-impl VelocityFunction for CoulombShape {
-    fn value(&self, dq: f64) -> f64 {
-        self.step(dq)
-    }
-
-    fn slope(&self, dq: f64) -> f64 {
-        CoulombShape::slope(*self, dq)
-    }
-
-    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        self.steps(motion.dq_of(joint), out);
+impl VelocityLaw for CoulombShape {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
+        match *self {
+            Self::Sign { dead_band } => dq.sign(dead_band),
+            Self::Smooth { width } => dq.smooth_step(width),
+        }
     }
 }
 
@@ -93,6 +73,34 @@ pub struct Coulomb {
     pub shape: CoulombShape,
 }
 
+impl VelocityLaw for Coulomb {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
+        self.shape.of(dq)
+    }
+}
+
+impl Coulomb {
+    /// Widths of the smooth step that recordings choose from, rad/s or m/s of a usual arm, in addition to the sign and
+    /// the width that a study states.
+    pub const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+
+    fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
+        let of = |shape| TorqueTerm::Coulomb(Self { joint: own.joint, shape });
+        let alone = own.alone.iter().map(|shape| GridPoint::alone(of(*shape)));
+        let smooth = own.widths.iter().enumerate();
+        alone.chain(smooth.map(|(step, &width)| GridPoint::at(step, of(CoulombShape::Smooth { width })))).collect()
+    }
+}
+
+impl Law for Coulomb {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw {
+        constants: 1,
+        is_step: true,
+        ..CandidateLaw::new("coulomb", CandidateRole::Start, Self::grid)
+    }];
+}
+
 impl TermKind for Coulomb {
     fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "coulomb", symbol: format!("fc{}", self.joint + 1), unit: "Nm" }
@@ -100,10 +108,6 @@ impl TermKind for Coulomb {
 
     fn joints(&self) -> TermJoints {
         TermJoints::One(self.joint)
-    }
-
-    fn is_nonnegative(&self) -> bool {
-        true
     }
 
     fn action(&self) -> TermAction<'_> {
@@ -114,13 +118,19 @@ impl TermKind for Coulomb {
         vec![("shape", TermConstant::Step(self.shape))]
     }
 
-    column_of_velocity!(shape);
-
     fn functions(&self) -> Vec<MotionFunction> {
         halves(self.joint, &format!("{:?}", self.shape)).into()
     }
 
     fn property(&self) -> Option<JointProperty> {
         Some(JointProperty::Friction)
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        Some(&mut self.shape)
+    }
+
+    fn step_role(&self) -> StepRole {
+        StepRole::Joint
     }
 }

@@ -7,7 +7,9 @@
 //! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
 
 use super::kind::{MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
-use super::{CoulombShape, JointMotion, TermInput};
+use super::law::{Law, VelocityLaw};
+use super::{Coulomb, CoulombShape, DriveInertia, JointMotion, TermInput, TorqueTerm, Viscous};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// What the shared drive adds.
@@ -21,6 +23,18 @@ pub enum CouplingEffect {
     Viscous,
     /// Coulomb friction on the drive's own velocity, Nm.
     Coulomb(CoulombShape),
+}
+
+impl CouplingEffect {
+    /// The term of a drive with this effect that turns with one joint, by `ratio` times the joint's velocity, and the
+    /// term's parameter per unit of the drive's.
+    pub fn of_joint(self, joint: usize, ratio: f64) -> (TorqueTerm, f64) {
+        match self {
+            Self::Inertia => (TorqueTerm::DriveInertia(DriveInertia { joint }), ratio * ratio),
+            Self::Viscous => (TorqueTerm::Viscous(Viscous { joint }), ratio * ratio),
+            Self::Coulomb(shape) => (TorqueTerm::Coulomb(Coulomb { joint, shape }), ratio.abs()),
+        }
+    }
 }
 
 /// One effect of one drive that turns with two joints.
@@ -42,6 +56,27 @@ pub struct Coupling {
 impl Coupling {
     /// Sizes that a ratio may have: gears turn by less, and products of two stay far inside the range of `f64`.
     pub const RATIOS: core::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
+    /// For joint `row` the other joint and its own ratio.
+    fn as_seen_by(&self, row: usize) -> (usize, f64) {
+        if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) }
+    }
+}
+
+impl VelocityLaw for Coupling {}
+
+impl Law for Coupling {
+    fn torque<S: Real>(&self, row: usize, dq: &[S]) -> Result<S, &'static str> {
+        let (other, own_ratio) = self.as_seen_by(row);
+        let [first, second] = self.ratios.map(S::splat);
+        Ok(match self.effect {
+            CouplingEffect::Inertia => S::ZERO,
+            CouplingEffect::Viscous => first * second * dq[other],
+            CouplingEffect::Coulomb(shape) => {
+                S::splat(own_ratio) * shape.of(first * dq[self.first] + second * dq[self.second])
+            }
+        })
+    }
 }
 
 impl TermKind for Coupling {
@@ -84,8 +119,7 @@ impl TermKind for Coupling {
     }
 
     fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        let (other, own_ratio) =
-            if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
+        let (other, own_ratio) = self.as_seen_by(row);
         let cross = self.ratios[0] * self.ratios[1];
         match self.effect {
             CouplingEffect::Inertia => {
@@ -109,8 +143,7 @@ impl TermKind for Coupling {
 
     fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 3]) {
         let [_, by_dq, by_ddq] = adjoints;
-        let (other, own_ratio) =
-            if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
+        let (other, own_ratio) = self.as_seen_by(row);
         let cross = self.ratios[0] * self.ratios[1];
         let start = |joint: usize| joint * motion.samples;
         for (s, w) in weights.iter().enumerate() {
@@ -125,6 +158,13 @@ impl TermKind for Coupling {
                     by_dq[start(self.second) + s] += self.ratios[1] * slope;
                 }
             }
+        }
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        match &mut self.effect {
+            CouplingEffect::Coulomb(shape) => Some(shape),
+            CouplingEffect::Inertia | CouplingEffect::Viscous => None,
         }
     }
 

@@ -6,6 +6,7 @@
 //! joint back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
 
 use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::law::{Law, VelocityLaw};
 use super::{Expression, JointMotion, JointNames, TermInput, TorqueFunction, TorqueTable};
 use crate::joint::{Joint, JointSpring};
 use crate::tree::Model;
@@ -152,6 +153,10 @@ impl StateFunction for Declared {
         }
     }
 }
+
+impl VelocityLaw for Declared {}
+
+impl Law for Declared {}
 
 impl TermKind for Declared {
     fn label(&self) -> TermLabel<'_> {

@@ -4,11 +4,15 @@
 //! `s`. All four parameters are positive where friction takes power. With a step that is a sign, the two Coulomb
 //! columns and an offset say the same: keep two of the three.
 
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{
-    MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction,
-    VelocityFunction, column_of_velocity, halves, smooth_friction,
+    MotionFunction, StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
+    VelocityFriction, halves,
 };
-use super::{CoulombShape, JointMotion};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedJoint, StatedLaw};
+use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm, Viscous};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Sense of motion.
@@ -23,6 +27,8 @@ pub enum Direction {
 }
 
 impl Direction {
+    const BOTH: [Self; 2] = [Self::Forward, Self::Backward];
+
     /// `+` or `-`, as in the parameter's symbol.
     pub fn sign(self) -> char {
         match self {
@@ -32,11 +38,11 @@ impl Direction {
     }
 
     /// The part of `value` in this direction.
-    #[inline]
-    fn part(self, value: f64) -> f64 {
+    #[inline(always)]
+    fn part<S: Real>(self, value: S) -> S {
         match self {
-            Self::Forward => value.max(0.0),
-            Self::Backward => value.min(0.0),
+            Self::Forward => value.max(S::ZERO),
+            Self::Backward => value.min(S::ZERO),
         }
     }
 
@@ -55,14 +61,6 @@ impl Direction {
             Self::Backward => vec![backward],
         }
     }
-
-    #[inline]
-    fn holds(self, dq: f64) -> bool {
-        match self {
-            Self::Forward => dq > 0.0,
-            Self::Backward => dq < 0.0,
-        }
-    }
 }
 
 /// Viscous friction of one joint in one direction, Nm s/rad (N s/m).
@@ -75,13 +73,35 @@ pub struct DirectionalViscous {
     pub direction: Direction,
 }
 
-impl VelocityFunction for DirectionalViscous {
-    fn value(&self, dq: f64) -> f64 {
+impl VelocityLaw for DirectionalViscous {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
         self.direction.part(dq)
     }
+}
 
-    fn slope(&self, dq: f64) -> f64 {
-        f64::from(self.direction.holds(dq))
+impl DirectionalViscous {
+    fn both(joint: usize) -> Vec<TorqueTerm> {
+        Direction::BOTH.map(|direction| TorqueTerm::DirectionalViscous(Self { joint, direction })).to_vec()
+    }
+}
+
+impl Law for DirectionalViscous {
+    const CANDIDATES: &'static [CandidateLaw] =
+        &[CandidateLaw::new("asymmetric viscous", CandidateRole::InPlaceOf("viscous"), |own| {
+            vec![GridPoint { terms: Self::both(own.joint), step: None }]
+        })];
+}
+
+/// The law `asymmetric-viscous` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct AsymmetricViscous {}
+
+impl StatedLaw for AsymmetricViscous {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        DirectionalViscous::both(own.joint)
     }
 }
 
@@ -94,16 +114,30 @@ impl TermKind for DirectionalViscous {
         }
     }
 
-    smooth_friction!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+    }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("direction", self.direction.constant())]
     }
 
-    column_of_velocity!();
-
     fn functions(&self) -> Vec<MotionFunction> {
         self.direction.half(halves(self.joint, "viscous"))
+    }
+
+    fn stated(&self) -> Option<FrictionTerm> {
+        Some(FrictionTerm::AsymmetricViscous(AsymmetricViscous {}))
+    }
+
+    fn both_directions(&self) -> Option<[TorqueTerm; 2]> {
+        let other = TorqueTerm::DirectionalViscous(Self { direction: Direction::Backward, ..*self });
+        let of_both = TorqueTerm::Viscous(Viscous { joint: self.joint });
+        (self.direction == Direction::Forward).then_some([other, of_both])
     }
 }
 
@@ -119,20 +153,44 @@ pub struct DirectionalCoulomb {
     pub shape: CoulombShape,
 }
 
-impl VelocityFunction for DirectionalCoulomb {
-    fn value(&self, dq: f64) -> f64 {
-        self.direction.part(self.shape.step(dq))
+impl VelocityLaw for DirectionalCoulomb {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
+        self.direction.part(self.shape.of(dq))
+    }
+}
+
+impl DirectionalCoulomb {
+    fn both(joint: usize, shape: CoulombShape) -> Vec<TorqueTerm> {
+        Direction::BOTH.map(|direction| TorqueTerm::DirectionalCoulomb(Self { joint, direction, shape })).to_vec()
     }
 
-    fn slope(&self, dq: f64) -> f64 {
-        if self.direction.holds(dq) { self.shape.slope(dq) } else { 0.0 }
+    fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
+        let of = |(step, &width): (usize, &f64)| GridPoint {
+            terms: Self::both(own.joint, CoulombShape::Smooth { width }),
+            step: Some(step),
+        };
+        own.widths.iter().enumerate().map(of).collect()
     }
+}
 
-    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        self.shape.steps(motion.dq_of(joint), out);
-        for step in out.iter_mut() {
-            *step = self.direction.part(*step);
-        }
+impl Law for DirectionalCoulomb {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw {
+        constants: 1,
+        is_step: true,
+        ..CandidateLaw::new("asymmetric coulomb", CandidateRole::InPlaceOf("coulomb"), Self::grid)
+    }];
+}
+
+/// The law `asymmetric-coulomb` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct AsymmetricCoulomb {}
+
+impl StatedLaw for AsymmetricCoulomb {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        DirectionalCoulomb::both(own.joint, own.step)
     }
 }
 
@@ -149,10 +207,6 @@ impl TermKind for DirectionalCoulomb {
         TermJoints::One(self.joint)
     }
 
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
     fn action(&self) -> TermAction<'_> {
         let forward = self.direction == Direction::Forward;
         let curve = match self.shape {
@@ -166,9 +220,25 @@ impl TermKind for DirectionalCoulomb {
         vec![("direction", self.direction.constant()), ("shape", TermConstant::Step(self.shape))]
     }
 
-    column_of_velocity!();
-
     fn functions(&self) -> Vec<MotionFunction> {
         self.direction.half(halves(self.joint, &format!("{:?}", self.shape)))
+    }
+
+    fn stated(&self) -> Option<FrictionTerm> {
+        Some(FrictionTerm::AsymmetricCoulomb(AsymmetricCoulomb {}))
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        Some(&mut self.shape)
+    }
+
+    fn step_role(&self) -> StepRole {
+        StepRole::Joint
+    }
+
+    fn both_directions(&self) -> Option<[TorqueTerm; 2]> {
+        let other = TorqueTerm::DirectionalCoulomb(Self { direction: Direction::Backward, ..*self });
+        let of_both = TorqueTerm::Coulomb(Coulomb { joint: self.joint, shape: self.shape });
+        (self.direction == Direction::Forward).then_some([other, of_both])
     }
 }

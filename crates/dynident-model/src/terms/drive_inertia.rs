@@ -1,6 +1,7 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
-use super::kind::{JointProperty, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
+use super::kind::{JointProperty, TermAction, TermJoints, TermKind, TermLabel};
+use super::law::{Law, VelocityLaw};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,10 @@ pub struct DriveInertia {
     pub joint: usize,
 }
 
+impl VelocityLaw for DriveInertia {}
+
+impl Law for DriveInertia {}
+
 impl TermKind for DriveInertia {
     fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "drive-inertia", symbol: format!("Ia{}", self.joint + 1), unit: "kg m^2" }
@@ -22,20 +27,12 @@ impl TermKind for DriveInertia {
         TermJoints::One(self.joint)
     }
 
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
     fn property(&self) -> Option<JointProperty> {
         Some(JointProperty::DriveInertia)
     }
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Inertia { factor: 1.0 }
-    }
-
-    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        Vec::new()
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {

@@ -1,8 +1,8 @@
-//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`];
-//! [`TorqueTerm`](super::TorqueTerm) hands every question on to it, so that nobody else has to know which kinds there
-//! are.
+//! What every kind of torque term states about itself. A kind is one type in one file that implements [`TermKind`];
+//! [`TorqueTerm`](super::TorqueTerm) passes every question on to it, so that no other code has to know the kinds.
 
-use super::{CoulombShape, JointMotion, TermInput};
+use super::candidate::velocity_within;
+use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use core::fmt::Debug;
 
 /// The joints that feel a term.
@@ -110,11 +110,7 @@ pub trait VelocityFunction: Debug {
     fn slope(&self, dq: f64) -> f64;
 
     /// Its values in the motion of joint `joint`.
-    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        for (to, &dq) in out.iter_mut().zip(motion.dq_of(joint)) {
-            *to = self.value(dq);
-        }
-    }
+    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]);
 
     /// Adds `weights · slope` in the motion of joint `joint` to its part of `by_dq`.
     fn add_slopes(&self, joint: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64]) {
@@ -124,9 +120,6 @@ pub trait VelocityFunction: Debug {
         }
     }
 }
-
-/// Samples of which functions of the velocity keep what is between on the stack.
-pub(super) const PART: usize = 64;
 
 /// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same
 /// joints cannot be distinguished.
@@ -140,7 +133,7 @@ pub struct MotionFunction {
     pub factor: f64,
 }
 
-/// What a robot's description can say of a term, by its name in URDF (MJCF).
+/// The property of a joint by which a robot description states a term, by its name in URDF (MJCF).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointProperty {
     /// `damping`.
@@ -153,11 +146,28 @@ pub enum JointProperty {
     Stiffness,
 }
 
+/// Which step at rest a law has when recordings choose the friction of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StepRole {
+    /// It is Coulomb friction: its step is the joint's.
+    Joint,
+    /// The joint's, where that is smooth.
+    AsJointIfSmooth,
+    /// Dry where the joint's is; else a smooth one of this width, rad/s (m/s).
+    Own {
+        /// The width.
+        width: f64,
+    },
+    /// None, or one that recordings do not choose.
+    Fixed,
+}
+
 /// A constant of a term, such as a velocity or an exponent, for programs that are not this one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TermConstant {
-    /// A number.
-    Number(f64),
+    /// A number, and its unit at a revolute joint as names in files have it (`rad_s`); empty without a unit, or with
+    /// the unit in its name.
+    Number(f64, &'static str),
     /// One number per joint.
     Numbers([f64; 2]),
     /// One of a few words.
@@ -173,17 +183,17 @@ pub enum TermConstant {
 }
 
 /// What a term is called.
-pub(super) struct TermLabel<'a> {
+pub struct TermLabel<'a> {
     /// Name of the kind.
-    pub(super) kind: &'static str,
+    pub kind: &'static str,
     /// Symbol of the parameter with the joint's number from 1.
-    pub(super) symbol: String,
+    pub symbol: String,
     /// Unit of the parameter at a revolute joint.
-    pub(super) unit: &'a str,
+    pub unit: &'a str,
 }
 
-/// What a kind of torque term says of itself.
-pub(super) trait TermKind: Debug {
+/// What every kind of torque term states about itself.
+pub trait TermKind: VelocityFunction {
     /// What it is called.
     fn label(&self) -> TermLabel<'_>;
 
@@ -191,20 +201,28 @@ pub(super) trait TermKind: Debug {
     fn joints(&self) -> TermJoints;
 
     /// Whether a negative parameter is unphysical.
-    fn is_nonnegative(&self) -> bool;
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
 
     /// Where it enters the equation of motion.
     fn action(&self) -> TermAction<'_>;
 
     /// Its constants by name, beside joints and parameter.
-    fn constants(&self) -> Vec<(&'static str, TermConstant)>;
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        Vec::new()
+    }
 
     /// The regressor column in the row of joint `row`.
-    fn column(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]);
+    fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
+        self.fill(row, motion, out);
+    }
 
     /// Adds what `Σ weights · column` in the row of joint `row` changes with positions, velocities and accelerations to
     /// the three parts of `gradient`.
-    fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], gradient: [&mut [f64]; 3]);
+    fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], [_, by_dq, _]: [&mut [f64]; 3]) {
+        self.add_slopes(row, motion, weights, by_dq);
+    }
 
     /// The functions of the motion that friction adds. What shares no function with another kind is one of its own.
     fn functions(&self) -> Vec<MotionFunction> {
@@ -219,53 +237,62 @@ pub(super) trait TermKind: Debug {
     fn property(&self) -> Option<JointProperty> {
         None
     }
+
+    /// The law of a study that states it; `None` for what has other keys.
+    fn stated(&self) -> Option<FrictionTerm> {
+        None
+    }
+
+    /// The step near zero velocity, where it has one.
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        None
+    }
+
+    /// Which step at rest it has when recordings choose a joint's friction.
+    fn step_role(&self) -> StepRole {
+        StepRole::Fixed
+    }
+
+    /// Width of the step at rest where the constant of this name has this value, rad/s (m/s); `None` for a constant that
+    /// does not set the width.
+    fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
+        (constant == "width").then_some(value)
+    }
+
+    /// The dry friction that it is where a joint rests below the velocity `rest`, and that term's parameter per unit.
+    fn dry(&self, _rest: f64) -> Option<(TorqueTerm, f64)> {
+        None
+    }
+
+    /// The way in one direction after which a law that remembers positions is Coulomb friction, rad (m).
+    fn sliding_distance(&self) -> Option<f64> {
+        None
+    }
+
+    /// For the forward half of friction by direction the other half, and the term that is the same in both.
+    fn both_directions(&self) -> Option<[TorqueTerm; 2]> {
+        None
+    }
+
+    /// The constants that recordings can choose as coordinates: logarithms, or in units of another constant. By default
+    /// the width of the joint's step.
+    fn coordinates(&self) -> Vec<f64> {
+        let is_joints = matches!(self.step_role(), StepRole::Joint | StepRole::AsJointIfSmooth);
+        let width = self.constants().into_iter().find_map(|(_, constant)| match constant {
+            TermConstant::Step(CoulombShape::Smooth { width }) => Some(width.ln()),
+            _ => None,
+        });
+        width.filter(|_| is_joints).into_iter().collect()
+    }
+
+    /// Moves its constants to these coordinates, within bounds; `velocity` is a rad/s (m/s) of a usual arm.
+    fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
+        let is_joints = matches!(self.step_role(), StepRole::Joint | StepRole::AsJointIfSmooth);
+        if let (true, [to, ..], Some(CoulombShape::Smooth { width })) = (is_joints, coordinates, self.step_mut()) {
+            *width = velocity_within(*to, velocity);
+        }
+    }
 }
-
-/// The joint, sign and action of friction that follows one joint's velocity by a smooth curve: the term itself.
-macro_rules! smooth_friction {
-    () => {
-        fn joints(&self) -> TermJoints {
-            TermJoints::One(self.joint)
-        }
-
-        fn is_nonnegative(&self) -> bool {
-            true
-        }
-
-        fn action(&self) -> TermAction<'_> {
-            TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
-        }
-    };
-}
-pub(super) use smooth_friction;
-
-/// Regressor column and adjoint of a term that follows its own joint's velocity: by itself, or by the field that is
-/// named.
-macro_rules! column_of_velocity {
-    ($($field:ident)?) => {
-        fn column(
-            &self,
-            _: usize,
-            motion: &super::JointMotion<'_>,
-            _: &mut super::TermInput<'_>,
-            out: &mut [f64],
-        ) {
-            self$(.$field)?.fill(self.joint, motion, out);
-        }
-
-        fn apply_adjoint(
-            &self,
-            _: usize,
-            motion: &super::JointMotion<'_>,
-            weights: &[f64],
-            adjoints: [&mut [f64]; 3],
-        ) {
-            let [_, by_dq, _] = adjoints;
-            self$(.$field)?.add_slopes(self.joint, motion, weights, by_dq);
-        }
-    };
-}
-pub(super) use column_of_velocity;
 
 /// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative velocity.
 pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {

@@ -4,8 +4,12 @@
 //! only, so the load comes with them (see [`TermInput`](super::TermInput)); without one the column is zero. Source:
 //! Hamon, Gautier and Garrec, IROS 2010, 6187.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
-use super::{CoulombShape, JointMotion, TermInput};
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
+use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
+use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Share of the load that one joint loses to friction; no unit.
@@ -18,6 +22,43 @@ pub struct LoadFriction {
     pub shape: CoulombShape,
 }
 
+impl LoadFriction {
+    fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
+        let shape = CoulombShape::Smooth { width: own.width };
+        vec![GridPoint::alone(TorqueTerm::Load(Self { joint: own.joint, shape }))]
+    }
+}
+
+impl VelocityLaw for LoadFriction {}
+
+impl Law for LoadFriction {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw::new("load", CandidateRole::Addition, Self::grid)];
+
+    fn torque<S: Real>(&self, _: usize, _: &[S]) -> Result<S, &'static str> {
+        Err("the torque that the gear carries")
+    }
+}
+
+/// The law `load` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct StatedLoad {
+    /// As for `stribeck`.
+    #[serde(default)]
+    pub width: Option<f64>,
+}
+
+impl StatedLaw for StatedLoad {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        vec![TorqueTerm::Load(LoadFriction { joint: own.joint, shape: step_or(self.width, own) })]
+    }
+
+    fn check(&self) -> Result<(), StatedFault> {
+        self.width.map_or(Ok(()), |width| check("width", width, VELOCITIES))
+    }
+}
+
 impl TermKind for LoadFriction {
     fn label(&self) -> TermLabel<'_> {
         TermLabel { kind: "load", symbol: format!("fl{}", self.joint + 1), unit: "1" }
@@ -25,10 +66,6 @@ impl TermKind for LoadFriction {
 
     fn joints(&self) -> TermJoints {
         TermJoints::One(self.joint)
-    }
-
-    fn is_nonnegative(&self) -> bool {
-        true
     }
 
     fn action(&self) -> TermAction<'_> {
@@ -47,7 +84,15 @@ impl TermKind for LoadFriction {
         }
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
-        // Without a load the column is zero.
+    fn stated(&self) -> Option<FrictionTerm> {
+        Some(FrictionTerm::Load(StatedLoad { width: width_of(self.shape) }))
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        Some(&mut self.shape)
+    }
+
+    fn step_role(&self) -> StepRole {
+        StepRole::AsJointIfSmooth
     }
 }

@@ -1,7 +1,9 @@
 //! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each term is one parameter
-//! and one regressor column per joint that feels it; each kind is one file here, which says all that there is to say of
-//! it, a variant of [`TorqueTerm`] and a line in its `kind`.
+//! and one regressor column per joint that feels it. Each kind is one file, which holds everything about it, and a row
+//! of [`TorqueTerm`]; a law that a study can state has a row of [`FrictionTerm`] as well. No other code lists friction
+//! laws.
 
+mod candidate;
 mod coulomb;
 mod coupling;
 mod declared;
@@ -10,43 +12,49 @@ mod drive_inertia;
 mod expression;
 mod function;
 mod kind;
+mod law;
 mod load;
 mod offset;
 mod order;
 mod power;
 mod sigmoid;
 mod slip;
+mod stated;
 mod stribeck;
 mod temperature;
 mod torque_table;
+mod torque_term;
 mod viscous;
 
+pub use candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 pub use coulomb::{Coulomb, CoulombShape};
 pub use coupling::{Coupling, CouplingEffect};
 pub use declared::{Declared, DeclaredLaw};
-pub use directional::{Direction, DirectionalCoulomb, DirectionalViscous};
+pub use directional::{AsymmetricCoulomb, AsymmetricViscous, Direction, DirectionalCoulomb, DirectionalViscous};
 pub use drive_inertia::DriveInertia;
 pub use expression::{
     Expression, ExpressionError, ExpressionFunction, ExpressionFunction2, ExpressionNode, ExpressionProblem, JointNames,
 };
 pub use function::{TorqueFunction, TorqueLaw};
 pub use kind::{
-    JointProperty, MotionFunction, StateFunction, TermAction, TermConstant, TermJoints, VelocityCurve,
-    VelocityFriction, VelocityFunction,
+    JointProperty, MotionFunction, StateFunction, StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel,
+    VelocityCurve, VelocityFriction, VelocityFunction,
 };
-pub use load::LoadFriction;
+pub use load::{LoadFriction, StatedLoad};
 pub use offset::Offset;
 pub use order::sort_terms;
-pub use power::{Power, PowerExponent};
-pub use sigmoid::Sigmoid;
-pub use slip::{HysteresisState, MaxwellSlip};
-pub use stribeck::Stribeck;
-pub use temperature::{TemperatureCoulomb, TemperatureViscous};
+pub use power::{CubeRoot, Power, PowerExponent, Quadratic};
+pub use sigmoid::{Sigmoid, StatedSigmoid};
+pub use slip::{HysteresisState, MaxwellSlip, StatedMaxwellSlip};
+pub use stated::{StatedFault, StatedJoint, StatedLaw};
+pub use stribeck::{StatedStribeck, Stribeck};
+pub use temperature::{StatedTemperature, TemperatureCoulomb, TemperatureViscous};
 pub use torque_table::{TablePiece, TorqueTable, TorqueTableError};
 pub use viscous::Viscous;
 
 use crate::tree::Model;
-use kind::TermKind;
+use dynident_lanes::Real;
+use law::Law;
 use serde::{Deserialize, Serialize};
 
 /// Joint motion of a block of samples, joint-major: joint `j`, sample `s` stands at `j * samples + s`.
@@ -90,12 +98,61 @@ impl<'a> JointMotion<'a> {
     }
 }
 
-/// One parameter of the drives, linear in the joint torques.
-#[doc(alias("friction", "torque term", "actuator"))]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum TorqueTerm {
+/// The one list of kinds: an enum, and what needs each kind's type.
+macro_rules! torque_terms {
+    ($($(#[$documentation:meta])* $kind:ident($type:ident),)*) => {
+        /// One parameter of the drives, linear in the joint torques.
+        #[doc(alias("friction", "torque term", "actuator"))]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+        #[serde(rename_all = "kebab-case")]
+        pub enum TorqueTerm {
+            $($(#[$documentation])* $kind($type),)*
+        }
+
+        impl TorqueTerm {
+            /// What its kind states about it.
+            pub fn kind(&self) -> &dyn TermKind {
+                match self {
+                    $(Self::$kind(term) => term,)*
+                }
+            }
+
+            fn kind_mut(&mut self) -> &mut dyn TermKind {
+                match self {
+                    $(Self::$kind(term) => term,)*
+                }
+            }
+
+            /// All laws that recordings can choose for a joint, in the order in which they are tried.
+            pub fn candidates() -> impl Iterator<Item = &'static CandidateLaw> {
+                [$($type::CANDIDATES),*].into_iter().flatten()
+            }
+
+            /// Which of the [`candidates`](Self::candidates) the term belongs to; `None` where recordings do not choose
+            /// it.
+            pub fn candidate(&self) -> Option<&'static CandidateLaw> {
+                match self {
+                    $(Self::$kind(term) => term.candidate(),)*
+                }
+            }
+
+            /// Torque of joint `row` per unit of the parameter at the velocities `dq`, over any scalar, as far as it
+            /// follows velocities: zero for inertia and declared torques, and for a change with temperature at its
+            /// reference.
+            ///
+            /// # Errors
+            /// With what it needs in addition to the velocities.
+            pub fn torque<S: Real>(&self, row: usize, dq: &[S]) -> Result<S, &'static str> {
+                match self {
+                    $(Self::$kind(term) => term.torque(row, dq),)*
+                }
+            }
+        }
+    };
+}
+
+torque_terms! {
     /// Torque in proportion to velocity.
     Viscous(Viscous),
     /// Torque by the sign of the velocity.
@@ -104,10 +161,10 @@ pub enum TorqueTerm {
     DirectionalViscous(DirectionalViscous),
     /// Torque by the sign of the velocity, in one direction.
     DirectionalCoulomb(DirectionalCoulomb),
-    /// More torque near rest.
-    Stribeck(Stribeck),
     /// A shifted smooth step.
     Sigmoid(Sigmoid),
+    /// More torque near rest.
+    Stribeck(Stribeck),
     /// Torque by a power of the velocity.
     Power(Power),
     /// Torque in proportion to the load, against the motion.
@@ -128,293 +185,56 @@ pub enum TorqueTerm {
     Declared(Declared),
 }
 
-impl TorqueTerm {
-    /// The one place that knows all kinds.
-    fn kind(&self) -> &dyn TermKind {
-        match self {
-            Self::Viscous(term) => term,
-            Self::Coulomb(term) => term,
-            Self::DirectionalViscous(term) => term,
-            Self::DirectionalCoulomb(term) => term,
-            Self::Stribeck(term) => term,
-            Self::Sigmoid(term) => term,
-            Self::Power(term) => term,
-            Self::Load(term) => term,
-            Self::MaxwellSlip(term) => term,
-            Self::TemperatureViscous(term) => term,
-            Self::TemperatureCoulomb(term) => term,
-            Self::Offset(term) => term,
-            Self::DriveInertia(term) => term,
-            Self::Coupling(term) => term,
-            Self::Declared(term) => term,
+/// The one list of laws that a study can state.
+macro_rules! friction_terms {
+    ($($(#[$documentation:meta])* $law:ident($type:ident),)*) => {
+        /// A law of `drive.laws`, beside `viscous`, `coulomb` and `offset`.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+        #[serde(tag = "law", rename_all = "kebab-case")]
+        pub enum FrictionTerm {
+            $($(#[$documentation])* $law($type),)*
         }
-    }
 
-    /// Name of the kind: `viscous`, `coulomb`, `maxwell-slip`, ..
-    pub fn kind_name(&self) -> &'static str {
-        self.kind().label().kind
-    }
-
-    /// Readable name of the parameter: its symbol, and the joint's number from 1 (`fv3`), as in the field's papers.
-    pub fn symbol(&self) -> String {
-        self.kind().label().symbol
-    }
-
-    /// Unit of the parameter at a revolute joint.
-    pub fn unit(&self) -> &str {
-        self.kind().label().unit
-    }
-
-    /// Its constants by name, beside joints and parameter.
-    pub fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        self.kind().constants()
-    }
-
-    /// The same law with another step near zero velocity, where it has one.
-    #[must_use]
-    pub fn with_step(self, other: impl Fn(CoulombShape) -> CoulombShape) -> Self {
-        match self {
-            Self::Coulomb(term) => Self::Coulomb(Coulomb { shape: other(term.shape), ..term }),
-            Self::DirectionalCoulomb(term) => {
-                Self::DirectionalCoulomb(DirectionalCoulomb { shape: other(term.shape), ..term })
+        impl FrictionTerm {
+            /// What its law does with the stated constants.
+            pub fn law(&self) -> &dyn StatedLaw {
+                match self {
+                    $(Self::$law(law) => law,)*
+                }
             }
-            Self::Stribeck(term) => Self::Stribeck(Stribeck { shape: other(term.shape), ..term }),
-            Self::Load(term) => Self::Load(LoadFriction { shape: other(term.shape), ..term }),
-            Self::TemperatureCoulomb(term) => {
-                Self::TemperatureCoulomb(TemperatureCoulomb { shape: other(term.shape), ..term })
-            }
-            Self::Coupling(Coupling { effect: CouplingEffect::Coulomb(shape), name, first, second, ratios }) => {
-                let effect = CouplingEffect::Coulomb(other(shape));
-                Self::Coupling(Coupling { name, first, second, ratios, effect })
-            }
-            Self::Viscous(_)
-            | Self::DirectionalViscous(_)
-            | Self::Sigmoid(_)
-            | Self::Power(_)
-            | Self::MaxwellSlip(_)
-            | Self::TemperatureViscous(_)
-            | Self::Offset(_)
-            | Self::DriveInertia(_)
-            | Self::Coupling(_)
-            | Self::Declared(_) => self,
-        }
-    }
 
-    /// The joints that feel this term.
-    pub fn joints(&self) -> Vec<usize> {
-        match self.kind().joints() {
-            TermJoints::One(joint) => vec![joint],
-            TermJoints::Two(first, second) => vec![first, second],
-        }
-    }
-
-    /// The one joint that the term belongs to; none for a drive that turns with two.
-    pub fn own_joint(&self) -> Option<usize> {
-        match self.kind().joints() {
-            TermJoints::One(joint) => Some(joint),
-            TermJoints::Two(..) => None,
-        }
-    }
-
-    /// True when joint `joint` feels this term. Allocates nothing, unlike [`joints`](TorqueTerm::joints).
-    pub fn acts_on(&self, joint: usize) -> bool {
-        match self.kind().joints() {
-            TermJoints::One(own) => own == joint,
-            TermJoints::Two(first, second) => first == joint || second == joint,
-        }
-    }
-
-    /// Where it enters the equation of motion.
-    pub fn action(&self) -> TermAction<'_> {
-        self.kind().action()
-    }
-
-    /// The functions of the motion that friction and declared torques add; none for inertia and offset.
-    pub fn functions(&self) -> Vec<MotionFunction> {
-        self.kind().functions()
-    }
-
-    /// The property of its joint by which a robot's description states the parameter.
-    pub fn property(&self) -> Option<JointProperty> {
-        self.kind().property()
-    }
-
-    /// The parameter by the description of `model`, where that says anything of it; that of a declared torque by who
-    /// declared it.
-    ///
-    /// # Panics
-    /// If the model does not have its joints.
-    pub fn described(&self, model: &Model) -> Option<f64> {
-        if let Self::Declared(term) = self {
-            return term.nominal;
-        }
-        let joint = &model.joints()[self.own_joint()?];
-        match self.property()? {
-            JointProperty::Damping => joint.damping,
-            JointProperty::Friction => joint.friction,
-            JointProperty::DriveInertia => joint.drive_inertia,
-            JointProperty::Stiffness => joint.spring.map(|spring| spring.stiffness),
-        }
-    }
-
-    /// True when a negative parameter is not possible: friction takes power from the motion at every velocity, inertia
-    /// is positive. An offset may have either sign, and so may a change with temperature; a coupling's cross terms are
-    /// judged with their drive.
-    pub fn is_nonnegative(&self) -> bool {
-        self.kind().is_nonnegative()
-    }
-
-    /// True when the column needs the joint's temperature.
-    pub fn needs_temperature(&self) -> bool {
-        match self.action() {
-            TermAction::Temperature => true,
-            TermAction::Inertia { .. }
-            | TermAction::Damping { .. }
-            | TermAction::Constant
-            | TermAction::Friction(_)
-            | TermAction::Hysteresis
-            | TermAction::State(_) => false,
-        }
-    }
-
-    /// True when the column needs the joint's load.
-    pub fn needs_load(&self) -> bool {
-        match self.action() {
-            TermAction::Friction(friction) => friction.by_load,
-            TermAction::Inertia { .. }
-            | TermAction::Damping { .. }
-            | TermAction::Constant
-            | TermAction::Hysteresis
-            | TermAction::Temperature
-            | TermAction::State(_) => false,
-        }
-    }
-
-    /// True for a torque that the user declares.
-    pub fn is_declared(&self) -> bool {
-        self.state_function().is_some()
-    }
-
-    /// The function of positions and velocities that a declared torque follows; none of all other terms.
-    pub fn state_function(&self) -> Option<&dyn StateFunction> {
-        match self.action() {
-            TermAction::State(function) => Some(function),
-            TermAction::Inertia { .. }
-            | TermAction::Damping { .. }
-            | TermAction::Constant
-            | TermAction::Friction(_)
-            | TermAction::Hysteresis
-            | TermAction::Temperature => None,
-        }
-    }
-
-    /// The first sample of a motion of which a declared torque says nothing: its expression has no value there, or its
-    /// table does not reach so far. Its column is zero there, or what the table's end says.
-    pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
-        self.state_function()?.first_outside(motion)
-    }
-
-    /// True when the column depends on earlier samples.
-    pub fn has_memory(&self) -> bool {
-        match self.action() {
-            TermAction::Hysteresis => true,
-            TermAction::Inertia { .. }
-            | TermAction::Damping { .. }
-            | TermAction::Constant
-            | TermAction::Friction(_)
-            | TermAction::Temperature
-            | TermAction::State(_) => false,
-        }
-    }
-
-    /// True for friction, of one joint or of a shared drive: all but inertia, offset and declared torques.
-    pub fn is_friction(&self) -> bool {
-        match self.action() {
-            TermAction::Inertia { .. } | TermAction::Constant | TermAction::State(_) => false,
-            TermAction::Damping { .. } | TermAction::Friction(_) | TermAction::Hysteresis | TermAction::Temperature => {
-                true
+            /// The same, to be changed.
+            pub fn law_mut(&mut self) -> &mut dyn StatedLaw {
+                match self {
+                    $(Self::$law(law) => law,)*
+                }
             }
         }
-    }
+    };
+}
 
-    /// True for friction of one joint: all but offset, drive inertia, couplings and declared torques.
-    pub fn is_joint_friction(&self) -> bool {
-        self.is_friction() && self.own_joint().is_some()
-    }
-
-    /// True for the inertia of one joint's drive.
-    pub fn is_drive_inertia(&self) -> bool {
-        self.mass_matrix_factor().is_some() && self.own_joint().is_some()
-    }
-
-    fn mass_matrix_factor(&self) -> Option<f64> {
-        match self.action() {
-            TermAction::Inertia { factor } => Some(factor),
-            TermAction::Damping { .. }
-            | TermAction::Constant
-            | TermAction::Friction(_)
-            | TermAction::Hysteresis
-            | TermAction::Temperature
-            | TermAction::State(_) => None,
-        }
-    }
-
-    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`.
-    /// The block counts as a recording of its own, without known load or temperature: see
-    /// [`column_following`](TorqueTerm::column_following).
-    ///
-    /// # Panics
-    /// If `row` is not one of [`joints`](TorqueTerm::joints) or `out` is not one value per sample.
-    pub fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        let mut input = TermInput { load: None, temperature_c: None, memory: &mut HysteresisState::default() };
-        self.column_following(row, motion, &mut input, out);
-    }
-
-    /// The regressor column as [`column`](TorqueTerm::column), of a block that follows others: with one sample a block,
-    /// what a simulation needs.
-    ///
-    /// # Panics
-    /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value
-    /// per sample.
-    pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
-        assert_eq!(out.len(), motion.samples);
-        assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
-        assert!(input.temperature_c.is_none_or(|t| t.len() == motion.samples), "one temperature per sample");
-        self.kind().column(row, motion, input, out);
-    }
-
-    /// Adds to the three parts of `gradient` (joint-major) the derivatives of `Σ weights[s] · column[s]` by positions,
-    /// velocities and accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint
-    /// `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element.
-    ///
-    /// # Panics
-    /// If lengths differ.
-    pub fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], gradient: [&mut [f64]; 3]) {
-        assert_eq!(weights.len(), motion.samples);
-        self.kind().apply_adjoint(row, motion, weights, gradient);
-    }
-
-    /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
-    pub fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
-        let entry = match self.kind().joints() {
-            TermJoints::One(joint) => (row, column) == (joint, joint),
-            TermJoints::Two(first, second) => (row, column) == (first, second) || (row, column) == (second, first),
-        };
-        self.mass_matrix_factor().filter(|_| entry).unwrap_or(0.0)
-    }
-
-    /// What this parameter adds to the torque of joint `row` at rest: a constant, one for the offset of that joint.
-    pub fn constant_torque(&self, row: usize) -> f64 {
-        match self.action() {
-            TermAction::Constant => f64::from(self.acts_on(row)),
-            TermAction::Inertia { .. }
-            | TermAction::Damping { .. }
-            | TermAction::Friction(_)
-            | TermAction::Hysteresis
-            | TermAction::Temperature
-            | TermAction::State(_) => 0.0,
-        }
-    }
+friction_terms! {
+    /// Viscous friction by direction, in place of `viscous`.
+    AsymmetricViscous(AsymmetricViscous),
+    /// Coulomb friction by direction, in place of `coulomb`; with a sign it says the same as `offset`, so switch one
+    /// off.
+    AsymmetricCoulomb(AsymmetricCoulomb),
+    /// `e^{-|dq/speed|^exponent}` times the step.
+    Stribeck(StatedStribeck),
+    /// A shifted smooth step, in place of `coulomb`.
+    Sigmoid(StatedSigmoid),
+    /// Torque by the cube root of the velocity.
+    CubeRoot(CubeRoot),
+    /// Torque by the square of the velocity.
+    Quadratic(Quadratic),
+    /// Torque in proportion to the load, against the motion.
+    Load(StatedLoad),
+    /// Viscous and Coulomb friction change with the joint's temperature, beside `viscous` and `coulomb`; logs need a
+    /// `temperature`.
+    Temperature(StatedTemperature),
+    /// Springs that slip, one per yield displacement.
+    MaxwellSlip(StatedMaxwellSlip),
 }
 
 /// The terms of joint after joint in the project's order: drive inertia, viscous, Coulomb, offset, as far as `choose`

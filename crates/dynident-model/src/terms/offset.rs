@@ -1,7 +1,8 @@
 //! A constant torque: sensor bias, unmodelled spring, asymmetric friction. `τ = τ_0`.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
-use super::{JointMotion, TermInput};
+use super::kind::{TermAction, TermJoints, TermKind, TermLabel};
+use super::law::{Law, VelocityLaw};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Constant torque of one joint, Nm (N).
@@ -11,6 +12,15 @@ pub struct Offset {
     /// The joint.
     pub joint: usize,
 }
+
+impl VelocityLaw for Offset {
+    #[inline(always)]
+    fn of<S: Real>(&self, _: S) -> S {
+        S::ONE
+    }
+}
+
+impl Law for Offset {}
 
 impl TermKind for Offset {
     fn label(&self) -> TermLabel<'_> {
@@ -27,17 +37,5 @@ impl TermKind for Offset {
 
     fn action(&self) -> TermAction<'_> {
         TermAction::Constant
-    }
-
-    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        Vec::new()
-    }
-
-    fn column(&self, _: usize, _: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        out.fill(1.0);
-    }
-
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
-        // It does not change.
     }
 }

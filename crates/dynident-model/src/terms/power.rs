@@ -4,10 +4,12 @@
 //! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope
 //! finite at rest, where that of a cube root is not.
 
-use super::kind::{
-    TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
-    column_of_velocity, smooth_friction,
-};
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedJoint, StatedLaw};
+use super::{FrictionTerm, TorqueTerm};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Friction of one joint by a power of its velocity, Nm (s/rad)^p.
@@ -26,6 +28,16 @@ impl Power {
     /// The rounding that is usual: below any velocity that a differentiated encoder separates from rest, rad/s or m/s
     /// of a usual arm ([`OwnScale::velocity`](crate::OwnScale::velocity)).
     pub const ROUNDING: f64 = 1.0e-3;
+
+    fn usual(own: &StatedJoint, exponent: PowerExponent) -> Vec<TorqueTerm> {
+        let rounding = own.scale.velocity(own.turns, Self::ROUNDING);
+        vec![TorqueTerm::Power(Self { joint: own.joint, exponent, rounding })]
+    }
+
+    fn grid(own: &CandidateJoint, exponent: PowerExponent) -> Vec<GridPoint> {
+        let rounding = Self::ROUNDING * own.velocity;
+        vec![GridPoint::alone(TorqueTerm::Power(Self { joint: own.joint, exponent, rounding }))]
+    }
 }
 
 /// The powers in use.
@@ -48,19 +60,56 @@ impl PowerExponent {
     }
 }
 
-impl VelocityFunction for Power {
-    fn value(&self, dq: f64) -> f64 {
-        let square = dq * dq + self.rounding * self.rounding;
+impl VelocityLaw for Power {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
+        let square = dq * dq + S::splat(self.rounding * self.rounding);
         match self.exponent {
-            PowerExponent::CubeRoot => dq / square.cbrt(),
-            PowerExponent::Quadratic => dq * square.sqrt(),
+            PowerExponent::CubeRoot => dq.over(square.power(1.0 / 3.0)),
+            PowerExponent::Quadratic => dq * square.power(0.5),
         }
     }
+}
 
-    fn slope(&self, dq: f64) -> f64 {
-        let (p, size) = (self.exponent.value(), dq.hypot(self.rounding));
-        let share = dq / size;
-        size.powf(p - 1.0) * (1.0 + (p - 1.0) * share * share)
+impl Law for Power {
+    const CANDIDATES: &'static [CandidateLaw] = &[
+        CandidateLaw {
+            is_near_rest: true,
+            ..CandidateLaw::new("cube-root", CandidateRole::Addition, |own| Self::grid(own, PowerExponent::CubeRoot))
+        },
+        CandidateLaw::new("quadratic", CandidateRole::Addition, |own| Self::grid(own, PowerExponent::Quadratic)),
+    ];
+
+    fn candidate(&self) -> Option<&'static CandidateLaw> {
+        let [cube_root, quadratic] = Self::CANDIDATES else { return None };
+        Some(match self.exponent {
+            PowerExponent::CubeRoot => cube_root,
+            PowerExponent::Quadratic => quadratic,
+        })
+    }
+}
+
+/// The law `cube-root` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct CubeRoot {}
+
+impl StatedLaw for CubeRoot {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        Power::usual(own, PowerExponent::CubeRoot)
+    }
+}
+
+/// The law `quadratic` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Quadratic {}
+
+impl StatedLaw for Quadratic {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        Power::usual(own, PowerExponent::Quadratic)
     }
 }
 
@@ -73,14 +122,25 @@ impl TermKind for Power {
         TermLabel { kind: "power", symbol: format!("{letters}{}", self.joint + 1), unit }
     }
 
-    smooth_friction!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+    }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![
-            ("exponent", TermConstant::Number(self.exponent.value())),
-            ("rounding", TermConstant::Number(self.rounding)),
+            ("exponent", TermConstant::Number(self.exponent.value(), "")),
+            ("rounding", TermConstant::Number(self.rounding, "rad_s")),
         ]
     }
 
-    column_of_velocity!();
+    fn stated(&self) -> Option<FrictionTerm> {
+        Some(match self.exponent {
+            PowerExponent::CubeRoot => FrictionTerm::CubeRoot(CubeRoot {}),
+            PowerExponent::Quadratic => FrictionTerm::Quadratic(Quadratic {}),
+        })
+    }
 }

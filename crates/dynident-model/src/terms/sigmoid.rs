@@ -4,12 +4,12 @@
 //! it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE
 //! RA-L 4 (2019) 4147.
 
-use super::JointMotion;
-use super::kind::{
-    PART, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
-    column_of_velocity, smooth_friction,
-};
-use dynident_lanes::tanh_all;
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
+use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// The step of one joint, Nm (N).
@@ -29,26 +29,62 @@ fn logistic(x: f64) -> f64 {
     0.5 * (1.0 + (0.5 * x).tanh())
 }
 
-impl VelocityFunction for Sigmoid {
-    fn value(&self, dq: f64) -> f64 {
-        logistic(self.steepness * (dq + self.offset_speed)) - logistic(self.steepness * self.offset_speed)
-    }
+/// Widths of half a Coulomb step that recordings choose from, rad/s or m/s of a usual arm.
+const WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
+/// Largest distance of the step from rest, in units of its width.
+const MAX_SHIFT: f64 = 2.0;
 
-    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+impl VelocityLaw for Sigmoid {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
+        let step = (dq + S::splat(self.offset_speed)).smooth_step(2.0 / self.steepness);
         let at_rest = logistic(self.steepness * self.offset_speed);
-        let mut middle = [0.0; PART];
-        for (dq, out) in motion.dq_of(joint).chunks(PART).zip(out.chunks_mut(PART)) {
-            middle.iter_mut().zip(dq).for_each(|(to, dq)| *to = dq + self.offset_speed);
-            tanh_all(&middle[..dq.len()], 2.0 / self.steepness, out);
-            for tanh in out.iter_mut() {
-                *tanh = 0.5 * (1.0 + *tanh) - at_rest;
-            }
-        }
+        S::splat(0.5) * (S::ONE + step) - S::splat(at_rest)
+    }
+}
+
+impl Sigmoid {
+    fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
+        let widths = WIDTHS.map(|width| width * own.velocity).into_iter().enumerate();
+        let of = |(step, width): (usize, f64)| {
+            [-0.5 * width, 0.5 * width].map(|offset_speed| {
+                let term = Self { joint: own.joint, steepness: 2.0 / width, offset_speed };
+                GridPoint::at(step, TorqueTerm::Sigmoid(term))
+            })
+        };
+        widths.flat_map(of).collect()
+    }
+}
+
+impl Law for Sigmoid {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw {
+        constants: 2,
+        is_near_rest: true,
+        ..CandidateLaw::new("sigmoid", CandidateRole::Start, Self::grid)
+    }];
+}
+
+/// The law `sigmoid` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct StatedSigmoid {
+    /// s/rad or s/m.
+    pub steepness: f64,
+    /// rad/s or m/s.
+    #[serde(default)]
+    pub offset_speed: f64,
+}
+
+impl StatedLaw for StatedSigmoid {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        let &Self { steepness, offset_speed } = self;
+        vec![TorqueTerm::Sigmoid(Sigmoid { joint: own.joint, steepness, offset_speed })]
     }
 
-    fn slope(&self, dq: f64) -> f64 {
-        let share = logistic(self.steepness * (dq + self.offset_speed));
-        self.steepness * share * (1.0 - share)
+    fn check(&self) -> Result<(), StatedFault> {
+        check("steepness", self.steepness, [1.0e-6, 1.0e9])?;
+        check("offset_speed", self.offset_speed, [-1.0e6, 1.0e6])
     }
 }
 
@@ -57,14 +93,46 @@ impl TermKind for Sigmoid {
         TermLabel { kind: "sigmoid", symbol: format!("sig{}", self.joint + 1), unit: "Nm" }
     }
 
-    smooth_friction!();
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+    }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![
-            ("steepness", TermConstant::Number(self.steepness)),
-            ("offset_speed", TermConstant::Number(self.offset_speed)),
+            ("steepness", TermConstant::Number(self.steepness, "s_per_rad")),
+            ("offset_speed", TermConstant::Number(self.offset_speed, "rad_s")),
         ]
     }
 
-    column_of_velocity!();
+    fn stated(&self) -> Option<FrictionTerm> {
+        let &Self { steepness, offset_speed, .. } = self;
+        Some(FrictionTerm::Sigmoid(StatedSigmoid { steepness, offset_speed }))
+    }
+
+    fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
+        (constant == "steepness").then_some(2.0 / value)
+    }
+
+    /// Without offset it is half a Coulomb step.
+    fn dry(&self, rest: f64) -> Option<(TorqueTerm, f64)> {
+        let shape = CoulombShape::Sign { dead_band: 0.0 };
+        let coulomb = TorqueTerm::Coulomb(Coulomb { joint: self.joint, shape });
+        (self.offset_speed.abs() <= rest).then_some((coulomb, 0.5))
+    }
+
+    /// The step's distance from rest in units of its width.
+    fn coordinates(&self) -> Vec<f64> {
+        vec![self.steepness.ln(), 0.5 * self.offset_speed * self.steepness]
+    }
+
+    fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
+        if let [steepness, shift] = coordinates {
+            self.steepness = 2.0 / velocity_within((2.0 / steepness.exp()).ln(), velocity);
+            self.offset_speed = 2.0 * shift.clamp(-MAX_SHIFT, MAX_SHIFT) / self.steepness;
+        }
+    }
 }

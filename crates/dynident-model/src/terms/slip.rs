@@ -7,8 +7,12 @@
 //! direction. Source: Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its
 //! sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
 
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
-use super::{JointMotion, TermInput};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
+use super::{FrictionTerm, JointMotion, TermInput, TorqueTerm};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Yield torque of one element of one joint, Nm (N).
@@ -35,6 +39,65 @@ impl HysteresisState {
     }
 }
 
+/// Yield displacements of the elements that recordings choose from, rad, or m of a usual arm.
+const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
+/// Most elements of one joint: each is a column.
+const MAX_ELEMENTS: f64 = 50.0;
+
+impl MaxwellSlip {
+    fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
+        let of = |usual| Self { joint: own.joint, yield_displacement: usual * own.position };
+        YIELDS.map(|usual| GridPoint::alone(TorqueTerm::MaxwellSlip(of(usual)))).to_vec()
+    }
+}
+
+impl VelocityLaw for MaxwellSlip {}
+
+impl Law for MaxwellSlip {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw {
+        is_near_rest: true,
+        ..CandidateLaw::new("maxwell-slip", CandidateRole::Addition, Self::grid)
+    }];
+
+    fn torque<S: Real>(&self, _: usize, _: &[S]) -> Result<S, &'static str> {
+        Err("the motion before")
+    }
+}
+
+/// The law `maxwell-slip` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct StatedMaxwellSlip {
+    /// rad or m.
+    pub yield_displacements: Vec<f64>,
+}
+
+impl StatedLaw for StatedMaxwellSlip {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        let of = |&yield_displacement| TorqueTerm::MaxwellSlip(MaxwellSlip { joint: own.joint, yield_displacement });
+        self.yield_displacements.iter().map(of).collect()
+    }
+
+    fn check(&self) -> Result<(), StatedFault> {
+        let (key, yields) = ("yield_displacements", &self.yield_displacements);
+        check("number of yield_displacements", yields.len() as f64, [1.0, MAX_ELEMENTS])?;
+        for (place, &value) in yields.iter().enumerate() {
+            check(key, value, [1.0e-7, 100.0])?;
+            if yields[..place].contains(&value) {
+                return Err(StatedFault::Twice { key, value });
+            }
+        }
+        Ok(())
+    }
+
+    fn join(&mut self, other: &FrictionTerm) -> bool {
+        let FrictionTerm::MaxwellSlip(more) = other else { return false };
+        self.yield_displacements.extend(&more.yield_displacements);
+        true
+    }
+}
+
 impl TermKind for MaxwellSlip {
     fn label(&self) -> TermLabel<'_> {
         TermLabel {
@@ -48,16 +111,12 @@ impl TermKind for MaxwellSlip {
         TermJoints::One(self.joint)
     }
 
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
     fn action(&self) -> TermAction<'_> {
         TermAction::Hysteresis
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        vec![("yield_displacement", TermConstant::Number(self.yield_displacement))]
+        vec![("yield_displacement", TermConstant::Number(self.yield_displacement, "rad"))]
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
@@ -70,7 +129,12 @@ impl TermKind for MaxwellSlip {
         }
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
-        // The deflection follows positions.
+    fn sliding_distance(&self) -> Option<f64> {
+        Some(2.0 * self.yield_displacement)
+    }
+
+    fn stated(&self) -> Option<FrictionTerm> {
+        let yield_displacements = vec![self.yield_displacement];
+        Some(FrictionTerm::MaxwellSlip(StatedMaxwellSlip { yield_displacements }))
     }
 }

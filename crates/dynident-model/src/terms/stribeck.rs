@@ -3,12 +3,12 @@
 //! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`.
 //! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
-use super::kind::{
-    PART, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction, VelocityFunction,
-    column_of_velocity,
-};
-use super::{CoulombShape, JointMotion};
-use dynident_lanes::decay_all;
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within, within};
+use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
+use super::{CoulombShape, FrictionTerm, TorqueTerm};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Extra friction of one joint near rest, Nm (N).
@@ -25,40 +25,68 @@ pub struct Stribeck {
     pub shape: CoulombShape,
 }
 
-impl VelocityFunction for Stribeck {
-    fn value(&self, dq: f64) -> f64 {
-        (-(dq / self.speed).abs().powf(self.exponent)).exp() * self.shape.step(dq)
-    }
+/// Velocities and exponents that recordings choose from; velocities in rad/s or m/s of a usual arm.
+const SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
+const EXPONENTS: [f64; 2] = [1.0, 2.0];
+/// Bounds of the exponent.
+const EXPONENT_BOUNDS: [f64; 2] = [0.5, 3.0];
+/// Width of a smooth step as a share of the Stribeck velocity while recordings choose: beyond half the velocity the
+/// step is done.
+const STEP_SHARE: f64 = 0.25;
 
-    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        let mut decay = [0.0; PART];
-        for (dq, out) in motion.dq_of(joint).chunks(PART).zip(out.chunks_mut(PART)) {
-            for (to, &dq) in out.iter_mut().zip(dq) {
-                let x = (dq / self.speed).abs();
-                // The two usual exponents without a power.
-                *to = match self.exponent {
-                    1.0 => x,
-                    2.0 => x * x,
-                    other => x.powf(other),
-                };
-            }
-            decay_all(out, &mut decay);
-            self.shape.steps(dq, out);
-            out.iter_mut().zip(&decay).for_each(|(step, share)| *step *= share);
-        }
+impl VelocityLaw for Stribeck {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
+        let ratio = dq.over(S::splat(self.speed)).abs();
+        ratio.power(self.exponent).decay() * self.shape.of(dq)
     }
+}
 
-    fn slope(&self, dq: f64) -> f64 {
-        let x = (dq / self.speed).abs();
-        let share = (-x.powf(self.exponent)).exp();
-        // At zero velocity the step is zero and goes to zero faster than x^(δ-1) grows.
-        let falling = if x > 0.0 {
-            self.exponent * x.powf(self.exponent - 1.0) / self.speed * dq.signum() * self.shape.step(dq)
-        } else {
-            0.0
+impl Stribeck {
+    fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
+        let speeds = SPEEDS.map(|speed| speed * own.velocity).into_iter().enumerate();
+        let of = |(step, speed): (usize, f64)| {
+            EXPONENTS.map(|exponent| {
+                let shape = CoulombShape::Smooth { width: STEP_SHARE * speed };
+                GridPoint::at(step, TorqueTerm::Stribeck(Self { joint: own.joint, speed, exponent, shape }))
+            })
         };
-        // Far out the share is zero, however large its factor.
-        if share > 0.0 { share * (self.shape.slope(dq) - falling) } else { 0.0 }
+        speeds.flat_map(of).collect()
+    }
+}
+
+impl Law for Stribeck {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw {
+        constants: 2,
+        is_near_rest: true,
+        ..CandidateLaw::new("stribeck", CandidateRole::Addition, Self::grid)
+    }];
+}
+
+/// The law `stribeck` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct StatedStribeck {
+    /// rad/s or m/s.
+    pub speed: f64,
+    /// 1 to 2.8 are usual.
+    pub exponent: f64,
+    /// Width of its smooth step, rad/s or m/s; by default the step is the joint's Coulomb step.
+    #[serde(default)]
+    pub width: Option<f64>,
+}
+
+impl StatedLaw for StatedStribeck {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        let (speed, exponent, shape) = (self.speed, self.exponent, step_or(self.width, own));
+        vec![TorqueTerm::Stribeck(Stribeck { joint: own.joint, speed, exponent, shape })]
+    }
+
+    fn check(&self) -> Result<(), StatedFault> {
+        check("speed", self.speed, VELOCITIES)?;
+        check("exponent", self.exponent, [0.1, 10.0])?;
+        self.width.map_or(Ok(()), |width| check("width", width, VELOCITIES))
     }
 }
 
@@ -71,10 +99,6 @@ impl TermKind for Stribeck {
         TermJoints::One(self.joint)
     }
 
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
     fn action(&self) -> TermAction<'_> {
         TermAction::Friction(VelocityFriction {
             fading: Some([self.speed, self.exponent]),
@@ -84,11 +108,36 @@ impl TermKind for Stribeck {
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![
-            ("speed", TermConstant::Number(self.speed)),
-            ("exponent", TermConstant::Number(self.exponent)),
+            ("speed", TermConstant::Number(self.speed, "rad_s")),
+            ("exponent", TermConstant::Number(self.exponent, "")),
             ("shape", TermConstant::Step(self.shape)),
         ]
     }
 
-    column_of_velocity!();
+    fn stated(&self) -> Option<FrictionTerm> {
+        let &Self { speed, exponent, shape, .. } = self;
+        Some(FrictionTerm::Stribeck(StatedStribeck { speed, exponent, width: width_of(shape) }))
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        Some(&mut self.shape)
+    }
+
+    fn step_role(&self) -> StepRole {
+        StepRole::Own { width: STEP_SHARE * self.speed }
+    }
+
+    fn coordinates(&self) -> Vec<f64> {
+        vec![self.speed.ln(), self.exponent.ln()]
+    }
+
+    fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
+        if let [speed, exponent] = coordinates {
+            self.speed = velocity_within(*speed, velocity);
+            self.exponent = within(*exponent, EXPONENT_BOUNDS);
+            if let CoulombShape::Smooth { width } = &mut self.shape {
+                *width = STEP_SHARE * self.speed;
+            }
+        }
+    }
 }

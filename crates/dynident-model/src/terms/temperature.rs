@@ -8,7 +8,9 @@
 //! (2015) 183.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
-use super::{CoulombShape, JointMotion, TermInput};
+use super::law::{Law, VelocityLaw};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
+use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use serde::{Deserialize, Serialize};
 
 /// Change of viscous friction with temperature, Nm s/(rad K) (N s/(m K)).
@@ -38,11 +40,6 @@ impl TemperatureViscous {
     pub fn value(self, temperature_c: f64, dq: f64) -> f64 {
         (temperature_c - self.reference_c) * dq
     }
-
-    /// Its derivative by the velocity.
-    pub fn slope(self, temperature_c: f64) -> f64 {
-        temperature_c - self.reference_c
-    }
 }
 
 impl TemperatureCoulomb {
@@ -50,10 +47,58 @@ impl TemperatureCoulomb {
     pub fn value(self, temperature_c: f64, dq: f64) -> f64 {
         (temperature_c - self.reference_c) * self.shape.step(dq)
     }
+}
 
-    /// Its derivative by the velocity; zero for the sign.
-    pub fn slope(self, temperature_c: f64, dq: f64) -> f64 {
-        (temperature_c - self.reference_c) * self.shape.slope(dq)
+impl VelocityLaw for TemperatureViscous {}
+
+impl Law for TemperatureViscous {}
+
+impl VelocityLaw for TemperatureCoulomb {}
+
+impl Law for TemperatureCoulomb {}
+
+/// The law `temperature` of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct StatedTemperature {
+    /// The temperature at which friction is what `viscous` and `coulomb` say, °C; 25 by default.
+    #[serde(default = "room_temperature")]
+    pub reference_c: f64,
+    /// Whether viscous friction changes. True by default.
+    #[serde(default = "yes")]
+    pub viscous: bool,
+    /// Whether Coulomb friction changes. True by default.
+    #[serde(default = "yes")]
+    pub coulomb: bool,
+}
+
+fn room_temperature() -> f64 {
+    25.0
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl StatedLaw for StatedTemperature {
+    fn terms(&self, own: &StatedJoint) -> Vec<TorqueTerm> {
+        let (joint, reference_c, shape) = (own.joint, self.reference_c, own.step);
+        let viscous = TorqueTerm::TemperatureViscous(TemperatureViscous { joint, reference_c });
+        let coulomb = TorqueTerm::TemperatureCoulomb(TemperatureCoulomb { joint, reference_c, shape });
+        [self.viscous.then_some(viscous), self.coulomb.then_some(coulomb)].into_iter().flatten().collect()
+    }
+
+    fn check(&self) -> Result<(), StatedFault> {
+        if !self.viscous && !self.coulomb {
+            let (problem, fix) = ("neither viscous nor coulomb changes", "leave the law out");
+            return Err(StatedFault::Empty { problem, fix });
+        }
+        check("reference_c", self.reference_c, [-273.15, 1.0e3])
+    }
+
+    fn needs_temperature(&self) -> bool {
+        true
     }
 }
 
@@ -75,15 +120,16 @@ impl TermKind for TemperatureViscous {
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        vec![("reference_c", TermConstant::Number(self.reference_c))]
+        vec![("reference_c", TermConstant::Number(self.reference_c, ""))]
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
-        // Without a temperature the column is zero.
+    fn stated(&self) -> Option<FrictionTerm> {
+        let reference_c = self.reference_c;
+        Some(FrictionTerm::Temperature(StatedTemperature { reference_c, viscous: true, coulomb: false }))
     }
 }
 
@@ -105,15 +151,20 @@ impl TermKind for TemperatureCoulomb {
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        vec![("reference_c", TermConstant::Number(self.reference_c)), ("shape", TermConstant::Step(self.shape))]
+        vec![("reference_c", TermConstant::Number(self.reference_c, "")), ("shape", TermConstant::Step(self.shape))]
     }
 
     fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
     }
 
-    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: [&mut [f64]; 3]) {
-        // Without a temperature the column is zero.
+    fn stated(&self) -> Option<FrictionTerm> {
+        let reference_c = self.reference_c;
+        Some(FrictionTerm::Temperature(StatedTemperature { reference_c, viscous: false, coulomb: true }))
+    }
+
+    fn step_mut(&mut self) -> Option<&mut CoulombShape> {
+        Some(&mut self.shape)
     }
 }
 

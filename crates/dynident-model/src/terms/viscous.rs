@@ -1,9 +1,10 @@
 //! Viscous friction: `τ = F_v q̇`.
 
-use super::kind::{
-    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFunction,
-    column_of_velocity, halves,
-};
+use super::TorqueTerm;
+use super::candidate::{CandidateLaw, CandidateRole, GridPoint};
+use super::kind::{JointProperty, MotionFunction, TermAction, TermJoints, TermKind, TermLabel, halves};
+use super::law::{Law, VelocityLaw};
+use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
 /// Viscous friction of one joint, Nm s/rad (N s/m).
@@ -14,14 +15,17 @@ pub struct Viscous {
     pub joint: usize,
 }
 
-impl VelocityFunction for Viscous {
-    fn value(&self, dq: f64) -> f64 {
+impl VelocityLaw for Viscous {
+    #[inline(always)]
+    fn of<S: Real>(&self, dq: S) -> S {
         dq
     }
+}
 
-    fn slope(&self, _: f64) -> f64 {
-        1.0
-    }
+impl Law for Viscous {
+    const CANDIDATES: &'static [CandidateLaw] = &[CandidateLaw::new("viscous", CandidateRole::Base, |own| {
+        vec![GridPoint::alone(TorqueTerm::Viscous(Self { joint: own.joint }))]
+    })];
 }
 
 impl TermKind for Viscous {
@@ -33,19 +37,9 @@ impl TermKind for Viscous {
         TermJoints::One(self.joint)
     }
 
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
     fn action(&self) -> TermAction<'_> {
         TermAction::Damping { factor: 1.0 }
     }
-
-    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
-        Vec::new()
-    }
-
-    column_of_velocity!();
 
     fn functions(&self) -> Vec<MotionFunction> {
         halves(self.joint, "viscous").into()

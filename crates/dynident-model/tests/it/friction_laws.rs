@@ -1,8 +1,11 @@
 //! Friction laws against differences, limits and what is known of them by hand.
+use dynident_lanes::Dual;
+use dynident_model::OwnScale;
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
-    HysteresisState, JointMotion, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid, Stribeck,
-    TemperatureCoulomb, TemperatureViscous, TermAction, TermInput, TorqueTerm, VelocityCurve, Viscous,
+    CandidateJoint, CandidateLaw, Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb,
+    DirectionalViscous, DriveInertia, HysteresisState, JointMotion, LoadFriction, MaxwellSlip, Offset, Power,
+    PowerExponent, Sigmoid, StatedJoint, Stribeck, TemperatureCoulomb, TemperatureViscous, TermAction, TermInput,
+    TorqueTerm, VelocityCurve, Viscous,
 };
 
 const STEP: CoulombShape = CoulombShape::Smooth { width: 0.05 };
@@ -221,7 +224,6 @@ fn a_slipping_spring_makes_the_loop_of_masing_and_remembers_across_blocks() {
 
 #[test]
 fn friction_changes_with_the_temperature_about_its_reference() {
-    use dynident_model::terms::{TemperatureCoulomb, TemperatureViscous};
     let (speeds, temperature) = ([0.4, -0.4, 0.0, 1.0], [25.0, 35.0, 35.0, 15.0]);
     let motion = JointMotion { samples: 4, q: &[0.0; 4], dq: &speeds, ddq: &[0.0; 4] };
     let shape = CoulombShape::Sign { dead_band: 0.0 };
@@ -240,14 +242,78 @@ fn friction_changes_with_the_temperature_about_its_reference() {
     }
     assert_eq!((&viscous.symbol()[..], viscous.unit()), ("fvT1", "Nm s/(rad K)"));
     assert_eq!((&coulomb.symbol()[..], coulomb.unit()), ("fcT1", "Nm/K"));
-    // Slopes against central differences: h² of curvature, rounding over h.
-    let smooth = TemperatureCoulomb { joint: 0, reference_c: 25.0, shape: CoulombShape::Smooth { width: 0.1 } };
-    let linear = TemperatureViscous { joint: 0, reference_c: 25.0 };
-    for dq in [-0.13, 0.02, 0.3] {
-        let h = 1e-6;
-        let slope = (smooth.value(31.0, dq + h) - smooth.value(31.0, dq - h)) / (2.0 * h);
-        assert!((smooth.slope(31.0, dq) - slope).abs() < 1e-7);
-        let slope = (linear.value(31.0, dq + h) - linear.value(31.0, dq - h)) / (2.0 * h);
-        assert!((linear.slope(31.0) - slope).abs() < 1e-7);
+}
+
+#[test]
+fn a_term_is_where_its_coordinates_say() {
+    const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
+    let stribeck = |shape| TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 1.5, shape });
+    let sigmoid = TorqueTerm::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.01 });
+    let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: STEP });
+    for term in [stribeck(STEP), stribeck(SIGN), sigmoid, coulomb] {
+        let own = term.kind().coordinates();
+        let back = term.at(&own, 1.0).kind().coordinates();
+        // Logarithms and back: a few roundings.
+        assert!(own.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-12) && own.len() == back.len(), "{term:?}");
+    }
+    // A change of one coordinate is a change of the constant that it names, and of no other.
+    let names = ["speed", "exponent"];
+    let own = stribeck(STEP).kind().coordinates();
+    for (place, name) in names.into_iter().enumerate() {
+        let mut moved = own.clone();
+        moved[place] += 0.5;
+        let values: Vec<_> = (0..2).map(|place| stribeck(STEP).constant_at(place, &moved, 1.0)).collect();
+        assert!(values.iter().map(|(name, _)| *name).eq(names), "{values:?}");
+        let ratio = values[place].1 / stribeck(STEP).constant_at(place, &own, 1.0).1;
+        assert!((ratio - 0.5_f64.exp()).abs() < 1e-12, "{name}: {ratio}");
+    }
+}
+
+/// One expression: generated code, which is written over symbols, and simulation have the value of the column.
+#[test]
+fn torque_over_any_scalar_is_the_column() {
+    for term in terms_of_velocity() {
+        for dq in [-0.3, -0.02, 0.0, 0.004, 0.7] {
+            let (number, dual) = (term.torque(0, &[dq]).unwrap(), term.torque(0, &[Dual::variable(dq)]).unwrap());
+            assert_eq!(dual.value, number);
+            // Lanes have a tangent and an exponential within 4 units of the last place.
+            assert!((column(&term, &[dq])[0] - number).abs() < 1e-14, "{term:?} {dq}");
+        }
+    }
+    for term in terms_of_all_kinds() {
+        let needs_more = term.needs_load() || term.has_memory();
+        assert_eq!(term.torque(0, &[0.1, 0.2]).is_err(), needs_more, "{term:?}");
+    }
+}
+
+/// Recordings choose only what a study can state, and every candidate has its own name and place.
+#[test]
+fn every_candidate_can_be_stated() {
+    let joint = CandidateJoint {
+        joint: 0,
+        velocity: 1.0,
+        position: 1.0,
+        alone: vec![STEP],
+        widths: vec![0.01, 0.05],
+        width: 0.02,
+    };
+    let mut ranks: Vec<_> = TorqueTerm::candidates().map(CandidateLaw::rank).collect();
+    ranks.sort_unstable();
+    ranks.dedup();
+    assert_eq!(ranks.len(), TorqueTerm::candidates().count());
+    for law in TorqueTerm::candidates() {
+        for term in (law.grid)(&joint).into_iter().flat_map(|point| point.terms) {
+            assert_eq!(term.candidate(), Some(law));
+            let constants = term.kind().coordinates().len();
+            assert!(constants == law.constants || law.constants == 0, "{term:?}");
+            // Viscous and Coulomb friction have keys of their own.
+            let Some(stated) = term.kind().stated() else {
+                assert!(term.property().is_some(), "{term:?}");
+                continue;
+            };
+            assert_eq!(stated.law().check(), Ok(()));
+            let own = StatedJoint { joint: 0, step: term.step().unwrap_or(STEP), turns: true, scale: OwnScale::USUAL };
+            assert!(stated.law().terms(&own).contains(&term), "{term:?}");
+        }
     }
 }

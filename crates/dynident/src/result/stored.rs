@@ -2,9 +2,9 @@
 
 use super::identification::{RESULT_SCHEMA, ResultFile};
 use super::seal::{PLACE, content_sha256, stated_sha256};
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::inputs::read_result;
-use crate::study::{FrictionTerm, JointDrive, Study};
+use crate::study::{JointDrive, Study};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
 use dynident_identification::payload::{KnownArm, Refit, known_payloads};
@@ -93,7 +93,7 @@ impl ResultFile {
         for joint in &stored.friction_choice {
             let mut terms = joint.drive.iter().flat_map(|drive| drive.terms.iter().flatten());
             terms
-                .try_for_each(FrictionTerm::validate)
+                .try_for_each(|term| term.law().check().map_err(StudyError::from))
                 .map_err(|error| wrong(format!("friction_choice of joint `{}`: {error}", joint.joint)))?;
         }
         Ok(stored)

@@ -167,12 +167,15 @@ impl DriveSection {
             Expected::Range(0.0, 100.0).check("drive.gain_std_percent", percent)?;
         }
         for (index, term) in self.terms.iter().enumerate() {
-            term.validate().map_err(StudyError::at(format!("drive.laws number {}", index + 1)))?;
+            term.law()
+                .check()
+                .map_err(StudyError::from)
+                .map_err(StudyError::at(format!("drive.laws number {}", index + 1)))?;
         }
         for (joint, drive) in &self.joints {
             for (index, term) in drive.terms.iter().flatten().enumerate() {
                 let place = format!("drive.joints.{joint}.laws number {}", index + 1);
-                term.validate().map_err(StudyError::at(place))?;
+                term.law().check().map_err(StudyError::from).map_err(StudyError::at(place))?;
             }
             if let Some(width) = drive.coulomb_width {
                 Expected::Positive.check(format!("drive.joints.{joint}.coulomb_width"), width)?;

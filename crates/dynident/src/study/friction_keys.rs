@@ -2,7 +2,7 @@
 
 use super::friction::{FrictionChoice, FrictionTerm};
 use super::{CoulombChoice, JointDrive};
-use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, TorqueTerm};
+use dynident_model::terms::{CoulombShape, JointProperty, StepRole, TorqueTerm};
 
 impl JointDrive {
     /// The keys of `[drive.joints.NAME]` that state these terms of a joint's friction, and no others. Drive inertia and
@@ -17,14 +17,8 @@ impl JointDrive {
         let mut further: Vec<FrictionTerm> = Vec::new();
         for term in terms {
             let Some(key) = drive.basic_or_further(term) else { continue };
-            // Elements are one law with a list.
-            if let (
-                Some(FrictionTerm::MaxwellSlip { yield_displacements }),
-                FrictionTerm::MaxwellSlip { yield_displacements: more },
-            ) = (further.last_mut(), &key)
-            {
-                yield_displacements.extend(more);
-            } else if !further.contains(&key) {
+            let is_joined = further.last_mut().is_some_and(|last| last.law_mut().join(&key));
+            if !is_joined && !further.contains(&key) {
                 further.push(key);
             }
         }
@@ -34,22 +28,21 @@ impl JointDrive {
 
     /// Sets the basic keys of a term, or returns its entry under `laws`.
     fn basic_or_further(&mut self, term: &TorqueTerm) -> Option<FrictionTerm> {
-        match term {
-            TorqueTerm::Viscous(_) => self.viscous = Some(true),
-            TorqueTerm::Coulomb(Coulomb { shape: CoulombShape::Sign { dead_band }, .. }) => {
-                (self.coulomb, self.coulomb_dead_band) = (Some(CoulombChoice::Sign), Some(*dead_band));
+        match (term.property(), term.step()) {
+            (Some(JointProperty::Damping), _) => self.viscous = Some(true),
+            (Some(JointProperty::Friction), Some(CoulombShape::Sign { dead_band })) => {
+                (self.coulomb, self.coulomb_dead_band) = (Some(CoulombChoice::Sign), Some(dead_band));
             }
-            TorqueTerm::Coulomb(Coulomb { shape: CoulombShape::Smooth { width }, .. }) => {
-                (self.coulomb, self.coulomb_width) = (Some(CoulombChoice::Smooth), Some(*width));
+            (Some(JointProperty::Friction), Some(CoulombShape::Smooth { width })) => {
+                (self.coulomb, self.coulomb_width) = (Some(CoulombChoice::Smooth), Some(width));
             }
             // The step by direction is the joint's, which has a key of its own.
-            TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape: CoulombShape::Smooth { width }, .. }) => {
-                self.coulomb_width = Some(*width);
-                return FrictionTerm::stating(term);
+            (_, Some(CoulombShape::Smooth { width })) if term.kind().step_role() == StepRole::Joint => {
+                self.coulomb_width = Some(width);
             }
-            further => return FrictionTerm::stating(further),
+            _ => {}
         }
-        None
+        term.kind().stated()
     }
 }
 
@@ -60,7 +53,8 @@ mod tests {
     use crate::study::robot_model::torque_terms;
     use dynident_model::load_robot;
     use dynident_model::terms::{
-        Direction, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent, Sigmoid, Stribeck, Viscous,
+        Coulomb, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent,
+        Sigmoid, Stribeck, Viscous,
     };
     use std::path::Path;
 

@@ -315,7 +315,7 @@ impl Study {
     fn check_temperature(&self) -> Result<(), StudyError> {
         let terms =
             self.drive.joints.values().filter_map(|own| own.terms.as_ref()).chain([&self.drive.terms]).flatten();
-        if !terms.into_iter().any(|term| matches!(term, FrictionTerm::Temperature { .. })) {
+        if !terms.into_iter().any(|term| term.law().needs_temperature()) {
             return Ok(());
         }
         let own = self.drive.joints.values().map(|own| own.friction);

@@ -7,7 +7,7 @@ use crate::error::{Error, StudyError};
 use crate::robot_file::{LoadSettings, load_robot};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
 use dynident_model::terms::{
-    CoulombShape, Coupling, CouplingEffect, Declared, DriveChoice, TorqueTerm, terms_per_joint,
+    CoulombShape, Coupling, CouplingEffect, Declared, DriveChoice, StatedJoint, TorqueTerm, terms_per_joint,
 };
 use dynident_model::{LoopClosure, Model, ModelError, Robot, Vec3, has_xacro_macros, loops};
 use dynident_system::ProgramPermission;
@@ -177,9 +177,10 @@ pub(super) fn torque_terms(
     let mut terms = terms_per_joint(model, |joint| drive_choice(drive, model, joint));
     for (joint, description) in model.joints().iter().enumerate() {
         let own = drive.joints.get(&description.name);
-        let step = friction_step(drive, model, joint);
+        let (step, turns) = (friction_step(drive, model, joint), description.turns());
+        let stated = StatedJoint { joint, step, turns, scale: model.own_scale() };
         let further = own.and_then(|own| own.terms.as_ref()).unwrap_or(&drive.terms);
-        terms.extend(further.iter().flat_map(|term| term.terms(model, joint, step)));
+        terms.extend(further.iter().flat_map(|term| term.law().terms(&stated)));
     }
     for section in coupling {
         let [first, second] = &section.joints;

@@ -88,7 +88,7 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     let terms = elbow.drive.as_ref().unwrap().terms.clone().unwrap();
     // 0.08 lies between 0.05 and 0.1 of the grid: a tenth is far less than the grid's step, and more than the noise.
     let near =
-        |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck { speed, .. } if (speed / 0.08 - 1.0).abs() < 0.1);
+        |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck(own) if (own.speed / 0.08 - 1.0).abs() < 0.1);
     assert!(terms.iter().any(near), "{terms:?}");
     // The noise, and a tenth of it for constants that are not quite those of the truth.
     assert!(found.result.validation[0].model.rmse_nm < 1.1 * NOISE, "{:?}", found.result.validation[0].model);

@@ -121,7 +121,7 @@ fn half_width(found: &IdentificationOutcome) -> f64 {
 /// step forwards than backwards (with the offset a shifted one says nearly the same).
 fn is_friction_chosen(found: &IdentificationOutcome) -> bool {
     let [shoulder, elbow, wrist] = &found.result.friction_choice[..] else { panic!("three joints") };
-    let near = |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck { speed, .. } if (speed / STRIBECK_SPEED - 1.0).abs() < 0.2);
+    let near = |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck(own) if (own.speed / STRIBECK_SPEED - 1.0).abs() < 0.2);
     let stribeck = shoulder.drive.as_ref().and_then(|drive| drive.terms.as_ref()).is_some_and(|t| t.iter().any(near));
     stribeck
         && (elbow.chosen.contains("asymmetric coulomb") || elbow.chosen.contains("sigmoid"))

@@ -4,7 +4,7 @@ use crate::jobs::recorded_velocities::recorded_velocities;
 use dynident_dynamics::ParametricModel;
 use dynident_export::{NearestFriction, RobotModel};
 use dynident_identification::Identification;
-use dynident_model::terms::{JointProperty, TorqueTerm};
+use dynident_model::terms::JointProperty;
 use dynident_model::{InertialParameters, JointChange};
 
 /// The new values of the joints, and where they are not the law itself.
@@ -58,23 +58,8 @@ impl JointValues {
 fn not_described(model: &ParametricModel) -> Vec<bool> {
     let mut joints = vec![false; model.dof()];
     for term in model.terms() {
-        let is_other = match term {
-            TorqueTerm::DirectionalViscous(_)
-            | TorqueTerm::DirectionalCoulomb(_)
-            | TorqueTerm::Stribeck(_)
-            | TorqueTerm::Sigmoid(_)
-            | TorqueTerm::Power(_)
-            | TorqueTerm::MaxwellSlip(_) => true,
-            TorqueTerm::Viscous(_)
-            | TorqueTerm::Coulomb(_)
-            | TorqueTerm::Load(_)
-            | TorqueTerm::TemperatureViscous(_)
-            | TorqueTerm::TemperatureCoulomb(_)
-            | TorqueTerm::Offset(_)
-            | TorqueTerm::DriveInertia(_)
-            | TorqueTerm::Coupling(_)
-            | TorqueTerm::Declared(_) => false,
-        };
+        let is_other = term.is_friction() && term.property().is_none();
+        let is_other = is_other && !term.needs_load() && !term.needs_temperature();
         if let (true, Some(joint)) = (is_other, term.own_joint()) {
             joints[joint] = true;
         }

@@ -1,0 +1,288 @@
+//! The questions that every torque term answers.
+
+use super::kind::{TermAction, TermConstant, TermJoints};
+use super::{
+    CoulombShape, HysteresisState, JointMotion, JointProperty, MotionFunction, StateFunction, TermInput, TorqueTerm,
+};
+use crate::tree::Model;
+
+impl TorqueTerm {
+    /// Name of the kind: `viscous`, `coulomb`, `maxwell-slip`, ..
+    pub fn kind_name(&self) -> &'static str {
+        self.kind().label().kind
+    }
+
+    /// Readable name of the parameter: its symbol, and the joint's number from 1 (`fv3`), as in the field's papers.
+    pub fn symbol(&self) -> String {
+        self.kind().label().symbol
+    }
+
+    /// Unit of the parameter at a revolute joint.
+    pub fn unit(&self) -> &str {
+        self.kind().label().unit
+    }
+
+    /// Its constants by name, beside joints and parameter.
+    pub fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        self.kind().constants()
+    }
+
+    /// The same law with another step near zero velocity, where it has one.
+    #[must_use]
+    pub fn with_step(mut self, other: impl Fn(CoulombShape) -> CoulombShape) -> Self {
+        if let Some(step) = self.kind_mut().step_mut() {
+            *step = other(*step);
+        }
+        self
+    }
+
+    /// The step near zero velocity, where the law has one.
+    pub fn step(&self) -> Option<CoulombShape> {
+        self.constants().into_iter().find_map(|(_, constant)| match constant {
+            TermConstant::Step(step) => Some(step),
+            _ => None,
+        })
+    }
+
+    /// Width of the step at rest, rad/s (m/s), 0 for a sign; `None` for a law without one.
+    pub fn step_width(&self) -> Option<f64> {
+        self.constants().into_iter().find_map(|(name, constant)| match constant {
+            TermConstant::Step(CoulombShape::Smooth { width }) => Some(width),
+            TermConstant::Step(CoulombShape::Sign { .. }) => Some(0.0),
+            TermConstant::Number(value, _) => self.kind().step_width_by(name, value),
+            _ => None,
+        })
+    }
+
+    /// The term with its constants at these coordinates, within bounds; `velocity` is a rad/s (m/s) of a usual arm.
+    #[must_use]
+    pub fn at(&self, coordinates: &[f64], velocity: f64) -> Self {
+        let mut term = self.clone();
+        term.kind_mut().move_to(coordinates, velocity);
+        term
+    }
+
+    /// Name of the constant behind a coordinate, and its value at these coordinates.
+    pub fn constant_at(&self, place: usize, coordinates: &[f64], velocity: f64) -> (&'static str, f64) {
+        match self.at(coordinates, velocity).constants().get(place) {
+            Some((name, TermConstant::Number(value, _))) => (name, *value),
+            _ => ("width", coordinates[place].exp()),
+        }
+    }
+
+    /// The joints that feel this term.
+    pub fn joints(&self) -> Vec<usize> {
+        match self.kind().joints() {
+            TermJoints::One(joint) => vec![joint],
+            TermJoints::Two(first, second) => vec![first, second],
+        }
+    }
+
+    /// The one joint that the term belongs to; none for a drive that turns with two.
+    pub fn own_joint(&self) -> Option<usize> {
+        match self.kind().joints() {
+            TermJoints::One(joint) => Some(joint),
+            TermJoints::Two(..) => None,
+        }
+    }
+
+    /// True when joint `joint` feels this term. Allocates nothing, unlike [`joints`](TorqueTerm::joints).
+    pub fn acts_on(&self, joint: usize) -> bool {
+        match self.kind().joints() {
+            TermJoints::One(own) => own == joint,
+            TermJoints::Two(first, second) => first == joint || second == joint,
+        }
+    }
+
+    /// Where it enters the equation of motion.
+    pub fn action(&self) -> TermAction<'_> {
+        self.kind().action()
+    }
+
+    /// The functions of the motion that friction and declared torques add; none for inertia and offset.
+    pub fn functions(&self) -> Vec<MotionFunction> {
+        self.kind().functions()
+    }
+
+    /// The property of its joint by which a robot's description states the parameter.
+    pub fn property(&self) -> Option<JointProperty> {
+        self.kind().property()
+    }
+
+    /// The parameter by the description of `model`, where that says anything of it; that of a declared torque by who
+    /// declared it.
+    ///
+    /// # Panics
+    /// If the model does not have its joints.
+    pub fn described(&self, model: &Model) -> Option<f64> {
+        if let Self::Declared(term) = self {
+            return term.nominal;
+        }
+        let joint = &model.joints()[self.own_joint()?];
+        match self.property()? {
+            JointProperty::Damping => joint.damping,
+            JointProperty::Friction => joint.friction,
+            JointProperty::DriveInertia => joint.drive_inertia,
+            JointProperty::Stiffness => joint.spring.map(|spring| spring.stiffness),
+        }
+    }
+
+    /// True when a negative parameter is not possible: friction takes power from the motion at every velocity, inertia
+    /// is positive. An offset may have either sign, and so may a change with temperature; a coupling's cross terms are
+    /// judged with their drive.
+    pub fn is_nonnegative(&self) -> bool {
+        self.kind().is_nonnegative()
+    }
+
+    /// True when the column needs the joint's temperature.
+    pub fn needs_temperature(&self) -> bool {
+        match self.action() {
+            TermAction::Temperature => true,
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::State(_) => false,
+        }
+    }
+
+    /// True when the column needs the joint's load.
+    pub fn needs_load(&self) -> bool {
+        match self.action() {
+            TermAction::Friction(friction) => friction.by_load,
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Hysteresis
+            | TermAction::Temperature
+            | TermAction::State(_) => false,
+        }
+    }
+
+    /// True for a torque that the user declares.
+    pub fn is_declared(&self) -> bool {
+        self.state_function().is_some()
+    }
+
+    /// The function of positions and velocities that a declared torque follows; none of all other terms.
+    pub fn state_function(&self) -> Option<&dyn StateFunction> {
+        match self.action() {
+            TermAction::State(function) => Some(function),
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::Temperature => None,
+        }
+    }
+
+    /// The first sample of a motion of which a declared torque says nothing: its expression has no value there, or its
+    /// table does not reach so far. Its column is zero there, or what the table's end says.
+    pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
+        self.state_function()?.first_outside(motion)
+    }
+
+    /// True when the column depends on earlier samples.
+    pub fn has_memory(&self) -> bool {
+        match self.action() {
+            TermAction::Hysteresis => true,
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Temperature
+            | TermAction::State(_) => false,
+        }
+    }
+
+    /// True for friction, of one joint or of a shared drive: all but inertia, offset and declared torques.
+    pub fn is_friction(&self) -> bool {
+        match self.action() {
+            TermAction::Inertia { .. } | TermAction::Constant | TermAction::State(_) => false,
+            TermAction::Damping { .. } | TermAction::Friction(_) | TermAction::Hysteresis | TermAction::Temperature => {
+                true
+            }
+        }
+    }
+
+    /// True for friction of one joint: all but offset, drive inertia, couplings and declared torques.
+    pub fn is_joint_friction(&self) -> bool {
+        self.is_friction() && self.own_joint().is_some()
+    }
+
+    /// True for the inertia of one joint's drive.
+    pub fn is_drive_inertia(&self) -> bool {
+        self.mass_matrix_factor().is_some() && self.own_joint().is_some()
+    }
+
+    fn mass_matrix_factor(&self) -> Option<f64> {
+        match self.action() {
+            TermAction::Inertia { factor } => Some(factor),
+            TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::Temperature
+            | TermAction::State(_) => None,
+        }
+    }
+
+    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`.
+    /// The block counts as a recording of its own, without known load or temperature: see
+    /// [`column_following`](TorqueTerm::column_following).
+    ///
+    /// # Panics
+    /// If `row` is not one of [`joints`](TorqueTerm::joints) or `out` is not one value per sample.
+    pub fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        let mut input = TermInput { load: None, temperature_c: None, memory: &mut HysteresisState::default() };
+        self.column_following(row, motion, &mut input, out);
+    }
+
+    /// The regressor column as [`column`](TorqueTerm::column), of a block that follows others: with one sample a block,
+    /// what a simulation needs.
+    ///
+    /// # Panics
+    /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value
+    /// per sample.
+    pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
+        assert_eq!(out.len(), motion.samples);
+        assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
+        assert!(input.temperature_c.is_none_or(|t| t.len() == motion.samples), "one temperature per sample");
+        self.kind().column(row, motion, input, out);
+    }
+
+    /// Adds to the three parts of `gradient` (joint-major) the derivatives of `Σ weights[s] · column[s]` by positions,
+    /// velocities and accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint
+    /// `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element.
+    ///
+    /// # Panics
+    /// If lengths differ.
+    pub fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], gradient: [&mut [f64]; 3]) {
+        assert_eq!(weights.len(), motion.samples);
+        self.kind().apply_adjoint(row, motion, weights, gradient);
+    }
+
+    /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
+    pub fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
+        let entry = match self.kind().joints() {
+            TermJoints::One(joint) => (row, column) == (joint, joint),
+            TermJoints::Two(first, second) => (row, column) == (first, second) || (row, column) == (second, first),
+        };
+        self.mass_matrix_factor().filter(|_| entry).unwrap_or(0.0)
+    }
+
+    /// What this parameter adds to the torque of joint `row` at rest: a constant, one for the offset of that joint.
+    pub fn constant_torque(&self, row: usize) -> f64 {
+        match self.action() {
+            TermAction::Constant => f64::from(self.acts_on(row)),
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::Temperature
+            | TermAction::State(_) => 0.0,
+        }
+    }
+}
