@@ -59,8 +59,8 @@ pub struct FrictionConstant {
 }
 
 impl FrictionConstant {
-    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if it is a constant of another
-    /// term, or does not set the width of the step.
+    /// The narrowest step at rest of `term` within the 95 % interval, rad/s (m/s). `None` if it is a constant of
+    /// another term, or does not set the width of the step.
     pub fn narrowest_step(&self, term: &TorqueTerm) -> Option<f64> {
         let widths = self.interval_95.iter().filter_map(|&end| term.kind().step_width_by(&self.constant, end));
         widths.reduce(f64::min).filter(|_| term.kind_name() == self.term)

@@ -253,8 +253,8 @@ pub trait TermKind: VelocityFunction {
         StepRole::Fixed
     }
 
-    /// Width of the step at rest where the constant of this name has this value, rad/s (m/s); `None` for a constant that
-    /// does not set the width.
+    /// Width of the step at rest where the constant of this name has this value, rad/s (m/s); `None` for a constant
+    /// that does not set the width.
     fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
         (constant == "width").then_some(value)
     }
