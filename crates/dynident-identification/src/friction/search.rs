@@ -189,7 +189,7 @@ fn add_terms(
     met.push(tuned(folds, columns, start, None));
     let is_distinct =
         most_inflation == f64::INFINITY || asymmetry_inflation(folds, columns, &met[at]) <= most_inflation;
-    additions.retain(|kind| is_distinct || !is_step_by_direction(*kind));
+    additions.retain(|kind| is_distinct || !is_step_by_direction(kind));
     for _ in 0..MOST_ADDED {
         let start = met.len();
         for &added in &additions {
