@@ -45,8 +45,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
         return Err(IdentificationError::NoTrainingLog);
     }
     let settings = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-    let logs =
-        Logs::new(robot.model(), recordings, &settings.motion, &settings.parallel_filter, &chosen, None, execution)?;
+    let logs = Logs::new(robot.model(), recordings, settings.row_settings(), &chosen, None, execution)?;
     let training = training_rows(&logs, &settings, robot.clone().into(), &chosen, payloads, None)?;
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
     let theta = &estimate.values[..training.columns.base()];

@@ -48,15 +48,8 @@ pub(crate) fn with_less_noise<'a>(
     let (logs, before) = if is_lower {
         // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
         let execution = found.logs.execution;
-        let lower = Logs::new(
-            robot.model(),
-            recordings,
-            &found.settings.motion,
-            &task.settings.parallel_filter,
-            chosen,
-            Some(lower_hz),
-            execution,
-        )?;
+        let lower =
+            Logs::new(robot.model(), recordings, found.settings.row_settings(), chosen, Some(lower_hz), execution)?;
         (lower, Some(found.logs))
     } else {
         (found.logs, None)

@@ -67,7 +67,7 @@
 //! let settings = IdentificationSettings::default();
 //!
 //! // Rows of the regressor, kept as triangular factors; one cut-off frequency for all recordings.
-//! let logs = Logs::new(robot.model(), &recordings, &settings.motion, &settings.parallel_filter, &[0], None, Execution::default())?;
+//! let logs = Logs::new(robot.model(), &recordings, settings.row_settings(), &[0], None, Execution::default())?;
 //! let training = training_rows((&logs, &settings), robot.clone().into(), &[0], &[], None)?;
 //!
 //! // Base parameters with their covariance, by the estimator of the settings.
@@ -167,7 +167,7 @@ pub use execution::Execution;
 pub use identify::{Identification, identify, identify_payload, identify_with_instruments};
 pub use likelihood::schwarz;
 pub use log_noise::LogNoise;
-pub use logs::Logs;
+pub use logs::{Logs, RowSettings};
 pub use one_fit::StageTimes;
 pub use progress::{Progress, Silent};
 pub use recording::{LogError, MotionRecord, Recording, Role, Samples};

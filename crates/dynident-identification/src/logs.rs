@@ -33,6 +33,15 @@ pub(crate) struct LogSpectrum {
     pub(crate) position_noise: Vec<f64>,
 }
 
+/// The settings that make rows of positions and torques.
+#[derive(Clone, Copy, Debug)]
+pub struct RowSettings<'a> {
+    /// From positions to velocities and accelerations.
+    pub motion: &'a MotionSettings,
+    /// The filter of torque and regressor.
+    pub parallel_filter: &'a ParallelFilterSettings,
+}
+
 /// The recordings of a task and the filters in force. A log that fits into memory is read and
 /// differentiated once, however many passes there are.
 #[derive(Clone, Debug)]
@@ -42,7 +51,7 @@ pub struct Logs<'a> {
     /// The motion settings with one cut-off for all logs.
     pub motion: MotionSettings,
     /// The low-pass and decimation that torque and regressor go through alike.
-    pub filter: &'a ParallelFilterSettings,
+    pub filter: ParallelFilterSettings,
     /// How the job runs.
     pub execution: Execution<'a>,
     /// Empty where nothing is kept between passes.
@@ -66,12 +75,12 @@ impl<'a> Logs<'a> {
     pub fn new(
         model: &Model,
         recordings: &'a [Recording],
-        settings: &MotionSettings,
-        filter: &'a ParallelFilterSettings,
+        settings: RowSettings<'_>,
         deciding: &[usize],
         cutoff_of_model_hz: Option<f64>,
         execution: Execution<'a>,
     ) -> Result<Self, LogError> {
+        let RowSettings { motion: settings, parallel_filter } = settings;
         let longest_s = model.own_scale().seconds(LONGEST_STATED_LAG_S);
         let stated = settings.torque_lag_s.as_ref();
         let mut stated = (0..model.dof()).filter_map(|joint| stated.and_then(|lags| lags.at(joint)));
@@ -104,6 +113,7 @@ impl<'a> Logs<'a> {
         }
         let kept = unread(recordings);
         let excerpts = Arc::default();
+        let filter = parallel_filter.clone();
         Ok(Self { recordings, motion, filter, execution, kept, excerpts, spectra, motion_hz: None, torque_hz: None })
     }
 
@@ -221,7 +231,7 @@ impl<'a> Logs<'a> {
             recording: &self.recordings[index],
             model,
             motion: &self.motion,
-            filter: self.filter,
+            filter: &self.filter,
             torque_hz: self.torque_hz,
             reader_thread: false,
             most_samples: None,
@@ -287,9 +297,7 @@ mod tests {
         let settings = IdentificationSettings::default();
         let made = excerpts(&recordings, &settings, &[0], Execution::default()).unwrap().unwrap();
         let execution = Execution::default();
-        let logs =
-            Logs::new(model.model(), &recordings, &settings.motion, &settings.parallel_filter, &[0], None, execution)
-                .unwrap();
+        let logs = Logs::new(model.model(), &recordings, settings.row_settings(), &[0], None, execution).unwrap();
         let logs = logs.with_excerpts(Arc::new(made));
         let rows_of = |pass: LogPass<'_>| {
             let mut rows = 0;

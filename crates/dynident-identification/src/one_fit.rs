@@ -137,9 +137,8 @@ pub(crate) fn fitted_once<'a>(
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
     let IdentificationTask { robot, recordings, payloads, .. } = task;
-    let filter = &task.settings.parallel_filter;
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
-    let logs = Logs::new(robot.model(), recordings, &settings.motion, filter, chosen, cutoff_hz, execution)?;
+    let logs = Logs::new(robot.model(), recordings, settings.row_settings(), chosen, cutoff_hz, execution)?;
 
     // Drives, filters and friction, by the logs where they are left to them.
     let started = Instant::now();

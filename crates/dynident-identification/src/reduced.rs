@@ -61,8 +61,7 @@ pub fn reduce(
     execution.install(|| {
         let training = of_role(recordings, Role::Identify);
         let logs =
-            Logs::new(robot.model(), recordings, &settings.motion, &settings.parallel_filter, &[], None, execution)?
-                .without_keeping();
+            Logs::new(robot.model(), recordings, settings.row_settings(), &[], None, execution)?.without_keeping();
         let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };
         let reduced = passes.factors(&model)?.into_iter().map(|log| {
             let few = |factors: Vec<SegmentedFactor>, most: usize| {
@@ -111,8 +110,7 @@ fn identified(
     let started = Instant::now();
     let recordings: Vec<Recording> = reduced.iter().map(|log| Recording::without_samples(log.name.clone())).collect();
     let training: Vec<usize> = (0..recordings.len()).collect();
-    let logs =
-        Logs::new(model.model(), &recordings, &settings.motion, &settings.parallel_filter, &[], None, execution)?;
+    let logs = Logs::new(model.model(), &recordings, settings.row_settings(), &[], None, execution)?;
     let factors = reduced.iter().enumerate().map(|(index, log)| log_factors(&model, index, log));
     let factors = factors.collect::<Result<Vec<_>, _>>()?;
     let passes = TrainingPasses { logs: &logs, settings, training: &training, payloads: &[], known_arm: None };

@@ -4,6 +4,7 @@ use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
+use crate::logs::RowSettings;
 use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::MotionSettings;
@@ -122,6 +123,11 @@ impl Default for IdentificationSettings {
 }
 
 impl IdentificationSettings {
+    /// The settings that make rows.
+    pub fn row_settings(&self) -> RowSettings<'_> {
+        RowSettings { motion: &self.motion, parallel_filter: &self.parallel_filter }
+    }
+
     /// Checks that the bodies and terms of which something is known are there.
     ///
     /// # Errors

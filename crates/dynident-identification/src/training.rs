@@ -7,7 +7,7 @@ use crate::examination::PriorAgreement;
 use crate::execution::Execution;
 use crate::friction::JointFriction;
 use crate::log_noise::{LogNoise, weighted_by_log};
-use crate::logs::Logs;
+use crate::logs::{Logs, RowSettings};
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
 use crate::recording::{LogError, MotionRecord, Recording};
 use crate::regressor_model::RegressorModel;
@@ -125,8 +125,8 @@ pub(crate) fn plain_fit(
 ) -> Result<Vec<f64>, IdentificationError> {
     let recordings: Vec<Recording> = pieces.into_iter().map(of_piece).collect();
     let all: Vec<usize> = (0..recordings.len()).collect();
-    let motion = MotionSettings::default();
-    let logs = Logs::new(model.model(), &recordings, &motion, filter, &[], None, execution)?;
+    let rows = RowSettings { motion: &MotionSettings::default(), parallel_filter: filter };
+    let logs = Logs::new(model.model(), &recordings, rows, &[], None, execution)?;
     let job = TrainingPasses { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
     let rows = job.rows_once(model)?;
     Ok(plain_values(&settings.estimation, &rows.problem)?.values)

@@ -203,15 +203,7 @@ fn residual(
     let identification = identification_settings(task, settings, 1);
     let all: Vec<usize> = (0..motions.len()).collect();
     let (robot, execution) = (&task.robot, Execution::default());
-    let logs = Logs::new(
-        robot.model(),
-        motions,
-        &identification.motion,
-        &identification.parallel_filter,
-        &all,
-        None,
-        execution,
-    )?;
+    let logs = Logs::new(robot.model(), motions, identification.row_settings(), &all, None, execution)?;
     let chosen = choose_friction(&logs, &identification, robot, &all, &settings.payloads)?;
     let training = training_rows(&logs, &identification, chosen.model, &all, &settings.payloads, None)?;
     let found = estimate(&training.rows(&logs, &identification, &all), None)?.estimate;

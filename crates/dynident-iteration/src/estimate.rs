@@ -177,15 +177,7 @@ impl RunsFit<'_> {
         let mut identification = identification.clone();
         loop {
             identification.motion.torque_lag_s = rounds.torque_lag_s();
-            let logs = Logs::new(
-                robot.model(),
-                recordings,
-                &identification.motion,
-                &identification.parallel_filter,
-                &all,
-                None,
-                execution,
-            )?;
+            let logs = Logs::new(robot.model(), recordings, identification.row_settings(), &all, None, execution)?;
             let chosen = choose_friction(&logs, &identification, robot, &all, &settings.payloads)?;
             let mut training =
                 training_rows(&logs, &identification, chosen.model.clone(), &all, &settings.payloads, None)?;

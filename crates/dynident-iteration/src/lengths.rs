@@ -133,16 +133,8 @@ fn left_with(
     let model = model.clone().with_joint_distances(&joints, 1.0 + change).ok()?;
     let robot = ParametricModel::new(model, task.robot.terms().to_vec()).ok()?;
     let all: Vec<usize> = (0..motions.len()).collect();
-    let logs = Logs::new(
-        robot.model(),
-        motions,
-        &identification.motion,
-        &identification.parallel_filter,
-        &all,
-        None,
-        Execution::default(),
-    )
-    .ok()?;
+    let logs =
+        Logs::new(robot.model(), motions, identification.row_settings(), &all, None, Execution::default()).ok()?;
     let training = training_rows(&logs, identification, RegressorModel::from(robot), &all, &[], None).ok()?;
     let found = estimate(&training.rows(&logs, identification, &all), None).ok()?.estimate;
     let (mut sigma, mut rows) = (vec![0.0; task.robot.dof()], vec![0; task.robot.dof()]);

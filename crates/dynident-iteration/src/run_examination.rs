@@ -128,15 +128,8 @@ fn predict(
     // The rows that the model was fitted to were without it.
     identification.motion.torque_lag_s = known.lag.taken_off();
     let all: Vec<usize> = (0..recordings.len()).collect();
-    let logs = Logs::new(
-        task.robot.model(),
-        &recordings,
-        &identification.motion,
-        &identification.parallel_filter,
-        &all,
-        None,
-        Execution::default(),
-    )?;
+    let logs =
+        Logs::new(task.robot.model(), &recordings, identification.row_settings(), &all, None, Execution::default())?;
     let model = RegressorModel::from(task.robot.clone());
     let model = model.clone().with_load_of_estimate(&model, &known.values);
     let added =

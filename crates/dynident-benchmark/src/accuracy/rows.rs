@@ -140,5 +140,5 @@ fn logs<'b>(
     settings: &'b IdentificationSettings,
 ) -> Result<Logs<'b>, LogError> {
     let alone = Execution { threads: 1, progress: &Silent };
-    Logs::new(scenario.model.model(), recordings, &settings.motion, &settings.parallel_filter, &[], None, alone)
+    Logs::new(scenario.model.model(), recordings, settings.row_settings(), &[], None, alone)
 }

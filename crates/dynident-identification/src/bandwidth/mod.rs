@@ -161,7 +161,7 @@ fn filter_of_copy(stand_in: &StandIn, cutoff_hz: f64) -> ParallelFilterSettings 
 impl Logs<'_> {
     /// The cut-off that the spectra ask for, where both cut-off and parallel filter are left to the data.
     fn automatic_cutoff_hz(&self) -> Option<f64> {
-        let filter = self.filter;
+        let filter = &self.filter;
         let is_automatic = filter.enabled && filter.factor.is_none() && filter.cutoff_hz.is_none();
         let motion_hz = self.motion_hz().or_else(|| motion_band_hz(&self.motion));
         motion_hz.filter(|_| is_automatic && !self.spectra().is_empty())

@@ -124,15 +124,7 @@ pub fn diagnose(task: DiagnosisTask<'_>) -> Result<Diagnosis, DiagnosisError> {
     }
     for share in LOWER_CUTOFFS {
         let (model, cutoff_hz) = (robot.model(), Some(share * cutoff_hz));
-        let slower = Logs::new(
-            model,
-            logs.recordings,
-            &settings.motion,
-            &settings.parallel_filter,
-            training,
-            cutoff_hz,
-            logs.execution,
-        )?;
+        let slower = Logs::new(model, logs.recordings, settings.row_settings(), training, cutoff_hz, logs.execution)?;
         let slower = slower.with_excerpts(logs.excerpts());
         let again = diagnosed(DiagnosisTask { logs: &slower, theta: None, ..task })?;
         let is_noise_alone = found.is_unexplained() && !again.is_unexplained();

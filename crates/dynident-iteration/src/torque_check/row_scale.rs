@@ -83,16 +83,8 @@ pub(crate) fn row_scales(
     let found = || {
         let model = RegressorModel::from(task.robot.clone());
         let execution = Execution::default();
-        let logs = Logs::new(
-            task.robot.model(),
-            &motions,
-            &identification.motion,
-            &identification.parallel_filter,
-            &all,
-            None,
-            execution,
-        )
-        .ok()?;
+        let logs =
+            Logs::new(task.robot.model(), &motions, identification.row_settings(), &all, None, execution).ok()?;
         let training = training_rows(&logs, &identification, model, &all, &[], None).ok()?;
         let found = estimate(&training.rows(&logs, &identification, &all), None).ok()?.estimate;
         let mut out = vec![None; dof];

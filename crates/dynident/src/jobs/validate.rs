@@ -53,16 +53,9 @@ pub fn validate_result(
     let execution = options.execution();
     let (recordings, settings) = (&task.recordings, &task.settings);
     let tested = execution.install(|| {
-        let logs = Logs::new(
-            robot.model(),
-            recordings,
-            &settings.motion,
-            &settings.parallel_filter,
-            &chosen,
-            stored.cutoff_hz(),
-            execution,
-        )?
-        .with_motion_band(stored.motion_hz());
+        let logs =
+            Logs::new(robot.model(), recordings, settings.row_settings(), &chosen, stored.cutoff_hz(), execution)?
+                .with_motion_band(stored.motion_hz());
         let one = |&index: &usize| {
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);

@@ -35,16 +35,7 @@ fn tested(job: &Job) -> (f64, usize) {
     let folders = dynident::Folders::new(&job.study, &job.path, None);
     let task = job.study.task(&job.path, &robot, &folders).unwrap();
     let alone = Execution::default();
-    let logs = Logs::new(
-        robot.model(),
-        &task.recordings,
-        &task.settings.motion,
-        &task.settings.parallel_filter,
-        &[0],
-        None,
-        alone,
-    )
-    .unwrap();
+    let logs = Logs::new(robot.model(), &task.recordings, task.settings.row_settings(), &[0], None, alone).unwrap();
     let (found, choice) = choose_drive_inertia(&logs, &task.settings, &task.robot, &[0], &[]).unwrap();
     let choice = choice.unwrap();
     assert_eq!(found.terms().iter().any(TorqueTerm::is_drive_inertia), choice.seen);

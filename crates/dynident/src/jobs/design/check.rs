@@ -156,7 +156,7 @@ fn pieces(
     settings.motion = study.motion.clone();
     let execution = Execution::default();
     let (model, alone) = (robot.model(), core::slice::from_ref(&recording));
-    let motion = Logs::new(model, alone, &settings.motion, &settings.parallel_filter, &[0], None, execution)
+    let motion = Logs::new(model, alone, settings.row_settings(), &[0], None, execution)
         .map_err(Error::identification(study_path))?
         .motion;
     let places = recording.places(model).map_err(Error::identification(study_path))?;
