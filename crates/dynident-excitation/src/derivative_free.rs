@@ -115,7 +115,7 @@ fn evolved(
     Ok((designed, history))
 }
 
-/// What one search found.
+/// The result of one search.
 struct Found {
     best: Vec<f64>,
     evaluations: usize,
@@ -171,7 +171,7 @@ impl<'a> Watched<'a> {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Reports a value after so many evaluations; whether the search was ended, now or before.
+    /// Reports a value and the number of evaluations. Returns whether the search was ended, now or before.
     fn reported(&self, value: f64, evaluations: usize) -> bool {
         let progress = DesignProgress { round: ROUND, value, violation: 0.0, evaluations: evaluations as u64 };
         if !self.is_stopped() && ((self.watch)(&progress).is_break() || (self.late)()) {

@@ -158,8 +158,8 @@ pub struct DesignProgress {
 /// Watches a design: called after every evaluation, from any thread; may end the search.
 pub(crate) type DesignWatch<'a> = dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync + 'a;
 
-/// Searches. `watch` is called after every evaluation, from any thread, and may end the search: the best so far is then
-/// still led inside the limits, for 0.5 s at most.
+/// Searches for the best trajectory. `watch` is called after every evaluation, from any thread, and may end the search.
+/// The best motion found until then is moved inside the limits, in at most 0.5 s.
 ///
 /// # Errors
 /// If settings are out of range or no start can be evaluated at all.

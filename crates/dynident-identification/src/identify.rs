@@ -42,11 +42,12 @@ pub struct Identification {
     pub training: Training,
     /// The estimator that made the estimate: of `auto` the one that it took.
     pub estimator: Estimator,
-    /// What the estimator returned: values with error bars by the residuals alone, and what it can determine.
+    /// The result of the estimator: values with error bars by the residuals alone, and its findings.
     pub estimation: Estimation,
     /// The other terms of the error bars.
     pub bars: ErrorBars,
-    /// The estimate with all terms in its error bars, and with parameters held at zero where that was asked for.
+    /// The estimate with all terms in its error bars, and with inessential parameters held at zero if the settings
+    /// require it.
     pub estimate: Estimate,
     /// What was held at zero because the data hardly determine it, if that was asked for.
     pub essential: Option<EssentialReport>,

@@ -23,12 +23,12 @@ use dynident_estimation::{Estimate, LinearProblem, left_out_ratios};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// Physically consistent parameters beside an estimate, or why there are none.
+/// Physically consistent parameters of an estimate, or why they do not exist.
 #[derive(Clone, Debug)]
 pub struct ConsistentParameters {
     /// The consistent set that explains the data best; none if it was not asked for or does not exist.
     pub fit: Option<PhysicalFit>,
-    /// Why there is none although it was asked for.
+    /// Why no consistent set was found; none where one was found or not requested.
     pub failure: Option<String>,
     /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
     /// nominal one that has the estimated base parameters.
@@ -38,11 +38,11 @@ pub struct ConsistentParameters {
     pub parameter_std: Vec<Option<f64>>,
     /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
     pub intervals: Option<Vec<ParameterInterval>>,
-    /// Bodies whose nominal parameters are no body's, with the least eigenvalue of their pseudo-inertia.
+    /// Bodies whose nominal inertia is not physically consistent, with the least eigenvalue of their pseudo-inertia.
     pub inconsistent_nominal: Vec<(String, f64)>,
 }
 
-/// What the training recordings say of the estimate.
+/// Tests of the estimate on the training recordings.
 #[derive(Clone, Debug)]
 pub struct TrainingExamination {
     /// For each training recording the delays of its torque, joint by joint; none where it does not determine one.
@@ -53,7 +53,7 @@ pub struct TrainingExamination {
     pub pooled_delays: Vec<Option<TorqueLag>>,
     /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
     pub sign: Option<TorqueSignCheck>,
-    /// The mean friction of every joint with friction of its own; empty for payloads on a known arm.
+    /// The mean friction of every joint that has friction terms; empty for payloads on a known arm.
     pub friction_signs: Vec<FrictionSign>,
 }
 
@@ -115,7 +115,7 @@ impl Stage<'_> {
         Ok(Examined { consistent, estimation_s, held_out: held_out?, examination })
     }
 
-    /// What the recordings would be under another study, if the settings ask for it or something does not fit.
+    /// Tests for mistakes in the study, if the settings require them or an examination gives reason to doubt it.
     pub(crate) fn diagnosis(
         &self,
         examined: &Examined,
@@ -156,7 +156,7 @@ impl Stage<'_> {
 /// with the motion costs less.
 const FAR_WORSE: f64 = 1.7;
 
-/// Whether a held-out log is far worse explained than the training logs, joints in units of their own noise.
+/// Whether the residual of a held-out log is far larger than that of the training logs, relative to each joint's noise.
 fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
     let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
     let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
@@ -164,8 +164,8 @@ fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
     squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
 }
 
-/// The arm's bodies are those of the earlier result; what the estimate of payloads says of them is the set nearest to
-/// the nominal one.
+/// The bodies of a known arm, which are those of the earlier result. Their parameters here are the set nearest to the
+/// nominal one that has the estimated base parameters.
 fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
     let robot = &training.model.parametric;
     let settings = task.settings.consistency.as_ref();
@@ -211,7 +211,7 @@ pub fn consistent_stage(
     };
     let parameters = fit.as_ref().map(|fit| fit.parameters.clone());
     let knowledge = settings.consistency.as_ref();
-    // A fit that succeeded has a problem that is one.
+    // A successful fit implies a valid problem.
     let parameter_std = match knowledge.filter(|_| fit.is_some()) {
         Some(knowledge) => parameter_std(robot, problem, &arm, knowledge).map_err(IdentificationError::Consistency)?,
         None => vec![None; robot.nominal().len()],
@@ -272,8 +272,8 @@ fn examine_all_training(
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
 }
 
-/// Blocks of time that the training logs are cut into, for how well each is predicted by the fit to the others: large
-/// enough that warmth and other motion tell them apart.
+/// Number of time blocks of the training logs; each is predicted by the fit to the others. Few blocks, so that they
+/// differ in temperature and motion as a new log does.
 const LEFT_OUT_BLOCKS: usize = 4;
 
 /// [`examine_held_out`] of every recording to test on, side by side.

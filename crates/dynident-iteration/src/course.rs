@@ -17,16 +17,16 @@ use crate::supervision::{Supervisor, Watching};
 use dynident_simulation::require_length;
 use std::time::Instant;
 
-/// How an iteration went.
+/// The result of an iteration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IterationOutcome {
     /// How it ended.
     pub status: IterationStatus,
-    /// What is not met; nothing if it has converged.
+    /// Conditions of convergence that are not met; empty if it has converged.
     pub shortfalls: Vec<Shortfall>,
     /// Every run.
     pub runs: Vec<RunRecord>,
-    /// Where motions are planned and everything is met: what a further run was expected to bring, too little for one.
+    /// The predicted gain of a further run, where all conditions are met and the gain was too small for another run.
     pub declined: Option<MotionForecast>,
 }
 
@@ -39,7 +39,7 @@ pub struct IterationOutcome {
 /// each new one is kept before the next begins. `watch` hears of every new run.
 ///
 /// # Errors
-/// Settings that do not fit, files that cannot be written. What the robot does wrong is in the records and in the
+/// Settings that do not fit together, files that cannot be written. Faults of the robot are in the records and the
 /// status.
 pub fn iterate(
     iteration: &Iteration,
@@ -50,8 +50,8 @@ pub fn iterate(
     iterate_supervised(iteration, robots, store, &mut Watching(watch))
 }
 
-/// [`iterate()`] under somebody's eyes, who may stop it, and is asked before every motion. A run that a stop cuts short
-/// does not count: what was recorded of it is kept in a folder of its own, and the run is made anew by the next call.
+/// [`iterate()`] with a supervisor, who may stop it and is asked before every motion. A run that is stopped is not
+/// used: its record is kept in a separate folder, and the next call repeats the run.
 ///
 /// # Errors
 /// As [`iterate()`].
@@ -116,11 +116,11 @@ fn known_records(
     Ok(records)
 }
 
-/// What follows the runs so far.
+/// The step after the runs that were made.
 enum NextStep {
     Run(RunPlan, NextRunMotion),
     Finished(IterationStatus),
-    /// Everything is met; a further run was expected to bring too little.
+    /// All conditions are met, and the predicted gain of a further run is too small.
     Declined(IterationStatus, Option<MotionForecast>),
 }
 

@@ -39,7 +39,7 @@ pub(crate) struct NextRunMotion {
 pub(crate) enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
-    /// Not counted: what was recorded of the run, and why.
+    /// The record of a run that is not used, and the reason.
     CutShort(Vec<RobotRun>, CutShort),
 }
 

@@ -41,7 +41,7 @@ pub struct RunEstimate {
     /// All parameters of the physically consistent set that fits best, ten for each body and one for each term, if it
     /// was asked for.
     pub possible: Option<Vec<f64>>,
-    /// Why there is none although it was asked for.
+    /// Why no consistent set was found; none where one was found or not requested.
     pub impossible: Option<String>,
     /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -220,7 +220,7 @@ fn sin_cos_bundle<R: Register, B: Register>(
 }
 
 impl<R: Register, B: Register> Wide<R, B> {
-    /// A function of every lane that has no lanes of its own.
+    /// Applies a scalar function to every lane.
     #[inline(always)]
     fn each(self, function: impl Fn(f64) -> f64) -> Self {
         let mut lanes = [0.0; 8];

@@ -19,7 +19,7 @@ pub trait Real: Scalar {
     /// The greater of the two; `other` where one of them is not a number.
     fn max(self, other: Self) -> Self;
 
-    /// The sign: -1, 0 or 1, and zero while the magnitude is at most `dead_band`. Its derivative counts as zero.
+    /// The sign: -1, 0 or 1, and zero while the magnitude is at most `dead_band`. Its derivative is taken as zero.
     fn sign(self, dead_band: f64) -> Self;
 
     /// `tanh(self / width)`.

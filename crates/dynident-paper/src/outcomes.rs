@@ -26,7 +26,7 @@ pub(crate) fn statements(runs: &JointRuns, figures: [f64; 2], claim: &str, quoti
     [vec![convergence], tracking(runs), parameters(runs), vec![comparison]].concat()
 }
 
-/// What the paper says at a place, and the result here.
+/// A statement of the paper, and the result here.
 fn statement(place: &str, paper: &str, here: String, holds: bool) -> PaperStatement {
     PaperStatement { place: place.to_owned(), paper: paper.to_owned(), here, holds }
 }

@@ -15,7 +15,7 @@ pub struct Trial<'a> {
     /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true
     /// parameters are for the judge.
     pub scenario: &'a Scenario,
-    /// What encoders and torque sensors said.
+    /// The readings of encoders and torque sensors.
     pub record: &'a Record,
     /// The record after the pipeline's own choice of cut-off and differentiator.
     pub motion: &'a MotionBlock,
@@ -28,18 +28,18 @@ pub struct Trial<'a> {
     /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian
     /// error, no friction and no drives.
     pub prior: &'a [f64],
-    /// What several estimators need, made once.
+    /// Work that several estimators share.
     pub(super) shared: &'a TrialData<'a>,
 }
 
-/// What an estimator says.
+/// The result of an estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The base parameters.
     pub values: Vec<f64>,
     /// Half the width of each value's 95 % interval; none if the estimator gives no error bars.
     pub half_width_95: Option<Vec<f64>>,
-    /// False when the iterations stopped before they had settled: counts as a failure.
+    /// False if the iterations stopped before they converged, which is a failure.
     pub converged: bool,
 }
 

@@ -202,7 +202,7 @@ fn links(model: &Model, shapes: &[LinkShape]) -> Vec<(String, Link)> {
     found.into_iter().map(|(name, body, hulls)| (name, Link::new(body, hulls))).collect()
 }
 
-/// Where a point of a body stands in the base frame.
+/// Position of a point of a body in the base frame, m.
 fn place(placements: &[Transform], body: Option<usize>, at: Vec3) -> Vec3 {
     body.map_or(at, |body| placements[body].rotation.mul_vec(at) + placements[body].translation)
 }
@@ -219,7 +219,7 @@ fn most([low, high]: &[Vec<f64>; 2], joint: usize) -> f64 {
 }
 
 impl Probe {
-    /// The ratio at one sample. A pair that cannot reach the `worst` ratio so far gives that one.
+    /// The ratio at one sample. A pair that cannot reach the `worst` ratio found up to now returns `worst`.
     pub(super) fn ratio(
         &mut self,
         state: &[Vec<f64>],
@@ -249,7 +249,7 @@ impl Probe {
                 let at = at(point);
                 let distance = ((at[0] - *x) * (at[0] - *x) + (at[1] - *y) * (at[1] - *y)).sqrt();
                 let least = *radius_m + point.radius_m;
-                // Beside the column or above it, whichever is farther.
+                // The larger of the distances from the side and from the top of the column.
                 (2.0 - distance / least).min(1.0 + (*top_m + point.radius_m - at[2]) / least)
             }
             Self::Pair(pair) => pair.ratio(placements, worst),

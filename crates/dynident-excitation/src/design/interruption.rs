@@ -1,5 +1,5 @@
-//! What ends a design before it has used all of its evaluations: the person or program that watches it, or the time
-//! limit.
+//! Reasons to end a design before it has used all of its evaluations: the watcher stops it, or the time limit is
+//! reached.
 
 use super::{DesignProgress, DesignSettings, DesignWatch};
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -24,7 +24,7 @@ pub(super) struct Interruption<'a> {
     elapsed_s: &'a (dyn Fn() -> f64 + Sync),
     time_limit_s: Option<f64>,
     evaluations: AtomicU64,
-    /// Whether the best motion so far keeps the limits well enough for the polish.
+    /// Whether the best motion up to now keeps the limits well enough for the polish.
     inside: AtomicBool,
     /// Bits of the seconds at which it was ended; infinite before.
     ended_s: AtomicU64,
@@ -46,17 +46,17 @@ impl<'a> Interruption<'a> {
         }
     }
 
-    /// Adds to the evaluations so far.
+    /// Adds to the number of evaluations.
     pub(super) fn count(&self, evaluations: usize) {
         self.evaluations.fetch_add(evaluations as u64, Ordering::Relaxed);
     }
 
-    /// Evaluations so far.
+    /// Number of evaluations up to now.
     pub(super) fn evaluations(&self) -> u64 {
         self.evaluations.load(Ordering::Relaxed)
     }
 
-    /// Records whether the best motion so far keeps the limits well enough for the polish.
+    /// Records whether the best motion up to now keeps the limits well enough for the polish.
     pub(super) fn set_inside(&self, inside: bool) {
         self.inside.store(inside, Ordering::Relaxed);
     }

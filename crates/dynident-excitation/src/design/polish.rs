@@ -143,7 +143,7 @@ fn made_smaller(run: &DesignRun<'_>, outside: &Assessment) -> Option<Assessment>
     shrunk(run.task, run.criterion, outside, [&run.fine, &run.logged], &|| run.interruption.is_overdue())
 }
 
-/// What the smooth criterion of `smaller` is above that of `larger`; infinite where either has none.
+/// The smooth criterion of `smaller` minus that of `larger`; infinite where one of them is undefined.
 fn loss(criterion: &dyn Criterion, larger: &Assessment, smaller: &Assessment) -> f64 {
     let value = |of: &Assessment| criterion.value_and_derivative(&of.information).map(|(value, _)| value);
     value(smaller).zip(value(larger)).map_or(f64::INFINITY, |(smaller, larger)| smaller - larger)

@@ -52,7 +52,7 @@ const VIOLATION_WEIGHT: f64 = 10.0;
 /// Whether a descent ends after an evaluation with this value and violation; called from any thread.
 pub(super) type Stop<'a> = dyn Fn(f64, f64) -> bool + Sync + 'a;
 
-/// What ends a round early.
+/// Conditions that end a round early.
 #[derive(Clone, Copy)]
 pub(super) struct RoundEnd<'a> {
     /// Ends all descents.

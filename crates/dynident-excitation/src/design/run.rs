@@ -1,4 +1,4 @@
-//! What all phases of a design share.
+//! Data that all phases of a design share.
 
 use super::assess::{Assessment, assess};
 use super::interruption::Interruption;

@@ -64,7 +64,7 @@ pub(super) fn searched(run: &DesignRun<'_>) -> Result<Candidate, OptimiserError>
 /// Which starts of a round are followed to their end.
 fn worth(run: &DesignRun<'_>, neighbourhood: &Neighbourhood, effort: &Effort, round: usize) -> Worth {
     match neighbourhood.score() {
-        // Restarts around the best find a better one sooner than it comes to its own end.
+        // Restarts near the best motion find a better one sooner than this search converges.
         _ if round < UNFOLLOWED_ROUNDS && effort.rounds >= MANY_ROUNDS => Worth::Never,
         Some(score) if round >= run.task.criteria.len() => Worth::IfBelow(score),
         _ => Worth::Always,

@@ -4,7 +4,7 @@ use super::kind::{Constraint, LimitKind};
 use super::set::{LimitSet, LimitWorkspace};
 use crate::motion::Motion;
 
-/// Values above this count as broken, as in the re-check.
+/// A limit is broken above this value, as in the final check.
 pub(super) const TOLERANCE: f64 = 1e-6;
 
 /// The slowest run that is considered, as a multiple of the duration.

@@ -198,7 +198,7 @@ fn clamped(x: &[f64], bounds: &[[f64; 2]]) -> Vec<f64> {
     x.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect()
 }
 
-/// All runs of a search, and their best point so far.
+/// All runs of a search, and the best point found up to now.
 struct Search<'a> {
     objective: &'a Objective<'a>,
     bounds: &'a [[f64; 2]],

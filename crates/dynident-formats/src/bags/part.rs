@@ -14,7 +14,7 @@ pub(super) enum Encoding {
     Other(String),
 }
 
-/// What a part of a recording calls one stream of messages.
+/// One stream of messages in a part of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Channel {
     pub(super) topic: String,
@@ -27,7 +27,7 @@ pub(super) trait Part: fmt::Debug + Send {
     /// The next message: its channel, the time at which it was recorded (ns), its bytes; `None` at the end.
     fn next(&mut self, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError>;
 
-    /// The channels met so far, by their number.
+    /// A channel that was already read, by its number.
     fn channel(&self, index: usize) -> Option<&Channel>;
 
     /// Whether the part ended too early.

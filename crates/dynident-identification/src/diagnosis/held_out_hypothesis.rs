@@ -1,5 +1,5 @@
-//! Mistakes of a held-out log alone: a format of its own, another day's cables. The base parameters of the training
-//! logs are known, so the residual alone is the evidence of a hypothesis.
+//! Mistakes that only a held-out log has: a different format, or cables that were exchanged on another day. The base
+//! parameters of the training logs are known, so the residual alone is the evidence of a hypothesis.
 
 use super::channels::Channels;
 use super::explanation::predicted;

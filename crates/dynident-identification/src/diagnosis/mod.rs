@@ -10,7 +10,7 @@
 //! | `mistakes` | the kinds of mistakes, one file each |
 //! | `motion_rows` | a few hundred instants of a recording |
 //! | `joint_fits`, `explanation`, `nominal`, `plausibility` | the evidence: best robots, the description, limits |
-//! | `step_width`, `beside_friction`, `further_friction`, `noise_torque`, `usual_errors`, `span` | causes that are no mistake: friction, noise, errors of descriptions |
+//! | `step_width`, `beside_friction`, `further_friction`, `noise_torque`, `usual_errors`, `span` | other causes than mistakes: friction, noise, errors of descriptions |
 //! | `hypothesis`, `search`, `round`, `refinement` | the score, the best hypothesis, and its number |
 //! | `confirmation` | whether correct logs would support the hypothesis as well |
 //! | `torque_clock` | torque of another moment |

@@ -3,7 +3,7 @@
 use dynident_estimation::{FastMotion, HausmanTest, InstrumentReport};
 use serde::{Deserialize, Serialize};
 
-/// What noise in the regressor does to least squares.
+/// The effect of noise in the regressor on least squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -12,7 +12,7 @@ pub enum NoiseVerdict {
     Harmless,
     /// It biases least squares by more than the error bars say.
     BiasesLeastSquares,
-    /// It cannot be told, or was not asked.
+    /// Not determined, or not tested.
     #[default]
     Undecided,
 }
@@ -29,7 +29,7 @@ pub struct EstimateContrast {
     pub column: String,
 }
 
-/// What was found out about noise in the regressor.
+/// Results of the test for noise in the regressor.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NoiseInRegressor {
@@ -39,7 +39,7 @@ pub struct NoiseInRegressor {
     pub instruments: InstrumentReport,
     /// Least squares against instruments: was filtering enough?
     pub hausman: HausmanTest,
-    /// What follows for least squares.
+    /// The consequence for least squares.
     #[serde(default)]
     pub verdict: NoiseVerdict,
     /// Whether torque follows the fast part of the motion, which instruments of half the regressor's cut-off leave
@@ -52,7 +52,7 @@ pub struct NoiseInRegressor {
     /// Whether `method = "auto"` took the instruments' estimate.
     #[serde(default)]
     pub instruments_taken: bool,
-    /// The regressor's cut-off that the logs asked for, where a lower one was taken because of the noise, Hz.
+    /// The cut-off of the regressor that was chosen from the logs, where a lower one was taken because of noise, Hz.
     #[serde(default)]
     pub cutoff_before_hz: Option<f64>,
 }

@@ -116,7 +116,7 @@ fn fitted_motion(
     Ok(motion)
 }
 
-/// What the fit found of each log's motion and noise.
+/// Motion and noise of each log, as fitted.
 fn series_fits(
     recorded: &[RawRecord],
     records: &mut PeriodicRecords<'_>,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct JointFriction {
     /// The joint.
     pub joint: String,
-    /// What was chosen, or why nothing was: the stated terms then stay in force.
+    /// The friction that was chosen, or why the stated terms stay in force.
     pub chosen: String,
     /// The joint's friction; none when nothing was chosen.
     pub terms: Option<Vec<TorqueTerm>>,
@@ -19,7 +19,7 @@ pub struct JointFriction {
     pub constants: Vec<FrictionConstant>,
     /// Blocks of time that were left out in turn.
     pub folds: usize,
-    /// What was compared, each with its best constants.
+    /// The candidates that were compared, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
 }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What of a known arm is fitted again, beside the payload.
+/// Parameters of a known arm that are fitted again together with the payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]

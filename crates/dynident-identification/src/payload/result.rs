@@ -74,7 +74,7 @@ pub struct PayloadResult {
     /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not
     /// determined alone.
     pub inertia_at_com_kgm2: [Option<Measured>; 6],
-    /// What the logs cannot determine, in words.
+    /// The parameters that the logs do not determine, in words.
     pub not_identified: Vec<String>,
     /// A body that it may be; none where there is none.
     pub possible: Option<ConsistentPayload>,
@@ -157,7 +157,7 @@ fn result(
     }
 }
 
-/// What the logs cannot determine, in words.
+/// The parameters that the logs do not determine, in words.
 fn not_identified(columns: &PayloadColumns, parameters: &[PayloadParameter]) -> Vec<String> {
     let mut not_identified: Vec<String> = parameters
         .iter()

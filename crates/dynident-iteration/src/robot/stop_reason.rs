@@ -30,7 +30,7 @@ impl core::fmt::Display for Breach {
     }
 }
 
-/// What leaves an envelope, by its own name.
+/// A joint or link that left its envelope, by its name.
 #[derive(Debug)]
 pub(super) struct SampleBreach {
     pub(super) name: String,

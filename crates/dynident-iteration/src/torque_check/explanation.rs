@@ -150,8 +150,8 @@ struct Free<'a> {
     pushes_away: bool,
 }
 
-/// What may explain a joint's difference `beside` between logged and commanded torque, the best first. `total` is the
-/// squared difference beside the drives' own loop.
+/// Possible causes of a joint's difference `beside` between logged and commanded torque, the best first. `total` is the
+/// squared difference without the part of the drives' own loop.
 fn candidates(data: &JointData<'_>, joint: usize, free: &Free<'_>, beside: &[f64], total: f64) -> Vec<Fitted> {
     let (y, columns) = (&data.torque[joint], &data.columns[joint]);
     let own_loop = columns.get(1..).unwrap_or_default();

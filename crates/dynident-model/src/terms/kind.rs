@@ -1,4 +1,4 @@
-//! What every kind of torque term states about itself. A kind is one type in one file that implements [`TermKind`];
+//! The properties that every kind of torque term defines. A kind is one type in one file that implements [`TermKind`];
 //! [`TorqueTerm`](super::TorqueTerm) passes every question on to it, so that no other code has to know the kinds.
 
 use super::candidate::velocity_within;
@@ -192,7 +192,7 @@ pub struct TermLabel<'a> {
     pub unit: &'a str,
 }
 
-/// What every kind of torque term states about itself.
+/// The properties that every kind of torque term defines.
 pub trait TermKind: VelocityFunction {
     /// What it is called.
     fn label(&self) -> TermLabel<'_>;

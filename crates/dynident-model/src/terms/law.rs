@@ -40,7 +40,7 @@ impl<L: VelocityLaw> VelocityFunction for L {
     }
 }
 
-/// What a kind of term states about itself beyond [`TermKind`]: what depends on the scalar, and constants of the kind.
+/// Properties of a kind of term in addition to [`TermKind`]: what depends on the scalar, and constants of the kind.
 pub(super) trait Law: TermKind + VelocityLaw {
     /// How it takes part when recordings choose a joint's friction; empty where they do not choose it.
     const CANDIDATES: &'static [CandidateLaw] = &[];

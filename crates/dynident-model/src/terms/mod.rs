@@ -111,7 +111,7 @@ macro_rules! torque_terms {
         }
 
         impl TorqueTerm {
-            /// What its kind states about it.
+            /// The properties of its kind.
             pub fn kind(&self) -> &dyn TermKind {
                 match self {
                     $(Self::$kind(term) => term,)*
@@ -197,7 +197,7 @@ macro_rules! friction_terms {
         }
 
         impl FrictionTerm {
-            /// What its law does with the stated constants.
+            /// The terms of its law with the stated constants.
             pub fn law(&self) -> &dyn StatedLaw {
                 match self {
                     $(Self::$law(law) => law,)*

@@ -178,8 +178,8 @@ impl TorqueTerm {
         }
     }
 
-    /// The first sample of a motion of which a declared torque says nothing: its expression has no value there, or its
-    /// table does not reach so far. Its column is zero there, or what the table's end says.
+    /// The first sample of a motion at which a declared torque is undefined: its expression has no value there, or its
+    /// table ends before. The column is zero there, or has the last value of the table.
     pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
         self.state_function()?.first_outside(motion)
     }
@@ -230,7 +230,7 @@ impl TorqueTerm {
     }
 
     /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`.
-    /// The block counts as a recording of its own, without known load or temperature: see
+    /// The block is treated as a separate recording, without known load or temperature: see
     /// [`column_following`](TorqueTerm::column_following).
     ///
     /// # Panics
@@ -240,8 +240,8 @@ impl TorqueTerm {
         self.column_following(row, motion, &mut input, out);
     }
 
-    /// The regressor column as [`column`](TorqueTerm::column), of a block that follows others: with one sample a block,
-    /// what a simulation needs.
+    /// The regressor column as [`column`](TorqueTerm::column), for a block that follows others; a simulation passes
+    /// blocks of one sample.
     ///
     /// # Panics
     /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value
@@ -255,7 +255,7 @@ impl TorqueTerm {
 
     /// Adds to the three parts of `gradient` (joint-major) the derivatives of `Σ weights[s] · column[s]` by positions,
     /// velocities and accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint
-    /// `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element.
+    /// `row`. The sign step and the deflection of a Maxwell-slip element are treated as constant.
     ///
     /// # Panics
     /// If lengths differ.
@@ -264,7 +264,7 @@ impl TorqueTerm {
         self.kind().apply_adjoint(row, motion, weights, gradient);
     }
 
-    /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
+    /// Contribution of this parameter to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
     pub fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
         let entry = match self.kind().joints() {
             TermJoints::One(joint) => (row, column) == (joint, joint),
@@ -273,7 +273,8 @@ impl TorqueTerm {
         self.mass_matrix_factor().filter(|_| entry).unwrap_or(0.0)
     }
 
-    /// What this parameter adds to the torque of joint `row` at rest: a constant, one for the offset of that joint.
+    /// Contribution of this parameter to the torque of joint `row` at rest: a constant, one for the offset of that
+    /// joint.
     pub fn constant_torque(&self, row: usize) -> f64 {
         match self.action() {
             TermAction::Constant => f64::from(self.acts_on(row)),

@@ -181,7 +181,7 @@ impl MeanStep {
         Ok(Self { mean_s, median_s, jitter: deviation / mean_s, rounded, repeats_rows })
     }
 
-    /// The jitter, and how many of so many stamps are rounded.
+    /// The jitter, and how many of the stamps are rounded.
     fn jitter_in_words(&self, stamps: usize) -> String {
         let by_rows = match self.rounded {
             0 => String::new(),

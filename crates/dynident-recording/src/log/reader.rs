@@ -255,7 +255,7 @@ impl LogReader {
         Ok(())
     }
 
-    /// Passes over a row before the first that is asked for.
+    /// Skips a row before the first requested one.
     fn skip_row(&mut self) -> Result<(), RecordingError> {
         let mut ended = None;
         for (index, table) in self.tables.iter_mut().enumerate() {

@@ -5,7 +5,7 @@ use crate::result::{IterationRun, IterationsFile};
 /// Curves of one plot: more cannot be distinguished.
 pub(super) const CURVES: usize = 6;
 
-/// A run's number, with its leg where each has an iteration of its own.
+/// A run's number, with its leg where each leg has a separate iteration.
 pub(super) fn run_name(run: &IterationRun) -> String {
     run.leg.map_or_else(|| run.run.to_string(), |leg| format!("{} of leg {leg}", run.run))
 }
@@ -25,7 +25,7 @@ pub(super) fn worst(run: &IterationRun) -> f64 {
     run.max_tracking_error_rad.iter().fold(0.0, |most, error| most.max(*error))
 }
 
-/// Root mean square error of the parameters that a run determines, in units of its own error bars.
+/// Root mean square error of the parameters that a run determines, in standard deviations.
 pub(super) fn error_in_bars(run: &IterationRun) -> Option<f64> {
     let squares: Vec<f64> = run
         .parameters

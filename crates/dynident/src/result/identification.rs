@@ -266,7 +266,7 @@ pub struct BaseParameterResult {
     pub excited: bool,
 }
 
-/// What one source of error contributes to a parameter's error bar.
+/// The contribution of one source of error to a parameter's error bar.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorTermResult {
@@ -587,6 +587,6 @@ pub struct JointFrictionResult {
     pub constants: Vec<FrictionConstant>,
     /// Blocks of time that were left out in turn.
     pub folds: usize,
-    /// What was compared, each with its best constants.
+    /// The candidates that were compared, each with its best constants.
     pub candidates: Vec<FrictionCandidate>,
 }

@@ -135,7 +135,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     Ok(SplineMotionEstimate { estimate, motion: motion.collect(), logs, cost_at_start, cost: cost_now })
 }
 
-/// What stays the same from step to step.
+/// Data that all steps of a fit share.
 struct Fit<'a> {
     problem: &'a SplineMotionProblem,
     settings: &'a SplineMotionSettings,

@@ -1,4 +1,4 @@
-//! What each kind of mistake states about itself.
+//! The properties that each kind of mistake defines.
 
 use super::Mistake;
 use super::numbers::Number;
@@ -139,12 +139,12 @@ pub(super) trait MistakeKind {
         None
     }
 
-    /// The same with another number; none where it has no number.
+    /// The same mistake with another number; `None` for a kind without a number.
     fn with_number(&self, _number: f64) -> Option<Mistake> {
         None
     }
 
-    /// The same without its number: what the mistake is about; none where it has no number.
+    /// The mistake with the number 1, to compare its subject with that of others; `None` for a kind without a number.
     fn subject(&self) -> Option<Mistake> {
         self.with_number(1.0)
     }

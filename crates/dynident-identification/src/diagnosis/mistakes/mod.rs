@@ -112,7 +112,7 @@ impl Mistake {
         self.facts().joints.unwrap_or_else(|| (0..dof).collect())
     }
 
-    /// What its kind states.
+    /// The properties of its kind.
     pub(super) fn facts(&self) -> Facts {
         self.kind().facts()
     }

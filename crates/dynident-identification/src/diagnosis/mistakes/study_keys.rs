@@ -76,7 +76,8 @@ impl StudyKeys {
         KeyChange { table, line: format!("scale = {}", list((0..factors.len()).map(value))) }
     }
 
-    /// `scale` of the torque columns in one unit of `unit` Nm (N): one number if they have one scale so far.
+    /// `scale` of the torque columns in one unit of `unit` Nm (N): one number if all columns have the same scale in the
+    /// study.
     pub fn torque_unit(&self, unit: f64) -> KeyChange {
         let (group, table) = self.group(Channels::Torque);
         let own: Vec<f64> = (0..self.columns).map(|place| at(group.scale.as_ref(), place, 1.0)).collect();

@@ -164,8 +164,8 @@ impl MotionStream {
         }
     }
 
-    /// Leaves the marked samples out; what remains waits as blocks of pieces of their own. `first` is the place of the
-    /// block's first row in the window that the marks count in.
+    /// Leaves out the marked samples. The other samples become separate pieces. `first` is the index of the block's
+    /// first row in the window to which the marks belong.
     fn keep_unmarked(&mut self, block: &MotionBlock, marked: &[Range<usize>], first: usize) {
         let runs = kept_runs(marked, first, block.rows);
         let kept: usize = runs.iter().map(ExactSizeIterator::len).sum();

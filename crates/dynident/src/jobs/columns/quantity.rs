@@ -1,6 +1,6 @@
 //! The quantity that a column holds.
 
-/// What a column holds of a joint.
+/// The quantity of a joint that a column contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::jobs) enum Quantity {
     Position,

@@ -3,7 +3,7 @@
 use crate::cpu_time::cpu_seconds;
 use std::time::Instant;
 
-/// What a job has cost so far.
+/// Measures the wall time and processor time of a job.
 pub(super) struct Stopwatch {
     pub(super) started: Instant,
     cpu_s: Option<f64>,

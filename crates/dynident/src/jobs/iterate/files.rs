@@ -36,8 +36,8 @@ impl<'a> ResultFiles<'a> {
         RobotFiles::none().added_to(self.without_page(set), self.robot_is_own).write()
     }
 
-    /// Writes the file, its page and the robot that was found. While runs are still being made there is no page and no
-    /// robot, and those of an earlier call are removed.
+    /// Writes the file, its page and the identified robot. While runs are still being made, page and robot of an
+    /// earlier call are removed.
     pub(super) fn write(&self, file: &IterationsFile, page: Option<String>, found: RobotFiles) -> Result<(), Error> {
         let bytes = dynident_text::json::to_string_pretty(file)
             .map_err(|error| Error::Result { path: self.out.join(ITERATIONS), message: error.to_string() })?;

@@ -1,4 +1,4 @@
-//! What all stages of an iteration have in common: robot, legs, settings and report.
+//! Data that all stages of an iteration share: robot, legs, settings and report.
 
 use super::bound;
 use super::inputs::Inputs;

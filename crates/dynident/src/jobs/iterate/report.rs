@@ -41,7 +41,7 @@ pub(super) struct IterationReport<'a> {
 
 /// One iteration of legs that are identified together, so far.
 pub(super) struct Stage<'a> {
-    /// The leg's number from 1, where each has an iteration of its own.
+    /// The leg's number from 1, where each leg has a separate iteration.
     pub(super) leg: Option<usize>,
     /// With the friction in force.
     pub(super) robot: &'a ParametricModel,

@@ -33,7 +33,7 @@ pub(super) struct Stages<'a> {
     pub(super) program: Option<&'a PermittedProgram>,
 }
 
-/// The results of the stages so far.
+/// The results of the stages that have ended.
 pub(super) struct StageResults<'a> {
     pub(super) files: Vec<IterationsFile>,
     pub(super) traces: Vec<RunTrace>,
@@ -50,7 +50,7 @@ pub(super) struct StageResults<'a> {
 #[derive(Clone, Copy)]
 struct CurrentStage<'a> {
     iteration: &'a Iteration,
-    /// The leg's number from 1, where each has an iteration of its own.
+    /// The leg's number from 1, where each leg has a separate iteration.
     leg: Option<usize>,
     /// How many legs it has.
     legs: usize,
@@ -124,7 +124,7 @@ impl<'a> Stages<'a> {
         unwritten.map_or(Ok(outcome), Err)
     }
 
-    /// Writes `iterations.json` with the runs so far, while the next run is awaited.
+    /// Writes `iterations.json` with the runs that were made, before the next run.
     fn write_progress(
         &self,
         stage: &CurrentStage<'_>,
