@@ -229,6 +229,43 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consist
     }
 }
 
+/// The base parameters with error bars, consistent set and description.
+fn base_table(page: &mut Report, r: &ResultFile) {
+    let optional = |value: Option<f64>| Cell::from(value.map_or_else(String::new, |value| short(value, 5)));
+    let row = |p: &BaseParameterResult| {
+        let relative = p.relative_half_width_percent();
+        let tone = if relative.is_none_or(|relative| relative > 30.0) { Tone::Warning } else { Tone::Plain };
+        let relative = relative.map_or_else(String::new, |value| short(value, 3));
+        vec![
+            Cell::from(&p.expression),
+            short(p.value, 6).into(),
+            short(p.bar_95(), 3).into(),
+            Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
+            optional(p.physical),
+            optional(p.prior),
+            Cell::from(unit(&p.unit)),
+            Cell::from(largest_error(p)),
+        ]
+    };
+    let columns = [
+        "expression",
+        "free fit",
+        "± (95 %)",
+        "± in %",
+        "consistent set",
+        "description",
+        "unit",
+        "largest error source",
+    ];
+    page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
+}
+
+/// The largest source of a parameter's error with its share of the variance, in words.
+fn largest_error(p: &BaseParameterResult) -> String {
+    let words = |(term, share): (&ErrorTermResult, f64)| format!("{} ({:.0} %)", term.name(), 100.0 * share);
+    p.largest_error().map_or_else(String::new, words)
+}
+
 fn parameters(page: &mut Report, r: &ResultFile) {
     // One picture a unit: bars of one scale.
     let mut units: Vec<&str> = Vec::new();
@@ -247,33 +284,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
         }
         page.add(plot);
     }
-    let optional = |value: Option<f64>| Cell::from(value.map_or_else(String::new, |value| short(value, 5)));
-    let row = |p: &BaseParameterResult| {
-        let relative = p.relative_half_width_percent();
-        let tone = if relative.is_none_or(|relative| relative > 30.0) { Tone::Warning } else { Tone::Plain };
-        let relative = relative.map_or_else(String::new, |value| short(value, 3));
-        vec![
-            Cell::from(&p.expression),
-            short(p.value, 6).into(),
-            short(p.bar_95(), 3).into(),
-            Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
-            optional(p.physical),
-            optional(p.prior),
-            Cell::from(unit(&p.unit)),
-            Cell::from(p.largest_error().map_or("", ErrorTermResult::name)),
-        ]
-    };
-    let columns = [
-        "expression",
-        "free fit",
-        "± (95 %)",
-        "± in %",
-        "consistent set",
-        "description",
-        "unit",
-        "largest error source",
-    ];
-    page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
+    base_table(page, r);
     if !r.method.coincident.is_empty() {
         let points = r.method.coincident.iter().map(|sentence| (Tone::Warning, sentence.clone())).collect();
         page.add(Text { paragraphs: Vec::new(), points });

@@ -1,6 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use super::check::StudyCheck;
+use super::error_terms::ErrorTermResult;
 use super::numbers::{number, rows};
 use super::provenance::Provenance;
 use crate::study::JointDrive;
@@ -16,7 +17,7 @@ use dynident_identification::examination::{
 use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::rows::VelocityHistogram;
-use dynident_identification::{BetweenLogs, Condition, CutoffByError, DriveInertiaChoice, ErrorSource, Role};
+use dynident_identification::{BetweenLogs, Condition, CutoffByError, DriveInertiaChoice, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -266,36 +267,13 @@ pub struct BaseParameterResult {
     pub excited: bool,
 }
 
-/// The contribution of one source of error to a parameter's error bar.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct ErrorTermResult {
-    /// The source.
-    pub source: ErrorSource,
-    /// Standard deviation, in the parameter's unit.
-    #[serde(deserialize_with = "number")]
-    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
-    pub std: f64,
-}
-
-impl ErrorTermResult {
-    /// The source in words.
-    pub fn name(&self) -> &'static str {
-        match self.source {
-            ErrorSource::Noise => "noise",
-            ErrorSource::Lag => "lag",
-            ErrorSource::BetweenLogs => "differences between logs",
-            ErrorSource::FrictionConstants => "friction constants",
-            ErrorSource::Gains => "drive gains",
-            ErrorSource::NominalValues => "nominal values",
-        }
-    }
-}
-
 impl BaseParameterResult {
-    /// The largest source of error; none where the noise is the only one.
-    pub fn largest_error(&self) -> Option<&ErrorTermResult> {
-        self.error_terms.iter().max_by(|one, other| one.std.total_cmp(&other.std))
+    /// The largest source of error and its share of the variance; none where the noise is the only source, and for a
+    /// parameter that is not excited.
+    pub fn largest_error(&self) -> Option<(&ErrorTermResult, f64)> {
+        let largest = self.error_terms.iter().max_by(|one, other| one.std.total_cmp(&other.std))?;
+        let variance: f64 = self.error_terms.iter().map(|term| term.std * term.std).sum();
+        Some((largest, largest.std * largest.std / variance))
     }
 
     /// `100 bar_95 / |value|`; none for a value of zero and for what the data do not excite.

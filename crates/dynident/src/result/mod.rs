@@ -3,6 +3,7 @@
 
 mod check;
 mod design;
+mod error_terms;
 mod evaluation;
 mod export;
 mod factors;
@@ -24,13 +25,14 @@ pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, ReadingResult, StudyChang
 pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
+pub use error_terms::ErrorTermResult;
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
 pub use identification::{
-    BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, JointResult, LogOffset, LogSummary,
-    MethodSummary, PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary,
-    TermResult, Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
+    Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
 };
 pub use inspection::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
@@ -42,7 +44,8 @@ pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
-// What the files hold of the crates below.
+// Types of the crates below that the files contain.
 pub use dynident_excitation::check::LimitReport;
+pub use dynident_identification::ErrorSource;
 pub use dynident_iteration::{RobotFault, RobotStatus};
 pub use validation::{VALIDATION_SCHEMA, ValidationFile};

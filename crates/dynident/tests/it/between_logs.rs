@@ -37,6 +37,14 @@ fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
             });
         }
         let result = job.identify().result;
+        let mut largest = Vec::new();
+        for own in result.base_parameters.iter().filter(|own| !own.error_terms.is_empty()) {
+            let terms = own.error_terms.iter().filter(|term| term.name() != "nominal values");
+            let variance: f64 = terms.map(|term| term.std * term.std).sum();
+            assert!((variance.sqrt() - own.std).abs() <= 1e-9 * own.std, "run {run}: {own:?}");
+            largest.extend(own.largest_error().map(|(term, _)| term.name()));
+        }
+        assert!(spread == 0.0 || largest.contains(&"differences between logs"), "run {run}: {largest:?}");
         // The robot's drives have none, and friction that is another every day must not look like it.
         let drives = result.drive_inertia_choice.as_ref().unwrap();
         assert!(!drives.seen && drives.standard_deviations.is_some(), "run {run}: {}", drives.sentence());

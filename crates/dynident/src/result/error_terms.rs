@@ -1,0 +1,31 @@
+//! The error bar of a parameter by source.
+
+use super::numbers::number;
+use dynident_identification::ErrorSource;
+use serde::{Deserialize, Serialize};
+
+/// The contribution of one source of error to a parameter's error bar.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ErrorTermResult {
+    /// The source.
+    pub source: ErrorSource,
+    /// Standard deviation, in the parameter's unit.
+    #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
+    pub std: f64,
+}
+
+impl ErrorTermResult {
+    /// The source in words.
+    pub fn name(&self) -> &'static str {
+        match self.source {
+            ErrorSource::Noise => "noise",
+            ErrorSource::Lag => "lag",
+            ErrorSource::BetweenLogs => "differences between logs",
+            ErrorSource::FrictionConstants => "friction constants",
+            ErrorSource::Gains => "drive gains",
+            ErrorSource::NominalValues => "nominal values",
+        }
+    }
+}
