@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// A source of error in the estimated parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum ErrorSource {
@@ -36,7 +36,7 @@ struct ErrorTerm {
     covariance: DMatrix<f64>,
 }
 
-/// The terms of an estimate's covariance beyond the noise, in the order in which they are added.
+/// The terms of an estimate's covariance beyond the noise, in the order of their sources.
 #[derive(Clone, Debug, Default)]
 pub struct ErrorBars {
     terms: Vec<ErrorTerm>,
@@ -48,6 +48,7 @@ impl ErrorBars {
     #[must_use]
     pub fn with(mut self, source: ErrorSource, covariance: Option<DMatrix<f64>>) -> Self {
         self.terms.extend(covariance.map(|covariance| ErrorTerm { source, covariance }));
+        self.terms.sort_by_key(|term| term.source);
         self
     }
 

@@ -7,7 +7,6 @@ use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
-use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::training_rows;
 use dynident_estimation::{WeightedSettings, weighted_least_squares};
@@ -44,9 +43,8 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     if chosen.is_empty() {
         return Err(IdentificationError::NoTrainingLog);
     }
-    let settings = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
     let logs = Logs::new(robot.model(), recordings, settings.row_settings(), &chosen, None, execution)?;
-    let training = training_rows(&logs, &settings, robot.clone().into(), &chosen, payloads, None)?;
+    let training = training_rows(&logs, settings, robot.clone().into(), &chosen, payloads, None)?;
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
     let theta = &estimate.values[..training.columns.base()];
     let known = training.columns.is_plain().then_some(theta);
@@ -57,7 +55,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     for index in of_role(recordings, Role::Validate) {
         imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));
     }
-    let task = DiagnosisTask { logs: &logs, settings: &settings, robot, training: &chosen, theta: known };
+    let task = DiagnosisTask { logs: &logs, settings, robot, training: &chosen, theta: known };
     let diagnosis = if have_jumps(&training) { None } else { Some(diagnose(task)?) };
     let rows = training.problem.joint_rows().iter().sum();
     Ok(StudyExamination { imports, diagnosis, rows, parameters: robot.base().count() })

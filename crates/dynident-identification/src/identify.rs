@@ -4,20 +4,22 @@ use crate::bandwidth::CutoffByError;
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::BetweenLogs;
 use crate::consistent::inertials;
+use crate::decisions::Job;
 use crate::diagnosis::Diagnosis;
 use crate::drive_inertia::DriveInertiaChoice;
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSource};
 use crate::examination::HeldOutExamination;
 use crate::execution::Execution;
-use crate::fitted::fitted;
+use crate::fitted::{Fitted, fitted};
 use crate::lag::LagChoice;
+use crate::less_noise::Fit;
 use crate::logs::of_role;
-use crate::one_fit::{Fitted, Job, StageTimes};
 use crate::payload::{KnownArm, PayloadError, PayloadResult, gain_error, payload_results};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
 use crate::settings::{GainChoice, IdentificationSettings};
+use crate::stage_times::StageTimes;
 use crate::stages::{ConsistentParameters, Stage, TrainingExamination};
 use crate::task::IdentificationTask;
 use crate::training::Training;
@@ -108,7 +110,7 @@ impl Identification {
 /// # Errors
 /// [`IdentificationError`]: recordings, settings that do not go together. A poor fit is not an error.
 pub fn identify(task: &IdentificationTask, execution: Execution<'_>) -> Result<Identification, IdentificationError> {
-    execution.install(|| identified(task, execution, &mut Job::Model(None)))
+    execution.install(|| identified(task, execution, Job::Model(None)))
 }
 
 /// As [`identify()`] with instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call
@@ -123,7 +125,7 @@ pub fn identify_with_instruments(
     source: &mut dyn InstrumentSource,
     execution: Execution<'_>,
 ) -> Result<Identification, IdentificationError> {
-    execution.install(|| identified(task, execution, &mut Job::Model(Some(source))))
+    execution.install(|| identified(task, execution, Job::Model(Some(source))))
 }
 
 /// Payloads on an arm that is known already, with the arm's error bars in theirs. The task's robot has the arm's terms;
@@ -142,13 +144,13 @@ pub fn identify_payload(
     if !task.settings.drive_inertia.is_empty() {
         return Err(PayloadError::DrivesOfKnownArm.into());
     }
-    execution.install(|| identified(task, execution, &mut Job::Payload(arm)))
+    execution.install(|| identified(task, execution, Job::Payload(arm)))
 }
 
 fn identified(
     task: &IdentificationTask,
     execution: Execution<'_>,
-    job: &mut Job<'_, '_>,
+    job: Job<'_>,
 ) -> Result<Identification, IdentificationError> {
     let IdentificationTask { robot, recordings, payloads, settings } = task;
     let chosen = of_role(recordings, Role::Identify);
@@ -157,22 +159,10 @@ fn identified(
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
-    // Rows and factors, with filters and friction stated or chosen and the torque's lag taken off; then the estimate.
-    let Fitted {
-        logs,
-        training,
-        estimation,
-        settings,
-        cutoff,
-        robot,
-        drive_inertia,
-        stated_friction,
-        lag,
-        between_logs,
-        bars,
-        mut times,
-        ..
-    } = fitted(task, &chosen, execution, job)?;
+    let arm = job.arm();
+    let Fitted { fit, choices, lag, between_logs, bars, mut times } = fitted(task, &chosen, execution, job)?;
+    let Fit { logs, training, estimation, settings } = fit;
+    let friction = choices.friction();
     let (settings, started) = (&settings, Instant::now());
     let total = bars.total(&estimation.estimate);
     let (estimate, dropped) = without_inessential(total, settings)?;
@@ -183,24 +173,26 @@ fn identified(
         settings,
         training: &training,
         estimate: &estimate,
-        stated_friction: stated_friction.as_ref(),
-        arm_is_known: job.arm().is_some(),
+        stated_friction: friction.as_ref().and_then(|friction| friction.stated.as_ref()),
+        arm_is_known: arm.is_some(),
         started,
     };
     let examined = stage.examined()?;
-    let diagnosis = stage.diagnosis(&examined, &robot, &chosen)?;
+    let drives = choices.drives();
+    let robot = drives.map_or(robot, |drives| &drives.robot);
+    let diagnosis = stage.diagnosis(&examined, robot, &chosen)?;
     times.estimation_s += examined.estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - examined.estimation_s;
-    let of_arm = job.arm().map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
+    let of_arm = arm.map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
     let gain_std = if settings.gains == GainChoice::Stated { settings.gain_std } else { 0.0 };
     let gain_error = gain_error(&training.problem, &training.columns, &estimate, &of_arm, gain_std)?;
     let with_gains = ErrorBars::default().with(ErrorSource::Gains, gain_error).total(&estimate);
     Ok(Identification {
         payloads: payload_results(recordings, payloads, &chosen, &training.columns, &with_gains),
         motion: logs.motion.clone(),
-        cutoff,
+        cutoff: choices.cutoff().cloned(),
         motion_hz: logs.motion_hz(),
-        drive_inertia,
+        drive_inertia: drives.and_then(|drives| drives.choice.clone()),
         estimator: settings.estimation.estimator.clone(),
         essential: dropped,
         consistent: examined.consistent,

@@ -10,8 +10,8 @@ use crate::training::{Training, training_rows};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimateStatus;
 
-/// Rows, estimate and the settings that made them.
-pub(crate) struct Estimated<'a> {
+/// Rows, estimate and the settings that made them: with the estimator that `auto` selected and the lag in force.
+pub(crate) struct Fit<'a> {
     pub(crate) logs: Logs<'a>,
     pub(crate) training: Training,
     pub(crate) estimation: Estimation,
@@ -34,8 +34,8 @@ pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
     robot: &ParametricModel,
     chosen: &[usize],
-    mut found: Estimated<'a>,
-) -> Result<Estimated<'a>, IdentificationError> {
+    mut found: Fit<'a>,
+) -> Result<Fit<'a>, IdentificationError> {
     let Some((cutoff_hz, noise)) = take_estimator(&mut found) else { return Ok(found) };
     let IdentificationTask { recordings, payloads, .. } = task;
     let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
@@ -62,19 +62,19 @@ pub(crate) fn with_less_noise<'a>(
     let mut estimation = estimate(&training.rows(&logs, &found.settings, chosen), None)?;
     if let Some(again) = &mut estimation.noise_in_regressor {
         if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {
-            return Ok(Estimated { logs: before.unwrap_or(logs), ..found });
+            return Ok(Fit { logs: before.unwrap_or(logs), ..found });
         }
         // The verdict is about the rows that noise was found in.
         (again.verdict, again.fast_motion, again.hausman) = (noise.verdict, noise.fast_motion, noise.hausman);
         (again.least_squares, again.instruments_taken) = (noise.least_squares, true);
         again.cutoff_before_hz = before_hz.filter(|_| is_lower);
     }
-    Ok(Estimated { logs, training, estimation, settings: found.settings })
+    Ok(Fit { logs, training, estimation, settings: found.settings })
 }
 
 /// Puts the estimator that `auto` took into the settings; the cut-off of the instruments, hertz, and what was found of
 /// the noise, where it took them.
-pub(crate) fn take_estimator(found: &mut Estimated<'_>) -> Option<(f64, NoiseInRegressor)> {
+pub(crate) fn take_estimator(found: &mut Fit<'_>) -> Option<(f64, NoiseInRegressor)> {
     let Estimator::Auto(own) = found.settings.estimation.estimator.clone() else { return None };
     let noise = found.estimation.noise_in_regressor.as_ref().filter(|noise| noise.instruments_taken);
     let taken = noise.and_then(|noise| Some((noise.instrument_cutoff_hz?[1], noise.clone())));

@@ -133,10 +133,9 @@ pub fn choose_cutoff(
     Ok(Some(CutoffByError { cutoff_hz, motion_hz, candidates }))
 }
 
-/// The same task with friction as stated and torque as logged: what the copies are fitted with.
+/// The settings without error bars, for fits of the copies.
 fn plain_settings(settings: &IdentificationSettings) -> IdentificationSettings {
-    let mut plain = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-    // No error bars are wanted.
+    let mut plain = settings.clone();
     plain.estimation.segments = SegmentSettings { max_segments: 2, first_length_rows: 1024 };
     plain
 }

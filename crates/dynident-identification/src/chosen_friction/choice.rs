@@ -46,11 +46,11 @@ impl ChosenFriction {
 }
 
 /// Chooses the friction of the joints that `settings.friction` names, by cross-validation inside the recordings
-/// `training`: first among terms whose columns stand in one set of factors, for a grid of constants; then in further
+/// `training`: first among terms whose columns are in one set of factors, for a grid of constants; then in further
 /// passes the constants between the grid's points, together with all parameters. Filters are those of `logs`.
 ///
 /// # Errors
-/// Recordings that cannot be read, rows that do not carry an estimate.
+/// Recordings that cannot be read, rows that do not determine an estimate.
 pub fn choose_friction(
     logs: &Logs<'_>,
     settings: &IdentificationSettings,
@@ -58,60 +58,68 @@ pub fn choose_friction(
     training: &[usize],
     payloads: &[Payload],
 ) -> Result<ChosenFriction, IdentificationError> {
-    friction_of_logs(logs, logs, settings, robot, training, payloads, None)
+    let passes = TrainingPasses::of_logs(logs, settings, training, payloads);
+    if !is_friction_open(settings, robot) {
+        return stated_friction(&passes, robot);
+    }
+    friction_by_terms(&passes, logs, robot, None)
 }
 
-/// The same with other filters for the constants: terms from the rows of `logs`, constants from those of
-/// `of_constants`; terms of all that may be were found [before](friction_by_grid) or not. Where the first are too few
-/// to choose from, terms come from the second as well.
-pub(crate) fn friction_of_logs(
-    logs: &Logs<'_>,
-    of_constants: &Logs<'_>,
-    settings: &IdentificationSettings,
+/// Friction as stated, with the error of the constants that other recordings chose before.
+///
+/// # Errors
+/// As [`choose_friction`].
+pub(crate) fn stated_friction(
+    passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
-    training: &[usize],
-    payloads: &[Payload],
+) -> Result<ChosenFriction, IdentificationError> {
+    let (stated, before) = (RegressorModel::from(robot.clone()), &passes.settings.friction_before);
+    if before.is_empty() {
+        return Ok(ChosenFriction::as_stated(stated));
+    }
+    // Without the load, load-dependent friction would look like noise.
+    let stated = if stated.needs_load() { passes.fit(stated)?.model } else { stated };
+    let constants_error = error_of_constants(passes, before, &stated)?;
+    Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) })
+}
+
+/// Friction that the recordings choose: terms from the rows of `passes`, constants from those of `of_constants`. Terms
+/// of all candidates may have been found [before](friction_by_grid). If the rows of `passes` are too few to choose
+/// from, terms are chosen from `of_constants` as well.
+///
+/// # Errors
+/// As [`choose_friction`].
+pub(crate) fn friction_of_logs(
+    passes: &TrainingPasses<'_>,
+    of_constants: &Logs<'_>,
+    robot: &ParametricModel,
     of_grid: Option<GridFriction>,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let found = friction_by_terms(logs, of_constants, settings, robot, training, payloads, of_grid)?;
-    let is_nothing = |one: &JointFriction| one.terms.is_none();
-    if core::ptr::eq(logs, of_constants) || found.joints.is_empty() || !found.joints.iter().all(is_nothing) {
+    let found = friction_by_terms(passes, of_constants, robot, of_grid)?;
+    let has_no_terms = |one: &JointFriction| one.terms.is_none();
+    if found.joints.is_empty() || !found.joints.iter().all(has_no_terms) {
         return Ok(found);
     }
-    friction_by_terms(of_constants, of_constants, settings, robot, training, payloads, None)
+    friction_by_terms(&TrainingPasses { logs: of_constants, ..*passes }, of_constants, robot, None)
 }
 
 fn friction_by_terms(
-    logs: &Logs<'_>,
+    passes: &TrainingPasses<'_>,
     of_constants: &Logs<'_>,
-    settings: &IdentificationSettings,
     robot: &ParametricModel,
-    training: &[usize],
-    payloads: &[Payload],
     of_grid: Option<GridFriction>,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let (passes, searches) =
-        (TrainingPasses::of_logs(logs, settings, training, payloads), searches_of(settings, robot));
-    let of_constants = TrainingPasses::of_logs(of_constants, settings, training, payloads);
-    if searches.is_empty() {
-        let stated = RegressorModel::from(robot.clone());
-        if settings.friction_before.is_empty() {
-            return Ok(ChosenFriction::as_stated(stated));
-        }
-        // Without the load that friction depends on, what it does would pass for noise.
-        let stated = if stated.needs_load() { of_constants.fit(stated)?.model } else { stated };
-        let constants_error = error_of_constants(&of_constants, &settings.friction_before, &stated)?;
-        return Ok(ChosenFriction { constants_error, ..ChosenFriction::as_stated(stated) });
-    }
+    let searches = searches_of(passes.settings, robot);
     let of_grid = match of_grid {
         Some(found) => found,
-        None => friction_of_grid(&passes, robot, &searches, GridTerms::All)?,
+        None => friction_of_grid(passes, robot, &searches, GridTerms::All)?,
     };
     let GridFriction { model, mut joints, stated, gains } = of_grid;
     let near_rest: Vec<&str> =
         searches.iter().filter(|(_, one)| one.rows_near_rest).map(|(_, one)| &one.joint[..]).collect();
+    let of_constants = TrainingPasses { logs: of_constants, ..*passes };
     let (mut model, constants_error) = best_constants(&of_constants, robot, &mut joints, &near_rest, model, &gains)?;
-    // What follows finds the gains with the friction that was chosen.
+    // The next fit estimates the gains with the friction that was chosen.
     model.torque_gains.clear();
     Ok(ChosenFriction { model, joints, stated: Some(stated), constants_error })
 }
@@ -147,6 +155,11 @@ pub(crate) fn friction_by_grid(
         return Ok(None);
     }
     friction_of_grid(passes, robot, &searches, terms).map(Some)
+}
+
+/// Whether friction of a joint of this robot is to be chosen.
+pub(crate) fn is_friction_open(settings: &IdentificationSettings, robot: &ParametricModel) -> bool {
+    !searches_of(settings, robot).is_empty()
 }
 
 /// The joints whose friction is to be chosen.
@@ -260,23 +273,20 @@ pub(crate) fn better_friction(
     Ok(ChosenFriction { model, joints, stated, constants_error })
 }
 
-/// Friction that an excerpt of the recordings `training` chose, with constants by all of their rows: one step from
-/// where the excerpt's have settled, for what is left is short, and a step of Gauss and Newton then ends where a second
-/// one would.
+/// Friction that was chosen from an excerpt, with constants estimated from all rows: one step of Gauss and Newton from
+/// the constants of the excerpt, which are close.
+///
+/// # Errors
+/// As [`choose_friction`].
 pub(crate) fn constants_of_all_rows(
-    logs: &Logs<'_>,
-    settings: &IdentificationSettings,
+    passes: &TrainingPasses<'_>,
     robot: &ParametricModel,
-    chosen: &ChosenFriction,
-    training: &[usize],
-    payloads: &[Payload],
+    mut chosen: ChosenFriction,
 ) -> Result<ChosenFriction, IdentificationError> {
-    let mut found = chosen.clone();
-    let passes = TrainingPasses::of_logs(logs, settings, training, payloads);
-    if let Some((model, error)) = one_step(&passes, robot, &mut found.joints, &chosen.model)? {
-        (found.model, found.constants_error) = (model, Some(error));
+    if let Some((model, error)) = one_step(passes, robot, &mut chosen.joints, &chosen.model)? {
+        (chosen.model, chosen.constants_error) = (model, Some(error));
     }
-    Ok(found)
+    Ok(chosen)
 }
 
 /// The width of the smooth step that a joint's friction has.

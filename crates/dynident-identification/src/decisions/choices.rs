@@ -1,0 +1,166 @@
+//! The choices so far, with the evidence for each.
+
+use crate::bandwidth::CutoffByError;
+use crate::chosen_friction::{ChosenFriction, GridFriction};
+use crate::drive_inertia::DriveInertiaChoice;
+use crate::lag::LagRounds;
+use crate::settings::LagCandidates;
+use dynident_dynamics::ParametricModel;
+
+/// Drive inertia: the robot with it or without it.
+#[derive(Clone)]
+pub(crate) struct Drives {
+    /// The task's robot, with the drive inertia that the logs show.
+    pub(crate) robot: ParametricModel,
+    /// The evidence; `None` if the terms state the drive inertia.
+    pub(crate) choice: Option<DriveInertiaChoice>,
+}
+
+/// A cut-off of the motion.
+#[derive(Clone)]
+pub(super) struct CutoffChoice {
+    /// The evidence; `None` if the cut-off is stated, or if the logs are too short.
+    pub(super) by_error: Option<CutoffByError>,
+}
+
+/// Friction of the joints.
+#[derive(Clone)]
+pub(super) enum FrictionChoice {
+    /// Not selected yet.
+    Open,
+    /// With the constants of a grid: enough to estimate a lag.
+    Grid(GridFriction),
+    /// Selected from an excerpt of the logs; its constants are still to be adjusted to all rows.
+    OfExcerpt(ChosenFriction),
+    /// Selected or stated.
+    Made(ChosenFriction),
+}
+
+/// What a change of the lag reopens.
+#[derive(Clone)]
+enum Origin {
+    /// All other choices: they were made from rows with the lag.
+    TheseLogs,
+    /// Only the friction constants: the rest was chosen from an excerpt.
+    Excerpt(ChosenFriction),
+    /// Nothing.
+    Final,
+}
+
+/// The choices so far. `None` and [`FrictionChoice::Open`] are open.
+#[derive(Clone)]
+pub(crate) struct Choices {
+    /// The lag that is compensated, and how often it was revised.
+    pub(super) lag: LagRounds,
+    pub(super) drives: Option<Drives>,
+    /// Selected with friction as stated.
+    pub(super) cutoff: Option<CutoffChoice>,
+    /// Friction of a grid with all terms, from a fit with the same lag.
+    pub(super) grid: Option<GridFriction>,
+    pub(super) friction: FrictionChoice,
+    /// The cut-off at which friction was selected, hertz; `None` if it was stated.
+    pub(super) friction_hz: Option<f64>,
+    /// The cut-off that was selected with the selected friction.
+    pub(super) cutoff_with_friction: Option<CutoffByError>,
+    /// Whether a lag was looked for before friction was selected.
+    pub(super) has_lag_before_friction: bool,
+    /// Whether friction was tried at another cut-off.
+    pub(super) has_cutoff_of_friction: bool,
+    origin: Origin,
+}
+
+impl Choices {
+    /// All choices open, for lags of these candidates.
+    pub(super) fn open(candidates: LagCandidates) -> Self {
+        Self {
+            lag: LagRounds::of(candidates),
+            drives: None,
+            cutoff: None,
+            grid: None,
+            friction: FrictionChoice::Open,
+            friction_hz: None,
+            cutoff_with_friction: None,
+            has_lag_before_friction: false,
+            has_cutoff_of_friction: false,
+            origin: Origin::TheseLogs,
+        }
+    }
+
+    /// The cut-off in force, with its evidence.
+    pub(crate) fn cutoff(&self) -> Option<&CutoffByError> {
+        let before = self.cutoff.as_ref().and_then(|cutoff| cutoff.by_error.as_ref());
+        self.cutoff_with_friction.as_ref().or(before)
+    }
+
+    /// Drive inertia, once it is decided.
+    pub(crate) fn drives(&self) -> Option<&Drives> {
+        self.drives.as_ref()
+    }
+
+    /// The friction in force; `None` while it is open.
+    pub(crate) fn friction(&self) -> Option<ChosenFriction> {
+        match &self.friction {
+            FrictionChoice::Open => None,
+            FrictionChoice::Grid(grid) => Some(grid.as_chosen()),
+            FrictionChoice::OfExcerpt(friction) | FrictionChoice::Made(friction) => Some(friction.clone()),
+        }
+    }
+
+    /// The lag in force and what is known of it.
+    pub(crate) fn lag(&self) -> &LagRounds {
+        &self.lag
+    }
+
+    /// The same choices with friction open.
+    #[must_use]
+    pub(super) fn with_open_friction(&self) -> Self {
+        Self { friction: FrictionChoice::Open, ..self.clone() }
+    }
+
+    /// The same choices with this lag.
+    #[must_use]
+    pub(super) fn with_lag(self, lag: LagRounds) -> Self {
+        Self { lag, ..self }
+    }
+
+    /// Keeps all other choices if the lag changes.
+    pub(super) fn finish(&mut self) {
+        self.origin = Origin::Final;
+    }
+
+    /// Reopens the choices that depend on the lag.
+    pub(super) fn reopen(&mut self) {
+        match &self.origin {
+            Origin::TheseLogs => {
+                (self.drives, self.cutoff, self.grid) = (None, None, None);
+                (self.friction, self.friction_hz, self.cutoff_with_friction) = (FrictionChoice::Open, None, None);
+            }
+            Origin::Excerpt(friction) => self.friction = FrictionChoice::OfExcerpt(friction.clone()),
+            Origin::Final => {}
+        }
+    }
+
+    /// The choices of an excerpt as a start for all rows: the lag and the friction constants are revised, the rest is
+    /// kept. `candidates` are the lags that all rows may have.
+    #[must_use]
+    pub(crate) fn of_excerpt(self, candidates: LagCandidates) -> Self {
+        let cutoff = CutoffChoice { by_error: self.cutoff().cloned() };
+        let lag = LagRounds::of(candidates).after(self.lag.clone().choice());
+        let (friction, origin) = match self.friction() {
+            Some(friction) => (FrictionChoice::OfExcerpt(friction.clone()), Origin::Excerpt(friction)),
+            None => (FrictionChoice::Open, Origin::TheseLogs),
+        };
+        Self {
+            lag,
+            cutoff: Some(cutoff),
+            grid: None,
+            friction,
+            friction_hz: None,
+            cutoff_with_friction: None,
+            has_lag_before_friction: true,
+            has_cutoff_of_friction: true,
+            origin,
+            ..self
+        }
+    }
+}

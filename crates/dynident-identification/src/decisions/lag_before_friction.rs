@@ -1,0 +1,87 @@
+//! The lag that is compensated before friction is selected.
+//!
+//! Selecting friction takes most of the time, so the lag is first looked for with friction of a grid. Friction that is
+//! selected from rows with a lag can compensate it, above all Maxwell-slip friction, which acts late itself. Conversely,
+//! friction that no stated term describes looks like a lag. Two rules follow. A lag that shows with friction of all
+//! terms is estimated with friction without memory. A lag that shows only with the stated terms is accepted if the
+//! Bayesian information criterion of the fit with all terms is lower with it than without it.
+
+use super::choices::FrictionChoice;
+use super::cutoff::Cutoff;
+use super::decision::{Decision, Next, decide_all};
+use super::drive_inertia::DriveInertia;
+use super::grid_friction::GridOfFriction;
+use super::lag::{Lag, free_lag};
+use super::workspace::Workspace;
+use crate::chosen_friction::{GridTerms, is_friction_open, stated_friction};
+use crate::error::IdentificationError;
+use crate::lag::{LagCandidates, LagRounds};
+use crate::likelihood::schwarz;
+use crate::training::TrainingPasses;
+
+pub(super) struct LagBeforeFriction;
+
+/// A grid of all friction terms.
+const ALL_TERMS: [&dyn Decision; 3] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::All)];
+/// The lag with friction that has no memory.
+const WITHOUT_MEMORY: [&dyn Decision; 4] = [&DriveInertia, &Cutoff, &GridOfFriction(GridTerms::WithoutMemory), &Lag];
+
+impl Decision for LagBeforeFriction {
+    fn decide(&self, work: &mut Workspace<'_, '_>) -> Result<Next, IdentificationError> {
+        if work.choices.has_lag_before_friction || !is_friction_open(&work.settings, &work.task.robot) {
+            return Ok(Next::Proceed);
+        }
+        let mut without = work.look(work.choices.clone());
+        decide_all(&ALL_TERMS, &mut without)?;
+        let is_seen = shows_lag(&mut without)?;
+        let has_lag = is_seen || {
+            let mut stated = without.look(without.choices.with_open_friction());
+            let logs = stated.logs_at(stated.choices.cutoff().map(|choice| choice.cutoff_hz))?;
+            let passes = TrainingPasses::of_logs(&logs, &stated.settings, stated.training, &stated.task.payloads);
+            let friction = stated_friction(&passes, &stated.drives().robot)?;
+            stated.choices.friction = FrictionChoice::Made(friction);
+            let shows = shows_lag(&mut stated)?;
+            work.logs_s += stated.logs_s;
+            shows
+        };
+        work.logs_s += without.logs_s;
+        if !has_lag {
+            work.take_look(without);
+            return Ok(Next::Proceed);
+        }
+
+        // The common lag with friction without memory, until none shows. Lags of single joints can be estimated only
+        // with fully selected friction.
+        let candidates = work.settings.lags;
+        let common = without.choices.with_open_friction().with_lag(LagRounds::of(LagCandidates::Common));
+        let mut late = without.look(common);
+        decide_all(&WITHOUT_MEMORY, &mut late)?;
+        late.choices.lag = LagRounds::of(candidates).after(late.choices.lag.clone().choice());
+        work.logs_s += late.logs_s;
+        if is_seen {
+            late.choices.friction = FrictionChoice::Open;
+            work.take_look(late);
+            return Ok(Next::Proceed);
+        }
+        let mut late = late.look(late.choices.with_open_friction());
+        decide_all(&ALL_TERMS, &mut late)?;
+        let is_better = criterion(&mut late)? < criterion(&mut without)?;
+        work.logs_s += late.logs_s;
+        work.take_look(if is_better { late } else { without });
+        Ok(Next::Proceed)
+    }
+}
+
+/// Whether the rows of the fit show a common lag that should be compensated.
+fn shows_lag(work: &mut Workspace<'_, '_>) -> Result<bool, IdentificationError> {
+    let training = work.training;
+    let fit = work.fit()?;
+    let lags = free_lag(fit, training)?;
+    Ok(LagRounds::of(LagCandidates::Common).again(lags.as_ref(), &fit.estimation.estimate))
+}
+
+/// Bayesian information criterion of the fit.
+fn criterion(work: &mut Workspace<'_, '_>) -> Result<f64, IdentificationError> {
+    let fit = work.fit()?;
+    Ok(schwarz(&fit.training.problem, &fit.estimation.estimate))
+}

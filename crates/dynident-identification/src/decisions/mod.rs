@@ -1,0 +1,32 @@
+//! Everything that the training logs decide before the last fit: drive inertia, cut-off, friction and lag.
+//!
+//! Each is one [`Decision`]. An open decision is made from the rows under the choices so far. A decision that revises a
+//! choice reopens the choices that depend on it. The driver then starts again at the top of the list, until every
+//! decision is made and none revises a choice.
+
+mod choices;
+mod cutoff;
+mod cutoff_of_friction;
+mod decision;
+mod drive_inertia;
+mod friction;
+mod grid_friction;
+mod lag;
+mod lag_before_friction;
+mod workspace;
+
+pub(crate) use choices::Choices;
+pub(crate) use decision::decide_all;
+pub(crate) use workspace::{Job, Workspace};
+
+use cutoff::Cutoff;
+use cutoff_of_friction::CutoffOfFriction;
+use decision::Decision;
+use drive_inertia::DriveInertia;
+use friction::Friction;
+use lag::Lag;
+use lag_before_friction::LagBeforeFriction;
+
+/// All decisions, in the order in which open ones are made.
+pub(crate) const DECISIONS: [&dyn Decision; 6] =
+    [&DriveInertia, &Cutoff, &LagBeforeFriction, &Friction, &Lag, &CutoffOfFriction];
