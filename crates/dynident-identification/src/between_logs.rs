@@ -11,8 +11,8 @@
 //! all days, friction that varies making errors of bodies and drives wherever the logs hold different motion; and by T
 //! more about what a further day will show. Its bars are for that: `Σ + Σ_l A_l T A_lᵀ + T`.
 
+use crate::friction_by_log::is_friction_column;
 use crate::training::Training;
-use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem, WeightedSettings, weighted_least_squares};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub(crate) fn variation_of_logs(
     let count = training.columns.base();
     let alone: Vec<Estimate> =
         (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, settings, estimate).ok()).collect();
-    let is_friction: Vec<bool> = training.model.layout().columns()[..count].iter().map(of_friction).collect();
+    let is_friction: Vec<bool> = training.model.layout().columns()[..count].iter().map(is_friction_column).collect();
     let [bodies, friction] = [false, true].map(|kind| {
         let columns: Vec<usize> = (0..count).filter(|&column| is_friction[column] == kind).collect();
         variation(&alone, &columns)
@@ -129,11 +129,6 @@ fn fit_alone(
     let alone =
         rows_of(problem, log)?.with_fallback(estimate.values.clone())?.with_unexcited(problem.unexcited().clone())?;
     weighted_least_squares(&alone, settings)
-}
-
-/// Whether a base parameter is a joint's own torque: what may be another on another day.
-pub(crate) fn of_friction(column: &Column) -> bool {
-    matches!(column, Column::Term(term) if !term.is_drive_inertia())
 }
 
 /// k of some parameters: the root of the mean of z² over pairs of logs, each by what Student's distribution makes of

@@ -3,14 +3,11 @@
 use crate::diagnosis::{Diagnosis, DiagnosisTask, diagnose};
 use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
-use crate::execution::Execution;
-use crate::logs::{Logs, of_role};
-use crate::recording::Role;
-use crate::regressor_model::RegressorModel;
 use crate::task::IdentificationTask;
 use crate::training::training_rows;
 use dynident_estimation::{WeightedSettings, weighted_least_squares};
 use dynident_recording::ImportReport;
+use dynident_rows::{Execution, Logs, RegressorModel, Role, of_role};
 
 /// What was found about a task's recordings before any fit is believed.
 #[derive(Clone, Debug)]

@@ -14,19 +14,17 @@
 //! from day to day to the drives. Rotors only add, so a negative one speaks against the others. F is Student's
 //! distribution with the ν degrees of freedom of s_i, and Φ⁻¹ F in Wallace's form (Ann. Math. Statist. 30 (1959) 1121).
 
-use crate::between_logs::of_friction;
 use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
-use crate::friction_by_log::with_friction_by_log;
+use crate::friction_by_log::{is_friction_column, with_friction_by_log};
 use crate::left_to_the_logs::{joints_left_to_the_logs, with_drives};
-use crate::logs::Logs;
 use crate::payload::Payload;
-use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::training::{TrainingPasses, plain_estimate};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::{CovarianceMethod, Estimate, EstimationError};
 use dynident_model::terms::{DriveInertia, TorqueTerm};
+use dynident_rows::{Logs, RegressorModel};
 use serde::{Deserialize, Serialize};
 
 /// Standard deviations from which drive inertia counts as seen: by chance once in some 740 studies. A drive that is not
@@ -132,7 +130,7 @@ pub fn choose_drive_inertia(
             return Ok(estimate);
         }
         // Friction that is another on another day looks like drives where it is one for all logs.
-        let is_friction: Vec<bool> = rows.model.layout().columns().iter().map(of_friction).collect();
+        let is_friction: Vec<bool> = rows.model.layout().columns().iter().map(is_friction_column).collect();
         let apart = with_friction_by_log(&rows.problem, &is_friction)?;
         Ok(plain_estimate(&settings.estimation, apart.as_ref().unwrap_or(&rows.problem))?)
     };

@@ -4,10 +4,9 @@ use crate::consistent::ConsistencyError;
 use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
-use crate::recording::LogError;
-use crate::reducible::ReduceError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
+use dynident_rows::LogError;
 use thiserror::Error;
 
 /// Why a model could not be identified. A poor fit is not an error.
@@ -62,4 +61,45 @@ impl From<EstimatorError> for IdentificationError {
             EstimatorError::Requirement { .. } | EstimatorError::Instruments { .. } => Self::Estimator(error),
         }
     }
+}
+
+/// Why logs cannot be reduced to factors: something is to be chosen from the samples of all of them.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ReduceError {
+    /// The cut-off is left to the logs.
+    #[error(
+        "the cut-off is left to the logs, and each would have its own: state motion.differentiator.cutoff_hz, or reduce like a model that was identified from some of them"
+    )]
+    Cutoff,
+    /// Whether drives have inertia is left to the logs.
+    #[error(
+        "whether the torque of joint {joint} holds its drive's inertia is left to the logs: state it (drive.drive_inertia = true or false), or reduce like a model that was identified from some of them"
+    )]
+    DriveInertia {
+        /// The first such joint.
+        joint: String,
+    },
+    /// Friction is left to the logs.
+    #[error(
+        "the friction of joint {joint} is left to the logs: state it (drive.friction = \"stated\" and its terms), or reduce like a model that was identified from some of them"
+    )]
+    Friction {
+        /// The first such joint.
+        joint: String,
+    },
+    /// Friction that grows with the load needs the samples again.
+    #[error("load-dependent friction needs the samples again, with the load of the fit before: leave it out")]
+    Load,
+    /// Payloads, gains or offsets make columns of single logs.
+    #[error("{what} cannot be had from reduced logs: identify them from the logs themselves")]
+    Columns {
+        /// What is asked for.
+        what: &'static str,
+    },
+    /// An estimator that goes back to the samples.
+    #[error("estimator.method = \"{method}\" goes back to the samples: give \"weighted\" or \"ordinary\"")]
+    Estimator {
+        /// Its name.
+        method: &'static str,
+    },
 }

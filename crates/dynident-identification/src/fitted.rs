@@ -4,16 +4,14 @@ use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::{BetweenLogs, variation_of_logs};
 use crate::decisions::{Choices, DECISIONS, Job, Workspace, decide_all};
 use crate::error::IdentificationError;
-use crate::excerpt::excerpts;
-use crate::execution::Execution;
 use crate::lag::{LagChoice, LagKind, gain_errors};
 use crate::less_noise::Fit;
 use crate::payload::free_gains;
-use crate::recording::Recording;
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::stage_times::StageTimes;
 use crate::task::IdentificationTask;
 use dynident_recording::log::OneOrMany;
+use dynident_rows::{Execution, Recording, excerpts};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -31,7 +29,7 @@ pub(crate) struct Fitted<'a> {
 }
 
 /// Decides everything that is left to the logs and fits the model. Decisions of long logs are made on an
-/// [excerpt](crate::excerpt) and then revised on all rows.
+/// [excerpt](dynident_rows::excerpts) and then revised on all rows.
 pub(crate) fn fitted<'a>(
     task: &'a IdentificationTask,
     training: &[usize],
@@ -99,7 +97,10 @@ fn choices_of_excerpt(
         return Ok(None);
     }
     let started = Instant::now();
-    let Some(recordings) = excerpts(recordings, settings, training, execution)? else { return Ok(None) };
+    let has_choices = !settings.friction.is_empty() || !settings.drive_inertia.is_empty();
+    let Some(recordings) = excerpts(recordings, settings.row_settings(), has_choices, training, execution)? else {
+        return Ok(None);
+    };
     let read_s = started.elapsed().as_secs_f64();
     let (robot, payloads, settings) = (robot.clone(), payloads.clone(), settings.clone());
     let task = IdentificationTask { robot, recordings, payloads, settings };

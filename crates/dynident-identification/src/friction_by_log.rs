@@ -3,11 +3,17 @@
 //! `τ_l = W_b θ_b + W_f θ_{f,l}` for the logs l: bodies and drives are one machine's, friction and offsets are free in
 //! every log ("fixed effects": Mundlak, Econometrica 46 (1978) 69).
 
+use dynident_dynamics::Column;
 use dynident_estimation::{EstimationError, LinearProblem, Unexcited};
 
 /// Friction is told apart between so many groups of logs at most; further logs share it with their neighbours, for
 /// every group adds its columns.
 const MOST_GROUPS: usize = 8;
+
+/// Whether a base parameter is torque of a single joint, which can differ from day to day.
+pub(crate) fn is_friction_column(column: &Column) -> bool {
+    matches!(column, Column::Term(term) if !term.is_drive_inertia())
+}
 
 /// The problem with further columns for the friction of logs behind the first group, whose columns stay as they are.
 /// `None` where nothing is to be told apart: one log, or a prior, which says nothing of the further columns.

@@ -10,14 +10,10 @@ use crate::drive_inertia::DriveInertiaChoice;
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSource};
 use crate::examination::HeldOutExamination;
-use crate::execution::Execution;
 use crate::fitted::{Fitted, fitted};
 use crate::lag::LagChoice;
 use crate::less_noise::Fit;
-use crate::logs::of_role;
 use crate::payload::{KnownArm, PayloadError, PayloadResult, gain_error, payload_results};
-use crate::recording::Role;
-use crate::regressor_model::RegressorModel;
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::stage_times::StageTimes;
 use crate::stages::{ConsistentParameters, Stage, TrainingExamination};
@@ -26,6 +22,7 @@ use crate::training::Training;
 use dynident_estimation::{EssentialReport, Estimate, essential};
 use dynident_model::InertialParameters;
 use dynident_recording::MotionSettings;
+use dynident_rows::{Execution, RegressorModel, Role, of_role};
 use std::time::Instant;
 
 /// An identified model with everything that was found on the way.

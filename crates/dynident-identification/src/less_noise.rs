@@ -3,12 +3,12 @@
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSettings, NoiseInRegressor, estimate};
 use crate::friction::JointFriction;
-use crate::logs::Logs;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimateStatus;
+use dynident_rows::Logs;
 
 /// Rows, estimate and the settings that made them: with the estimator that `auto` selected and the lag in force.
 pub(crate) struct Fit<'a> {

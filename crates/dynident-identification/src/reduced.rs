@@ -7,16 +7,12 @@
 use crate::bars::{ErrorBars, ErrorSource};
 use crate::between_logs::variation_of_logs;
 use crate::error::IdentificationError;
+use crate::error::ReduceError;
 use crate::estimators::{Estimation, Estimator, estimate};
 use crate::examination::{friction_signs, sign_evidence};
-use crate::execution::Execution;
 use crate::identify::Identification;
 use crate::lag::LagChoice;
-use crate::logs::{Logs, of_role};
-use crate::recording::{Recording, Role};
-use crate::reducible::{ReduceError, is_reducible};
-use crate::regressor_model::RegressorModel;
-use crate::rows::LogStatistics;
+use crate::reducible::is_reducible;
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
 use crate::stage_times::StageTimes;
 use crate::stages::{TrainingExamination, consistent_stage};
@@ -24,6 +20,7 @@ use crate::task::IdentificationTask;
 use crate::training::{LogFactors, TrainingPasses};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{EstimationError, SegmentedFactor};
+use dynident_rows::{Execution, LogStatistics, Logs, Recording, RegressorModel, Role, of_role};
 use std::time::Instant;
 
 /// A log of which its factors are left.

@@ -4,10 +4,9 @@ use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::{FrictionSearch, JointFriction};
 use crate::log_noise::LogNoise;
-use crate::logs::RowSettings;
-use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::MotionSettings;
+use dynident_rows::{ParallelFilterSettings, RowSettings};
 use serde::{Deserialize, Serialize};
 
 /// Whether logs share the constant torques of their joints.

@@ -11,15 +11,13 @@ use crate::examination::{
     FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
     TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
-use crate::execution::Execution;
-use crate::logs::Logs;
-use crate::recording::Role;
 use crate::settings::{DiagnosisChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::Training;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{Estimate, LinearProblem, left_out_ratios};
+use dynident_rows::{Execution, Logs, Role};
 use rayon::prelude::*;
 use std::time::Instant;
 

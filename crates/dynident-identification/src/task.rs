@@ -1,9 +1,9 @@
 //! What is to be identified, from which recordings, and how.
 
 use crate::payload::Payload;
-use crate::recording::Recording;
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
+use dynident_rows::Recording;
 
 /// A robot, its recordings, and how to go about it.
 #[derive(Clone, Debug)]

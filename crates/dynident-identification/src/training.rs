@@ -4,14 +4,9 @@ use crate::consistent::nominal_covariance;
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::PriorAgreement;
-use crate::execution::Execution;
 use crate::friction::JointFriction;
 use crate::log_noise::{LogNoise, weighted_by_log};
-use crate::logs::{Logs, RowSettings};
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
-use crate::recording::{LogError, MotionRecord, Recording};
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, LogStatistics, ParallelFilterSettings, RowBlock, RowConsumer, noise_factors};
 use crate::settings::{GainChoice, IdentificationSettings};
 use dynident_dynamics::Column;
 use dynident_estimation::{
@@ -19,6 +14,10 @@ use dynident_estimation::{
     WeightedValues, ordinary_least_squares, unexcited_columns, weighted_least_squares, weighted_values,
 };
 use dynident_recording::{MotionBlock, MotionSettings};
+use dynident_rows::{
+    Execution, JointRows, LogError, LogPass, LogStatistics, Logs, MotionRecord, ParallelFilterSettings, Recording,
+    RegressorModel, RowBlock, RowConsumer, RowSettings, noise_factors,
+};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;

@@ -12,13 +12,10 @@ mod stand_in;
 mod thinned;
 
 use crate::error::IdentificationError;
-use crate::execution::Execution;
-use crate::logs::Logs;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::training::plain_fit;
 use dynident_estimation::SegmentSettings;
+use dynident_rows::{Execution, Logs, ParallelFilterSettings, RegressorModel};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use stand_in::StandIn;
@@ -154,15 +151,5 @@ fn filter_of_copy(stand_in: &StandIn, cutoff_hz: f64) -> ParallelFilterSettings 
                 ..automatic
             }
         }
-    }
-}
-
-impl Logs<'_> {
-    /// The cut-off that the spectra ask for, where both cut-off and parallel filter are left to the data.
-    fn automatic_cutoff_hz(&self) -> Option<f64> {
-        let filter = &self.filter;
-        let is_automatic = filter.enabled && filter.factor.is_none() && filter.cutoff_hz.is_none();
-        let motion_hz = self.motion_hz().or_else(|| motion_band_hz(&self.motion));
-        motion_hz.filter(|_| is_automatic && !self.spectra().is_empty())
     }
 }

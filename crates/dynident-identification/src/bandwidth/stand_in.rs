@@ -2,11 +2,6 @@
 
 use super::thinned::Thinned;
 use crate::error::IdentificationError;
-use crate::execution::Execution;
-use crate::logs::{LogSpectrum, Logs};
-use crate::recording::{LogError, Samples};
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, ParallelFilterSettings, RowBuilder, RowConsumer, predicted_torque};
 use crate::settings::IdentificationSettings;
 use crate::training::plain_fit;
 use dynident_model::sample::Random;
@@ -14,6 +9,10 @@ use dynident_recording::derivative::ButterworthZeroPhase;
 use dynident_recording::{
     DecimationSettings, Decimator, Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, MotionStream,
     Place, SampleRanges,
+};
+use dynident_rows::{
+    Execution, JointRows, LogError, LogSpectrum, Logs, ParallelFilterSettings, RegressorModel, RowBuilder, RowConsumer,
+    Samples, predicted_torque,
 };
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;

@@ -1,8 +1,7 @@
 //! A log at a lower rate: its torque through a low-pass, its smooth motion as it is.
 
-use crate::recording::LogError;
-use crate::rows::set_aside;
 use dynident_recording::{Decimator, MotionBlock};
+use dynident_rows::{LogError, set_aside};
 
 /// A log's blocks at a lower rate, piece by piece, joints in the model's order.
 #[derive(Default)]

@@ -10,14 +10,13 @@ use crate::friction::{
     CandidateColumn, ConstantsError, FrictionSearch, JointFriction, JointScale, candidate_columns,
     choose_friction as choose_terms, is_coulomb, smooth_width, step_columns,
 };
-use crate::logs::Logs;
 use crate::payload::{Payload, free_gains};
-use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::training::{Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::Estimate;
 use dynident_model::terms::TorqueTerm;
+use dynident_rows::{Logs, RegressorModel};
 use nalgebra::DMatrix;
 
 /// A model with the friction that its recordings chose.

@@ -8,11 +8,11 @@ use crate::friction::{
     ConstantsError, ConstantsStep, FrictionConstants, JointFriction, JointScale, Weak, is_one_friction, second_start,
 };
 use crate::likelihood::{JointScore, deviance};
-use crate::regressor_model::RegressorModel;
 use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate, plain_values};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::{LinearProblem, WeightedValues};
 use dynident_model::terms::TorqueTerm;
+use dynident_rows::RegressorModel;
 
 /// Passes over the recordings for the constants of chosen friction, at most, and one more where the last went too far.
 const MOST_PASSES: usize = 8;

@@ -4,12 +4,12 @@ use crate::error::IdentificationError;
 use crate::estimators::EstimationSettings;
 use crate::friction::{JointFriction, chosen_model};
 use crate::payload::with_free_gains;
-use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::training::{LogFactors, TrainingPasses};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::{CovarianceMethod, LinearProblem};
 use dynident_model::terms::TorqueTerm;
+use dynident_rows::RegressorModel;
 
 /// Settings of a fit whose error bars nobody wants.
 pub(crate) fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {

@@ -3,10 +3,10 @@
 use super::error::ConsistencyError;
 use super::problem::consistency_problem;
 use super::settings::ConsistencySettings;
-use crate::progress::Progress;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::consistent::{ConsistentIntervals, IntervalEnd, IntervalSettings, PhysicalSettings};
 use dynident_estimation::{Estimate, LinearProblem};
+use dynident_rows::Progress;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

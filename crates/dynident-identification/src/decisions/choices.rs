@@ -92,6 +92,12 @@ impl Choices {
         self.cutoff_with_friction.as_ref().or(before)
     }
 
+    /// The cut-off at which friction is selected, hertz: the highest that serves the parameters nearly as well as the
+    /// best, because details of friction lie above the band of the motion.
+    pub(super) fn friction_cutoff_hz(&self) -> Option<f64> {
+        self.cutoff().map(CutoffByError::highest_alike_hz)
+    }
+
     /// Drive inertia, once it is decided.
     pub(crate) fn drives(&self) -> Option<&Drives> {
         self.drives.as_ref()

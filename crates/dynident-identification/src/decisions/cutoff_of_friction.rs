@@ -16,8 +16,8 @@ use crate::chosen_friction::{ChosenFriction, better_friction, friction_of_logs};
 use crate::error::IdentificationError;
 use crate::friction::smooth_width;
 use crate::less_noise::Fit;
-use crate::logs::{LogSpectrum, Logs};
 use crate::training::TrainingPasses;
+use dynident_rows::{LogSpectrum, Logs};
 
 /// Cut-offs with a smaller ratio are treated as equal; candidates are √2 apart.
 const MIN_CUTOFF_RATIO: f64 = 1.2;

@@ -1,9 +1,9 @@
 //! Friction of the joints: terms, then their constants, and the cut-off for a fit with them.
 
-use super::choices::{Choices, FrictionChoice};
+use super::choices::FrictionChoice;
 use super::decision::{Decision, Next};
 use super::workspace::Workspace;
-use crate::bandwidth::{CutoffByError, choose_cutoff};
+use crate::bandwidth::choose_cutoff;
 use crate::bars::ErrorSource;
 use crate::chosen_friction::{constants_of_all_rows, friction_of_logs, is_friction_open, stated_friction};
 use crate::error::IdentificationError;
@@ -22,7 +22,7 @@ impl Decision for Friction {
         };
         let is_open = of_excerpt.is_none() && is_friction_open(&work.settings, &robot);
         let cutoff_hz = if is_open {
-            friction_cutoff_hz(&work.choices)
+            work.choices.friction_cutoff_hz()
         } else {
             work.choices.cutoff().map(|choice| choice.cutoff_hz)
         };
@@ -64,10 +64,4 @@ impl Decision for Friction {
         let covariance = friction.error_of_constants(columns, &fit.estimation.estimate)?;
         Some((ErrorSource::FrictionConstants, covariance))
     }
-}
-
-/// The cut-off at which friction is selected, hertz: the highest that serves the parameters nearly as well as the best,
-/// because details of friction lie above the band of the motion.
-pub(super) fn friction_cutoff_hz(choices: &Choices) -> Option<f64> {
-    choices.cutoff().map(CutoffByError::highest_alike_hz)
 }

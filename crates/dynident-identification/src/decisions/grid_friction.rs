@@ -2,7 +2,6 @@
 
 use super::choices::FrictionChoice;
 use super::decision::{Decision, Next};
-use super::friction::friction_cutoff_hz;
 use super::workspace::Workspace;
 use crate::chosen_friction::{ChosenFriction, GridTerms, friction_by_grid};
 use crate::error::IdentificationError;
@@ -15,7 +14,7 @@ impl Decision for GridOfFriction {
         if matches!(work.choices.friction, FrictionChoice::Open) {
             let Self(terms) = *self;
             let robot = work.drives().robot;
-            let logs = work.logs_at(friction_cutoff_hz(&work.choices))?;
+            let logs = work.logs_at(work.choices.friction_cutoff_hz())?;
             let passes = TrainingPasses::of_logs(&logs, &work.settings, work.training, &work.task.payloads);
             work.choices.friction = match friction_by_grid(&passes, &robot, terms)? {
                 Some(grid) => FrictionChoice::Grid(grid),

@@ -3,14 +3,13 @@
 use super::choices::{Choices, Drives, FrictionChoice};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
-use crate::execution::Execution;
 use crate::lag::LagFit;
 use crate::less_noise::{Fit, take_estimator, with_less_noise};
-use crate::logs::Logs;
 use crate::payload::KnownArm;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::training_rows;
+use dynident_rows::{Execution, Logs};
 
 /// What a fit estimates.
 pub(crate) enum Job<'w> {

@@ -1,8 +1,8 @@
 //! Why a diagnosis could not be made.
 
-use crate::recording::LogError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
+use dynident_rows::LogError;
 use thiserror::Error;
 
 /// Why a diagnosis could not be made.

@@ -3,9 +3,9 @@
 use super::joint_fits::{JointFits, panels, score};
 use super::motion_rows::MotionRows;
 use crate::consistent::{ConsistencySettings, consistent_parameters};
-use crate::rows::predicted_torque;
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
+use dynident_rows::predicted_torque;
 
 /// Number of independent instants for each of a joint's own parameters, below which these follow the noise, and
 /// friction and elasticity without a term in the model.

@@ -1,9 +1,9 @@
 //! What laws of friction that the study does not have leave of a torque: identification chooses among these by itself.
 
-use super::beside_friction::step_of;
 use super::explanation::{predicted, without_terms};
 use super::motion_rows::MotionRows;
 use super::span::Span;
+use crate::friction::step_of_joint;
 use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
@@ -22,7 +22,7 @@ pub(super) fn left_beside_further_friction(
     let of = |theta: &[f64]| predicted(robot, rows, theta).swap_remove(joint);
     let bodies = of(&without_terms(robot, theta));
     let left: Vec<f64> = rows.tau[joint].iter().zip(of(theta)).map(|(tau, explained)| tau - explained).collect();
-    let (left, step) = (DVector::from_vec(left), step_of(robot, joint));
+    let (left, step) = (DVector::from_vec(left), step_of_joint(robot, joint));
     let turns = robot.model().joints()[joint].turns();
     let own_velocity = |usual: f64| robot.model().own_scale().velocity(turns, usual);
     let column = |row: usize, k: usize| {

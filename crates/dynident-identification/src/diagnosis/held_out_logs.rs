@@ -8,9 +8,7 @@ use super::motion_rows::{INSTANTS, MotionRows, MotionSamples};
 use super::torque_clock::TorqueClock;
 use super::unmodelled_payload::{UnmodelledPayload, unmodelled_payload};
 use crate::consistent::ConsistencySettings;
-use crate::logs::Logs;
-use crate::recording::Role;
-use crate::regressor_model::RegressorModel;
+use dynident_rows::{Logs, RegressorModel, Role};
 
 /// Ratio of the residual of one robot for all logs to that with a payload or a mistake, up to which there is neither.
 const MAX_RATIO_OF_ONE_ROBOT: f64 = 1.3;

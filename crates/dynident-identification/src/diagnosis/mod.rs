@@ -65,10 +65,9 @@ pub use wrong_mass::WrongMass;
 
 pub(crate) use plausibility::{has_jumps, is_beyond_limits};
 
-use crate::logs::Logs;
-use crate::regressor_model::RegressorModel;
 use description_fit::description_fit;
 use duplicate_channels::{duplicate_channels, has_lost_signs};
+use dynident_rows::{Logs, RegressorModel};
 use explanation::Explanation;
 use held_out_logs::{HeldOutLogs, Trained, held_out_logs};
 use inconsistent_torque::inconsistent_torques;

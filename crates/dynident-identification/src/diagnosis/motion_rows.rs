@@ -1,12 +1,9 @@
 //! A few hundred instants of a recording, on which hypotheses are compared.
 
 use super::channels::Channels;
-use crate::logs::Logs;
-use crate::recording::LogError;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use core::ops::Range;
 use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
+use dynident_rows::{LogError, Logs, ParallelFilterSettings, RegressorModel, motion_band_hz};
 
 /// Number of instants; more are slower and not more accurate.
 pub(super) const INSTANTS: usize = 300;

@@ -1,10 +1,7 @@
 //! Torque from noise of the positions.
 
 use super::motion_rows::denser;
-use crate::logs::Logs;
-use crate::recording::LogError;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{LogPass, noise_factors};
+use dynident_rows::{LogError, LogPass, Logs, RegressorModel, noise_factors};
 
 /// Root mean square, over the recordings `training`, of the torque that noise of the positions adds to what the base
 /// parameters `theta` predict of each joint at the instants of the comparison, Nm (N): `N θ` of

@@ -1,10 +1,10 @@
 //! What the description's own bodies leave of the torque, with friction fitted joint by joint.
 
-use super::beside_friction::step_of;
 use super::motion_rows::MotionRows;
-use crate::rows::predicted_torque;
+use crate::friction::step_of_joint;
 use dynident_dynamics::{Panels, ParametricModel, Workspace, inverse_dynamics};
 use dynident_model::terms::CoulombShape;
+use dynident_rows::predicted_torque;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// The torque of the nominal bodies, one vector for each joint, Nm (N); `None` while a body's inertials are unknown.
@@ -60,7 +60,7 @@ fn torque_of(
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows, nominal: &[Vec<f64>]) -> Vec<f64> {
     let left = |(joint, nominal): (usize, &Vec<f64>)| {
         let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
-        left_by_friction(&rows.dq[joint], step_of(robot, joint), &rest)
+        left_by_friction(&rows.dq[joint], step_of_joint(robot, joint), &rest)
     };
     nominal.iter().enumerate().map(left).collect()
 }

@@ -9,10 +9,9 @@ use super::search::{Search, searches};
 use super::torque_clock::TorqueClock;
 use crate::consistent::ConsistencySettings;
 use crate::left_to_the_logs::with_drives_left_to_the_logs;
-use crate::logs::Logs;
-use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use dynident_dynamics::ParametricModel;
+use dynident_rows::{Logs, RegressorModel};
 
 /// Largest ratio of the unexplained torque with a late channel to that of the best hypothesis without.
 const MAX_RATIO_OF_LATE: f64 = 0.8;

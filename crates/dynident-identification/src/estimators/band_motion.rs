@@ -3,10 +3,9 @@
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
-use crate::recording::LogError;
-use crate::rows::LogPass;
 use dynident_recording::derivative::ButterworthZeroPhase;
 use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
+use dynident_rows::{LogError, LogPass};
 use rayon::prelude::*;
 
 /// Order of the low-pass, as of the differentiator's default.

@@ -1,7 +1,7 @@
 //! What an estimator needs and does not find.
 
-use crate::recording::LogError;
 use dynident_estimation::EstimationError;
+use dynident_rows::LogError;
 use thiserror::Error;
 
 /// Why an estimator gives no estimate.

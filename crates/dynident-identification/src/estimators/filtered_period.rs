@@ -4,11 +4,10 @@
 //! friction whose torque was smoothed and whose column was not is another friction law. A mean period has no ends, so
 //! that the filter runs around it and invents nothing.
 
-use crate::regressor_model::RegressorModel;
-use crate::rows::PANEL_SAMPLES;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_model::terms::JointMotion;
 use dynident_recording::AveragedPeriods;
+use dynident_rows::{PANEL_SAMPLES, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 
 /// The low-pass and how many samples lie between rows.

@@ -1,9 +1,8 @@
 //! Generalised least squares: the joints' rows of the same instants side by side, in one factor.
 
 use super::{EstimatorError, Findings, TrainingRows};
-use crate::recording::LogError;
-use crate::rows::{JointRows, RowConsumer};
 use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_least_squares};
+use dynident_rows::{JointRows, LogError, RowConsumer};
 
 /// Puts the joints' rows of the same instants side by side.
 struct SideBySide {

@@ -3,13 +3,14 @@
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
-use crate::recording::{LogError, Samples};
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointFilters, LogPass, PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque, set_aside};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_model::terms::JointMotion;
 use dynident_recording::MotionBlock;
+use dynident_rows::{
+    JointFilters, LogError, LogPass, PANEL_SAMPLES, RegressorModel, Samples, in_model_order, motion_band_hz,
+    predicted_torque, set_aside,
+};
 
 /// The factors of one log's `[Z | W | τ]`, one for each joint.
 pub(super) fn instrumented_factors(

@@ -5,11 +5,11 @@ use super::instrument_rows::{fast_motion_factors, instrumented_factors};
 use super::instruments::{InstrumentSource, SmoothedMotion};
 use super::noise_in_regressor::NoiseInRegressor;
 use super::{EstimationSettings, EstimatorError, TrainingRows};
-use crate::recording::Samples;
 use dynident_estimation::{
     HausmanSettings, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem, LinearProblem, SegmentedFactor,
     Unexcited, hausman_test, instrumental_variables,
 };
+use dynident_rows::Samples;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -2,10 +2,9 @@
 //! first.
 
 use super::EstimatorError;
-use crate::logs::Logs;
-use crate::recording::LogError;
 use dynident_model::Model;
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings, MotionStream};
+use dynident_rows::{LogError, Logs};
 
 /// Where the motion behind the instruments comes from: [`SmoothedMotion`] of the same log, or a simulation of the
 /// closed loop with the current model, which a crate above this one can plug in.

@@ -4,9 +4,6 @@ use super::filtered_period::PeriodFilter;
 use super::row_pass::Stop;
 use super::simulated::torque_sigma;
 use super::{EstimatorError, TrainingRows};
-use crate::recording::LogError;
-use crate::regressor_model::RegressorModel;
-use crate::rows::motion_band_hz;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimationError, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
@@ -14,6 +11,7 @@ use dynident_estimation::{
 };
 use dynident_model::terms::JointMotion;
 use dynident_recording::{AveragedPeriods, MotionBlock, averaged_periods};
+use dynident_rows::{LogError, RegressorModel, motion_band_hz};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

@@ -44,11 +44,10 @@ pub use spline_motion::SplineFit;
 pub use spline_torque::SplineTorque;
 
 use crate::consistent::ConsistencySettings;
-use crate::logs::Logs;
-use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
     Estimate, LinearProblem, RowWeight, SplineMotionSettings, ordinary_least_squares, weighted_least_squares,
 };
+use dynident_rows::{Logs, RegressorModel};
 use simulated_loop::ComparedSignal;
 
 /// How base parameters are estimated, with the settings that belong to the estimator alone.

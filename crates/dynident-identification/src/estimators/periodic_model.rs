@@ -1,11 +1,11 @@
 //! Unknown motion and unknown parameters of a record whose motion is a Fourier series: what the simultaneous fit asks
 //! of a robot.
 
-use crate::regressor_model::RegressorModel;
 use core::f64::consts::TAU;
 use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_adjoint};
 use dynident_estimation::{ChannelRows, EstimationError, SimultaneousModel};
 use dynident_model::terms::JointMotion;
+use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples whose regressor is made at a time.

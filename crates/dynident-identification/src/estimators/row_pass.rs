@@ -1,9 +1,8 @@
 //! Every row of the training logs once more, for estimators that reweight them.
 
 use super::{EstimatorError, TrainingRows};
-use crate::recording::LogError;
-use crate::rows::{JointRows, RowConsumer};
 use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
+use dynident_rows::{JointRows, LogError, RowConsumer};
 
 /// What stops an estimator that comes back to the logs: itself, or what reads or simulates them.
 pub(crate) enum Stop {

@@ -3,13 +3,11 @@
 
 use super::row_pass::Stop;
 use super::{EstimatorError, TrainingRows};
-use crate::recording::LogError;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_estimation::{SimulatedCriterion, SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
 use dynident_model::terms::TorqueTerm;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
+use dynident_rows::{JointRows, LogError, RegressorModel, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_simulation::{
     ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, SimulationError, closed_loop,
 };

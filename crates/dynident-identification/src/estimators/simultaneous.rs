@@ -4,12 +4,12 @@
 use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
 use super::simulated::torque_sigma;
 use super::{EstimatorError, Findings, PeriodSettings, TrainingRows};
-use crate::recording::LogError;
 use dynident_estimation::{
     Estimate, LinearProblem, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
     simultaneous_least_squares, weighted_least_squares,
 };
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
+use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
 /// Positions further from the series than this share of their own size are not those of such a motion.

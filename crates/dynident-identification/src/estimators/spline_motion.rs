@@ -4,12 +4,12 @@
 use super::simulated::torque_sigma;
 use super::spline_torque::SplineTorque;
 use super::{EstimatorError, Findings, TrainingRows};
-use crate::recording::LogError;
 use dynident_estimation::{
     Estimate, SplineLogFit, SplineMotionProblem, SplineMotionSettings, SplineRecord, spline_motion_least_squares,
     weighted_least_squares,
 };
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
+use dynident_rows::LogError;
 use serde::{Deserialize, Serialize};
 
 /// Shorter pieces between two gaps are left out, samples.

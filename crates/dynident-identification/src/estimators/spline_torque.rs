@@ -1,12 +1,12 @@
 //! The torque of a robot and its derivatives by motion and parameters: what the spline fit asks of a robot.
 
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{
     BatchWorkspace, MotionGradient, Panels, TermHistory, regressor_panels, regressor_panels_adjoint,
     regressor_panels_following,
 };
 use dynident_estimation::{EstimationError, TorqueModel, TorqueSlopes};
 use dynident_model::terms::{JointMotion, TorqueTerm};
+use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
 /// Samples that one thread takes at a time.

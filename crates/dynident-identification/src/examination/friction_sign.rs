@@ -3,10 +3,10 @@
 //! Least squares follows a reversed joint: its friction comes out negative, which no robot has. The check of the torque
 //! as a whole, [`sign_evidence`](super::sign_evidence), asks the same of all joints at once and does not see one alone.
 
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};
+use dynident_rows::RegressorModel;
 
 /// Standard deviations below zero from which friction counts as negative. On the real logs that this was first tried
 /// on, honest joints stay above −2.5 and dead ones lie below −8.

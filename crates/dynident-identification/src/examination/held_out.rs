@@ -6,11 +6,11 @@ use super::residuals::{JointResiduals, JointWatch, Uncertainty};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::lag::{DelayCheck, TorqueLag, lags_after_pass};
-use crate::logs::Logs;
-use crate::recording::{LogError, Role, Samples};
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, LogStatistics, RawSamples, RowConsumer, predicted_torque};
 use dynident_estimation::{Validation, ValidationReport};
+use dynident_rows::{
+    JointRows, LogError, LogPass, LogStatistics, Logs, RawSamples, RegressorModel, Role, RowConsumer, Samples,
+    predicted_torque,
+};
 use serde::{Deserialize, Serialize};
 
 /// Errors of the predicted torque on one held-out recording.

@@ -1,11 +1,10 @@
 //! Torque in the motion's own band: figures that do not depend on the cut-off of the fit.
 
-use crate::logs::Logs;
-use crate::recording::LogError;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointFilters, ParallelFilterSettings, RawSamples, predicted_torque};
 use dynident_estimation::{Validation, ValidationReport};
 use dynident_recording::{DecimationSettings, FilterError};
+use dynident_rows::{
+    JointFilters, LogError, Logs, ParallelFilterSettings, RawSamples, RegressorModel, predicted_torque,
+};
 
 /// Measured torque and that of several sets of base parameters, all through the low-pass that the motion's spectrum
 /// alone asks for: a fit with a lower cut-off leaves less torque to explain, and looks better for it.

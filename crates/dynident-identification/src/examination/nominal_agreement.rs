@@ -2,14 +2,13 @@
 //!
 //! Least squares fits either sign equally well (all parameters change sign), so only a nominal model can decide.
 
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, predicted_torque};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     EstimationError, FactorWorkspace, SegmentedFactor, TriangularFactor, nonnegative_least_squares,
 };
 use dynident_model::terms::TorqueTerm;
 use dynident_recording::{Finding, Level};
+use dynident_rows::{JointRows, RegressorModel, predicted_torque};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 

@@ -1,13 +1,13 @@
 //! Residual diagnostics and the 95 % band of a held-out log, joint by joint, in the pass that validates.
 
 use super::stiction::Stiction;
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, Normality, NormalityReport, SpeedRanges, SpeedRangesReport, Whiteness, WhitenessReport,
     student_half_width,
 };
 use dynident_model::terms::{JointProperty, TorqueTerm};
+use dynident_rows::RegressorModel;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 

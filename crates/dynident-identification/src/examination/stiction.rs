@@ -1,9 +1,9 @@
 //! How much torque the dry friction of a joint may hold while the joint rests.
 
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::SpeedRanges;
 use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
+use dynident_rows::RegressorModel;
 
 /// Speeds at which friction is looked at, from a rest's limit to a reversal's, equally far apart by factors.
 const SPEEDS: usize = 8;

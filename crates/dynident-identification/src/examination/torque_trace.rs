@@ -1,8 +1,6 @@
 //! Measured and predicted torque over time, for the report.
 
-use crate::recording::Role;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, RawSamples, predicted_torque};
+use dynident_rows::{JointRows, RawSamples, RegressorModel, Role, predicted_torque};
 
 /// Rows of one joint that are kept at most: pictures need no more, and memory stays bounded.
 const MOST_ROWS: usize = 100_000;

@@ -3,11 +3,7 @@
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_after_pass};
-use crate::logs::Logs;
-use crate::progress::Silent;
-use crate::recording::{LogError, Role};
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
+use dynident_rows::{JointRows, LogError, LogPass, Logs, RawSamples, RegressorModel, Role, RowConsumer, Silent};
 
 /// What the second pass gathers.
 struct SecondPass<'a> {

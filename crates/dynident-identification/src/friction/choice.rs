@@ -6,10 +6,10 @@
 use super::candidates::{CandidateColumn, JointScale};
 use super::joint_friction::JointFriction;
 use super::search::search;
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
 use dynident_estimation::{CrossValidation, Estimate, EstimationError, LinearProblem};
 use dynident_model::terms::{TorqueTerm, sort_terms};
+use dynident_rows::RegressorModel;
 use rayon::prelude::*;
 
 /// Blocks of time; half as many where a log is too short for these.

@@ -1,11 +1,18 @@
 //! Steps at rest of a joint's terms, and the mean of terms that differ in their constants.
 
 use super::candidates::JointScale;
+use dynident_dynamics::ParametricModel;
 use dynident_model::terms::{CoulombShape, StepRole, TorqueTerm};
 
 /// The step of a term that changes its sign at rest.
-pub(crate) fn step_of(term: &TorqueTerm) -> Option<CoulombShape> {
+pub(super) fn step_of(term: &TorqueTerm) -> Option<CoulombShape> {
     term.step().filter(|_| term.kind().step_role() != StepRole::Fixed)
+}
+
+/// The step of a joint's dry friction; the sign function if its terms have none.
+pub(crate) fn step_of_joint(robot: &ParametricModel, joint: usize) -> CoulombShape {
+    let mut own = robot.terms().iter().filter(|term| term.own_joint() == Some(joint));
+    own.find_map(step_of).unwrap_or(CoulombShape::Sign { dead_band: 0.0 })
 }
 
 /// Whether it is Coulomb friction, in one or both directions.

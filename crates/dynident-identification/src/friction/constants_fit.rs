@@ -13,10 +13,10 @@ use super::candidates::JointScale;
 use super::constants::step_of;
 use super::joint_friction::{FrictionConstant, JointFriction};
 use super::weak_terms::{Weak, has_doubtful_term, without_weakest};
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, HALF_WIDTH_95, JointRows, LinearProblem, SegmentedFactor};
 use dynident_model::terms::{CoulombShape, TorqueTerm};
+use dynident_rows::RegressorModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

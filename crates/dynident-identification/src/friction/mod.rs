@@ -15,7 +15,7 @@ pub use joint_friction::{FrictionCandidate, FrictionConstant, JointFriction};
 
 pub(crate) use candidates::{CandidateColumn, JointScale, candidate_columns, step_columns};
 pub(crate) use choice::choose_friction;
-pub(crate) use constants::{is_coulomb, smooth_width, step_of};
+pub(crate) use constants::{is_coulomb, smooth_width, step_of_joint};
 pub(crate) use constants_fit::{ConstantsError, ConstantsStep, FrictionConstants};
 pub(crate) use second_start::{is_one_friction, second_start};
 pub(crate) use weak_terms::Weak;

@@ -12,11 +12,10 @@ use super::samples::DelayCheck;
 use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
 use crate::log_noise::{LogNoise, weighted_by_log};
-use crate::logs::Logs;
-use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, SegmentedFactor, weighted_least_squares, weighted_values,
 };
+use dynident_rows::{Logs, RegressorModel};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

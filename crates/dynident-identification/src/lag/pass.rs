@@ -5,13 +5,11 @@ use super::measured::{TorqueLag, pooled_delay};
 use super::samples::{DELAY_SAMPLES, DelayCheck};
 use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
-use crate::logs::Logs;
 use crate::payload::{DriveGain, LoadColumns, free_gains};
-use crate::progress::Silent;
-use crate::recording::{LogError, Recording, Samples};
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
 use crate::settings::IdentificationSettings;
+use dynident_rows::{
+    JointRows, LogError, LogPass, Logs, RawSamples, Recording, RegressorModel, RowConsumer, Samples, Silent,
+};
 use rayon::prelude::*;
 use std::borrow::Cow;
 

@@ -1,9 +1,9 @@
 //! Rows for estimating a lag: regressor, slope of the predicted torque, and the torque at six neighbouring samples,
 //! from which it is known at any time between.
 
-use crate::rows::{JointRows, divide_by_coverage as divide};
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_recording::{DecimationSettings, Decimator};
+use dynident_rows::{JointRows, divide_by_coverage as divide};
 
 /// Samples that torque between samples is made from.
 pub(crate) const NODES: usize = 6;

@@ -2,11 +2,9 @@
 
 use super::rows::{DelayRows, FilteredRows, Piece};
 use crate::estimators::EstimationSettings;
-use crate::logs::Logs;
-use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, RawSamples, motion_band_hz, predicted_torque};
 use dynident_estimation::EstimationError;
 use dynident_recording::{DecimationSettings, Decimator, best_lag};
+use dynident_rows::{JointRows, Logs, RawSamples, RegressorModel, motion_band_hz, predicted_torque};
 
 /// Samples that are looked at: some tens of seconds of any log.
 pub(crate) const DELAY_SAMPLES: usize = 20_000;

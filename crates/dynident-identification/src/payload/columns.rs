@@ -7,14 +7,12 @@
 
 use super::error::PayloadError;
 use super::refit::Refit;
-use crate::logs::of_role;
-use crate::recording::{Recording, Role};
-use crate::regressor_model::RegressorModel;
 use crate::settings::{GainChoice, IdentificationSettings, OffsetChoice};
 use dynident_dynamics::{Column, independent_columns};
 use dynident_estimation::{Estimate, EstimationError, LinearProblem, SegmentedFactor};
 use dynident_model::terms::{Offset, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
+use dynident_rows::{Recording, RegressorModel, Role, of_role};
 use nalgebra::{DMatrix, DVector};
 
 /// A payload's parameter is a sum of earlier ones when the part of its change that they do not make is below this

@@ -4,10 +4,10 @@ use super::columns::LoadColumns;
 use super::error::PayloadError;
 use super::refit::Refit;
 use crate::estimators::EstimationSettings;
-use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, KnownColumns, LinearProblem, weighted_least_squares_with_known};
 use dynident_model::terms::TorqueTerm;
+use dynident_rows::RegressorModel;
 use nalgebra::DMatrix;
 
 /// Base parameters of an arm, and how well they are known.

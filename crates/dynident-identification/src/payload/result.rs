@@ -2,9 +2,9 @@
 
 use super::body::{at_centre_of_mass, jacobian, nearest_consistent_body};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
-use crate::recording::Recording;
 use dynident_estimation::Estimate;
 use dynident_model::INERTIAL_NAMES;
+use dynident_rows::Recording;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 

@@ -21,13 +21,13 @@ mod test_log;
 mod velocities;
 
 pub use builder::RowBuilder;
-pub(crate) use coverage::{divide_by_coverage, set_aside};
+pub use coverage::{divide_by_coverage, set_aside};
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
-pub(crate) use joint_filters::JointFilters;
-pub(crate) use motion_noise::noise_factors;
+pub use joint_filters::JointFilters;
+pub use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
-pub(crate) use row_block::RowBlock;
-pub(crate) use samples::in_model_order;
+pub use row_block::RowBlock;
+pub use samples::in_model_order;
 pub use velocities::VelocityHistogram;
 
 use crate::recording::LogError;
@@ -35,7 +35,7 @@ use dynident_dynamics::Panels;
 
 /// Samples that are made into regressor blocks at a time: small enough for the cache, large enough to spread the
 /// filter's overhead.
-pub(crate) const PANEL_SAMPLES: usize = 256;
+pub const PANEL_SAMPLES: usize = 256;
 
 /// Filtered rows of one joint.
 #[derive(Clone, Copy, Debug)]

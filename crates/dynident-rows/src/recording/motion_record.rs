@@ -21,7 +21,7 @@ pub struct MotionRecord {
 
 impl MotionRecord {
     /// The record as `settings` ask for it: without the lag of the torque that they state.
-    pub(crate) fn as_set(&self, settings: &MotionSettings) -> Cow<'_, Self> {
+    pub fn as_set(&self, settings: &MotionSettings) -> Cow<'_, Self> {
         match &settings.torque_lag_s {
             Some(lag_s) => {
                 let motion = Arc::new(self.motion.without_torque_lag(lag_s));
@@ -32,7 +32,7 @@ impl MotionRecord {
     }
 
     /// The same with every row, where only samples at the ends do not count.
-    pub(crate) fn with_every_row(&self) -> Option<Self> {
+    pub fn with_every_row(&self) -> Option<Self> {
         let first = self.usable.iter().position(|usable| *usable).unwrap_or(0);
         let last = self.usable.iter().rposition(|usable| *usable).unwrap_or(0);
         let inside = self.usable.get(first..=last).unwrap_or_default();

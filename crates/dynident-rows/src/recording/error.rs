@@ -93,7 +93,7 @@ pub enum LogError {
 
 impl LogError {
     /// A log that cannot be read.
-    pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
+    pub fn recording(log: &str, source: RecordingError) -> Self {
         Self::Recording { log: log.to_owned(), source: Box::new(source) }
     }
 }

@@ -13,13 +13,7 @@ use dynident_recording::MotionBlock;
 use std::borrow::Cow;
 
 /// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
-pub(crate) fn in_model_order(
-    block: &MotionBlock,
-    places: &[usize],
-    from: usize,
-    samples: usize,
-    motion: &mut [Vec<f64>; 3],
-) {
+pub fn in_model_order(block: &MotionBlock, places: &[usize], from: usize, samples: usize, motion: &mut [Vec<f64>; 3]) {
     for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
         to.clear();
         for &place in places {

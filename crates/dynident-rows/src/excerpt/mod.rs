@@ -9,8 +9,8 @@
 mod pieces;
 
 use crate::execution::Execution;
+use crate::logs::RowSettings;
 use crate::recording::{LogError, Recording, Samples, Whole};
-use crate::settings::IdentificationSettings;
 use dynident_recording::{
     DecimationSettings, Decimator, Derivatives, Differentiator, FilterError, JointSamples, Log, MotionBlock,
     MotionSettings, MotionStream, Place, RecordingError, SampleRanges,
@@ -35,15 +35,17 @@ const PERIODS_IN_PIECE: f64 = 30.0;
 /// is none: it would say less of the other joints.
 const MOST_LEFT_OUT: f64 = 0.1;
 
-/// The recordings of a task with excerpts in place of the long ones among `training`; `None` where they are not long
-/// together, where nothing is left to choose, and where something is counted in samples: the parallel filter's factor,
-/// or a differentiator that has no cut-off or follows a commanded motion.
+/// The recordings of a task with excerpts in place of the long ones among `training`. `None` if they are not long
+/// together, if nothing is left to choose (`has_choices`: drive inertia or friction are left to the logs), and if a
+/// setting is a number of samples: the factor of the parallel filter, or a differentiator that has no cut-off or follows
+/// a commanded motion.
 ///
 /// # Errors
 /// Recordings that cannot be read.
-pub(crate) fn excerpts(
+pub fn excerpts(
     recordings: &[Recording],
-    settings: &IdentificationSettings,
+    settings: RowSettings<'_>,
+    has_choices: bool,
     training: &[usize],
     execution: Execution<'_>,
 ) -> Result<Option<Vec<Recording>>, LogError> {
@@ -52,8 +54,7 @@ pub(crate) fn excerpts(
     if !has_cutoff || differentiator.reference().is_some() || settings.parallel_filter.factor.is_some() {
         return Ok(None);
     }
-    let is_chosen = differentiator.wants_cutoff() || settings.motion.torque_lag_s.is_none();
-    if !is_chosen && settings.friction.is_empty() && settings.drive_inertia.is_empty() {
+    if !differentiator.wants_cutoff() && settings.motion.torque_lag_s.is_some() && !has_choices {
         return Ok(None);
     }
     let rows = |index: usize| recordings[index].estimated_rows().unwrap_or(0);
@@ -67,7 +68,8 @@ pub(crate) fn excerpts(
         let share = ((LONG as f64 * rows(index) as f64 / all as f64) as u64).max(LEAST) as usize;
         if let Samples::Log(log) = &recordings[index].samples
             && rows(index) > LEAST
-            && let Some((excerpt, whole)) = excerpt(&recordings[index], log, settings, share, execution.parallel())?
+            && let Some((excerpt, whole)) =
+                excerpt(&recordings[index], log, settings.motion, share, execution.parallel())?
         {
             found[index].samples = Samples::Log(Box::new(excerpt));
             found[index].whole = Some(whole);
@@ -82,7 +84,7 @@ pub(crate) fn excerpts(
 fn excerpt(
     recording: &Recording,
     log: &Log,
-    settings: &IdentificationSettings,
+    settings: &MotionSettings,
     most: usize,
     beside: bool,
 ) -> Result<Option<(Log, Whole)>, LogError> {
@@ -90,11 +92,11 @@ fn excerpt(
     // Logged velocities and accelerations are for comparison only; lag and ends are for the passes that come.
     let mut read = log.clone();
     (read.format.velocity, read.format.acceleration) = (None, None);
-    let motion = MotionSettings { keep_outliers: settings.motion.keep_outliers, ..MotionSettings::default() };
+    let motion = MotionSettings { keep_outliers: settings.keep_outliers, ..MotionSettings::default() };
     let build = |_: &_| -> Result<Box<dyn Differentiator>, FilterError> { Ok(Box::new(AsLogged)) };
     let stream = MotionStream::with_differentiator(&read, &motion, build).map_err(named)?.without_channels();
     let mut stream = if beside { stream.read_beside() } else { stream };
-    let given_hz = settings.motion.differentiator.cutoff_hz().unwrap_or(0.0);
+    let given_hz = settings.differentiator.cutoff_hz().unwrap_or(0.0);
     let needed_hz = SAMPLES_IN_PERIOD * stream.cutoff().cutoff_hz.max(given_hz);
     let factor = ((stream.rate_hz() / needed_hz) as usize).clamp(1, 1000);
     let piece_s = PERIODS_IN_PIECE / stream.cutoff().cutoff_hz;

@@ -75,38 +75,38 @@ impl<'a> RowBuilder<'a> {
     }
 
     /// The same that leaves out rows that do not count.
-    pub(crate) fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
+    pub fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
         self.filter.mask = mask;
         self
     }
 
     /// Where the model's joints stand in the motion.
-    pub(crate) fn places(&self) -> &[usize] {
+    pub fn places(&self) -> &[usize] {
         self.maker.places()
     }
 
     /// Samples to either side of a filtered row that it is made from.
-    pub(crate) fn reach(&self) -> usize {
+    pub fn reach(&self) -> usize {
         self.filter.filters.reach()
     }
 
     /// Samples that the first filtered row needs.
-    pub(crate) fn needed(&self) -> usize {
+    pub fn needed(&self) -> usize {
         self.filter.filters.needed()
     }
 
     /// Filtered rows of each joint so far, whether they counted or not.
-    pub(crate) fn filtered_rows(&self) -> u64 {
+    pub fn filtered_rows(&self) -> u64 {
         self.filter.filtered_rows
     }
 
     /// Samples so far.
-    pub(crate) fn samples(&self) -> u64 {
+    pub fn samples(&self) -> u64 {
         self.maker.samples()
     }
 
     /// How often each joint moved at which velocity so far.
-    pub(crate) fn into_velocities(self) -> Vec<VelocityHistogram> {
+    pub fn into_velocities(self) -> Vec<VelocityHistogram> {
         self.maker.into_velocities()
     }
 

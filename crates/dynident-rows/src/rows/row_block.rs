@@ -5,7 +5,7 @@ use dynident_estimation::factor::BLOCK_ROWS;
 /// Takes a joint's rows as they leave a filter, some at a time, and gives them on in blocks of [`BLOCK_ROWS`]: a factor
 /// takes in a large block in a fraction of the time of its parts, and its numbers do not depend on how they come.
 #[derive(Clone, Debug)]
-pub(crate) struct RowBlock {
+pub struct RowBlock {
     /// Column by column, with room for a whole block in each.
     values: Vec<f64>,
     columns: usize,
@@ -14,12 +14,12 @@ pub(crate) struct RowBlock {
 
 impl RowBlock {
     /// No rows yet of so many columns, the torque among them.
-    pub(crate) fn new(columns: usize) -> Self {
+    pub fn new(columns: usize) -> Self {
         Self { values: vec![0.0; columns * BLOCK_ROWS], columns, rows: 0 }
     }
 
     /// Takes `rows` rows, column by column; whole blocks go to `take`.
-    pub(crate) fn push<E>(
+    pub fn push<E>(
         &mut self,
         panel: &[f64],
         rows: usize,
@@ -42,7 +42,7 @@ impl RowBlock {
     }
 
     /// Gives the rest to `take`.
-    pub(crate) fn finish<E>(mut self, take: impl FnOnce(&[f64], usize) -> Result<(), E>) -> Result<(), E> {
+    pub fn finish<E>(mut self, take: impl FnOnce(&[f64], usize) -> Result<(), E>) -> Result<(), E> {
         if self.rows == 0 {
             return Ok(());
         }

@@ -60,18 +60,18 @@ pub struct Recording {
     /// The payload that it was recorded with, by name.
     pub payload: Option<String>,
     /// What is known of the longer recording that it is an excerpt of; none where it is whole.
-    pub(crate) whole: Option<Whole>,
+    pub whole: Option<Whole>,
 }
 
 /// What a recording says that is kept as an [excerpt](crate::excerpt), at the excerpt's rate.
 #[derive(Clone, Debug)]
-pub(crate) struct Whole {
+pub struct Whole {
     /// Rows of the whole.
-    pub(crate) rows: u64,
+    pub rows: u64,
     /// The cut-off that the whole's positions suggest.
-    pub(crate) cutoff: CutoffChoice,
+    pub cutoff: CutoffChoice,
     /// Standard deviation of the noise of one sample, in the log's order of joints.
-    pub(crate) position_noise: Vec<f64>,
+    pub position_noise: Vec<f64>,
 }
 
 impl Recording {
@@ -110,7 +110,7 @@ impl Recording {
     }
 
     /// Rows, about.
-    pub(crate) fn estimated_rows(&self) -> Option<u64> {
+    pub fn estimated_rows(&self) -> Option<u64> {
         match &self.samples {
             Samples::Log(log) => log.source().estimated_rows(),
             Samples::Motion(record) => Some(record.motion.rows as u64),
@@ -130,12 +130,12 @@ impl Recording {
     }
 
     /// Rows of what it is an excerpt of, or its own, about.
-    pub(crate) fn rows_of_whole(&self) -> Option<u64> {
+    pub fn rows_of_whole(&self) -> Option<u64> {
         self.whole.as_ref().map_or_else(|| self.estimated_rows(), |whole| Some(whole.rows))
     }
 
     /// Whether it has the temperatures of the joints.
-    pub(crate) fn has_temperature(&self) -> bool {
+    pub fn has_temperature(&self) -> bool {
         match &self.samples {
             Samples::Log(log) => log.format.temperature.is_some(),
             Samples::Motion(record) => !record.motion.temperature_c.is_empty(),
@@ -167,7 +167,7 @@ impl Recording {
     ///
     /// # Errors
     /// A joint that the recording does not have.
-    pub(crate) fn in_log_order<'m>(
+    pub fn in_log_order<'m>(
         &self,
         model: &Model,
         motion: &'m MotionSettings,

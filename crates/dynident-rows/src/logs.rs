@@ -22,15 +22,15 @@ const BEYOND_MOTION: f64 = 8.0;
 
 /// What the positions of one log say about its noise.
 #[derive(Clone, Debug)]
-pub(crate) struct LogSpectrum {
+pub struct LogSpectrum {
     /// Number of the recording.
-    pub(crate) index: usize,
+    pub index: usize,
     /// Samples a second.
-    pub(crate) rate_hz: f64,
+    pub rate_hz: f64,
     /// The cut-off that they suggest.
-    pub(crate) choice: CutoffChoice,
+    pub choice: CutoffChoice,
     /// Standard deviation of the noise of one sample, in the log's order of joints.
-    pub(crate) position_noise: Vec<f64>,
+    pub position_noise: Vec<f64>,
 }
 
 /// The settings that make rows of positions and torques.
@@ -133,7 +133,7 @@ impl<'a> Logs<'a> {
 
     /// The same with a cut-off that was chosen, or as it is.
     #[must_use]
-    pub(crate) fn with_chosen_cutoff(self, settings: &MotionSettings, cutoff_hz: Option<f64>) -> Self {
+    pub fn with_chosen_cutoff(self, settings: &MotionSettings, cutoff_hz: Option<f64>) -> Self {
         match cutoff_hz {
             Some(cutoff_hz) => self.with_cutoff(settings, cutoff_hz),
             None => self,
@@ -142,7 +142,7 @@ impl<'a> Logs<'a> {
 
     /// The same with what `other` has kept of the same recordings, where both have the same motion.
     #[must_use]
-    pub(crate) fn with_motion_of(mut self, other: &Self) -> Self {
+    pub fn with_motion_of(mut self, other: &Self) -> Self {
         if self.motion == other.motion && core::ptr::eq(self.recordings, other.recordings) {
             self.kept = Arc::clone(&other.kept);
         }
@@ -151,19 +151,19 @@ impl<'a> Logs<'a> {
 
     /// The same with [excerpts](crate::excerpt) for [looks at some instants](Self::pass_for_instants).
     #[must_use]
-    pub(crate) fn with_excerpts(mut self, excerpts: Arc<Vec<Recording>>) -> Self {
+    pub fn with_excerpts(mut self, excerpts: Arc<Vec<Recording>>) -> Self {
         self.excerpts = excerpts;
         self
     }
 
     /// What was given to [`with_excerpts`](Self::with_excerpts); empty where nothing was.
-    pub(crate) fn excerpts(&self) -> Arc<Vec<Recording>> {
+    pub fn excerpts(&self) -> Arc<Vec<Recording>> {
         Arc::clone(&self.excerpts)
     }
 
     /// The same with every pass reading anew: slower, in memory that does not grow with the length of a log.
     #[must_use]
-    pub(crate) fn without_keeping(mut self) -> Self {
+    pub fn without_keeping(mut self) -> Self {
         self.kept = Arc::default();
         self
     }
@@ -182,7 +182,7 @@ impl<'a> Logs<'a> {
     ///
     /// # Errors
     /// A recording that cannot be read.
-    pub(crate) fn with_torque_beyond_motion(&self, model: &RegressorModel) -> Result<Self, LogError> {
+    pub fn with_torque_beyond_motion(&self, model: &RegressorModel) -> Result<Self, LogError> {
         let Some(motion_hz) = motion_band_hz(&self.motion) else { return Ok(self.clone()) };
         let mut rows = 0.0;
         for log in &self.spectra {
@@ -211,12 +211,20 @@ impl<'a> Logs<'a> {
     }
 
     /// What the spectra alone ask for; none where the fit has that cut-off too.
-    pub(crate) fn motion_hz(&self) -> Option<f64> {
+    pub fn motion_hz(&self) -> Option<f64> {
         self.motion_hz
     }
 
+    /// The cut-off that the spectra suggest, if both the cut-off and the parallel filter are left to the data; hertz.
+    pub fn automatic_cutoff_hz(&self) -> Option<f64> {
+        let filter = &self.filter;
+        let is_automatic = filter.enabled && filter.factor.is_none() && filter.cutoff_hz.is_none();
+        let motion_hz = self.motion_hz().or_else(|| motion_band_hz(&self.motion));
+        motion_hz.filter(|_| is_automatic && !self.spectra().is_empty())
+    }
+
     /// What the spectra of the deciding logs say; empty where the cut-off was given.
-    pub(crate) fn spectra(&self) -> &[LogSpectrum] {
+    pub fn spectra(&self) -> &[LogSpectrum] {
         &self.spectra
     }
 
@@ -242,7 +250,7 @@ impl<'a> Logs<'a> {
 
     /// A pass that is asked for some instants of recording number `index`: of one whose motion is not kept over its
     /// excerpt, where it has one, so that a long log is not read again.
-    pub(crate) fn pass_for_instants<'p>(&'p self, model: &'p RegressorModel, index: usize) -> LogPass<'p> {
+    pub fn pass_for_instants<'p>(&'p self, model: &'p RegressorModel, index: usize) -> LogPass<'p> {
         let pass = self.pass(model, index);
         let is_kept = pass.kept.is_some_and(|kept| kept.get().is_some());
         match self.excerpts.get(index) {
@@ -252,13 +260,13 @@ impl<'a> Logs<'a> {
     }
 
     /// Begins a stage over some recordings.
-    pub(crate) fn begin(&self, stage: &str, indices: &[usize]) {
+    pub fn begin(&self, stage: &str, indices: &[usize]) {
         let rows = indices.iter().map(|&index| self.recordings[index].estimated_rows()).sum();
         self.execution.progress.begin(stage, rows);
     }
 
     /// Ends a stage.
-    pub(crate) fn end(&self) {
+    pub fn end(&self) {
         self.execution.progress.end();
     }
 }
@@ -269,7 +277,7 @@ fn unread(recordings: &[Recording]) -> Arc<Vec<OnceLock<KeptLog>>> {
 }
 
 /// Places of the recordings with this role.
-pub(crate) fn of_role(recordings: &[Recording], role: Role) -> Vec<usize> {
+pub fn of_role(recordings: &[Recording], role: Role) -> Vec<usize> {
     (0..recordings.len()).filter(|&index| recordings[index].role == role).collect()
 }
 
@@ -277,7 +285,6 @@ pub(crate) fn of_role(recordings: &[Recording], role: Role) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::excerpt::excerpts;
-    use crate::settings::IdentificationSettings;
     use dynident_dynamics::ParametricModel;
     use dynident_recording::JointSamples;
 
@@ -294,10 +301,11 @@ mod tests {
         };
         let samples = JointSamples::at_rate(1000.0, columns(1.0), columns(10.0));
         let recordings = vec![Recording::training("log", samples.into_log("log", &model.joint_names()).unwrap())];
-        let settings = IdentificationSettings::default();
-        let made = excerpts(&recordings, &settings, &[0], Execution::default()).unwrap().unwrap();
+        let (motion, parallel_filter) = (MotionSettings::default(), ParallelFilterSettings::default());
+        let settings = RowSettings { motion: &motion, parallel_filter: &parallel_filter };
         let execution = Execution::default();
-        let logs = Logs::new(model.model(), &recordings, settings.row_settings(), &[0], None, execution).unwrap();
+        let made = excerpts(&recordings, settings, true, &[0], execution).unwrap().unwrap();
+        let logs = Logs::new(model.model(), &recordings, settings, &[0], None, execution).unwrap();
         let logs = logs.with_excerpts(Arc::new(made));
         let rows_of = |pass: LogPass<'_>| {
             let mut rows = 0;

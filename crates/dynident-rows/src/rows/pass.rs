@@ -243,7 +243,7 @@ impl LogPass<'_> {
     /// Gives the motion to `take`, block by block and without its regressor, all of it or as many samples as are asked
     /// for: as it was kept, or read once and kept if it fits. Returns what the importer found; `None` for a motion that
     /// was made already.
-    pub(crate) fn each_block(
+    pub fn each_block(
         &self,
         take: &mut dyn FnMut(&MotionBlock) -> Result<(), LogError>,
     ) -> Result<Option<ImportReport>, LogError> {
@@ -293,7 +293,7 @@ impl LogPass<'_> {
     /// Some pieces of the motion, spread over the whole log where it was kept, else its first ones: about `samples`
     /// samples in pieces of `piece` or less, a piece with a segment of its own each. None for a motion that was made
     /// already. The second number is how many samples the pieces were taken from.
-    pub(crate) fn some_pieces(&self, samples: usize, piece: usize) -> Result<(Vec<MotionBlock>, usize), LogError> {
+    pub fn some_pieces(&self, samples: usize, piece: usize) -> Result<(Vec<MotionBlock>, usize), LogError> {
         let piece = piece.max(1);
         let of = |blocks: &[MotionBlock]| {
             let mut pieces = Vec::new();

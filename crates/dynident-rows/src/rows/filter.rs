@@ -64,7 +64,7 @@ impl ParallelFilterSettings {
     /// Rows a second that are left by default of a motion below this cut-off: the motion's cut-off is twice its highest
     /// frequency; with seven eighths of it per Nyquist band the filter's gain of one half lies at 0.7 of the cut-off,
     /// above all motion.
-    pub(crate) fn rows_per_s(motion_cutoff_hz: f64) -> f64 {
+    pub fn rows_per_s(motion_cutoff_hz: f64) -> f64 {
         1.75 * motion_cutoff_hz
     }
 

@@ -13,7 +13,7 @@ const LEAST_COVERAGE: f64 = 0.5;
 /// biased. Rows are divided by their coverage `c = Σ h_k m_k` (at least one half), so that a mean stays a mean; those
 /// with less than half of it do not count as rows ([`JointRows::counted`]).
 #[derive(Debug)]
-pub(crate) struct Coverage {
+pub(super) struct Coverage {
     taps: Vec<f64>,
     factor: usize,
     /// Samples of the piece so far.
@@ -25,7 +25,7 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    pub(crate) fn new(dof: usize, rate_hz: f64, filter: Option<&DecimationSettings>) -> Result<Self, FilterError> {
+    pub(super) fn new(dof: usize, rate_hz: f64, filter: Option<&DecimationSettings>) -> Result<Self, FilterError> {
         let taps = filter.map_or_else(|| Ok(vec![1.0]), |settings| settings.taps(rate_hz))?;
         Ok(Self {
             taps,
@@ -38,7 +38,7 @@ impl Coverage {
     }
 
     /// A new piece begins.
-    pub(crate) fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.samples = 0;
         self.joints.iter_mut().for_each(|(left_out, rows)| {
             left_out.clear();
@@ -47,7 +47,7 @@ impl Coverage {
     }
 
     /// The panel of `samples` samples with those of `set_aside` (as many; none if empty) left out.
-    pub(crate) fn mask<'a>(
+    pub(super) fn mask<'a>(
         &'a mut self,
         joint: usize,
         panel: &'a [f64],
@@ -69,12 +69,12 @@ impl Coverage {
     }
 
     /// All joints have seen so many further samples.
-    pub(crate) fn advance(&mut self, samples: usize) {
+    pub(super) fn advance(&mut self, samples: usize) {
         self.samples += samples;
     }
 
     /// Divides the next rows of a joint by their coverage, which it returns; empty where all of it is left.
-    pub(crate) fn divide(&mut self, joint: usize, rows: usize, panel: &mut [f64]) -> &[f64] {
+    pub(super) fn divide(&mut self, joint: usize, rows: usize, panel: &mut [f64]) -> &[f64] {
         let (left_out, done) = &mut self.joints[joint];
         self.shares.clear();
         let first = *done;
@@ -98,14 +98,14 @@ impl Coverage {
 }
 
 /// Divides the values of a column by the coverage of their rows, at least by one half; nothing where that is empty.
-pub(crate) fn divide_by_coverage(column: &mut [f64], coverage: &[f64]) {
+pub fn divide_by_coverage(column: &mut [f64], coverage: &[f64]) {
     for (value, coverage) in column.iter_mut().zip(coverage) {
         *value /= coverage.max(LEAST_COVERAGE);
     }
 }
 
 /// Whether the samples `from .. from + samples` of the joint at `place` are set aside; empty if all of the block count.
-pub(crate) fn set_aside(block: &MotionBlock, place: usize, from: usize, samples: usize) -> &[bool] {
+pub fn set_aside(block: &MotionBlock, place: usize, from: usize, samples: usize) -> &[bool] {
     match block.set_aside.get(place * block.rows + from..place * block.rows + from + samples) {
         Some(set_aside) => set_aside,
         None => &[],

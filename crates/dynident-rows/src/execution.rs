@@ -39,7 +39,7 @@ impl Execution<'_> {
     }
 
     /// Whether there is a second thread.
-    pub(crate) fn parallel(&self) -> bool {
+    pub fn parallel(&self) -> bool {
         self.threads > 1
     }
 }

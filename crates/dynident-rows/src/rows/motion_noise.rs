@@ -32,7 +32,7 @@ const SEED: u64 = 0x6e6f_6973_6521;
 ///
 /// # Errors
 /// A log that cannot be read again.
-pub(crate) fn noise_factors(
+pub fn noise_factors(
     pass: &LogPass<'_>,
     model: &RegressorModel,
     report: Option<&ImportReport>,

@@ -6,7 +6,7 @@ use dynident_recording::MotionBlock;
 
 /// Leaves out rows that do not count.
 #[derive(Debug)]
-pub(crate) struct RowMask<'a> {
+pub struct RowMask<'a> {
     record: &'a MotionRecord,
     /// How many of the samples before each cannot be used.
     unusable_before: Vec<usize>,
@@ -22,7 +22,7 @@ pub(crate) struct RowMask<'a> {
 impl<'a> RowMask<'a> {
     /// The mask of a record's rows behind a filter that reaches `half` samples to either side and keeps every
     /// `factor`-th row; `None` where all count.
-    pub(crate) fn of(record: &'a MotionRecord, half: usize, factor: usize) -> Option<Self> {
+    pub fn of(record: &'a MotionRecord, half: usize, factor: usize) -> Option<Self> {
         if record.usable.is_empty() && record.windows.is_none() {
             return None;
         }
@@ -47,7 +47,7 @@ impl<'a> RowMask<'a> {
     }
 
     /// The rows that count of a joint's next `all`.
-    pub(crate) fn apply<'s>(&'s mut self, all: &JointRows<'_>) -> JointRows<'s> {
+    pub fn apply<'s>(&'s mut self, all: &JointRows<'_>) -> JointRows<'s> {
         let Self { record, unusable_before, half, factor, done, places, kept, coverage } = self;
         let &JointRows { joint, rows, .. } = all;
         let MotionBlock { rows: samples, first_time_s, rate_hz, .. } = *record.motion;
