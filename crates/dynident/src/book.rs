@@ -13,6 +13,7 @@ chapters! {
     introduction: "introduction.md",
     first_identification: "first-identification.md",
     robots: "robots.md",
+    robot_formats: "robot-formats.md",
     logs: "logs.md",
     filters: "filters.md",
     dynamics: "dynamics.md",
