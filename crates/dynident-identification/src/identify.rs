@@ -11,6 +11,7 @@ use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSource};
 use crate::examination::HeldOutExamination;
 use crate::fitted::{Fitted, fitted};
+use crate::forms::{FormFit, form_fits};
 use crate::lag::LagChoice;
 use crate::less_noise::Fit;
 use crate::payload::{KnownArm, PayloadError, PayloadResult, gain_error, payload_results};
@@ -61,6 +62,8 @@ pub struct Identification {
     /// Other readings of the recordings beside the task's; none where there was no reason to try them, and for
     /// payloads.
     pub diagnosis: Option<Diagnosis>,
+    /// The model with the torque terms of each class of forms; empty for payloads on a known arm and with unknown gains.
+    pub forms: Vec<FormFit>,
     /// The lag of the torque that was taken off the rows, and how well the rest is known.
     pub torque_lag: LagChoice,
     /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
@@ -178,6 +181,11 @@ fn identified(
     let drives = choices.drives();
     let robot = drives.map_or(robot, |drives| &drives.robot);
     let diagnosis = stage.diagnosis(&examined, robot, &chosen)?;
+    let forms = if arm.is_some() || training.gains.is_some() {
+        Vec::new()
+    } else {
+        form_fits(&logs, settings, &training.model.parametric, &examined.consistent.parameters, &chosen)?
+    };
     times.estimation_s += examined.estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - examined.estimation_s;
     let of_arm = arm.map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
@@ -200,6 +208,7 @@ fn identified(
         bars,
         estimate,
         diagnosis,
+        forms,
         torque_lag: lag,
         between_logs,
         times,

@@ -131,6 +131,7 @@ mod error;
 pub mod estimators;
 pub mod examination;
 mod fitted;
+pub mod forms;
 pub mod friction;
 mod friction_by_log;
 mod identify;

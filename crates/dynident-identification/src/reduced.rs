@@ -141,6 +141,7 @@ fn identified(
         examination,
         held_out: Vec::new(),
         diagnosis: None,
+        forms: Vec::new(),
         torque_lag: LagChoice::default(),
         between_logs,
         times: StageTimes { estimation_s: started.elapsed().as_secs_f64(), ..StageTimes::default() },

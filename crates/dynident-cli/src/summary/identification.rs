@@ -117,6 +117,7 @@ fn headline(r: &ResultFile) -> String {
         );
     }
     text += &bands(r);
+    text += &super::forms::forms(r);
     text + &beside(r)
 }
 

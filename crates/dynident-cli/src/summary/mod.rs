@@ -5,6 +5,7 @@ mod check;
 mod design;
 mod factors;
 mod findings;
+mod forms;
 mod identification;
 mod inspection;
 mod iteration;

@@ -25,3 +25,4 @@ pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;
 
 pub(crate) use held_out::tested_on;
+pub(crate) use motion_band::MotionBand;

@@ -4,6 +4,7 @@
 //! laws.
 
 mod candidate;
+mod class;
 mod coulomb;
 mod coupling;
 mod declared;
@@ -27,6 +28,7 @@ mod torque_term;
 mod viscous;
 
 pub use candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
+pub use class::TermClass;
 pub use coulomb::{Coulomb, CoulombShape};
 pub use coupling::{Coupling, CouplingEffect};
 pub use declared::{Declared, DeclaredLaw};

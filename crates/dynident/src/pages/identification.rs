@@ -48,6 +48,7 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
     for log in &r.validation {
         page.add(held_out(log));
     }
+    super::forms::forms(&mut page, r);
     torques(&mut page, &r.robot.joints, traces, r.validation.iter().any(|log| log.physical.is_some()));
     page.add(Heading::new("Parameters"));
     parameters(&mut page, r);

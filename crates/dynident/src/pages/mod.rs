@@ -2,6 +2,7 @@
 
 mod check;
 pub(crate) mod design;
+mod forms;
 pub(crate) mod identification;
 pub(crate) mod iteration;
 mod iteration_parameters;

@@ -2,6 +2,7 @@
 
 use super::check::StudyCheck;
 use super::error_terms::ErrorTermResult;
+use super::forms::FormResult;
 use super::numbers::{number, rows};
 use super::provenance::Provenance;
 use crate::study::JointDrive;
@@ -90,6 +91,10 @@ pub struct ResultFile {
     /// How friction was chosen, for the joints where the study asks for it.
     #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,
+    /// The model in each class of forms that `dynident export` writes, with its own held-out error; empty for payloads
+    /// on a known arm, with unknown gains, and in results of older versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forms: Vec<FormResult>,
     /// Payloads that were estimated.
     #[serde(default)]
     pub payloads: Vec<PayloadResult>,

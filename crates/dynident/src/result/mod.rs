@@ -7,6 +7,7 @@ mod error_terms;
 mod evaluation;
 mod export;
 mod factors;
+mod forms;
 mod identification;
 mod inspection;
 mod iterations;
@@ -29,6 +30,7 @@ pub use error_terms::ErrorTermResult;
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
+pub use forms::{FormError, FormResult, FormTerm};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,

@@ -1,88 +1,46 @@
-//! What a description holds of a joint's drive: damping, friction, drive inertia and stiffness.
+//! Values of a joint's drive in a robot description: damping, friction, drive inertia and stiffness.
 
-use crate::jobs::recorded_velocities::recorded_velocities;
-use dynident_dynamics::ParametricModel;
-use dynident_export::{NearestFriction, RobotModel};
 use dynident_identification::Identification;
-use dynident_model::terms::JointProperty;
-use dynident_model::{InertialParameters, JointChange};
+use dynident_model::JointChange;
+use dynident_model::terms::{JointProperty, TermClass, TorqueTerm};
 
-/// The new values of the joints, and where they are not the law itself.
+/// The new values of the joints in a form of a class.
 pub(super) struct JointValues {
     /// New damping, friction, drive inertia and stiffness.
     pub(super) changes: Vec<JointChange>,
-    /// For each joint whose friction follows a law that no description holds, the damping and friction nearest to it.
-    pub(super) nearest: Vec<Option<NearestFriction>>,
+    /// Whether terms are missing in the form, so that the others were fitted again.
+    pub(super) is_refitted: bool,
 }
 
 impl JointValues {
-    /// Values of the terms that a description has a place for. A joint with another law of friction gets the damping
-    /// and friction nearest to it over the motion that was fitted to, for what the description said before is no
-    /// longer true.
-    ///
-    /// # Errors
-    /// Values that no robot has.
-    pub(super) fn of(
-        found: &Identification,
-        inertials: &[InertialParameters],
-        parameters: &[f64],
-    ) -> Result<Self, String> {
+    /// Values of the terms that a description of this class has a place for. They were fitted again for the class if
+    /// it cannot hold all terms of the model. Without such a fit (unknown gains) they are the model's own values.
+    pub(super) fn of(found: &Identification, class: TermClass) -> Self {
         let model = &found.model().parametric;
-        let values = &parameters[model.model().inertial_count()..];
-        let laws = not_described(model);
-        let mut nearest = vec![None; laws.len()];
-        if laws.contains(&true) {
-            let robot = model.model().with_inertials(inertials).map_err(|error| error.to_string())?;
-            let logs = found.training.logs.iter().map(|log| &log.statistics.velocities[..]);
-            let velocities = recorded_velocities(logs, laws.len());
-            let robot = RobotModel::new(robot, model.terms().to_vec(), values.to_vec())
-                .and_then(|robot| robot.with_velocities(velocities))
-                .map_err(|error| error.to_string())?;
-            for (joint, nearest) in nearest.iter_mut().enumerate().filter(|(joint, _)| laws[*joint]) {
-                *nearest = Some(NearestFriction::of(&robot, joint));
+        let form = found.forms.iter().find(|form| form.class == class);
+        let values: Vec<(&TorqueTerm, f64)> = match form {
+            Some(form) => form.terms.iter().zip(form.values.iter().copied()).collect(),
+            None => {
+                let values = &found.consistent.parameters[model.model().inertial_count()..];
+                model.terms().iter().zip(values.iter().copied()).collect()
             }
+        };
+        let mut changes: Vec<JointChange> = Vec::new();
+        for (term, value) in values {
+            let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
+            let change = change_of(&mut changes, &model.model().joints()[joint].name);
+            *match property {
+                JointProperty::Damping => &mut change.damping,
+                JointProperty::Friction => &mut change.friction,
+                JointProperty::DriveInertia => &mut change.drive_inertia,
+                JointProperty::Stiffness => &mut change.stiffness,
+            } = Some(value);
         }
-        let mut changes = changes_of_terms(model, values);
-        for (joint, nearest) in nearest.iter().enumerate() {
-            if let Some(nearest) = nearest {
-                let change = change_of(&mut changes, &model.model().joints()[joint].name);
-                (change.damping, change.friction) = (Some(nearest.viscous), Some(nearest.coulomb));
-            }
-        }
-        Ok(Self { changes, nearest })
+        Self { changes, is_refitted: form.is_some_and(|form| form.is_refitted) }
     }
 }
 
-/// For each joint whether its friction follows a law other than viscous and Coulomb friction. What follows a load or a
-/// temperature stands beside these two.
-fn not_described(model: &ParametricModel) -> Vec<bool> {
-    let mut joints = vec![false; model.dof()];
-    for term in model.terms() {
-        let is_other = term.is_friction() && term.property().is_none();
-        let is_other = is_other && !term.needs_load() && !term.needs_temperature();
-        if let (true, Some(joint)) = (is_other, term.own_joint()) {
-            joints[joint] = true;
-        }
-    }
-    joints
-}
-
-fn changes_of_terms(model: &ParametricModel, values: &[f64]) -> Vec<JointChange> {
-    let mut changes: Vec<JointChange> = Vec::new();
-    for (term, &value) in model.terms().iter().zip(values) {
-        let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
-        let change = change_of(&mut changes, &model.model().joints()[joint].name);
-        *match property {
-            JointProperty::Damping => &mut change.damping,
-            JointProperty::Friction => &mut change.friction,
-            JointProperty::DriveInertia => &mut change.drive_inertia,
-            JointProperty::Stiffness => &mut change.stiffness,
-        } = Some(value);
-    }
-    changes
-}
-
-/// The change of the joint `name`, a new one where there is none yet.
+/// The change of the joint `name`, a new one if there is none yet.
 fn change_of<'a>(changes: &'a mut Vec<JointChange>, name: &str) -> &'a mut JointChange {
     let place = changes.iter().position(|change| change.joint == name).unwrap_or_else(|| {
         let joint = name.to_owned();

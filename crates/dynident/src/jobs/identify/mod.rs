@@ -1,5 +1,6 @@
 //! Logs to a model: the main job.
 
+mod forms;
 mod joint_values;
 mod model_files;
 mod sections;
@@ -23,6 +24,7 @@ use dynident_identification::{
 };
 use dynident_model::InertialParameters;
 use dynident_recording::Level;
+use forms::form_results;
 use model_files::{ModelFiles, model_files};
 use sections::{
     base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
@@ -349,6 +351,7 @@ fn result_file(
             .into_iter()
             .flat_map(friction_results)
             .collect(),
+        forms: form_results(found),
         payloads: found.payloads.clone(),
         offsets: offset_results(found, &task.recordings),
         drive_gains: found.training.gains.as_ref().map(|(_, gains)| gains.clone()),

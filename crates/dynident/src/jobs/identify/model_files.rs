@@ -7,13 +7,12 @@ use crate::study::StudyRobot;
 use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::HALF_WIDTH_95;
-use dynident_export::{ComparedOver, NearestFriction};
 use dynident_identification::Identification;
 use dynident_model::mjcf::{Loss, included_from};
-use dynident_model::terms::JointProperty;
+use dynident_model::terms::{JointProperty, TermClass};
 use dynident_model::{
-    Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, LinkChange, Model, Robot, link_changes, rewrite_dh,
-    rewrite_mjcf, rewrite_sdf, rewrite_urdf, write_urdf,
+    Body, DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, Model, Robot, link_changes,
+    rewrite_dh, rewrite_mjcf, rewrite_sdf, rewrite_urdf, write_urdf,
 };
 use std::path::Path;
 
@@ -39,10 +38,10 @@ pub(super) fn model_files(
 ) -> Result<ModelFiles, String> {
     let (model, inertials) = (&found.model().parametric, &found.inertials()[..]);
     let (parameters, std) = (&found.consistent.parameters[..], &found.consistent.parameter_std[..]);
-    let JointValues { changes: joints, nearest } = JointValues::of(found, inertials, parameters)?;
+    let JointValues { changes: joints, is_refitted } = JointValues::of(found, TermClass::DampingAndFriction);
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
-    let known = Known { model, parameters, std, sources, nearest: &nearest };
+    let known = Known { model, parameters, std, sources, is_refitted };
     known.note(lost_in_urdf, &mut links);
     let Robot { model: whole, format, text, .. } = &robot.robot;
     let urdf = |text: &str| rewrite_urdf(text, &links, &joints).map_err(|error| error.to_string());
@@ -50,7 +49,9 @@ pub(super) fn model_files(
         DescriptionFormat::Urdf => Ok(ModelFiles { urdf: urdf(text)?, table: None, mjcf: None, sdf: None }),
         DescriptionFormat::Mjcf => {
             let mjcf = keeping(robot, model.model(), inertials).and_then(|mut links| {
-                known.note(|property| property.is_none(), &mut links);
+                let JointValues { changes: joints, is_refitted } =
+                    JointValues::of(found, TermClass::DampingFrictionAndInertia);
+                Known { is_refitted, ..known }.note(|property| property.is_none(), &mut links);
                 let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
                 rewrite_mjcf(text, &mut included_from(folder), &links, &joints).map_err(|error| error.to_string())
             });
@@ -59,7 +60,7 @@ pub(super) fn model_files(
         DescriptionFormat::Sdf => {
             let sdf = keeping(robot, model.model(), inertials).and_then(|mut links| {
                 known.note(lost_in_urdf, &mut links);
-                rewrite_sdf(text, &links, &joints).map_err(|error| error.to_string())
+                rewrite_sdf(text, &links, &with_springs(found, &joints)).map_err(|error| error.to_string())
             });
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: None, mjcf: None, sdf: Some(sdf) })
         }
@@ -68,6 +69,13 @@ pub(super) fn model_files(
             Ok(ModelFiles { urdf: urdf(&write_urdf(whole))?, table: Some(table), mjcf: None, sdf: None })
         }
     }
+}
+
+/// The same with the springs of the joints, which SDF has and URDF has not.
+fn with_springs(found: &Identification, joints: &[JointChange]) -> Vec<JointChange> {
+    let springs = JointValues::of(found, TermClass::DampingFrictionAndInertia).changes;
+    let spring = |joint: &JointChange| springs.iter().find(|own| own.joint == joint.joint)?.stiffness;
+    joints.iter().map(|joint| JointChange { stiffness: spring(joint), ..joint.clone() }).collect()
 }
 
 /// URDF, SDF and the D-H table have no drive inertia.
@@ -132,20 +140,22 @@ fn keeping(robot: &StudyRobot, model: &Model, inertials: &[InertialParameters]) 
     Ok(links)
 }
 
-/// What a body's comment tells of its values.
+/// What the comment of a body states about its values.
+#[derive(Clone, Copy)]
 struct Known<'a> {
     model: &'a ParametricModel,
     parameters: &'a [f64],
     std: &'a [Option<f64>],
     sources: &'a [[ValueSource; 10]],
-    nearest: &'a [Option<NearestFriction>],
+    /// Whether damping and friction were fitted again for the file.
+    is_refitted: bool,
 }
 
 impl Known<'_> {
     /// Says in a body's comment how well its mass is known, which of its values torque told, and what of its joint's
     /// drive the file does not hold or holds as something near to it.
     fn note(&self, lost: fn(Option<JointProperty>) -> bool, changes: &mut [LinkChange]) {
-        let Self { model, parameters, std, sources, nearest } = self;
+        let Self { model, parameters, std, sources, is_refitted } = self;
         for (index, (body, sources)) in model.model().bodies().iter().zip(*sources).enumerate() {
             let of = |which: ValueSource| -> String {
                 let names = (0..10).filter(|&k| sources[k] == which).map(|k| INERTIAL_NAMES[k]);
@@ -168,17 +178,8 @@ impl Known<'_> {
             if !lost.is_empty() {
                 let _ = write!(text, "; of this joint's drive this file does not hold {}", lost.join(", "));
             }
-            if let Some(Some(nearest)) = nearest.get(index) {
-                let unit = if model.model().joints()[index].turns() { "Nm" } else { "N" };
-                let over = match nearest.over {
-                    ComparedOver::RecordedMotion => "over the fitted motion",
-                    ComparedOver::VelocityLimit => "up to the velocity limit",
-                };
-                let _ = write!(
-                    text,
-                    "; its damping and friction are the nearest to the friction that was found, {over} off by {:.3} {unit} rms",
-                    nearest.rms_error
-                );
+            if *is_refitted && index < model.dof() {
+                let _ = write!(text, "; its damping and friction are fitted to the training logs without these terms");
             }
             let set = changes.iter_mut().find_map(|change| match change {
                 LinkChange::Set { link, note, .. } if link == body.name() => Some(note),

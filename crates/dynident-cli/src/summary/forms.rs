@@ -1,0 +1,22 @@
+//! The held-out error of each form of the model.
+
+use super::text::{percent, wrapped};
+use dynident::ResultFile;
+
+/// The forms with their errors, one line for each held-out log; empty if no log was held out.
+pub(super) fn forms(r: &ResultFile) -> String {
+    let mut text = String::new();
+    for (number, log) in r.validation.iter().enumerate() {
+        let of_form = |form: &dynident::result::FormResult| {
+            let error = form.held_out.iter().find(|error| error.log == log.log)?.relative_error_percent?;
+            Some(format!("{} {}\u{a0}%", form.forms.join("/"), percent(Some(error))))
+        };
+        let errors: Vec<String> = r.forms.iter().filter_map(of_form).collect();
+        if !errors.is_empty() {
+            let line =
+                format!("exported files on [{}], each fitted to what it can hold: {}", number + 1, errors.join(", "));
+            text += &wrapped(&line, 2);
+        }
+    }
+    text
+}

@@ -1,0 +1,215 @@
+//! Terms of a class, fitted to the training recordings with the bodies of the identified model.
+
+use super::test::tested_forms;
+use crate::error::IdentificationError;
+use crate::settings::IdentificationSettings;
+use crate::training::{LogFactors, log_factors};
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::{ValidationReport, nonnegative_least_squares};
+use dynident_model::terms::{TermClass, TorqueTerm, sort_terms};
+use dynident_rows::{Logs, RegressorModel, Role};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// The model with the torque terms of a class.
+#[derive(Clone, Debug)]
+pub struct FormFit {
+    /// The class.
+    pub class: TermClass,
+    /// Its terms.
+    pub terms: Vec<TorqueTerm>,
+    /// A value for each term, N m, N m s/rad, kg m² (N, N s/m, kg) per unit of the term.
+    pub values: Vec<f64>,
+    /// Whether terms of the identified model are missing in the class, so that the others were fitted again.
+    pub is_refitted: bool,
+    /// Errors of the predicted torque on each held-out recording: the number of the recording and the report, in the
+    /// band of the identified model's own test.
+    pub held_out: Vec<(usize, ValidationReport)>,
+}
+
+/// Fits the terms of every class to the training recordings `training` and tests them on the held-out recordings.
+/// `parameters` are all parameters of the identified model `robot`: ten for each body and one for each term. The bodies
+/// are kept. For each joint `j` with terms of its own `x_j`,
+///
+/// ```text
+/// min_x Σ ‖τ_j − W_j θ_bodies − A_j x_j‖²,    x_j ≥ 0 where the term cannot be negative
+/// ```
+///
+/// over the filtered rows. Terms that a class cannot hold are not in the prediction. Recordings with a payload are not
+/// used.
+///
+/// # Errors
+/// Recordings that cannot be read.
+pub fn form_fits(
+    logs: &Logs<'_>,
+    settings: &IdentificationSettings,
+    robot: &ParametricModel,
+    parameters: &[f64],
+    training: &[usize],
+) -> Result<Vec<FormFit>, IdentificationError> {
+    let is_bare = |index: &usize| logs.recordings[*index].payload.is_none();
+    let training: Vec<usize> = training.iter().copied().filter(is_bare).collect();
+    let held_out: Vec<usize> = logs.of_role(Role::Validate).into_iter().filter(is_bare).collect();
+    let wide = WideModel::new(robot, parameters)?;
+    let factors: Vec<LogFactors> = if training.is_empty() {
+        Vec::new()
+    } else {
+        logs.begin("forms of the model", &training);
+        let one = |&index: &usize| log_factors(logs, settings, &wide.model, index, training.len() == 1);
+        let factors: Result<Vec<LogFactors>, _> = training.par_iter().map(one).collect();
+        logs.end();
+        factors?
+    };
+    let fits: Vec<(FormFit, Vec<f64>)> = TermClass::ALL.iter().map(|&class| wide.fit(class, &factors)).collect();
+    let sets: Vec<&[f64]> = fits.iter().map(|(_, theta)| &theta[..]).collect();
+    let mut reports = tested_forms(logs, &wide.model, &sets, &held_out)?;
+    let mut found: Vec<FormFit> = fits.iter().map(|(fit, _)| fit.clone()).collect();
+    for (index, reports) in held_out.iter().zip(&mut reports) {
+        for (fit, report) in found.iter_mut().zip(reports.drain(..)) {
+            fit.held_out.push((*index, report));
+        }
+    }
+    Ok(found)
+}
+
+/// The robot with the terms of all classes as columns.
+struct WideModel<'a> {
+    robot: &'a ParametricModel,
+    /// Of the identified model.
+    parameters: &'a [f64],
+    model: RegressorModel,
+    /// Base parameters of its bodies without any term.
+    theta_bodies: Vec<f64>,
+}
+
+impl<'a> WideModel<'a> {
+    fn new(robot: &'a ParametricModel, parameters: &'a [f64]) -> Result<Self, IdentificationError> {
+        let mut terms: Vec<TorqueTerm> = robot.terms().to_vec();
+        for class in TermClass::ALL {
+            for joint in 0..robot.dof() {
+                for term in class.terms_of_joint(robot.model(), robot.terms(), joint).into_iter().flatten() {
+                    if !terms.contains(&term) {
+                        terms.push(term);
+                    }
+                }
+            }
+        }
+        terms.retain(|term| !term.has_memory() && !term.needs_temperature());
+        sort_terms(&mut terms);
+        let parametric = robot.with_terms(terms)?;
+        let bodies = parameters.len() - robot.terms().len();
+        let mut rigid = parameters[..bodies].to_vec();
+        rigid.resize(bodies + parametric.terms().len(), 0.0);
+        let theta_bodies = parametric.base().values(&rigid);
+        let mut model = RegressorModel::from(parametric);
+        if model.needs_load() {
+            model.load_parameters = Some(theta_bodies.clone());
+        }
+        Ok(Self { robot, parameters, model, theta_bodies })
+    }
+
+    /// The value of a term in the identified model; zero if it has no such term.
+    fn value(&self, term: &TorqueTerm) -> f64 {
+        let bodies = self.parameters.len() - self.robot.terms().len();
+        let place = self.robot.terms().iter().position(|own| own == term);
+        place.map_or(0.0, |place| self.parameters[bodies + place])
+    }
+
+    /// Base parameters of one unit of a term.
+    fn unit(&self, term: &TorqueTerm) -> Vec<f64> {
+        let parametric = &self.model.parametric;
+        let bodies = parametric.base().all_columns().len() - parametric.terms().len();
+        let mut unit = vec![0.0; parametric.base().all_columns().len()];
+        if let Some(place) = parametric.terms().iter().position(|own| own == term) {
+            unit[bodies + place] = 1.0;
+        }
+        parametric.base().values(&unit)
+    }
+
+    /// Adds a term with this value to base parameters.
+    fn add(&self, theta: &mut [f64], term: &TorqueTerm, value: f64) {
+        theta.iter_mut().zip(self.unit(term)).for_each(|(theta, unit)| *theta += value * unit);
+    }
+
+    /// The terms of a class with their values, and the base parameters of the wide model for them.
+    fn fit(&self, class: TermClass, factors: &[LogFactors]) -> (FormFit, Vec<f64>) {
+        let mut fit =
+            FormFit { class, terms: Vec::new(), values: Vec::new(), is_refitted: false, held_out: Vec::new() };
+        let mut theta = self.theta_bodies.clone();
+        let others = self.robot.terms().iter().filter(|term| term.own_joint().is_none());
+        for term in others {
+            if class.holds_other_terms() {
+                let value = self.value(term);
+                self.add(&mut theta, term, value);
+                fit.terms.push(term.clone());
+                fit.values.push(value);
+            } else {
+                fit.is_refitted = true;
+            }
+        }
+        let known = theta.clone();
+        for joint in 0..self.robot.dof() {
+            let own: Vec<&TorqueTerm> =
+                self.robot.terms().iter().filter(|term| term.own_joint() == Some(joint)).collect();
+            let lists = class.terms_of_joint(self.robot.model(), self.robot.terms(), joint);
+            let is_same = lists.len() == 1 && own.len() == lists[0].len() && own.iter().all(|t| lists[0].contains(t));
+            let (terms, values) = if is_same || factors.is_empty() {
+                let terms = lists.into_iter().next().unwrap_or_default();
+                let values = terms.iter().map(|term| self.value(term)).collect();
+                (terms, values)
+            } else {
+                fit.is_refitted = true;
+                self.best_list(joint, lists, &known, factors)
+            };
+            for (term, value) in terms.into_iter().zip(values) {
+                self.add(&mut theta, &term, value);
+                fit.terms.push(term);
+                fit.values.push(value);
+            }
+        }
+        (fit, theta)
+    }
+
+    /// Of several lists of terms of a joint the one with the least residual, with its values.
+    fn best_list(
+        &self,
+        joint: usize,
+        lists: Vec<Vec<TorqueTerm>>,
+        known: &[f64],
+        factors: &[LogFactors],
+    ) -> (Vec<TorqueTerm>, Vec<f64>) {
+        let fitted = lists.into_iter().map(|terms| {
+            let (values, squares) = self.least_squares(joint, &terms, known, factors);
+            (squares, terms, values)
+        });
+        let best = fitted.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or_else(Default::default, |(_, terms, values)| (terms, values))
+    }
+
+    /// The values of terms of a joint that fit its rows best, and the sum of squares that they explain, negative.
+    fn least_squares(
+        &self,
+        joint: usize,
+        terms: &[TorqueTerm],
+        known: &[f64],
+        factors: &[LogFactors],
+    ) -> (Vec<f64>, f64) {
+        let columns = self.model.layout().joint_columns(joint);
+        let local = |theta: &[f64]| DVector::from_iterator(columns.len(), columns.iter().map(|&column| theta[column]));
+        let units: Vec<DVector<f64>> = terms.iter().map(|term| local(&self.unit(term))).collect();
+        let (known, count) = (local(known), terms.len());
+        let (mut gram, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        for log in factors.iter().filter(|log| log.factors[joint].rows() > 0) {
+            let total = log.factors[joint].total();
+            let triangle = total.regressor_triangle();
+            let rest = total.rotated_torque() - &triangle * &known;
+            let a = DMatrix::from_columns(&units.iter().map(|unit| &triangle * unit).collect::<Vec<_>>());
+            gram += a.tr_mul(&a);
+            right += a.tr_mul(&rest);
+        }
+        let nonnegative: Vec<bool> = terms.iter().map(TorqueTerm::is_nonnegative).collect();
+        let x = nonnegative_least_squares(&gram, &right, &nonnegative);
+        let squares = x.dot(&(&gram * &x)) - 2.0 * x.dot(&right);
+        (x.iter().copied().collect(), squares)
+    }
+}

@@ -1,0 +1,65 @@
+//! Which torque terms a form of the model can hold.
+
+use super::{Coulomb, CoulombShape, DriveInertia, JointProperty, TorqueTerm, Viscous};
+use crate::Model;
+use serde::{Deserialize, Serialize};
+
+/// A class of torque terms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum TermClass {
+    /// `d q̇ + c sign(q̇)` for each joint: URDF and SDF.
+    DampingAndFriction,
+    /// The same with the drive inertia and the spring of each joint: MJCF.
+    DampingFrictionAndInertia,
+    /// All terms that depend only on the current position, velocity and acceleration: code without state.
+    WithoutMemory,
+}
+
+impl TermClass {
+    /// All classes.
+    pub const ALL: [Self; 3] = [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::WithoutMemory];
+
+    /// The terms of joint `joint` in a form of this class, for a robot with the terms `terms`. Several lists are
+    /// alternatives: the one with the smallest residual should be taken.
+    pub fn terms_of_joint(self, model: &Model, terms: &[TorqueTerm], joint: usize) -> Vec<Vec<TorqueTerm>> {
+        let own = || terms.iter().filter(move |term| term.own_joint() == Some(joint)).cloned();
+        let simple = || {
+            let shape = CoulombShape::Sign { dead_band: 0.0 };
+            vec![TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape })]
+        };
+        match self {
+            Self::DampingAndFriction => vec![simple()],
+            Self::DampingFrictionAndInertia => {
+                let drive = TorqueTerm::DriveInertia(DriveInertia { joint });
+                let is_held = |term: &TorqueTerm| *term == drive || term.property() == Some(JointProperty::Stiffness);
+                vec![simple().into_iter().chain(own().filter(is_held)).collect()]
+            }
+            Self::WithoutMemory => {
+                let kept: Vec<TorqueTerm> =
+                    own().filter(|term| !term.has_memory() && !term.needs_temperature()).collect();
+                let has_step = kept.iter().any(|term| term.is_joint_friction() && term.step().is_some());
+                if has_step || !own().any(|term| term.has_memory()) {
+                    return vec![kept];
+                }
+                // Friction with memory is Coulomb friction as long as the joint does not reverse.
+                let turns = model.joints()[joint].turns();
+                let widths = STEP_WIDTHS.map(|width| model.own_scale().velocity(turns, width));
+                let with_step = |width: f64| {
+                    let shape = CoulombShape::Smooth { width };
+                    kept.iter().cloned().chain([TorqueTerm::Coulomb(Coulomb { joint, shape })]).collect()
+                };
+                widths.map(with_step).to_vec()
+            }
+        }
+    }
+
+    /// Whether the class can hold terms of two joints (couplings) and declared torques.
+    pub fn holds_other_terms(self) -> bool {
+        self == Self::WithoutMemory
+    }
+}
+
+/// Widths of the smooth step in place of friction with memory that are tried, rad/s or m/s of a usual arm.
+const STEP_WIDTHS: [f64; 4] = [0.005, 0.02, 0.05, 0.1];

@@ -1,0 +1,38 @@
+//! The model in each class of forms: what is refitted, and the held-out error of each.
+
+use crate::result::ResultFile;
+use dynident_model::terms::TermClass;
+use dynident_report::{Report, Table};
+
+/// The table of forms; nothing for results without them.
+pub(super) fn forms(page: &mut Report, r: &ResultFile) {
+    if r.forms.is_empty() {
+        return;
+    }
+    let percent = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2} %"));
+    let rows = r.forms.iter().flat_map(|form| {
+        let held = match form.class {
+            TermClass::DampingAndFriction => "bodies, damping, Coulomb friction",
+            TermClass::DampingFrictionAndInertia => "bodies, damping, Coulomb friction, drive inertia, springs",
+            TermClass::WithoutMemory => "everything except friction with memory or temperature",
+        };
+        let refitted = if form.refitted { "drives fitted again" } else { "nothing" };
+        let row = move |log: &str, error: Option<f64>, model: Option<f64>| {
+            let cells = [form.forms.join(", "), held.to_owned(), refitted.to_owned(), log.to_owned()];
+            let errors = [percent(error), percent(model)];
+            cells.into_iter().chain(errors).map(Into::into).collect::<Vec<_>>()
+        };
+        let of_log = |error: &crate::result::FormError| {
+            row(&error.log, error.relative_error_percent, error.model_relative_error_percent)
+        };
+        let rows: Vec<_> = form.held_out.iter().map(of_log).collect();
+        if rows.is_empty() { vec![row("none held out", None, None)] } else { rows }
+    });
+    page.add(
+        Table::new(
+            "Forms of the model",
+            ["form", "can hold", "refitted", "held-out log", "error of the form", "error of the model"],
+        )
+        .rows(rows),
+    );
+}
