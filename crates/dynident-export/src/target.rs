@@ -10,6 +10,7 @@ use crate::model_file::model_json;
 use crate::robot_model::RobotModel;
 use crate::ros2_parameters::ros2_parameters;
 use crate::sdf::sdf;
+use dynident_model::terms::TermClass;
 use dynident_text::visible;
 
 /// A form of the model.
@@ -51,6 +52,16 @@ impl Target {
         Self::Ros2Yaml,
         Self::Json,
     ];
+
+    /// The class of torque terms that the form can hold; `None` if it can list all terms.
+    pub fn class(self) -> Option<TermClass> {
+        match self {
+            Self::C | Self::Cpp | Self::Rust | Self::Python | Self::Matlab => Some(TermClass::FunctionsOfMotion),
+            Self::Mjcf => Some(TermClass::DampingFrictionAndInertia),
+            Self::Urdf | Self::Sdf => Some(TermClass::DampingAndFriction),
+            Self::Ros2Yaml | Self::Json => None,
+        }
+    }
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {

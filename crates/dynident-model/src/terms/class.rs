@@ -13,13 +13,13 @@ pub enum TermClass {
     DampingAndFriction,
     /// The same with the drive inertia and the spring of each joint: MJCF.
     DampingFrictionAndInertia,
-    /// All terms that depend only on the current position, velocity and acceleration: code without state.
-    WithoutMemory,
+    /// All terms that are functions of the current position, velocity and acceleration: code.
+    FunctionsOfMotion,
 }
 
 impl TermClass {
     /// All classes.
-    pub const ALL: [Self; 3] = [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::WithoutMemory];
+    pub const ALL: [Self; 3] = [Self::DampingAndFriction, Self::DampingFrictionAndInertia, Self::FunctionsOfMotion];
 
     /// The terms of joint `joint` in a form of this class, for a robot with the terms `terms`. Several lists are
     /// alternatives: the one with the smallest residual should be taken.
@@ -36,14 +36,13 @@ impl TermClass {
                 let is_held = |term: &TorqueTerm| *term == drive || term.property() == Some(JointProperty::Stiffness);
                 vec![simple().into_iter().chain(own().filter(is_held)).collect()]
             }
-            Self::WithoutMemory => {
-                let kept: Vec<TorqueTerm> =
-                    own().filter(|term| !term.has_memory() && !term.needs_temperature()).collect();
+            Self::FunctionsOfMotion => {
+                let kept: Vec<TorqueTerm> = own().filter(|term| Self::is_function_of_motion(term)).collect();
                 let has_step = kept.iter().any(|term| term.is_joint_friction() && term.step().is_some());
-                if has_step || !own().any(|term| term.has_memory()) {
+                if has_step || own().all(|term| Self::is_function_of_motion(&term)) {
                     return vec![kept];
                 }
-                // Friction with memory is Coulomb friction as long as the joint does not reverse.
+                // Friction with memory is Coulomb friction until the joint reverses; friction under load has its sign.
                 let turns = model.joints()[joint].turns();
                 let widths = STEP_WIDTHS.map(|width| model.own_scale().velocity(turns, width));
                 let with_step = |width: f64| {
@@ -55,11 +54,16 @@ impl TermClass {
         }
     }
 
+    /// Whether a term depends only on the current motion: not on earlier motion, the load of the gear or a temperature.
+    fn is_function_of_motion(term: &TorqueTerm) -> bool {
+        !term.has_memory() && !term.needs_load() && !term.needs_temperature()
+    }
+
     /// Whether the class can hold terms of two joints (couplings) and declared torques.
     pub fn holds_other_terms(self) -> bool {
-        self == Self::WithoutMemory
+        self == Self::FunctionsOfMotion
     }
 }
 
-/// Widths of the smooth step in place of friction with memory that are tried, rad/s or m/s of a usual arm.
+/// Widths of the smooth step in place of friction with memory or under load that are tried, rad/s or m/s of a usual arm.
 const STEP_WIDTHS: [f64; 4] = [0.005, 0.02, 0.05, 0.1];

@@ -14,7 +14,7 @@ pub(super) fn forms(page: &mut Report, r: &ResultFile) {
         let held = match form.class {
             TermClass::DampingAndFriction => "bodies, damping, Coulomb friction",
             TermClass::DampingFrictionAndInertia => "bodies, damping, Coulomb friction, drive inertia, springs",
-            TermClass::WithoutMemory => "everything except friction with memory or temperature",
+            TermClass::FunctionsOfMotion => "everything except friction with memory, load or temperature",
         };
         let refitted = if form.refitted { "drives fitted again" } else { "nothing" };
         let row = move |log: &str, error: Option<f64>, model: Option<f64>| {

@@ -46,8 +46,16 @@ pub struct FormError {
 }
 
 impl FormResult {
-    /// The value of a term.
-    pub fn value(&self, term: &TorqueTerm) -> Option<f64> {
-        self.terms.iter().find(|one| one.term == *term).map(|one| one.value)
+    /// The errors of the form in sentences, one for each held-out log.
+    pub(crate) fn sentences(&self) -> impl Iterator<Item = String> {
+        let percent = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} %"));
+        self.held_out.iter().map(move |error| {
+            format!(
+                "Held-out torque error of this file: {} on {}; of the identified model: {}.",
+                percent(error.relative_error_percent),
+                error.log,
+                percent(error.model_relative_error_percent)
+            )
+        })
     }
 }

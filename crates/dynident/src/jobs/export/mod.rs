@@ -7,7 +7,7 @@ pub use simulator::{export_simulator, export_simulator_of};
 use crate::error::Error;
 use crate::jobs::recorded_velocities::recorded_velocities;
 use crate::jobs::violations::violations;
-use crate::result::ResultFile;
+use crate::result::{FormResult, ResultFile};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_export::{ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, payload_command};
 use dynident_identification::Role;
@@ -43,8 +43,32 @@ pub fn export_result(
     target: Target,
 ) -> Result<Exported, Error> {
     let robot = robot_model(stored, result_path, study, study_path, data)?;
+    let form = target.class().and_then(|class| stored.forms.iter().find(|form| form.class == class));
+    let mut notes = reservations(stored);
+    let robot = match form {
+        Some(form) => {
+            if form.refitted {
+                notes.push(
+                    "This form cannot hold all torque terms of the result: friction and drives were fitted again to \
+                     the training logs."
+                        .to_owned(),
+                );
+            }
+            notes.extend(form.sentences());
+            of_form(&robot, form)
+                .map_err(|source| Error::Export { path: result_path.to_owned(), source: Box::new(source) })?
+        }
+        None => robot,
+    };
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
-    export(&robot, target, &reservations(stored)).map_err(cannot)
+    export(&robot, target, &notes).map_err(cannot)
+}
+
+/// The robot with the torque terms of a form.
+fn of_form(robot: &RobotModel, form: &FormResult) -> Result<RobotModel, ExportError> {
+    let terms = form.terms.iter().map(|one| one.term.clone()).collect();
+    let values = form.terms.iter().map(|one| one.value).collect();
+    RobotModel::new(robot.model().clone(), terms, values)
 }
 
 /// What a user of the model has to know of the result.

@@ -1,9 +1,11 @@
 //! The model in each class of forms, for the result.
 
 use crate::result::{FormError, FormResult, FormTerm};
+use dynident_estimation::ValidationReport;
+use dynident_export::Target;
 use dynident_identification::Identification;
 use dynident_identification::forms::FormFit;
-use dynident_model::terms::TermClass;
+use dynident_model::terms::TorqueTerm;
 
 /// The results of all classes of forms.
 pub(super) fn form_results(found: &Identification) -> Vec<FormResult> {
@@ -11,13 +13,13 @@ pub(super) fn form_results(found: &Identification) -> Vec<FormResult> {
 }
 
 fn form_result(found: &Identification, form: &FormFit) -> FormResult {
-    let term = |(term, value): (&dynident_model::terms::TorqueTerm, &f64)| FormTerm {
+    let term = |(term, value): (&TorqueTerm, &f64)| FormTerm {
         symbol: term.symbol(),
         value: *value,
         unit: term.unit().to_owned(),
         term: term.clone(),
     };
-    let error = |(index, report): &(usize, dynident_estimation::ValidationReport)| {
+    let error = |(index, report): &(usize, ValidationReport)| {
         let tested = found.held_out.iter().find(|tested| tested.index == *index)?;
         let model = tested.validation.physical.as_ref().unwrap_or(&tested.validation.model);
         Some(FormError {
@@ -26,20 +28,12 @@ fn form_result(found: &Identification, form: &FormFit) -> FormResult {
             model_relative_error_percent: model.relative_error_percent,
         })
     };
+    let has_class = |target: &Target| target.class() == Some(form.class);
     FormResult {
         class: form.class,
-        forms: names(form.class).iter().map(|&name| name.to_owned()).collect(),
+        forms: Target::ALL.into_iter().filter(has_class).map(|target| target.name().to_owned()).collect(),
         refitted: form.is_refitted,
         terms: form.terms.iter().zip(&form.values).map(term).collect(),
         held_out: form.held_out.iter().filter_map(error).collect(),
-    }
-}
-
-/// The forms of `dynident export` that have a class.
-fn names(class: TermClass) -> &'static [&'static str] {
-    match class {
-        TermClass::DampingAndFriction => &["urdf", "sdf"],
-        TermClass::DampingFrictionAndInertia => &["mjcf"],
-        TermClass::WithoutMemory => &["c", "cpp", "rust", "python", "matlab"],
     }
 }
