@@ -17,6 +17,12 @@ pub enum ExportError {
         /// Number of values.
         found: usize,
     },
+    /// A model file that does not describe a robot.
+    #[error("the model file is damaged: {what}")]
+    File {
+        /// What is wrong.
+        what: String,
+    },
     /// A value that is no number.
     #[error("the value of {symbol} is {value}, not a finite number")]
     NotFinite {

@@ -32,6 +32,7 @@ mod drive_torque;
 mod equations;
 mod error;
 mod exported;
+mod from_file;
 mod graph;
 mod languages;
 mod model_file;

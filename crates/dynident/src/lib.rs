@@ -82,6 +82,7 @@ pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study}
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{
     export_model, export_payload, export_payload_of, export_result, export_simulator, export_simulator_of,
+    export_stored,
 };
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{

@@ -6,15 +6,15 @@ use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::export::{Exported, PayloadReader, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile};
-use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, study_inputs};
+use dynident::{ResultFile, export_payload_of, export_result, export_simulator_of, export_stored, study_inputs};
 use std::path::PathBuf;
 
 /// Options of `export`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The result.json of an identification.
+    /// The result.json of an identification, or its folder.
     result: PathBuf,
-    /// The study that it was made with; a payload needs none.
+    /// The study that it was made with: needed for results of older versions and for the simulator's drives.
     #[arg(long, value_name = "STUDY.toml")]
     study: Option<PathBuf>,
     /// Use the result although it was edited after it was written. Its numbers are checked all the same.
@@ -107,10 +107,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let data = options.data.as_deref();
     let study = options.study.as_deref().map(|path| options.programs.load_study(path, data).map(|study| (study, path)));
     let study = study.transpose()?;
+    let result = if options.result.is_dir() { options.result.join("result.json") } else { options.result.clone() };
     if let Some(out) = &options.out {
         let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "torque", "log"]));
         let mut inputs = named.unwrap_or_default();
-        inputs.push(options.result.clone());
+        inputs.push(result.clone());
         dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;
     }
     let with_study = || {
@@ -118,20 +119,22 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         study.ok_or_else(|| "--study STUDY.toml is missing: name the study that the result was made with".to_owned())
     };
     let read = if options.accept_edited { ResultFile::read_edited } else { ResultFile::read };
-    let stored = read(&options.result).map_err(message_of)?;
+    let stored = read(&result).map_err(message_of)?;
     let drives = || -> Result<_, String> {
         let (study, path) = with_study()?;
-        export_simulator_of(&stored, &options.result, study, path, data).map_err(known_in(path))
+        export_simulator_of(&stored, &result, study, path, data).map_err(known_in(path))
     };
     let exported = match options.to.kind() {
-        Kind::Model(target) => {
-            let (study, path) = with_study()?;
-            export_result(&stored, &options.result, study, path, data, target).map_err(known_in(path))?
-        }
+        Kind::Model(target) => match &study {
+            Some((study, path)) => {
+                export_result(&stored, &result, study, path, data, target).map_err(known_in(path))?
+            }
+            None => export_stored(&stored, &result, target).map_err(message_of)?,
+        },
         Kind::SimulatorJson => drives()?.json().map_err(|error| error.to_string())?,
         Kind::SimulatorTable => drives()?.table(),
         Kind::Payload(reader) => {
-            export_payload_of(&stored, &options.result, options.payload.as_deref(), reader).map_err(message_of)?
+            export_payload_of(&stored, &result, options.payload.as_deref(), reader).map_err(message_of)?
         }
     };
     write(options, context, exported)

@@ -1,5 +1,6 @@
 //! The model in each class of forms, with its own held-out error.
 
+use dynident_export::{ExportError, ModelFile, RobotModel};
 use dynident_model::terms::{TermClass, TorqueTerm};
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,25 @@ pub struct FormResult {
     pub terms: Vec<FormTerm>,
     /// Error of the predicted torque, log by log.
     pub held_out: Vec<FormError>,
+}
+
+/// The identified robot, complete: what `dynident export` needs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct StoredModel {
+    /// Links, joints, limits and bodies.
+    pub robot: ModelFile,
+    /// All torque terms with their values.
+    pub terms: Vec<FormTerm>,
+}
+
+impl StoredModel {
+    /// The robot, with its own terms or those of a form.
+    pub(crate) fn robot(&self, form: Option<&FormResult>) -> Result<RobotModel, ExportError> {
+        let terms = form.map_or(&self.terms, |form| &form.terms);
+        self.robot
+            .robot(terms.iter().map(|one| one.term.clone()).collect(), terms.iter().map(|one| one.value).collect())
+    }
 }
 
 /// A term of a form.

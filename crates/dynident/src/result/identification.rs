@@ -2,7 +2,7 @@
 
 use super::check::StudyCheck;
 use super::error_terms::ErrorTermResult;
-use super::forms::FormResult;
+use super::forms::{FormResult, StoredModel};
 use super::numbers::{number, rows};
 use super::provenance::Provenance;
 use crate::study::JointDrive;
@@ -91,6 +91,10 @@ pub struct ResultFile {
     /// How friction was chosen, for the joints where the study asks for it.
     #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,
+    /// The identified robot for `dynident export`, which needs no study with it; `None` for payloads on a known arm, for
+    /// bodies with unknown parameters, and in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<StoredModel>,
     /// The model in each class of forms that `dynident export` writes, with its own held-out error; empty for payloads
     /// on a known arm, with unknown gains, and in results of older versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -30,7 +30,7 @@ pub use error_terms::ErrorTermResult;
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use factors::{FACTORS_SCHEMA, FactorsFile, FactorsLog};
-pub use forms::{FormError, FormResult, FormTerm};
+pub use forms::{FormError, FormResult, FormTerm, StoredModel};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,

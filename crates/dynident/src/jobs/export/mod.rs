@@ -43,25 +43,51 @@ pub fn export_result(
     target: Target,
 ) -> Result<Exported, Error> {
     let robot = robot_model(stored, result_path, study, study_path, data)?;
-    let form = target.class().and_then(|class| stored.forms.iter().find(|form| form.class == class));
-    let mut notes = reservations(stored);
-    let robot = match form {
-        Some(form) => {
-            if form.refitted {
-                notes.push(
-                    "This form cannot hold all torque terms of the result: friction and drives were fitted again to \
-                     the training logs."
-                        .to_owned(),
-                );
-            }
-            notes.extend(form.sentences());
-            of_form(&robot, form)
-                .map_err(|source| Error::Export { path: result_path.to_owned(), source: Box::new(source) })?
-        }
-        None => robot,
+    let form = form_of(stored, target);
+    let made = match form {
+        Some(form) => of_form(&robot, form),
+        None => Ok(robot),
     };
-    let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
-    export(&robot, target, &notes).map_err(cannot)
+    written(stored, result_path, made, form, target)
+}
+
+/// As [`export_result()`] without the study: for a result that holds its robot.
+///
+/// # Errors
+/// A result of an older version, which does not hold its robot; [`Error::Export`] for what the form cannot hold at all.
+pub fn export_stored(stored: &ResultFile, result_path: &Path, target: Target) -> Result<Exported, Error> {
+    let Some(model) = &stored.model else {
+        let message = "does not contain the robot: name the study that the result was made with (--study STUDY.toml)";
+        return Err(Error::Result { path: result_path.to_owned(), message: message.to_owned() });
+    };
+    let form = form_of(stored, target);
+    written(stored, result_path, model.robot(form), form, target)
+}
+
+/// The fit for the class of terms that the form can hold.
+fn form_of(stored: &ResultFile, target: Target) -> Option<&FormResult> {
+    let class = target.class()?;
+    stored.forms.iter().find(|form| form.class == class)
+}
+
+fn written(
+    stored: &ResultFile,
+    result_path: &Path,
+    robot: Result<RobotModel, ExportError>,
+    form: Option<&FormResult>,
+    target: Target,
+) -> Result<Exported, Error> {
+    let mut notes = reservations(stored);
+    if let Some(form) = form {
+        if form.refitted {
+            let note = "This form cannot hold all torque terms of the result: friction and drives were fitted again to \
+                        the training logs.";
+            notes.push(note.to_owned());
+        }
+        notes.extend(form.sentences());
+    }
+    let made = robot.and_then(|robot| export(&robot, target, &notes));
+    made.map_err(|source| Error::Export { path: result_path.to_owned(), source: Box::new(source) })
 }
 
 /// The robot with the torque terms of a form.

@@ -1,10 +1,11 @@
 //! The model in each class of forms, for the result.
 
-use crate::result::{FormError, FormResult, FormTerm};
+use crate::result::{FormError, FormResult, FormTerm, StoredModel};
 use dynident_estimation::ValidationReport;
-use dynident_export::Target;
+use dynident_export::{ModelFile, RobotModel, Target};
 use dynident_identification::Identification;
 use dynident_identification::forms::FormFit;
+use dynident_model::InertialParameters;
 use dynident_model::terms::TorqueTerm;
 
 /// The results of all classes of forms.
@@ -13,12 +14,6 @@ pub(super) fn form_results(found: &Identification) -> Vec<FormResult> {
 }
 
 fn form_result(found: &Identification, form: &FormFit) -> FormResult {
-    let term = |(term, value): (&TorqueTerm, &f64)| FormTerm {
-        symbol: term.symbol(),
-        value: *value,
-        unit: term.unit().to_owned(),
-        term: term.clone(),
-    };
     let error = |(index, report): &(usize, ValidationReport)| {
         let tested = found.held_out.iter().find(|tested| tested.index == *index)?;
         let model = tested.validation.physical.as_ref().unwrap_or(&tested.validation.model);
@@ -33,7 +28,26 @@ fn form_result(found: &Identification, form: &FormFit) -> FormResult {
         class: form.class,
         forms: Target::ALL.into_iter().filter(has_class).map(|target| target.name().to_owned()).collect(),
         refitted: form.is_refitted,
-        terms: form.terms.iter().zip(&form.values).map(term).collect(),
+        terms: form_terms(&form.terms, &form.values),
         held_out: form.held_out.iter().filter_map(error).collect(),
     }
+}
+
+/// The identified robot; `None` if a body has no parameters.
+pub(super) fn stored_model(found: &Identification, inertials: &[InertialParameters]) -> Option<StoredModel> {
+    let model = &found.model().parametric;
+    let values = &found.consistent.parameters[model.model().inertial_count()..];
+    let robot = model.model().with_inertials(inertials).ok()?;
+    let robot = RobotModel::new(robot, model.terms().to_vec(), values.to_vec()).ok()?;
+    Some(StoredModel { robot: ModelFile::of(&robot, &[]), terms: form_terms(model.terms(), values) })
+}
+
+fn form_terms(terms: &[TorqueTerm], values: &[f64]) -> Vec<FormTerm> {
+    let term = |(term, value): (&TorqueTerm, &f64)| FormTerm {
+        symbol: term.symbol(),
+        value: *value,
+        unit: term.unit().to_owned(),
+        term: term.clone(),
+    };
+    terms.iter().zip(values).map(term).collect()
 }

@@ -24,7 +24,7 @@ use dynident_identification::{
 };
 use dynident_model::InertialParameters;
 use dynident_recording::Level;
-use forms::form_results;
+use forms::{form_results, stored_model};
 use model_files::{ModelFiles, model_files};
 use sections::{
     base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
@@ -219,6 +219,7 @@ pub(in crate::jobs) fn written(
         no_mjcf,
         no_sdf,
         inertials: &inertials,
+        is_payload,
         training,
     };
     let mut result = result_file(study, robot, task, &found, parts);
@@ -295,6 +296,7 @@ struct Parts<'a> {
     no_mjcf: Option<String>,
     no_sdf: Option<String>,
     inertials: &'a [InertialParameters],
+    is_payload: bool,
     training: TrainingResult,
 }
 
@@ -351,6 +353,7 @@ fn result_file(
             .into_iter()
             .flat_map(friction_results)
             .collect(),
+        model: if parts.is_payload { None } else { stored_model(found, parts.inertials) },
         forms: form_results(found),
         payloads: found.payloads.clone(),
         offsets: offset_results(found, &task.recordings),
