@@ -31,5 +31,5 @@ pub(crate) use segmented::ReducedRows;
 pub use segmented::{SegmentSettings, SegmentedFactor};
 pub use stored::{FactorShape, SegmentShape};
 pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
-pub(crate) use triangular::{check_columns, check_weight};
+pub(crate) use triangular::{MAX_MAGNITUDE, check_columns, check_weight};
 pub use unexcited::Unexcited;

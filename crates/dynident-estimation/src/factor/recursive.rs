@@ -158,7 +158,7 @@ impl RecursiveFactor {
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
     pub fn scale(&mut self, weight: f64) -> Result<(), EstimationError> {
-        require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")?;
+        require(weight.is_finite() && weight >= 0.0, "weight", weight, "use a finite, nonnegative weight")?;
         for value in self.triangle.iter_mut().flat_map(|chunk| &mut chunk.0) {
             *value *= weight;
         }

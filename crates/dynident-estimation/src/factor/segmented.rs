@@ -43,8 +43,8 @@ impl SegmentSettings {
     /// # Errors
     /// [`EstimationError::Setting`] for fewer than two segments or a length of zero.
     pub fn validate(&self) -> Result<(), EstimationError> {
-        require(self.max_segments >= 2, "max_segments", self.max_segments as f64, "give at least 2")?;
-        require(self.first_length_rows > 0, "first_length_rows", 0.0, "give at least 1")
+        require(self.max_segments >= 2, "max_segments", self.max_segments as f64, "use at least 2")?;
+        require(self.first_length_rows > 0, "first_length_rows", 0.0, "use at least 1")
     }
 }
 

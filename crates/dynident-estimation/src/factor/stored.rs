@@ -127,7 +127,7 @@ impl SegmentedFactor {
     /// # Errors
     /// [`EstimationError::Setting`] if `most` is zero.
     pub fn with_at_most(&self, most: usize) -> Result<Self, EstimationError> {
-        require(most > 0, "segments", most as f64, "give at least 1")?;
+        require(most > 0, "segments", most as f64, "use at least 1")?;
         let mut fewer = self.clone();
         while fewer.segments().len() > most {
             fewer.halve();

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 pub const BLOCK_ROWS: usize = 256;
 
 /// The largest magnitude that can be squared and summed without overflow.
-pub(super) const MAX_MAGNITUDE: f64 = 1.0e140;
+pub(crate) const MAX_MAGNITUDE: f64 = 1.0e140;
 
 /// The upper triangular R of `[W | τ] = Q·R` (a square-root information array): `RᵀR = [W | τ]ᵀ[W | τ]`.
 ///
@@ -329,7 +329,7 @@ impl TriangularFactor {
         expect("kept columns plus weights of the remaining ones", self.columns + 1, given)?;
         expect("kept columns, at most", self.columns.min(columns), columns)?;
         for &weight in weights {
-            require(weight.is_finite(), "weight of a torque", weight, "give a finite number")?;
+            require(weight.is_finite(), "weight of a torque", weight, "use a finite number")?;
         }
         let torque = |row: usize| {
             let behind = self.row(row).iter().rev().zip(weights.iter().rev());
