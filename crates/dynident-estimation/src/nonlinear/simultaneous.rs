@@ -205,7 +205,7 @@ struct Evaluated {
 }
 
 /// The unknowns after the longest of the full, half, quarter, ... step with a cost of at most `before`; `None` if
-/// there is none.
+/// no step has one.
 fn descended<M: SimultaneousModel>(
     model: &mut M,
     rows: &WhiteRows,

@@ -9,7 +9,7 @@ use super::problem::{
 };
 use super::rows::{FreeParameters, Piece};
 use super::smoothing::smoothed;
-use super::system::{Paid, System, TorqueInformation, torque_information};
+use super::system::{EffectiveUnknowns, System, TorqueInformation, torque_information};
 use crate::error::EstimationError;
 use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
 use rayon::prelude::*;
@@ -195,9 +195,9 @@ impl Fit<'_> {
         information: &[TorqueInformation],
         state: &State,
         noise: &mut [LogNoise],
-    ) -> Result<Paid, EstimationError> {
+    ) -> Result<EffectiveUnknowns, EstimationError> {
         let Solved { system, step } = self.solve(information, state, noise)?;
-        let found = Paid::new(&system, &self.pieces, information, noise, &self.free);
+        let found = EffectiveUnknowns::new(&system, &self.pieces, information, noise, &self.free);
         let moved: Vec<Vec<f64>> =
             state.coefficients.iter().zip(&step.motion).map(|(c, step)| sum(c, step, 1.0)).collect();
         found.levels(&self.pieces, &moved, noise);
@@ -205,7 +205,7 @@ impl Fit<'_> {
     }
 
     /// The state after the longest of the full, half, quarter, ... step with a cost of at most `before`; `None` if
-    /// there is none.
+    /// no step has one.
     fn descended<M: TorqueModel>(
         &self,
         model: &mut M,
@@ -364,7 +364,7 @@ fn least_sigma(pieces: &[Piece<'_>], log: usize, joint: usize) -> f64 {
 fn torque_levels(
     pieces: &[Piece<'_>],
     residuals: &[Vec<Vec<f64>>],
-    paid: &Paid,
+    paid: &EffectiveUnknowns,
     noise: &mut [LogNoise],
     most: usize,
     iterations: usize,
@@ -399,7 +399,7 @@ fn torque_levels(
     }
 }
 
-fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&Paid>) -> Vec<SplineLogFit> {
+fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&EffectiveUnknowns>) -> Vec<SplineLogFit> {
     let of_log = |(log, own): (usize, &LogNoise)| {
         let of_log: Vec<&Piece<'_>> = pieces.iter().filter(|piece| piece.record.log == log).collect();
         let functions: usize = of_log.iter().map(|piece| piece.spline.functions()).sum();
