@@ -1,4 +1,4 @@
-//! Functions of many values, as many at once as the processor takes.
+//! Functions of many values, vectorised.
 
 use crate::dispatch::{Level, dispatch};
 use crate::kernel::Kernel;
@@ -10,8 +10,8 @@ pub trait LaneFunction {
     fn of<T: Lane>(&self, x: T) -> T;
 }
 
-/// Writes `function` of the values to `out`, as many as there are in the shorter of the two; the same wherever in the
-/// slice a value stands.
+/// Writes `function` of the values to `out`, up to the shorter length. The result does not depend on the position of a
+/// value in the slice.
 pub fn map_all(values: &[f64], out: &mut [f64], function: &impl LaneFunction) {
     dispatch(Level::detect(), All { values, out, function });
 }
@@ -62,7 +62,7 @@ mod tests {
         }
     }
 
-    /// What four units of the last place are of a value.
+    /// Equal to four units in the last place.
     fn near(found: f64, expected: f64) -> bool {
         found == expected || (found - expected).abs() <= 4.0 * f64::EPSILON * expected.abs()
     }

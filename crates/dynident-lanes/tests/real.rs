@@ -1,4 +1,4 @@
-//! Functions of real numbers: the same on numbers, lanes and dual numbers, with right slopes.
+//! Functions of real numbers: the same for numbers, lanes and dual numbers, with correct slopes.
 
 use dynident_lanes::{Dual, Lane, LaneFunction, Real, Scalar, map_all};
 
@@ -32,7 +32,7 @@ fn numbers_lanes_and_duals_have_the_same_functions() {
         let (number, dual) = (Everything::over(x), Everything::over(Dual::variable(x)));
         assert_eq!(dual.value, number);
         assert!((lane - number).abs() <= 1e-14 * number.abs().max(1.0), "{x}: {lane} {number}");
-        // A central difference with this step is right to about 1e-9.
+        // A central difference with this step is accurate to about 1e-9.
         let step = 1e-5;
         let slope = (Everything::over(x + step) - Everything::over(x - step)) / (2.0 * step);
         assert!((dual.derivative - slope).abs() < 1e-7 * slope.abs().max(1.0), "{x}: {} {slope}", dual.derivative);
