@@ -46,9 +46,8 @@ use dynident_model::terms::JointMotion;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-///
-///
-///
+/// # Panics
+/// If a vector's length is not the number of joints, or for a workspace of another tree.
 #[doc(alias("christoffel", "centrifugal"))]
 pub fn coriolis_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64], dq: &[f64]) -> &'w [f64] {
     workspace.check(model, &[q, dq]);

@@ -137,7 +137,7 @@ pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
     let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
     outward_of((steps, bodies, base), hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
     let tau = &mut scratch.tau[..joints];
-    // What the body after this one asks of it, where it hangs on it: stays in registers.
+    // Wrench on the next body if it is a child of this one; stays in registers.
     let mut next = LinkWrench::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];

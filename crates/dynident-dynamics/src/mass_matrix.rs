@@ -39,8 +39,9 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
 ///
 /// Allocation-free, except for robots with coupled joints at the first block of a size.
 ///
-/// # Panics If `q` does not have joints × samples or `out` not joints × joints × samples values, or for a workspace of
-/// another tree.
+/// # Panics
+/// If `q` does not have joints × samples or `out` not joints × joints × samples values, or for a workspace of another
+/// tree.
 #[doc(alias("crba"))]
 pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64], samples: usize, out: &mut [f64]) {
     workspace.check(model, samples, &[q]);

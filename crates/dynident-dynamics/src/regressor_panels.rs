@@ -59,10 +59,11 @@ pub fn all_columns(model: &Model, terms: &[TorqueTerm]) -> Vec<Column> {
 pub struct PanelLayout {
     columns: Vec<Column>,
     joints: Vec<JointPanel>,
-    /// For each body, bit `k` says whether the layout has its parameter `k`.
+    /// For each body, bit `k` is set if the layout has its parameter `k`.
     parameters: Vec<u16>,
+    /// For each body and each joint on its path: position of the body's first column in that joint's panel.
     places: Vec<usize>,
-    /// Where each body's places start.
+    /// Start of each body's entries in `places`.
     place_start: Vec<usize>,
     /// Parents of the bodies of the model.
     parents: Vec<Option<usize>>,
@@ -252,7 +253,7 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// Panels that use memory from before.
+    /// Creates panels that reuse memory.
     pub(crate) fn in_buffers(joints: Vec<AlignedBuffer>) -> Self {
         Self { samples: 0, joints }
     }
@@ -315,8 +316,8 @@ pub fn regressor_panels(
 /// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: `history` provides
 /// the memory of terms, the load of load-dependent terms, and temperatures.
 /// # Panics
-/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the
-/// layout's columns. Temperatures of another number than joints × samples count as none.
+/// As [`regressor_panels`](regressor_panels()), or if the number of load parameters differs from the number of columns.
+/// Temperatures are ignored unless there are joints × samples of them.
 pub fn regressor_panels_following(
     model: &Model,
     workspace: &mut BatchWorkspace,

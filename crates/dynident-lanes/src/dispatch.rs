@@ -30,8 +30,8 @@ static CHOSEN: OnceLock<Level> = OnceLock::new();
 pub struct Level(Instructions);
 
 impl Level {
-    /// The best level of this processor; a lower one if the environment variable `DYNIDENT_INSTRUCTIONS` (`portable`,
-    /// `avx2` or `avx512`) says so, for tests and comparisons. Any other value of the variable counts as none.
+    /// The best level of this processor, or a lower one from the environment variable `DYNIDENT_INSTRUCTIONS`
+    /// (`portable`, `avx2` or `avx512`), for tests and comparisons. Other values of the variable are ignored.
     pub fn detect() -> Self {
         *CHOSEN.get_or_init(|| {
             let named = std::env::var("DYNIDENT_INSTRUCTIONS").ok();

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 /// Fixed, so that the same robot always has the same base parameters.
 const SEED: u64 = 1;
 
-/// The split of all columns (bodies, then terms), where a share below `tolerance` counts as none.
+/// Splits all columns (bodies, then terms); shares below `tolerance` are treated as zero.
 pub(super) fn independent_columns(model: &Model, terms: &[TorqueTerm], tolerance: f64) -> IndependentColumns {
     let ScaledRegressors { mut rows, factors } = ScaledRegressors::new(model, terms, SEED);
     let first_term = model.inertial_count();

@@ -5,10 +5,10 @@
 //! subtree of joint `j` and a twist `w` at its frame, `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`; the gravity torque is the
 //! same with `w = X a_g`. Both are linear in the parameters. The conditions are finite for three reasons:
 //!
-//! 1. The twists `w` that can arrive at a joint span a space that one outward recursion builds: each joint turns it by
-//!    `X(q) = X_0 + X_1 cos q + X_2 sin q` (sliding: `X_0 + X_1 q`), and `cos`, `sin` and 1 are independent functions.
+//! 1. One outward recursion computes the space of the twists `w` that can arrive at a joint: each joint transforms it by
+//!    `X(q) = X_0 + X_1 cos q + X_2 sin q` (prismatic: `X_0 + X_1 q`), and `cos`, `sin` and 1 are independent functions.
 //! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q`
-//!    (sliding: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
+//!    (prismatic: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
 //!    outward, and one for every other harmonic, on the child alone.
 //! 3. So each body has a small space of functionals of its ten composite parameters, and each functional is one row of
 //!    conditions on all parameters.
@@ -256,7 +256,7 @@ fn arriving_twists(
     };
     for w in from {
         let mut source = w.source.clone();
-        // The slot is the joint's own from here on.
+        // From here on the slot belongs to this joint.
         source[j % slots] = 0.0;
         push(&(motion.twist[0] * w.twist), source);
         for matrix in &motion.twist[1..] {
