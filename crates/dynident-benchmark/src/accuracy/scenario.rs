@@ -125,7 +125,7 @@ impl Scenario {
     pub(super) fn prior(&self, random: &mut Random, spread: f64) -> Vec<f64> {
         let mut prior = self.model.model().parameter_vector();
         for body in prior.chunks_exact_mut(10) {
-            // Four standard deviations below, a body would weigh less than nothing.
+            // Lower limit, so that masses remain positive.
             let factor = (1.0 + spread * random.normal()).max(0.25);
             for value in body {
                 *value *= factor;

@@ -34,7 +34,7 @@ pub struct CaseNoise {
 pub enum CaseFriction {
     /// The same law at all joints.
     All(FrictionTruth),
-    /// Another law at each joint, in the order of [`FrictionTruth::ALL`].
+    /// A different law at each joint, in the order of [`FrictionTruth::ALL`].
     Mixed,
 }
 
@@ -65,9 +65,9 @@ pub struct DefaultCase {
     pub motion: CaseMotion,
     /// Its friction.
     pub friction: CaseFriction,
-    /// What sensors add.
+    /// Sensor noise.
     pub noise: CaseNoise,
-    /// How much later than the motion the torque is logged, s.
+    /// Delay of the logged torque relative to the motion, s.
     pub lag_s: f64,
 }
 

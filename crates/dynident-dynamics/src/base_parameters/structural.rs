@@ -5,8 +5,9 @@
 //! subtree of joint `j` and a twist `w` at its frame, `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`; the gravity torque is the
 //! same with `w = X a_g`. Both are linear in the parameters. The conditions are finite for three reasons:
 //!
-//! 1. One outward recursion computes the space of the twists `w` that can arrive at a joint: each joint transforms it by
-//!    `X(q) = X_0 + X_1 cos q + X_2 sin q` (prismatic: `X_0 + X_1 q`), and `cos`, `sin` and 1 are independent functions.
+//! 1. One outward recursion computes the space of the twists `w` that can arrive at a joint: each joint transforms it
+//!    by `X(q) = X_0 + X_1 cos q + X_2 sin q` (prismatic: `X_0 + X_1 q`), where `cos`, `sin` and 1 are independent
+//!    functions.
 //! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q`
 //!    (prismatic: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
 //!    outward, and one for every other harmonic, on the child alone.

@@ -125,7 +125,7 @@ fn derivatives_of_the_acceleration_are_those_of_differences() {
             let mass = nalgebra::DMatrix::from_row_slice(dof, dof, mass_matrix(&model, &mut ws, &q));
             let acceleration = forward_dynamics(&model, &mut ws, &q, &dq, &tau).to_vec();
             let found = forward_dynamics_derivatives(&model, &mut ws, &q, &dq, &tau);
-            assert_eq!(found.acceleration, acceleration, "what the articulated bodies say");
+            assert_eq!(found.acceleration, acceleration, "acceleration by articulated bodies");
             // Rounding times the condition number of the mass matrix (up to several thousand here).
             let identity = nalgebra::DMatrix::from_row_slice(dof, dof, found.by_torque) * &mass;
             assert_close(identity.as_slice(), nalgebra::DMatrix::identity(dof, dof).as_slice(), 1e-9, "inverse");

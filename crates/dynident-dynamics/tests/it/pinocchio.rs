@@ -193,7 +193,7 @@ fn link_placement(model: &Model, bodies: &[Transform], name: &str) -> Transform 
     let moving =
         bodies.iter().zip(model.bodies()).flat_map(|(at, body)| body.links.iter().map(move |link| (*at, link)));
     let resting = model.base().links.iter().map(|link| (Transform::IDENTITY, link));
-    let (at, link) = resting.chain(moving).find(|(_, link)| link.name == name).expect("every link stands in a body");
+    let (at, link) = resting.chain(moving).find(|(_, link)| link.name == name).expect("every link belongs to a body");
     at.then(&link.placement)
 }
 

@@ -141,7 +141,7 @@ fn one_sample_is_that_of_the_general_way() {
                 let found = mass_matrix(&model, &mut workspace, &q);
                 assert_near(&of("mass matrix"), found.iter().copied(), &mass);
                 let found = mass_matrix_and_bias(&model, &mut workspace, &q, &dq);
-                assert_near(&of("mass matrix beside the bias"), found.0.iter().copied(), &mass);
+                assert_near(&of("mass matrix with the bias"), found.0.iter().copied(), &mass);
                 assert_near(&of("bias"), found.1.iter().copied(), &bias);
                 let rows = torque_regressor(&model, &mut workspace, &q, &dq, &ddq);
                 let found = rows.chunks_exact(10 * model.body_count());

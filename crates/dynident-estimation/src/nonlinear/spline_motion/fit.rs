@@ -14,8 +14,7 @@ use crate::error::EstimationError;
 use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
 use rayon::prelude::*;
 
-/// Longest tested time between knots, s, and the factor to the next shorter one.
-const MAX_KNOT_SPACING_S: f64 = 0.5;
+/// Ratio of successive tested times between knots.
 const SPACING_RATIO: f64 = 1.5;
 /// Minimum number of rows between knots, if the rate allows, so that friction reversals within an interval are
 /// resolved.
@@ -26,9 +25,6 @@ const MIN_TORQUE_SIGMA_SHARE: f64 = 1e-7;
 const LEVEL_TOLERANCE: f64 = 0.05;
 /// Minimum share of the torque noise that remains in its residuals.
 const MIN_REMAINING_NOISE_SHARE: f64 = 0.1;
-/// Residuals with a longer memory, s, are model errors, not noise: whitening them would remove the information of slow
-/// motion about the parameters.
-const MAX_NOISE_MEMORY_S: f64 = 0.1;
 /// After ORDERS_DECREASE_AFTER steps the autoregression orders may only decrease, and after LEVELS_FIXED_AFTER steps
 /// the noise levels are fixed, to stop oscillation between two equally good noise models.
 const ORDERS_DECREASE_AFTER: usize = 6;
@@ -85,7 +81,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     first_torque_levels(&fit.pieces, &residuals, &mut noise);
     let first = state.clone();
     let (mut iterations, mut converged) = (0, false);
-    let mut paid = None;
+    let mut effective = None;
     while !converged && iterations < settings.max_iterations {
         iterations += 1;
         let information = fit.information(model, &state, &noise)?;
@@ -96,7 +92,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
             _ => 1,
         };
         for _ in 0..again {
-            paid = Some(fit.find_levels(&information, &state, &mut noise)?);
+            effective = Some(fit.find_levels(&information, &state, &mut noise)?);
         }
         let Solved { step, .. } = fit.solve(&information, &state, &noise)?;
         let before = cost(&fit.pieces, &state, &residuals, &noise);
@@ -105,10 +101,10 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
         if let Some(better) = better {
             (state, residuals) = (better.state, better.residuals);
         }
-        if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_FIXED_AFTER) {
-            let longest_noise_s = MAX_NOISE_MEMORY_S * settings.own_second_s;
+        if let Some(effective) = effective.as_ref().filter(|_| iterations <= LEVELS_FIXED_AFTER) {
+            let longest_noise_s = settings.max_noise_memory_s * settings.own_second_s;
             let most = settings.most_autoregression;
-            torque_levels(&fit.pieces, &residuals, paid, &mut noise, most, iterations, longest_noise_s);
+            torque_levels(&fit.pieces, &residuals, effective, &mut noise, most, iterations, longest_noise_s);
         }
         let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
         converged = step.length <= settings.tolerance && change <= LEVEL_TOLERANCE && iterations > 2;
@@ -121,7 +117,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     let at_start = all_residuals(&pieces, model, &first)?;
     let cost_at_start = cost(&pieces, &first, &at_start, &noise);
     let converged = converged && cost_now <= cost_at_start * (1.0 + 1e-9);
-    let logs = log_fits(&pieces, &noise, paid.as_ref());
+    let logs = log_fits(&pieces, &noise, effective.as_ref());
     let estimate = estimate_of(
         problem,
         settings,
@@ -272,7 +268,7 @@ fn begin<'a>(
         // The unknowns are shared among the logs by samples.
         let least = (all * joints).div_ceil(settings.max_unknowns).max(2);
         let mut ladder = Vec::new();
-        let mut step = MAX_KNOT_SPACING_S * settings.own_second_s * rate_hz;
+        let mut step = settings.max_knot_spacing_s * settings.own_second_s * rate_hz;
         while step.round() as usize > least {
             ladder.push(step.round() as usize);
             step /= SPACING_RATIO;
@@ -364,7 +360,7 @@ fn least_sigma(pieces: &[Piece<'_>], log: usize, joint: usize) -> f64 {
 fn torque_levels(
     pieces: &[Piece<'_>],
     residuals: &[Vec<Vec<f64>>],
-    paid: &EffectiveUnknowns,
+    effective: &EffectiveUnknowns,
     noise: &mut [LogNoise],
     most: usize,
     iterations: usize,
@@ -378,7 +374,7 @@ fn torque_levels(
             // noise; its expectation is added back (expectation step of Dempster, Laird and Rubin, J. R. Statist. Soc.
             // B 39 (1977) 1).
             let rows: usize = of_joint.iter().map(|r| r.len()).sum();
-            let taken = &paid.torque[log][joint];
+            let taken = &effective.torque[log][joint];
             let product =
                 |r: &&[f64], lag: usize| r.iter().zip(&r[lag.min(r.len())..]).map(|(a, b)| a * b).sum::<f64>();
             let left = |lag: usize| of_joint.iter().map(|r| product(r, lag)).sum::<f64>() / rows.max(1) as f64;
@@ -399,7 +395,7 @@ fn torque_levels(
     }
 }
 
-fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&EffectiveUnknowns>) -> Vec<SplineLogFit> {
+fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], effective: Option<&EffectiveUnknowns>) -> Vec<SplineLogFit> {
     let of_log = |(log, own): (usize, &LogNoise)| {
         let of_log: Vec<&Piece<'_>> = pieces.iter().filter(|piece| piece.record.log == log).collect();
         let functions: usize = of_log.iter().map(|piece| piece.spline.functions()).sum();
@@ -408,7 +404,7 @@ fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&EffectiveUnk
             torque_std: own.torque_std[joint],
             torque_autoregression: own.colours[joint].clone(),
             order: own.positions[joint].order,
-            used_functions: paid.map_or(0.0, |paid| functions as f64 - paid.smoothness[log][joint]),
+            used_functions: effective.map_or(0.0, |effective| functions as f64 - effective.smoothness[log][joint]),
         };
         let any = of_log.first();
         SplineLogFit {

@@ -129,10 +129,17 @@ pub struct SplineMotionSettings {
     pub tolerance: f64,
     /// Maximum number of steps. Default 30; five to ten are usual.
     pub max_iterations: usize,
-    /// Time scale of the robot relative to a usual arm: the unit of the longest knot spacing (0.5) and of the longest
-    /// memory of the torque noise (0.1). Default 1.
+    /// Time scale of the robot relative to a usual arm: a factor of `max_knot_spacing_s` and `max_noise_memory_s`.
+    /// Default 1.
     #[serde(skip)]
     pub own_second_s: f64,
+    /// Longest tested time between knots for a robot of time scale 1, s. Default 0.5.
+    #[serde(skip)]
+    pub max_knot_spacing_s: f64,
+    /// Longest memory of torque noise for a robot of time scale 1, s: residuals with a longer memory are model errors,
+    /// and whitening them would remove the information of slow motion about the parameters. Default 0.1.
+    #[serde(skip)]
+    pub max_noise_memory_s: f64,
     /// Seconds between two knots; by default the most likely spacing for the positions.
     pub knot_spacing_s: Option<f64>,
     /// Maximum number of unknowns of the motion over all joints and logs; a larger number increases the knot spacing.
@@ -149,6 +156,8 @@ impl Default for SplineMotionSettings {
             tolerance: 0.03,
             max_iterations: 30,
             own_second_s: 1.0,
+            max_knot_spacing_s: 0.5,
+            max_noise_memory_s: 0.1,
             knot_spacing_s: None,
             max_unknowns: 60_000,
         }
@@ -160,14 +169,19 @@ impl SplineMotionSettings {
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for an order above 16, a tolerance outside 1e-6 to 1, fewer than two iterations,
-    /// fewer than a thousand unknowns, a time scale that is not positive, or rank settings out of range.
+    /// fewer than a thousand unknowns, a time or time scale that is not positive, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         let fix = "use 0 to 16";
         require(self.most_autoregression <= 16, "most_autoregression", self.most_autoregression as f64, fix)?;
         within("tolerance", self.tolerance, 1.0e-6..=1.0, "use a length in error bars from 1e-6 to 1")?;
-        let is_second = self.own_second_s > 0.0 && self.own_second_s.is_finite();
-        require(is_second, "own_second_s", self.own_second_s, "use a positive number")?;
+        for (setting, value) in [
+            ("own_second_s", self.own_second_s),
+            ("max_knot_spacing_s", self.max_knot_spacing_s),
+            ("max_noise_memory_s", self.max_noise_memory_s),
+        ] {
+            require(value > 0.0 && value.is_finite(), setting, value, "use a positive number")?;
+        }
         require(self.max_iterations >= 2, "max_iterations", self.max_iterations as f64, "use at least 2")?;
         let fix = "use seconds above 0 and at most 10000";
         require(
