@@ -138,7 +138,6 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
     ))
 }
 
-/// Processor seconds of this process.
 fn clock() -> f64 {
     #[cfg(unix)]
     {

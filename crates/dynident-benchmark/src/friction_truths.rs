@@ -64,12 +64,10 @@ impl FrictionTruth {
         }
     }
 
-    /// Terms at a joint.
     pub(crate) fn terms(self, joint: usize) -> Vec<TorqueTerm> {
         self.terms_with_shares(joint).into_iter().map(|(term, _)| term).collect()
     }
 
-    /// Terms at a joint, each with the ratio of its parameter to a typical one.
     fn terms_with_shares(self, joint: usize) -> Vec<(TorqueTerm, f64)> {
         let shape = CoulombShape::Smooth { width: STEP_WIDTH_RAD_S };
         let viscous = (TorqueTerm::Viscous(Viscous { joint }), 1.0);
@@ -214,7 +212,6 @@ fn plain_without(plain: &ParametricModel, truth: FrictionTruth) -> Option<Parame
     plain.with_terms(rest).ok()
 }
 
-/// A recording and its true values.
 struct Made {
     log: dynident_recording::Log,
     motion: Motion,

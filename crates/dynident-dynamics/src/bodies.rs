@@ -3,7 +3,6 @@
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Vec3};
 
-/// Inertial parameters of a tree's steps.
 pub(crate) trait Bodies<T: Scalar>: Copy {
     /// See [`JointStep::mass`].
     fn mass(self, index: usize) -> T;

@@ -7,7 +7,6 @@
 use dynident_lanes::Lane;
 use dynident_model::{Model, Vec3};
 
-/// Columns of all joints and the resulting work.
 #[derive(Debug)]
 pub(crate) struct ColumnScratch<T: Lane> {
     /// Bundle, and place in it, of each joint's column.

@@ -66,7 +66,6 @@ pub fn gravity_torque_derivative<'w>(model: &Model, workspace: &'w mut Workspace
 
 one_sample_kernel!((q), stiffness, out: matrix);
 
-/// Writes the derivative into the scratch's matrix.
 #[inline(always)]
 fn stiffness<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let steps = model.steps();

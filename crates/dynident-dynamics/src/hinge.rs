@@ -129,7 +129,6 @@ pub(crate) fn symmetric<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
     Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
 }
 
-/// Joint positions, with sines and cosines.
 #[derive(Debug)]
 pub(crate) struct Hinges<T> {
     cosine: Vec<T>,

@@ -155,7 +155,6 @@ impl Column {
     }
 }
 
-/// Dependent columns solved together.
 const COLUMNS_PER_BLOCK: usize = 32;
 
 /// Number of products from which multithreading is faster (some milliseconds of work).

@@ -50,7 +50,6 @@ impl<T: Scalar, const PARENT: usize, const CHILD: usize> Along<T, PARENT, CHILD>
 }
 
 impl<T: Lane, const PARENT: usize, const CHILD: usize> Along<T, PARENT, CHILD> {
-    /// The same rotation for bundles.
     #[inline(always)]
     pub(crate) fn bundled(self) -> Along<T::Bundle, PARENT, CHILD> {
         let [[a, b], [c, d]] = self.block;
@@ -86,7 +85,6 @@ impl<T: Scalar, const PARENT: usize, const CHILD: usize> OwnTurn<T> for Along<T,
     }
 }
 
-/// A general rotation about a general axis.
 #[derive(Clone, Copy)]
 pub(crate) struct GeneralTurn<T> {
     pub(crate) rotation: Mat3<T>,
@@ -94,7 +92,6 @@ pub(crate) struct GeneralTurn<T> {
 }
 
 impl<T: Lane> GeneralTurn<T> {
-    /// The same rotation for bundles.
     #[inline(always)]
     pub(crate) fn bundled(self) -> GeneralTurn<T::Bundle> {
         let [a, b, c] = self.rotation.0;

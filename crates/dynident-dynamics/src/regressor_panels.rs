@@ -65,9 +65,7 @@ pub struct PanelLayout {
     places: Vec<usize>,
     /// Start of each body's entries in `places`.
     place_start: Vec<usize>,
-    /// Parents of the bodies of the model.
     parents: Vec<Option<usize>>,
-    /// Data for coupled joints.
     coupled: Option<Box<CoupledPanels>>,
 }
 
@@ -93,7 +91,6 @@ struct ColumnShare {
 
 #[derive(Clone, Debug, Default)]
 struct JointPanel {
-    /// Global column of every panel column.
     columns: Vec<usize>,
     /// Terms: place in the panel, and index of the global column.
     terms: Vec<(usize, usize)>,
@@ -253,12 +250,10 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// Creates panels that reuse memory.
     pub(crate) fn in_buffers(joints: Vec<AlignedBuffer>) -> Self {
         Self { samples: 0, joints }
     }
 
-    /// Returns the memory for reuse.
     pub(crate) fn into_buffers(self) -> Vec<AlignedBuffer> {
         self.joints
     }

@@ -7,7 +7,6 @@ pub(crate) fn parents(model: &Model) -> Vec<Option<usize>> {
     model.maps().iter().map(|map| map.parent).collect()
 }
 
-/// Whether a model has these parents.
 pub(crate) fn same_tree(parents: &[Option<usize>], model: &Model) -> bool {
     model.maps().iter().map(|map| map.parent).eq(parents.iter().copied())
 }

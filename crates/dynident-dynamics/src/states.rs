@@ -112,14 +112,12 @@ impl<T: Lane> AxisScratch<T> {
     }
 }
 
-/// Scratch of the reverse sweep.
 #[derive(Debug)]
 pub(crate) struct AdjointScratch<T> {
     pub(crate) path: Vec<u32>,
     pub(crate) path_start: Vec<usize>,
     /// Axes of the joints on the path to each body, as twists at the body's frame: angular, linear.
     pub(crate) axes: Vec<(Vec3<T>, Vec3<T>)>,
-    /// Derivatives of the cost by the axes.
     pub(crate) by_axes: Vec<(Vec3<T>, Vec3<T>)>,
     pub(crate) by_motion: Vec<BodyAdjoint<T>>,
     pub(crate) joints: Vec<JointAdjoint<T>>,

@@ -10,7 +10,6 @@ pub struct TermHistory {
     pub(crate) memories: Vec<HysteresisState>,
     /// One value per column of the layout; those of bodies determine the load.
     pub(crate) load_parameters: Option<Vec<f64>>,
-    /// The load of one joint.
     pub(crate) load: Vec<f64>,
     /// Temperatures of the next block, joint-major, °C; may be empty.
     pub(crate) temperature_c: Vec<f64>,

@@ -7,7 +7,6 @@ use dynident_lanes::AlignedBuffer;
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointCoupling, Model};
 
-/// Scratch for one sample.
 #[derive(Debug)]
 pub(crate) struct TreeScratch {
     pub(crate) q: Vec<f64>,
@@ -39,7 +38,6 @@ impl TreeScratch {
         &self.q
     }
 
-    /// Converts one sample of a motion.
     pub(crate) fn take_motion(&mut self, coupling: &JointCoupling, q: &[f64], dq: &[f64], ddq: &[f64]) {
         coupling.positions(q, 1, &mut self.q);
         coupling.rates(dq, 1, &mut self.dq);
@@ -56,7 +54,6 @@ pub(crate) struct TreeBatch {
     pub(crate) results: [Vec<f64>; 3],
     /// Square matrices over the joints of the tree, by entry.
     pub(crate) matrices: [Vec<f64>; 3],
-    /// One regressor panel per joint of the tree.
     pub(crate) panels: Vec<AlignedBuffer>,
 }
 

@@ -12,15 +12,11 @@ use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 
-/// Scratch of all algorithms for one lane type.
 #[derive(Debug)]
 pub(crate) struct Scratch<T: Lane> {
     pub(crate) core: CoreScratch<T>,
-    /// Columns of the mass matrix, in bundles.
     pub(crate) columns: ColumnScratch<T>,
-    /// Ancestor axes of the torque regressor, in bundles.
     pub(crate) axes: AxisScratch<T>,
-    /// Scratch of the regressor's reverse sweep.
     pub(crate) adjoint: AdjointScratch<T>,
 }
 
@@ -161,18 +157,15 @@ impl Kernel for MakeScratch<'_> {
 pub struct Workspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
-    /// Parents of the bodies, to check the tree.
     pub(crate) parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
     pub(crate) vector: Vec<f64>,
     /// Entries of joints on different branches are zero; no algorithm writes them.
     pub(crate) matrices: [Vec<f64>; 3],
-    /// Derivatives of the forward dynamics, with all entries.
     pub(crate) acceleration_derivatives: [Vec<f64>; 3],
     pub(crate) acceleration: Vec<f64>,
     pub(crate) regressor: Vec<f64>,
     pub(crate) placements: Vec<Transform>,
-    /// Scratch for coupled joints.
     pub(crate) tree: TreeScratch,
 }
 
@@ -206,7 +199,6 @@ impl Workspace {
         self.level
     }
 
-    /// Checks the tree for algorithms that depend on it.
     pub(crate) fn check_tree(&self, model: &Model) {
         assert!(same_tree(&self.parents, model), "the workspace was made for a model with another tree");
     }
@@ -232,7 +224,6 @@ pub struct BatchWorkspace {
     pub(crate) dof: usize,
     parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
-    /// Scratch for coupled joints.
     pub(crate) tree: TreeBatch,
 }
 
@@ -249,7 +240,6 @@ impl BatchWorkspace {
         Self { level, dof: model.dof(), parents: parents(model), scratch, tree: TreeBatch::default() }
     }
 
-    /// Checks the tree for algorithms that depend on it.
     pub(crate) fn check_tree(&self, model: &Model) {
         assert!(same_tree(&self.parents, model), "the workspace was made for a model with another tree");
     }

@@ -51,7 +51,6 @@ fn count() {
     REQUESTS.set(REQUESTS.get() + 1);
 }
 
-/// Allocations of the second call.
 fn requests_when_warm(mut call: impl FnMut()) -> usize {
     call();
     let before = REQUESTS.get();

@@ -72,7 +72,6 @@ pub(super) fn usable(answer: &Answer, truth: &[f64], start: &[f64], bound: &[f64
         && distance(&answer.values) <= MAX_ERROR_OVER_START * distance(start)
 }
 
-/// Names and true values of a cell.
 pub(super) struct Cell<'a> {
     pub(super) robot: &'a str,
     pub(super) noise: &'a str,

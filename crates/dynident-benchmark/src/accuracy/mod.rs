@@ -169,7 +169,6 @@ impl BenchmarkSettings {
     }
 }
 
-/// Entries of a registry with the given names.
 fn chosen<T: Copy>(
     option: &'static str,
     registry: &[T],

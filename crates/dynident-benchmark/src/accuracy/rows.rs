@@ -17,7 +17,6 @@ use dynident_identification::{
 use dynident_recording::MotionBlock;
 use std::sync::Arc;
 
-/// Name of the only log.
 const LOG: &str = "run";
 
 /// Rows of all joints from a given motion, with their triangular factors.
@@ -26,7 +25,6 @@ pub struct Rows<'a> {
     scenario: &'a Scenario,
     recordings: [Recording; 1],
     settings: IdentificationSettings,
-    /// The joints' rows as triangular factors.
     pub(super) problem: LinearProblem,
     blocks: OnceCell<Vec<Block>>,
 }
@@ -38,7 +36,6 @@ struct Block {
     panel: Vec<f64>,
 }
 
-/// Stores rows after the parallel filter.
 struct BlockStore(Vec<Block>);
 
 impl RowConsumer for BlockStore {
@@ -108,7 +105,6 @@ impl<'a> Rows<'a> {
         Ok(self.blocks.get_or_init(|| kept.0))
     }
 
-    /// Passes all rows to a visitor.
     pub(super) fn pass(&self, visit: &mut RowVisitor<'_>) -> Result<(), EstimationError> {
         // Rows that were computed once can be computed again.
         self.blocks().map_err(|_| EstimationError::Empty)?.iter().try_for_each(|block| {

@@ -47,7 +47,6 @@ pub struct Scenario {
     pub reference: Motion,
     pub(super) truth: Vec<f64>,
     pub(super) motion: Motion,
-    /// Noise-free torque, joint-major.
     pub(super) torque: Vec<f64>,
 }
 
@@ -94,7 +93,6 @@ impl Scenario {
         Ok(Self { robot: robot.name, model: parametric, reference, truth, motion, torque })
     }
 
-    /// One run's record.
     pub(super) fn record(&self, noise: &NoiseLevel, random: &mut Random) -> Record {
         let samples = self.motion.samples;
         let position_std = noise.position_std_deg.to_radians();

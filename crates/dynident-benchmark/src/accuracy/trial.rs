@@ -28,7 +28,6 @@ pub struct Trial<'a> {
     /// Nominal model: every body's ten true parameters times a common factor with 15 % Gaussian error, without
     /// friction and drives.
     pub prior: &'a [f64],
-    /// Data shared by several estimators.
     pub(super) shared: &'a TrialData<'a>,
 }
 
@@ -67,7 +66,6 @@ impl<'a> TrialData<'a> {
         self.made(trial).map(|periodic| &periodic.rows)
     }
 
-    /// Filtered rows with the Fourier series' motion.
     pub(super) fn periodic_filtered(&self, trial: &Trial<'a>) -> Result<Rows<'a>, EstimationError> {
         let motion = &self.made(trial)?.motion;
         let started_s = thread_seconds();

@@ -37,7 +37,6 @@ pub struct ErrorOfName {
     pub settled: usize,
 }
 
-/// Result of an estimator in one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum NamedRun {
     NotAsked,
@@ -47,7 +46,6 @@ pub(super) enum NamedRun {
     Settled(f64),
 }
 
-/// Results of one run; errors are shares.
 pub(super) struct RunFigures {
     pub(super) written: f64,
     pub(super) free: f64,

@@ -102,7 +102,6 @@ impl Simulated {
         identify(&task, Execution::default())
     }
 
-    /// Error of the estimate.
     pub(super) fn free_error(&self, found: &Identification) -> f64 {
         self.error(found.model(), found.base_values())
     }

@@ -29,7 +29,6 @@ const TEST_RATE_HZ: f64 = 100.0;
 const MAX_MASS_DEVIATION: f64 = 0.25;
 /// Maximum deviation of a body's position, m (each axis).
 const MAX_POSITION_DEVIATION_M: f64 = 0.02;
-/// Size of an outlier in standard deviations of the noise.
 const OUTLIER_STD: f64 = 20.0;
 
 /// The robot of a case: with the default terms, and with the true terms.
@@ -51,18 +50,14 @@ impl CaseRobot {
     }
 }
 
-/// A recording and its true values.
 pub(super) struct Simulated {
     /// The true robot, including the load for its friction.
     pub(super) regressor: RegressorModel,
-    /// True base parameters.
     pub(super) theta: Vec<f64>,
     pub(super) log: Log,
     /// Cut-off from the positions' spectra, Hz.
     pub(super) asked_hz: f64,
-    /// The true motion.
     pub(super) motion: Motion,
-    /// Standard deviation of each joint's torque noise.
     pub(super) torque_std: Vec<f64>,
     exact: Vec<f64>,
     other: Motion,
@@ -198,7 +193,6 @@ fn designed(
     best.map(|(_, family, parameters)| (family, parameters)).ok_or_else(none)
 }
 
-/// Simulated encoder positions.
 fn encoded(case: &DefaultCase, q: &[f64], random: &mut Random) -> Vec<f64> {
     let step = case.noise.encoder_bits.map(|bits| core::f64::consts::TAU / 2.0_f64.powi(bits));
     let mut of = |q: &f64| {
@@ -208,7 +202,6 @@ fn encoded(case: &DefaultCase, q: &[f64], random: &mut Random) -> Vec<f64> {
     q.iter().map(&mut of).collect()
 }
 
-/// Simulated torque signal.
 fn measured(case: &DefaultCase, exact: &[f64], std: f64, random: &mut Random) -> Vec<f64> {
     let correlation = colour(case);
     let fresh = std * (1.0 - correlation * correlation).sqrt();

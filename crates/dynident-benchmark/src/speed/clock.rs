@@ -21,7 +21,6 @@ pub(super) fn now_ns() -> f64 {
     START.get_or_init(Instant::now).elapsed().as_nanos() as f64
 }
 
-/// Properties of the printed results.
 pub(crate) struct Report<'a> {
     pub(crate) robot: &'a str,
     pub(crate) dof: usize,

@@ -18,9 +18,7 @@ use dynident_lanes::Level;
 use dynident_model::Model;
 use std::path::Path;
 
-/// Robot that is timed for its dynamics only.
 const DYNAMICS_ONLY: &str = "talos_reduced";
-/// Robot for the timing of factors.
 const FACTORS_OF: &str = "panda_arm7";
 
 /// Measures the limits of this machine, and times reading the text at `path`: `rows` samples of `model`, created if

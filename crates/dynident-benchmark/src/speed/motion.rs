@@ -72,7 +72,6 @@ impl Motion {
             .collect()
     }
 
-    /// The joint vectors of each sample.
     pub(crate) fn by_sample(&self) -> Vec<[Vec<f64>; 3]> {
         let dof = self.q.len() / self.samples;
         let at = |array: &[f64], sample: usize| (0..dof).map(|joint| array[joint * self.samples + sample]).collect();

@@ -12,7 +12,6 @@ use std::hint::black_box;
 /// One call at `q`, `dq` and `ddq` (or torque), with one number of its result.
 type Call<'a> = dyn FnMut(&mut Workspace, &[f64], &[f64], &[f64]) -> f64 + 'a;
 
-/// Times every algorithm over random states.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     let states = Motion::random(model, STATES).by_sample();
     let mut workspace = Workspace::with_level(model, report.level);

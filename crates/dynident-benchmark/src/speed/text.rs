@@ -80,7 +80,6 @@ pub(crate) fn time_reading(path: &Path, report: &Report<'_>) -> Result<(), Recor
     Ok(())
 }
 
-/// Reads all rows and returns their number.
 fn read(path: &Path) -> Result<usize, RecordingError> {
     let (_, mut table) = FileLog::described_by_itself(path).open_with_format()?;
     let mut rows = 0;

@@ -95,7 +95,6 @@ pub(super) fn regrouped(
     }
 }
 
-/// Random states, joint-major.
 struct States {
     samples: usize,
     q: Vec<f64>,

@@ -7,7 +7,6 @@ use core::fmt::Write;
 /// Coefficients below this are rounding noise of the split, not geometry (lengths have at best micrometre precision).
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
-/// Number of digits of the factors.
 #[derive(Clone, Copy)]
 pub(super) enum Digits {
     /// Six, without trailing zeros, for names.
@@ -16,7 +15,6 @@ pub(super) enum Digits {
     All,
 }
 
-/// One sum per independent column.
 pub(super) fn expressions(columns: &[Column], split: &IndependentColumns, digits: Digits) -> Vec<String> {
     let mut sums: Vec<String> = split.independent.iter().map(|&column| columns[column].symbol()).collect();
     for (&dependent, factors) in split.dependent.iter().zip(split.regrouping.column_iter()) {

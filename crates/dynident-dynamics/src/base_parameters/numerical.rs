@@ -41,7 +41,6 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
 pub(super) struct ScaledRegressors {
     /// Rows of the contribution of motion, joint after joint, then rows at rest; all columns.
     pub(super) rows: DMatrix<f64>,
-    /// Scale factor of each column.
     pub(super) factors: Vec<f64>,
 }
 

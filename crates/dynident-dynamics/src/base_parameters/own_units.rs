@@ -28,7 +28,6 @@ impl OwnUnits {
         if turns { 1.0 } else { self.length_m }
     }
 
-    /// A placement with its lengths in this unit.
     pub(super) fn placement(&self, Transform { rotation, translation }: Transform) -> Transform {
         Transform { rotation, translation: translation.scale(1.0 / self.length_m) }
     }

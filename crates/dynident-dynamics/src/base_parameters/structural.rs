@@ -42,7 +42,6 @@ pub(super) struct IdentifiableDirections<'a> {
     first_row: Vec<usize>,
     /// For each body: constant part of the transformation of a composite to the parent, transposed.
     carry: Vec<Matrix10>,
-    /// Rows over the terms only.
     friction: Vec<DVector<f64>>,
 }
 

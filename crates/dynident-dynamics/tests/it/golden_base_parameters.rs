@@ -173,7 +173,6 @@ fn a_rounded_half_turn_of_the_base_adds_no_base_parameters() {
     }
 }
 
-/// The exact sums reproduce the base parameters.
 #[test]
 fn exact_expressions_hold_every_digit() {
     for name in ARMS {

@@ -15,7 +15,6 @@ fn place(names: &[&str], joint: &Joint) -> usize {
     names.iter().position(|name| Some(*name) == own).unwrap()
 }
 
-/// Values of the golden file in the order of the model.
 fn in_order(model: &Model, names: &[&str], values: &[f64]) -> Vec<f64> {
     model.joints().iter().map(|joint| values[place(names, joint)]).collect()
 }

@@ -13,9 +13,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 #[derive(Clone, Debug)]
 pub(super) struct AssembledProgram {
     pub(super) program: Program,
-    /// Names of the constraints by label.
     pub(super) names: Vec<String>,
-    /// First variable of each free body.
     pub(super) starts: Vec<Option<usize>>,
     first_scalar: usize,
     /// Constant part of the prior, not included in the program's objective.
@@ -199,7 +197,6 @@ impl AssembledProgram {
 /// Accuracy of the room, and its minimum: a narrower set has no interior in double precision.
 const ROOM_TOLERANCE: f64 = 1.0e-9;
 const MIN_ROOM: f64 = 1.0e-8;
-/// Sufficient room for a start.
 const SUFFICIENT_ROOM: f64 = 1.0e-6;
 
 /// A program that maximises the room t of another program's constraints; t is its last variable.

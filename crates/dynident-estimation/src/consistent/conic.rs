@@ -67,7 +67,6 @@ pub(super) struct Program {
     pub(super) rows: Vec<Row>,
 }
 
-/// Multipliers of a program.
 #[derive(Clone, Debug)]
 pub(super) struct Multipliers {
     pub(super) blocks: Vec<Matrix4<f64>>,
@@ -87,12 +86,10 @@ pub(super) struct Certificate {
 }
 
 impl Certificate {
-    /// The larger of stationarity and gap.
     pub(super) fn residual(&self) -> f64 {
         self.stationarity.max(self.gap)
     }
 
-    /// The duality gap without division.
     pub(super) fn absolute_gap(&self) -> f64 {
         self.gap * (1.0 + self.objective.abs())
     }
@@ -240,7 +237,6 @@ impl Program {
     }
 }
 
-/// Distances from the constraints.
 #[derive(Clone, Debug)]
 pub(super) struct Slacks {
     pub(super) blocks: Vec<Matrix4<f64>>,

@@ -56,7 +56,6 @@ pub(super) fn pseudo_inertia(p: &[f64]) -> Matrix4<f64> {
     )
 }
 
-/// The ten parameters of a pseudo-inertia.
 pub(super) fn parameters_of(p: &Matrix4<f64>) -> Vector10 {
     Vector10::from([
         p[(3, 3)],

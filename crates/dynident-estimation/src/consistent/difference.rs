@@ -4,7 +4,6 @@ use super::PhysicalFit;
 use crate::uncertainty::{Estimate, f_tail};
 use serde::{Deserialize, Serialize};
 
-/// Significance level of the test.
 const SIGNIFICANCE_LEVEL: f64 = 0.01;
 
 /// Test of a [`PhysicalFit`] against the estimate from which it was made.

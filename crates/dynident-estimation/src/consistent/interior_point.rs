@@ -24,7 +24,6 @@ use super::precise::Precise;
 use super::stacked::{LocalRows, RightSide, Rows, Singles, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
     /// Certificate within the tolerance.
@@ -44,7 +43,6 @@ pub(super) struct InteriorPointResult {
     pub(super) ending: Ending,
 }
 
-/// Maximum step as a share of the distance to the boundary.
 const FRACTION_TO_BOUNDARY: f64 = 0.99;
 
 /// Minimum product of slack and multiplier after a step, relative to the mean (to its weight for an entropic block). A
@@ -135,7 +133,6 @@ fn from_state(
     Some(best)
 }
 
-/// A block and its multiplier, in scaled coordinates.
 #[derive(Clone, Debug)]
 struct Cone {
     scaling: Scaling,
@@ -143,7 +140,6 @@ struct Cone {
     owner: Option<usize>,
 }
 
-/// A row's slack and multiplier.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
     slack: f64,
@@ -159,7 +155,6 @@ struct State {
     balanced: bool,
 }
 
-/// A direction in scaled coordinates, by block and row.
 struct Direction {
     x: DVector<f64>,
     primal: Vec<Matrix4<f64>>,
@@ -168,7 +163,6 @@ struct Direction {
     row_dual: Vec<f64>,
 }
 
-/// Target products of slacks and multipliers.
 struct Targets {
     blocks: Vec<Matrix4<f64>>,
     rows: Vec<f64>,
@@ -371,7 +365,6 @@ impl State {
     }
 }
 
-/// Adds the barrier rows of one block.
 fn add_block(rows: &mut Rows, map: &BlockMap, cone: &Cone, state: &State) {
     let square = |matrix: &Matrix10| DMatrix::from_column_slice(10, 10, matrix.as_slice());
     match (map, cone.owner) {
@@ -551,7 +544,6 @@ impl<'a> Newton<'a> {
         (4 * plain + self.state.rows.len()).max(1) as f64
     }
 
-    /// Longest possible step in a direction.
     fn longest(&self, d: &Direction) -> f64 {
         let mut alpha = f64::INFINITY;
         for (k, cone) in self.state.cones.iter().enumerate() {

@@ -103,7 +103,6 @@ pub struct ConsistentIntervals {
     settings: IntervalSettings,
     best: PhysicalFit,
     assembled: AssembledProgram,
-    /// Start points of the programs of the ends.
     central_path: Option<CentralPath>,
     quantile: f64,
     /// Residuals of the best set, `ρ₁ − R₁ B π`.
@@ -117,7 +116,6 @@ pub struct ConsistentIntervals {
     sizes: Vec<f64>,
 }
 
-/// A program that maximises one parameter.
 struct ExtremeProgram {
     program: Program,
     /// Largest coefficient of the parameter over the variables.
@@ -346,7 +344,6 @@ const MAX_IMBALANCE: f64 = 1.0e-3;
 const MAX_THRESHOLD_CHANGE: f64 = 0.3;
 /// End of the search relative to the distance of an open end.
 const SEARCH_RANGE_FACTOR: f64 = 1.1;
-/// Maximum number of iterations per end.
 const MAX_ITERATIONS: usize = 200;
 /// Prior weight in the programs of the ends relative to that of the best set. A larger prior would limit parameters as
 /// data do; a tenth of this share moves ends by less than a hundredth.

@@ -39,7 +39,6 @@ const FASTEST_REDUCTION: f64 = 0.02;
 /// is removed.
 const PULL_RELEASE_RATIO: f64 = 0.3;
 
-/// Steps of the last stage without progress of the certificate.
 const MAX_STEPS_WITHOUT_PROGRESS: usize = 25;
 
 /// One body: its first variable and the constant part of its block.
@@ -122,14 +121,12 @@ struct Point {
     /// U, one per body.
     factors: Vec<Matrix4<f64>>,
     x: Precise,
-    /// Slacks of the rows.
     rows: Vec<f64>,
 }
 
 /// A Newton step in the bodies' own coordinates.
 struct NewtonStep {
     step: DVector<f64>,
-    /// Decrease of the barrier predicted by its quadratic model.
     predicted: f64,
 }
 
@@ -330,7 +327,6 @@ impl Point {
     }
 }
 
-/// Change of a body by a step.
 struct Change {
     /// V.
     factor: Matrix4<f64>,

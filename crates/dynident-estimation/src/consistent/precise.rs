@@ -10,9 +10,7 @@ use std::sync::OnceLock;
 
 #[derive(Clone, Debug)]
 pub(super) struct Precise {
-    /// Leading part.
     pub(super) high: DVector<f64>,
-    /// Remainder.
     low: DVector<f64>,
     /// Cached residual of a program's data at this point.
     data_rest: OnceLock<DVector<f64>>,

@@ -23,7 +23,6 @@ pub(super) struct LocalRows {
     pub(super) matrix: DMatrix<f64>,
 }
 
-/// Rows of a Newton system.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
     /// Frames: `Δx[first..first + 10] = J u[first..first + 10]`; other variables have no frame.
@@ -34,7 +33,6 @@ pub(super) struct Rows {
     pub(super) wide: Vec<DMatrix<f64>>,
 }
 
-/// Destinations of single rows.
 #[derive(Clone, Debug)]
 pub(super) struct Singles {
     /// Rows with one body or one variable only.
@@ -119,7 +117,6 @@ impl Rows {
         singles
     }
 
-    /// First variable and size of the frame of this variable.
     fn group_of(&self, variable: usize) -> (usize, usize) {
         let holds = |first: usize| first <= variable && variable < first + 10;
         self.frames.iter().find(|(first, _)| holds(*first)).map_or((variable, 1), |(first, _)| (*first, 10))
@@ -158,7 +155,6 @@ impl Rows {
     }
 }
 
-/// A pivot below this share of its column is treated as lost.
 const MIN_PIVOT_SHARE: f64 = 1.0e-15;
 
 impl StackedSystem {
@@ -281,7 +277,6 @@ struct Panel<'a> {
     size: usize,
     chunks: usize,
     values: &'a mut [Chunk],
-    /// Rows so far.
     rows: usize,
 }
 

@@ -36,7 +36,6 @@ pub struct CrossValidation<'a> {
 #[derive(Debug)]
 struct Part {
     first: usize,
-    /// Rows of each block.
     own: Vec<TriangularFactor>,
     /// Rows of all other blocks, for each block, and (last) all rows.
     others: Vec<TriangularFactor>,
@@ -54,7 +53,6 @@ pub struct JointFolds {
 /// Data shared by all candidates for one left-out block; columns in the order common, variable.
 #[derive(Debug)]
 struct Fold {
-    /// All fitted rows.
     triangle: TriangularFactor,
     /// The joint's rows in the left-out block (in all blocks for the last fold).
     rows: TriangularFactor,
@@ -65,10 +63,8 @@ struct Fold {
     independent: Vec<bool>,
 }
 
-/// Candidates computed together.
 const CANDIDATES_PER_BLOCK: usize = 8;
 
-/// One number per candidate.
 type CandidateValues = [f64; CANDIDATES_PER_BLOCK];
 
 /// Prediction errors of a candidate model.
@@ -351,7 +347,6 @@ impl Fold {
     }
 }
 
-/// Kernel for the residuals of several candidates, one per column.
 struct Residuals<'a> {
     fold: &'a Fold,
     /// Places of the columns of any candidate; all others are zero in `theta`.

@@ -6,10 +6,8 @@ use crate::uncertainty::Estimate;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// One joint's rows in one block of time.
 struct Block {
     joint: usize,
-    /// For every column of the factor its number in the problem.
     columns: Vec<usize>,
     factor: TriangularFactor,
 }

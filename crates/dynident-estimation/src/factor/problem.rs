@@ -290,10 +290,8 @@ impl LinearProblem {
     }
 }
 
-/// A problem with the total factor of every equation.
 pub(crate) struct StackedProblem<'a> {
     pub(crate) problem: &'a LinearProblem,
-    /// One per equation.
     pub(crate) totals: Vec<&'a TriangularFactor>,
     /// For each group of [same-column equations](LinearProblem::same_column_groups) the number of its first equation
     /// and the factor of all its rows; with many logs this saves most of the work.

@@ -86,7 +86,6 @@ pub struct RankReport {
     pub condition_number_scaled: f64,
 }
 
-/// Free and fixed columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Split {
     pub(crate) free: Vec<usize>,
@@ -138,13 +137,10 @@ pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings, unexci
     }
 }
 
-/// Values of all columns, with the data for their covariance.
 pub(crate) struct SolvedValues {
     /// One value per column, including fixed ones.
     pub(crate) values: Vec<f64>,
-    /// The free columns, each divided by its scale.
     reduced: TriangularFactor,
-    /// Scales of the free columns.
     scales: Vec<f64>,
 }
 
@@ -163,7 +159,6 @@ impl SolvedValues {
         whitened
     }
 
-    /// The values with their inverse triangle.
     pub(crate) fn with_inverse(self) -> Solution {
         let mut inverse = dispatch(Level::detect(), Inverse { triangle: &self.reduced });
         for (k, scale) in self.scales.iter().enumerate() {
@@ -223,7 +218,6 @@ struct Inverse<'a> {
     triangle: &'a TriangularFactor,
 }
 
-/// Columns of the inverse computed together.
 const COLUMNS_PER_BLOCK: usize = 8;
 
 impl Kernel for Inverse<'_> {

@@ -59,7 +59,6 @@ pub struct RecursiveFactor {
     begins: Vec<usize>,
 }
 
-/// Eight columns of a group of rows.
 type Line = [Chunk; GROUP_ROWS];
 
 impl RecursiveFactor {
@@ -216,7 +215,6 @@ impl RecursiveFactor {
     }
 }
 
-/// Lines of eight columns, including the torque.
 const fn line_count(columns: usize) -> usize {
     (columns + 1).div_ceil(CHUNK_ROWS)
 }

@@ -19,7 +19,6 @@ impl Chunk {
 /// Rows in a [`Chunk`].
 pub(crate) const CHUNK_ROWS: usize = 8;
 
-/// Reflectors applied together.
 const REFLECTORS: usize = 4;
 
 /// A column with a smaller squared norm is treated as zero, because its reciprocal would overflow. Its entries are
@@ -35,11 +34,9 @@ pub(crate) const fn row_start(size: usize, row: usize) -> usize {
 pub(crate) struct TriangleOnPanel<'a> {
     /// Packed upper triangle by rows, with a nonnegative diagonal.
     pub(crate) triangle: &'a mut [f64],
-    /// Rows and columns of the triangle.
     pub(crate) size: usize,
     /// Columns of the panel one after another, each `chunks` long, padded with zero rows.
     pub(crate) panel: &'a mut [Chunk],
-    /// Chunks per column.
     pub(crate) chunks: usize,
     /// Chunks of each column up to its last nonzero number: see [`heights`].
     pub(crate) heights: &'a mut [usize],

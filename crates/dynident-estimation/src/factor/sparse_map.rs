@@ -26,7 +26,6 @@ impl SparseMap {
         self.size
     }
 
-    /// Number of new columns, without the torque.
     pub(super) fn columns(&self) -> usize {
         self.of_columns.len() - 1
     }

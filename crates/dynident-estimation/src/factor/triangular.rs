@@ -233,7 +233,6 @@ impl TriangularFactor {
         self.reflect(workspace, rows);
     }
 
-    /// Adds to the number of rows.
     pub(crate) fn count(&mut self, rows: usize) {
         self.rows += rows;
     }

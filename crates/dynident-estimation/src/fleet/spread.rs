@@ -16,7 +16,6 @@ use crate::error::EstimationError;
 use crate::uncertainty::{chi_squared_tail, f_tail};
 use serde::Serialize;
 
-/// Minimum number of robots, also after exclusions.
 const MIN_ROBOTS: usize = 3;
 
 /// One parameter over the fleet, without the excluded robots.

@@ -23,7 +23,6 @@ pub(crate) struct Projection {
     pub(crate) left: TriangularFactor,
     /// Π, (columns, columns); zero rows for excluded instruments.
     pub(crate) coefficients: DMatrix<f64>,
-    /// Number of independent instruments.
     pub(crate) instruments: usize,
 }
 

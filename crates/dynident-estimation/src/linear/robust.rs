@@ -173,7 +173,6 @@ pub struct RobustEstimate {
     pub mean_weight: Vec<f64>,
 }
 
-/// Results of one pass over the rows.
 struct PassSums {
     factors: Vec<SegmentedFactor>,
     residuals: Vec<Vec<f64>>,

@@ -243,11 +243,9 @@ struct SimulationPoint {
     cost: f64,
 }
 
-/// The linear problem of one step.
 struct Linearised {
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
-    /// Factor of the rows over their noise.
     triangle: TriangularFactor,
     choice: Split,
 }

@@ -90,12 +90,10 @@ impl WhiteRows {
         self.motion + self.parameters
     }
 
-    /// Splits the unknowns into motion and parameters.
     pub(crate) fn parts<'a>(&self, unknowns: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
         unknowns.as_slice().split_at(self.motion)
     }
 
-    /// Whitened residuals.
     pub(crate) fn filtered(&self, residuals: &[Vec<f64>]) -> Result<Vec<DVector<f64>>, EstimationError> {
         expect("channels of residuals", self.channels.len(), residuals.len())?;
         let one = |((residual, colour), channel): ((&Vec<f64>, &Vec<f64>), &WhiteChannel)| {

@@ -49,7 +49,6 @@ pub enum CovarianceMethod {
     White,
 }
 
-/// Covariances and diagnostics from the scores.
 pub(crate) struct Covariances {
     /// By the chosen method, over all columns (zero for fixed columns).
     pub(crate) chosen: DMatrix<f64>,
@@ -68,7 +67,6 @@ pub(crate) struct Covariances {
 struct Moment {
     matrix: DMatrix<f64>,
     clusters: usize,
-    /// Independent squares per cluster.
     independent: f64,
 }
 

@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Properties of the fit that a covariance needs.
 pub(crate) struct Fit<'a> {
     pub(crate) split: &'a Split,
     pub(crate) solution: &'a Solution,
@@ -25,7 +24,6 @@ pub(crate) struct Fit<'a> {
 pub(super) struct Scores<'a> {
     /// One for each equation of the problem, in the same order.
     pub(super) joints: Vec<JointScores<'a>>,
-    /// Number of estimated columns.
     pub(super) free: usize,
     /// R⁻¹ of the free columns.
     inverse: &'a DMatrix<f64>,
@@ -72,7 +70,6 @@ impl<'a> Scores<'a> {
         Ok(Self { joints: joints.collect::<Result<_, EstimationError>>()?, free, inverse, place })
     }
 
-    /// Number of segments of all joints and logs.
     pub(super) fn clusters(&self) -> usize {
         self.joints.iter().map(|joint| joint.scores.len()).sum()
     }
@@ -118,7 +115,6 @@ impl<'a> Scores<'a> {
 }
 
 impl JointScores<'_> {
-    /// Reduced rows of every segment, in order of time.
     fn segments(&self) -> &[ReducedRows] {
         self.segments.get_or_init(|| self.rows.factor.reduced_segments())
     }

@@ -24,7 +24,6 @@ fn worse(a: f64, b: f64) -> f64 {
     if b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
-/// Differences of Gram matrices, relative to the column norms.
 fn gram_difference(r: &DMatrix<f64>, w: &DMatrix<f64>) -> f64 {
     let (a, b) = (r.tr_mul(r), w.tr_mul(w));
     let mut worst = 0.0_f64;
@@ -37,7 +36,6 @@ fn gram_difference(r: &DMatrix<f64>, w: &DMatrix<f64>) -> f64 {
     worst
 }
 
-/// Differences of triangles, relative to the norm of each column.
 fn triangle_difference(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     (0..a.ncols()).map(|c| (a.column(c) - b.column(c)).norm() / b.column(c).norm()).fold(0.0, worse)
 }

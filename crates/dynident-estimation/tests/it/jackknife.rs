@@ -78,7 +78,6 @@ fn intervals_hold_where_segments_are_few() {
     assert!(share(inside_own) < share(inside), "own residuals {}", share(inside_own));
 }
 
-/// Segments without excitation, some or all of them.
 #[test]
 fn segments_and_columns_without_motion_are_no_trouble() {
     let mut random = Random::new(5);

@@ -7,7 +7,6 @@ use dynident_estimation::consistent::{PhysicalFit, PhysicalRoute, PhysicalSettin
 use dynident_model::InertialParameters;
 use dynident_testing::count;
 
-/// Required accuracies.
 const KKT: f64 = 1.0e-7;
 const AGREEMENT: f64 = 1.0e-6;
 const FEASIBLE: f64 = 1.0e-9;

@@ -192,7 +192,6 @@ fn pieces_have_motions_of_their_own() {
     assert_eq!(found.estimate.status, EstimateStatus::NotAllExcited);
 }
 
-/// Bit-identical for any number of threads.
 #[test]
 fn threads_do_not_change_the_estimate() {
     let made = |threads: usize| {
@@ -203,7 +202,6 @@ fn threads_do_not_change_the_estimate() {
     assert_eq!(made(1), made(3));
 }
 
-/// Invalid input gives an error, not a panic.
 #[test]
 fn wrong_input_is_an_error() {
     let good = record(1, (200.0, 200), (5e-4, 0.05, 0.0), &mut Random::new(1));

@@ -16,7 +16,6 @@ pub(crate) fn robot(name: &str) -> Model {
     load_robot(repository(&format!("robots/{name}.urdf"))).unwrap().model.without_followers()
 }
 
-/// A robot and the results of another program.
 pub(crate) struct Golden {
     pub(crate) model: Model,
     pub(crate) file: Value,
@@ -44,13 +43,11 @@ impl Golden {
         self.file["states"].as_array().unwrap()
     }
 
-    /// One number per joint.
     pub(crate) fn vector(&self, value: &Value) -> Vec<f64> {
         let theirs = numbers(value);
         self.theirs.iter().map(|&k| theirs[k]).collect()
     }
 
-    /// Ten numbers per body.
     pub(crate) fn parameters(&self, value: &Value) -> Vec<f64> {
         let theirs = numbers(value);
         self.theirs.iter().flat_map(|&k| theirs[10 * k..10 * k + 10].to_vec()).collect()

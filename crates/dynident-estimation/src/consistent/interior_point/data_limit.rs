@@ -49,7 +49,6 @@ impl CentralPath {
         self.0.iter().find(begins).or_else(|| self.0.last()).filter(|stage| stage.data_squares < limit)
     }
 
-    /// Start point of a program with this limit.
     pub(in crate::consistent) fn start(&self, limits: (f64, f64)) -> Option<&DVector<f64>> {
         self.first_within(limits.0, limits.1).map(|stage| &stage.state.x.high)
     }
@@ -70,7 +69,6 @@ const MIN_KEPT_ROOM_SHARE: f64 = 0.1;
 /// Product of slack and multiplier of a limit relative to the mean, from which the program restarts for a new limit.
 const MAX_PRODUCT_RATIO: f64 = 50.0;
 
-/// An iterate of the search.
 pub(in crate::consistent) struct Iterate<'a> {
     pub(in crate::consistent) x: &'a DVector<f64>,
     /// `b − A x`.
@@ -80,7 +78,6 @@ pub(in crate::consistent) struct Iterate<'a> {
     pub(in crate::consistent) certificate: Certificate,
 }
 
-/// Next action of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::consistent) enum Next {
     /// Continue to a duality gap not below this value.
@@ -147,7 +144,6 @@ impl State {
         Some(Self { x, cones: state.cones.clone(), rows, balanced: false })
     }
 
-    /// Sum of all products of slacks and multipliers.
     fn products(&self) -> f64 {
         let cones = self.cones.iter().map(|cone| cone.scaling.lambda.norm_squared()).sum::<f64>();
         cones + self.rows.iter().map(|pair| pair.slack * pair.force).sum::<f64>()

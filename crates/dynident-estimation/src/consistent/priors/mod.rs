@@ -39,7 +39,6 @@ impl PhysicalPrior {
     }
 }
 
-/// Data of a body for its prior.
 pub(super) struct PriorBody<'a> {
     pub(super) reference: &'a [f64; 10],
     pub(super) whitening: &'a Whitening,

@@ -152,7 +152,6 @@ impl BandedArrow {
     }
 }
 
-/// Result of the elimination of the band.
 #[derive(Clone, Debug)]
 pub(super) struct Eliminated {
     size: usize,
@@ -241,7 +240,6 @@ impl Eliminated {
     }
 }
 
-/// Entries of an inverse near its diagonal.
 #[derive(Clone, Debug)]
 pub(super) struct InverseBand {
     bandwidth: usize,

@@ -14,10 +14,8 @@ const PIECES: [[f64; ACTIVE]; ACTIVE] = [
     [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
     [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
 ];
-/// Number of frequencies for the mean logarithm of a symbol.
 const SYMBOL_FREQUENCIES: usize = 4096;
 
-/// The functions of a piece of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Spline {
     pub(super) samples: usize,
@@ -85,7 +83,6 @@ impl Spline {
         left
     }
 
-    /// Number of samples of an interval.
     pub(super) fn interval_samples(&self, interval: usize) -> usize {
         self.samples.saturating_sub(interval * self.step).min(self.step)
     }
@@ -231,7 +228,6 @@ impl Spline {
     }
 }
 
-/// Coefficients of a polynomial's derivative.
 fn coefficients(piece: &[f64; ACTIVE], order: usize) -> Vec<f64> {
     let mut own = piece.to_vec();
     for _ in 0..order {

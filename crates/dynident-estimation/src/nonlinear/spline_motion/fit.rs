@@ -23,7 +23,6 @@ const MIN_ROWS_PER_INTERVAL: usize = 6;
 const MIN_TORQUE_SIGMA_SHARE: f64 = 1e-7;
 /// Maximum relative change of noise levels at convergence.
 const LEVEL_TOLERANCE: f64 = 0.05;
-/// Minimum share of the torque noise that remains in its residuals.
 const MIN_REMAINING_NOISE_SHARE: f64 = 0.1;
 /// After ORDERS_DECREASE_AFTER steps the autoregression orders may only decrease, and after LEVELS_FIXED_AFTER steps
 /// the noise levels are fixed, to stop oscillation between two equally good noise models.
@@ -32,7 +31,6 @@ const LEVELS_FIXED_AFTER: usize = 12;
 /// Updates of the noise levels per linearisation: in early steps, and later.
 const LEVEL_UPDATES: (usize, usize) = (3, 3);
 
-/// Motion and parameters of one step.
 #[derive(Clone)]
 struct State {
     coefficients: Vec<Vec<f64>>,

@@ -2,7 +2,6 @@
 
 use super::smoothing::Smoothness;
 
-/// Noise and smoothness of one log.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LogNoise {
     /// By joint.
@@ -16,7 +15,6 @@ pub(super) struct LogNoise {
 }
 
 impl LogNoise {
-    /// Highest order of the autoregressions.
     pub(super) fn most_order(&self) -> usize {
         self.colours.iter().map(Vec::len).max().unwrap_or(0)
     }

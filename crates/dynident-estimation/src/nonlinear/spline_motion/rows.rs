@@ -10,7 +10,6 @@ use crate::error::{EstimationError, expect};
 use dynident_model::terms::JointMotion;
 use rayon::prelude::*;
 
-/// Rows computed at a time.
 const CHUNK_ROWS: usize = 512;
 
 /// A record with the functions of its motion.
@@ -29,7 +28,6 @@ pub(super) struct Piece<'a> {
 pub(super) struct JointRows {
     /// First unknown of the window of each row.
     pub(super) first: Vec<usize>,
-    /// Width of the windows.
     pub(super) width: usize,
     /// Derivatives by the motion's unknowns, by row.
     pub(super) own: Vec<f64>,
@@ -68,7 +66,6 @@ impl Piece<'_> {
         self.samples() / self.mean_of
     }
 
-    /// Number of unknowns of the motion.
     pub(super) fn unknowns(&self) -> usize {
         self.spline.functions() * self.joints
     }

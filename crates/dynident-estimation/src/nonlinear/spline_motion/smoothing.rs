@@ -15,13 +15,11 @@ const MAX_WORSE_SPACINGS: usize = 3;
 /// Searched decades of λσ², relative to the value at which both terms are equal at the highest frequency. Beyond the
 /// last one both terms do not fit into double precision.
 const RATIO_DECADES: (i32, i32) = (-6, 11);
-/// Golden section steps after the search over decades.
 const GOLDEN_SECTION_STEPS: usize = 14;
 /// Lower limit of σ of a position, rad (m): an encoder of 26 bits has steps of 9e-8 rad, and noise-free data have
 /// rounding only.
 pub(super) const MIN_SIGMA: f64 = 1e-7;
 
-/// Smoothness of a joint's motion in a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Smoothness {
     /// r: order of the white derivative.
@@ -32,11 +30,9 @@ pub(super) struct Smoothness {
     pub(super) position_std: f64,
 }
 
-/// Motion of one joint in all pieces of a log.
 #[derive(Clone, Debug)]
 pub(super) struct Smoothed {
     pub(super) smoothness: Smoothness,
-    /// Coefficients of every piece.
     pub(super) coefficients: Vec<Vec<f64>>,
     /// −2 ln of the restricted likelihood.
     criterion: f64,

@@ -10,7 +10,6 @@ use crate::error::EstimationError;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-/// Rows of each joint and log for the leverage.
 const LEVERAGE_ROWS: usize = 200;
 /// Pivot of the scaled Schur complement that is treated as zero (rounding).
 const MIN_PIVOT: f64 = 1e-12;
@@ -128,7 +127,6 @@ impl System {
         (step.as_slice().to_vec(), length)
     }
 
-    /// Step of a record's motion for a given step of the parameters.
     pub(super) fn motion_step(&self, piece: usize, of_parameters: &[f64]) -> Vec<f64> {
         self.pieces[piece].band_solution(of_parameters)
     }
