@@ -13,9 +13,6 @@ const RATE_HZ: f64 = 250.0;
 
 /// Lower bound of the base parameters' standard deviations for unbiased estimators, with a Fourier series with unknown
 /// coefficients as motion; `None` for friction with memory. Computed for one period and scaled to all.
-///
-/// # Errors
-/// The motion does not determine all parameters.
 pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f64>>, EstimationError> {
     if made.regressor.needs_load() {
         return Ok(None);

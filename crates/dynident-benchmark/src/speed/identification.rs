@@ -18,9 +18,6 @@ const SAMPLES: usize = 10_000;
 const BLOCK: usize = 248;
 
 /// Times both for 10,000 samples of a smooth motion; torques are computed beforehand, as in the Python program.
-///
-/// # Errors
-/// A factor rejects its rows; the result is then meaningless.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), EstimationError> {
     let blocks = Motion::fourier(model, SAMPLES, 10.0).blocks(BLOCK);
     let mut workspace = BatchWorkspace::with_level(model, report.level);

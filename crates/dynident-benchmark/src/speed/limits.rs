@@ -96,9 +96,6 @@ fn memory() {
 
 /// Prints the speed of counting the lines of a text in the system's cache, and of parsing its numbers with the
 /// standard library.
-///
-/// # Errors
-/// The text cannot be read.
 pub(crate) fn of_text(path: &Path) -> std::io::Result<()> {
     let bytes = std::fs::metadata(path)?.len() as f64;
     let mut taken = vec![0; TEXT_CHUNK_BYTES];

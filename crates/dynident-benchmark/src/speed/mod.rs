@@ -23,9 +23,6 @@ const FACTORS_OF: &str = "panda_arm7";
 
 /// Measures the limits of this machine, and times reading the text at `path`: `rows` samples of `model`, created if
 /// missing.
-///
-/// # Errors
-/// A message if the text cannot be written or read.
 pub(crate) fn time_machine(
     name: &str,
     model: &Model,
@@ -47,9 +44,6 @@ pub(crate) fn time_machine(
 
 /// Times everything of one robot on these processor levels, with `block` samples per batch; only quantities of `only`
 /// unless it is empty.
-///
-/// # Errors
-/// A message if a quantity cannot be computed.
 pub(crate) fn time_robot(
     name: &str,
     model: &Model,

@@ -16,9 +16,6 @@ const BLOCK: usize = 248;
 
 /// Writes `rows` samples at 1 kHz of a smooth motion: time, positions, velocities and torques of every joint, nine
 /// digits each; with joint friction and white noise on positions and torques. Keeps an existing file.
-///
-/// # Errors
-/// The file cannot be written.
 pub(crate) fn write(path: &Path, model: &Model, rows: usize) -> Result<(), Error> {
     if path.exists() {
         return Ok(());
@@ -62,9 +59,6 @@ pub(crate) fn write(path: &Path, model: &Model, rows: usize) -> Result<(), Error
 }
 
 /// Times reading every number of the file, per row.
-///
-/// # Errors
-/// The file cannot be read.
 pub(crate) fn time_reading(path: &Path, report: &Report<'_>) -> Result<(), RecordingError> {
     let rows = read(path)?;
     let bytes = std::fs::metadata(path).map_err(|source| RecordingError::Io { file: path.to_owned(), source })?.len();

@@ -21,9 +21,6 @@ impl Unexcited {
 }
 
 /// Sensitivity of the estimated columns to the held ones: `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹ W_FᵀW_H`, shape (free, held).
-///
-/// # Errors
-/// [`EstimationError::Overflow`] if the free columns are dependent.
 pub(crate) fn answer_of_free(
     triangle: &DMatrix<f64>,
     free: &[usize],

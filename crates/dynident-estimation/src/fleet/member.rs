@@ -22,10 +22,6 @@ impl Member {
 }
 
 /// Checks the members and returns their number of parameters.
-///
-/// # Errors
-/// Fewer members than `fewest`, different numbers of parameters, values that are not finite, an invalid false-alarm
-/// rate.
 pub(super) fn checked(members: &[Member], fewest: usize, false_alarm: f64) -> Result<usize, EstimationError> {
     require(
         false_alarm > 0.0 && false_alarm < 1.0,

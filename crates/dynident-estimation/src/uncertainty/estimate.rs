@@ -62,9 +62,6 @@ impl Estimate {
 }
 
 /// Covariance of all columns (zero for the fixed ones) and its standard deviations from that of the `free` columns.
-///
-/// # Errors
-/// [`EstimationError::Overflow`] if a value or its standard deviation is not finite.
 pub(crate) fn covariance_of_all(
     names: &[String],
     values: &DVector<f64>,
