@@ -220,7 +220,7 @@ mod tests {
 
     /// Recordings longer than one period must not be at rest after the first period.
     #[test]
-    fn a_motion_repeats_as_long_as_it_is_recorded() {
+    fn motions_repeat_during_the_recording() {
         let model = PLANAR.model().unwrap();
         let (family, parameters) = random_series(&model, 5, &mut Random::new(1)).unwrap();
         let (rate_hz, late_s) = (100.0, 0.008);

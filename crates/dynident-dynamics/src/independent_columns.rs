@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dependent_column_spends_no_row() {
+    fn dependent_columns_use_no_row() {
         // Columns 2 and 4 depend on earlier ones; the textbook rule would lose column 3 or 5 here.
         let a = DMatrix::from_fn(12, 4, |i, j| ((i * 7 + j * 5 + i * i * (j + 1)) % 11) as f64 - 5.0);
         let mut m = DMatrix::zeros(12, 6);
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_of_rounding_noise_is_no_direction() {
+    fn columns_of_rounding_noise_are_dependent() {
         let a = DMatrix::from_fn(8, 3, |i, j| {
             if j == 1 {
                 1e-13 * ((i * 5 % 7) as f64 - 3.0)
@@ -315,7 +315,7 @@ mod tests {
     proptest! {
         /// Skipping zeros must not change any bit, because results in files are compared byte by byte.
         #[test]
-        fn zeros_left_out_change_no_bit(
+        fn skipped_zeros_change_no_bit(
             rows in 1..40_usize,
             columns in 1..90_usize,
             slope in 0.0..2.0_f64,

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn an_angle_counts_as_its_polynomials() {
+    fn angles_are_counted_as_their_polynomials() {
         counted_operations();
         dispatch_single(Level::counted(), SinCos);
         // From sin_cos.rs: reduction 4 multiply-adds and 1 difference; x², x³ and x⁴; 2 · 5 for the polynomials; 1 for

@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_are_right_and_what_is_no_number_stays_none() {
+    fn range_limits_are_correct_and_nan_stays_nan() {
         let mut out = [0.0; 6];
         map_all(&[0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e300], &mut out, &Step(1.0));
         assert_eq!(out[..4], [0.0, -0.0, 1.0, -1.0]);
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_is_the_same_wherever_it_stands() {
+    fn values_do_not_depend_on_their_lane() {
         let values = values();
         let (mut all, mut one) = (vec![0.0; values.len()], [0.0]);
         map_all(&values, &mut all, &Step(0.02));

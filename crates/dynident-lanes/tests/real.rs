@@ -24,7 +24,7 @@ impl LaneFunction for Everything {
 }
 
 #[test]
-fn numbers_lanes_and_duals_have_the_same_functions() {
+fn scalars_lanes_and_duals_have_the_same_functions() {
     let values: Vec<f64> = (-40..=40).map(|k| 0.05 * f64::from(k) + 0.01).collect();
     let mut lanes = vec![0.0; values.len()];
     map_all(&values, &mut lanes, &Everything);
@@ -40,7 +40,7 @@ fn numbers_lanes_and_duals_have_the_same_functions() {
 }
 
 #[test]
-fn slopes_at_rest_and_far_out_are_finite() {
+fn derivatives_at_zero_and_large_values_are_finite() {
     let at = Dual::variable;
     assert_eq!(at(0.0).abs().power(0.5), Dual::ZERO);
     assert_eq!(at(1e200).power(2.0).decay(), Dual::ZERO);

@@ -24,7 +24,7 @@ fn made(threads: usize) -> Result<BenchmarkFile, Box<dyn std::error::Error>> {
 }
 
 #[test]
-fn the_same_for_any_number_of_threads() -> Result<(), Box<dyn std::error::Error>> {
+fn figures_are_identical_for_any_number_of_threads() -> Result<(), Box<dyn std::error::Error>> {
     assert_eq!(made(1)?, made(3)?);
     Ok(())
 }
@@ -33,7 +33,7 @@ fn the_same_for_any_number_of_threads() -> Result<(), Box<dyn std::error::Error>
 /// over the bound has a sampling error of about 1/√(2·12·12) = 6 % for independent errors; lower limit 3 σ. Upper
 /// limit: decimation to the motion's band costs at most half.
 #[test]
-fn the_bound_is_a_bound_and_nearly_reached() -> Result<(), Box<dyn std::error::Error>> {
+fn true_motion_nearly_reaches_the_bound() -> Result<(), Box<dyn std::error::Error>> {
     let file = made(2)?;
     let oracle = file.cells.iter().find(|cell| cell.estimator == "weighted-true-motion").ok_or("no such cell")?;
     assert_eq!((oracle.runs, oracle.failures), (12, 0));
@@ -71,7 +71,7 @@ fn unknown_names_and_no_runs_are_reported() {
 /// noise needs a higher one than the spectrum suggests, and the default uses it. With two runs the limits are wider
 /// than 1.15.
 #[test]
-fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dyn std::error::Error>> {
+fn slow_motion_gets_the_cutoff_of_its_parameters() -> Result<(), Box<dyn std::error::Error>> {
     let slow = CUTOFF_CELLS.iter().find(|cell| cell.robot.name == "Panda" && cell.log.position_noise_rad == 1e-4);
     let figures = cutoff_figures(slow.ok_or("no such cell")?, 2, false)?;
     assert!(figures.default_over_best() < 1.3, "{figures:?}");
@@ -82,7 +82,7 @@ fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dy
 /// Direction-dependent friction is found, with constants between grid points: the error is at most twice that with the
 /// true terms and constants, on a motion where viscous and Coulomb friction have over ten times that error.
 #[test]
-fn friction_that_is_chosen_is_nearly_as_good_as_friction_that_is_known() -> Result<(), Box<dyn std::error::Error>> {
+fn selected_friction_is_nearly_as_good_as_known_friction() -> Result<(), Box<dyn std::error::Error>> {
     let cells = friction_cells();
     let cell = cells.iter().find(|cell| cell.truth == FrictionTruth::Asymmetric).ok_or("no such cell")?;
     let figures = friction_figures(cell, 1)?;

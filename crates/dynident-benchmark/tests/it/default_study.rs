@@ -15,7 +15,7 @@ fn figures(case: &DefaultCase, threads: usize) -> Result<CaseFigures, Box<dyn Er
 
 /// The experiment must use the defaults of a study.
 #[test]
-fn the_default_is_that_of_a_study_of_files_and_columns_alone() -> Result<(), Box<dyn Error>> {
+fn default_equals_a_study_of_files_and_columns_only() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("log.csv"), "t,q1,q2,tau1,tau2\n0,0,0,0,0\n0.01,0,0,0,0\n")?;
     std::fs::write(folder.path().join("arm.urdf"), include_str!("../../robots/planar2r.urdf"))?;
@@ -66,7 +66,7 @@ fn figures_do_not_depend_on_threads_and_are_in_order() -> Result<(), Box<dyn Err
 /// absorb part of it, with different lags per joint. So the common lag is compensated first; its error is some tenths
 /// of a millisecond.
 #[test]
-fn a_lag_that_all_joints_share_is_found_beside_chosen_friction() -> Result<(), Box<dyn Error>> {
+fn common_lag_and_friction_law_are_found_together() -> Result<(), Box<dyn Error>> {
     let is_it =
         |case: &&DefaultCase| case.robot.name == "UR10" && case.friction.name() == "Stribeck" && case.lag_s == 8e-3;
     let case = DEFAULT_CASES.iter().find(is_it).ok_or("no such case")?;
@@ -91,7 +91,7 @@ fn noise_of_the_positions_does_not_spoil_friction() -> Result<(), Box<dyn Error>
 
 /// The motion must repeat after its first period, for estimators of periodic motion.
 #[test]
-fn estimators_of_repeated_motion_are_given_one() -> Result<(), Box<dyn Error>> {
+fn estimators_for_repeated_motion_receive_it() -> Result<(), Box<dyn Error>> {
     let is_it = |case: &&DefaultCase| case.robot.name == "planar 2R" && case.friction.name() == "asymmetric";
     let case = DEFAULT_CASES.iter().find(is_it).ok_or("no such case")?;
     let found = case_figures(case, 0..1, true)?;

@@ -65,7 +65,7 @@ mod tests {
 
     /// A pendulum about y: only parameters that rotate about its axis affect the torque, each separately.
     #[test]
-    fn a_pendulum_tells_its_first_moments_and_one_inertia() {
+    fn pendulum_determines_first_moments_and_one_inertia() {
         let text = r#"<robot name="p"><link name="b"/><link name="r"><inertial><mass value="1"/><inertia ixx="1"
             iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j" type="continuous">
             <parent link="b"/><child link="r"/><axis xyz="0 1 0"/></joint></robot>"#;

@@ -18,7 +18,7 @@ fn all_terms(model: &Model) -> Vec<TorqueTerm> {
 }
 
 #[test]
-fn the_planar_arm_has_exactly_the_papers_table_2() {
+fn planar_arm_has_the_base_parameters_of_table_2() {
     let mut random = Random::new(1);
     // a1 = 0.7, so that a1 and a1² differ from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1 r1y, θ4..6 = Izz2,
     // m2 r2x, m2 r2y.
@@ -104,7 +104,7 @@ fn assert_full_torques(model: &Model, seed: u64) {
 }
 
 #[test]
-fn drives_regroup_where_structure_says_so() {
+fn drives_regroup_according_to_structure() {
     let mut random = Random::new(9);
     let model = planar_2r(1.0, random.body(), random.body());
     let terms = all_terms(&model);
@@ -137,7 +137,7 @@ fn couplings_and_terms_given_twice_are_found() {
 }
 
 #[test]
-fn without_gravity_fewer_parameters_are_seen() {
+fn without_gravity_fewer_parameters_are_identifiable() {
     let mut random = Random::new(2);
     let model = planar_2r(1.0, random.body(), random.body());
     let weightless = model.clone().with_gravity(dynident_model::Vec3([0.0; 3])).unwrap();

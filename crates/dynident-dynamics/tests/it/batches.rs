@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-12;
 const SAMPLES: [usize; 2] = [21, 3];
 
 #[test]
-fn matrices_in_batches_are_those_of_single_samples() {
+fn batched_matrices_equal_those_of_single_samples() {
     for case in cases().step_by(3) {
         let (model, dof) = (&case.model, case.model.dof());
         for (level, samples) in Level::available().into_iter().flat_map(|level| SAMPLES.map(|samples| (level, samples)))

@@ -52,7 +52,7 @@ fn ordered(order: &[usize], value: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
+fn mimic_joints_agree_with_pinocchio() {
     let golden = golden();
     for (name, path) in [("followers", "golden/coupled/followers.urdf"), ("panda", "robots/panda.urdf")] {
         let (model, file) = (load_robot(repository(path)).unwrap().model, &golden["mimic"][name]);
@@ -77,7 +77,7 @@ fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
 }
 
 #[test]
-fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
+fn connected_mjcf_chains_agree_with_mujoco() {
     let path = repository("golden/closed_chains.json");
     let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let robot = load_robot(repository("golden/coupled/palletizer.xml")).unwrap();
@@ -111,7 +111,7 @@ fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
 }
 
 #[test]
-fn a_palletising_arm_is_its_tree_held_together() {
+fn palletising_arm_equals_its_constrained_tree() {
     let (model, golden) = (palletizer(), golden());
     let file = &golden["loops"];
     let order = order(&model, file);
@@ -157,7 +157,7 @@ fn invalid_loops_are_reported() {
 }
 
 #[test]
-fn base_parameters_of_coupled_joints_carry_the_torque_and_no_more() {
+fn base_parameters_of_coupled_joints_are_minimal() {
     let followers = load_robot(repository("golden/coupled/followers.urdf")).unwrap().model;
     for model in [palletizer(), followers] {
         let choice = DriveChoice { drive_inertia: true, viscous: true, offset: true, ..DriveChoice::default() };
@@ -283,7 +283,7 @@ fn base_parameters_of_coupled_joints_do_not_depend_on_size() {
 }
 
 #[test]
-fn derivatives_of_torque_and_regressor_are_those_of_differences() {
+fn torque_and_regressor_derivatives_equal_differences() {
     let model = palletizer();
     let (dof, samples, step) = (model.dof(), 5, 1e-6);
     let mut random = Random::new(3);

@@ -174,7 +174,7 @@ fn a_rounded_half_turn_of_the_base_adds_no_base_parameters() {
 }
 
 #[test]
-fn exact_expressions_hold_every_digit() {
+fn exact_expressions_keep_every_digit() {
     for name in ARMS {
         let model = robot(name);
         let ours = base(&model, &[]);

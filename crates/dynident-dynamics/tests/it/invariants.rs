@@ -116,7 +116,7 @@ fn derivative_by_acceleration_is_the_mass_matrix_and_inverse_dynamics_is_affine_
 }
 
 #[test]
-fn derivatives_of_the_acceleration_are_those_of_differences() {
+fn acceleration_derivatives_equal_differences() {
     for Case { model, q, dq, ddq } in cases() {
         let dof = model.dof();
         for level in Level::available() {
@@ -262,7 +262,7 @@ fn gravity_torque_is_the_slope_of_potential_energy() {
 
 /// Entries of joints on different branches are never written, so remains of another algorithm would stay.
 #[test]
-fn a_workspace_keeps_nothing_of_one_algorithm_for_another() {
+fn algorithms_do_not_affect_each_other_in_a_workspace() {
     type Quantity = fn(&Model, &mut Workspace, &[f64], &[f64], &[f64]) -> Vec<f64>;
     let quantities: [Quantity; 7] = [
         |model, ws, q, dq, ddq| {
@@ -447,7 +447,7 @@ fn locked_joints_change_nothing_but_the_number_of_joints() {
 
 #[test]
 #[should_panic(expected = "another tree")]
-fn a_workspace_of_another_tree_is_refused_not_misread() {
+fn workspaces_of_another_tree_are_refused() {
     // Same number of joints, other branches: the regressor's scratch would use the wrong paths.
     let (model, other) = (random_tree(2, 6), random_tree(5, 6));
     let parents = |model: &Model| model.joints().iter().map(|joint| joint.parent).collect::<Vec<_>>();
@@ -459,7 +459,7 @@ fn a_workspace_of_another_tree_is_refused_not_misread() {
 
 /// Mass matrix and bias of one call are bit-identical to those of two calls.
 #[test]
-fn the_equation_of_motion_is_its_parts() {
+fn equation_of_motion_equals_the_sum_of_its_terms() {
     for seed in 0..10 {
         let model = random_tree(seed, 1 + seed as usize);
         let dof = model.dof();

@@ -46,7 +46,7 @@ fn each(robots: &[&'static str], mut check: impl FnMut(&Golden, &Value, &State, 
 }
 
 #[test]
-fn readers_give_the_same_machine() {
+fn readers_give_the_same_model() {
     for name in ROBOTS {
         let Golden { model, file, .. } = Golden::of("pinocchio", name);
         for (index, joint) in model.joints().iter().enumerate() {

@@ -118,7 +118,7 @@ fn times_parameters(model: &Model, row: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[test]
-fn one_sample_is_that_of_the_general_way() {
+fn one_sample_equals_the_general_method() {
     for seed in 0..count(160, 3000) as u64 {
         let model = robot(seed);
         let dof = model.dof();
@@ -157,7 +157,7 @@ fn one_sample_is_that_of_the_general_way() {
 }
 
 #[test]
-fn many_samples_are_those_of_the_general_way() {
+fn many_samples_equal_the_general_method() {
     for seed in 0..count(60, 1000) as u64 {
         let model = robot(seed);
         let dof = model.dof();

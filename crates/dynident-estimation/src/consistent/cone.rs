@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn the_scaling_makes_both_sides_one_diagonal() {
+    fn scaling_maps_the_pair_to_one_diagonal() {
         // S and Z need not be on the central path.
         for small in [1.0, 1e-6] {
             let (s, z) = (definite(0.3, small), definite(1.1, 0.5));
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_eigenvalue_is_that_of_all_four() {
+    fn least_eigenvalue_is_the_minimum_of_all_four() {
         let turned = |values: [f64; 4], seed: f64| {
             let q = definite(seed, 0.7).qr().q();
             q * Matrix4::from_diagonal(&Vector4::from(values)) * q.transpose()
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn congruence_is_the_product() {
+    fn congruence_equals_the_matrix_product() {
         let (v, x) = (definite(0.2, 2.0), definite(0.9, 1.0));
         assert!((congruence(&v) * vector_of(&x) - vector_of(&(v * x * v))).amax() < 1e-12);
     }

@@ -130,7 +130,7 @@ mod tests {
     const BODY: [f64; 10] = [2.5, 0.3, -0.2, 0.7, 0.9, 0.02, -0.05, 0.8, 0.1, 0.4];
 
     #[test]
-    fn agrees_with_the_model_and_comes_back() {
+    fn coordinates_agree_with_the_model_and_invert() {
         // Sums and products of a few numbers of order one.
         let p = pseudo_inertia(&BODY);
         assert!((p - InertialParameters(BODY).pseudo_inertia()).amax() < 1e-15);

@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn without_active_constraints_they_are_the_usual_intervals() {
+    fn intervals_without_active_constraints_are_the_usual_ones() {
         let found = intervals(&all(0.01), None);
         for (index, value, deviation) in all(0.01) {
             let interval = found.of(index).unwrap();
@@ -429,11 +429,11 @@ mod tests {
     }
 
     #[test]
-    fn an_honest_covariance_widens_them() {
+    fn clustered_covariance_widens_intervals() {
         let white = DMatrix::from_diagonal(&DVector::from_iterator(11, all(0.01).iter().map(|row| row.2.powi(2))));
-        let mut honest = white;
-        honest[(10, 10)] *= 9.0;
-        let found = intervals(&all(0.01), Some(&honest));
+        let mut clustered = white;
+        clustered[(10, 10)] *= 9.0;
+        let found = intervals(&all(0.01), Some(&clustered));
         let [friction, mass] = [10, 0].map(|index| found.of(index).unwrap());
         // The lower end is at zero, above 0.5 - 3 * 0.196; the upper end is unconstrained.
         assert_eq!(friction.held_by, [IntervalEnd::Constraint, IntervalEnd::Data]);
@@ -445,7 +445,7 @@ mod tests {
     /// Measured friction −0.1 ± 0.1: the best consistent value is zero, and the profile above it is ½((p + 0.1)/0.1)²
     /// − ½.
     #[test]
-    fn friction_that_the_data_want_negative() {
+    fn negative_friction_estimates_end_at_zero() {
         let mut measured = all(0.01);
         measured[10].1 = -0.1;
         let interval = intervals(&measured, None).of(10).unwrap();
@@ -457,7 +457,7 @@ mod tests {
 
     /// Mass and first moment measured, inertia not: the parallel axis theorem limits it from below only.
     #[test]
-    fn an_unmeasured_moment_is_held_by_physical_consistency() {
+    fn physical_consistency_limits_an_unmeasured_moment() {
         let measured = [(0, 2.0, 1e-4), (1, 0.0, 1e-4), (2, 0.6, 1e-4), (3, 0.0, 1e-4), (10, 0.5, 0.1)];
         let found = intervals(&measured, None);
         let interval = found.of(4).unwrap();
@@ -473,7 +473,7 @@ mod tests {
     /// Only Ixx = Σyy + Σzz measured: |Σyz| is at most half of it, and the sums are at least the margin; parameters
     /// that involve x are open.
     #[test]
-    fn one_moment_holds_what_it_contains() {
+    fn a_measured_moment_limits_the_parameters_in_it() {
         let found = intervals(&[(4, 0.02, 1e-6), (10, 0.5, 0.1)], None);
         let product = found.of(8).unwrap();
         assert_eq!(product.held_by, [IntervalEnd::Constraint; 2]);

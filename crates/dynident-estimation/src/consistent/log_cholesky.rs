@@ -371,7 +371,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_jacobian_is_the_derivative_of_both_ways_to_move() {
+    fn jacobian_equals_differences_of_both_curves() {
         let numbers = Vector10::from([0.3, -0.2, 0.4, -1.0, 0.5, -0.3, 0.2, 0.1, -0.6, 0.7]);
         let u = curved(&numbers).unwrap().factor;
         assert!((upper_factor(&(u * u.transpose())).unwrap() - u).amax() < 1e-14);

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn every_row_is_the_same_to_the_last_bit_at_every_level() {
+    fn rows_are_bit_identical_at_every_level() {
         for rows in [1, 3, 8, 13] {
             let wave = |i: usize, j: usize| ((i * 7 + j * j * 3) as f64 * 0.61).sin() * 10.0_f64.powi((i % 5) as i32);
             let (matrix, target) = (DMatrix::from_fn(rows, 9, wave), DVector::from_fn(rows, |i, _| wave(i, 11)));
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cancels_keeps_its_digits() {
+    fn cancelling_terms_keep_their_digits() {
         // 1e8 (1e8 + 1e-9) − 1e16 = 0.1; in double precision 1e8 + 1e-9 is 1e8.
         let mut x = Precise::new(DVector::from_element(1, 1.0e8));
         x.add(&DVector::from_element(1, 1.0e-9));

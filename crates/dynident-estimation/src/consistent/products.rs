@@ -175,7 +175,7 @@ mod tests {
     use nalgebra::DVector;
 
     #[test]
-    fn products_are_the_products_at_every_level() {
+    fn products_agree_at_every_processor_level() {
         let wave = |i: usize, j: usize| ((i * i * 5 + j * 3 + i * j * j * 2) as f64 * 0.37).sin();
         for (rows, columns) in [(0, 3), (1, 1), (5, 9), (16, 7), (23, 12)] {
             let matrix = DMatrix::from_fn(rows, columns, wave);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn both_solutions_are_the_triangles() {
+    fn both_solutions_satisfy_the_triangle() {
         let size = 21;
         let entry = |i: usize, j: usize| if i == j { 2.0 } else { 0.3 * ((i * 7 + j * j) as f64 * 0.61).sin() };
         let packed: Vec<f64> = (0..size).flat_map(|i| (i..size).map(move |j| entry(i, j))).collect();

@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_and_the_direct_part_are_the_normal_equations() {
+    fn frames_and_direct_part_equal_the_normal_equations() {
         let size = 12;
         let frame = Matrix10::from_fn(|i, j| f64::from(i == j) + 0.1 * ((i * 3 + j) as f64).sin());
         let mut rows = Rows { frames: vec![(1, frame)], ..Rows::default() };
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variable_without_rows_or_a_broken_one_is_none() {
+    fn variables_without_rows_or_with_nan_give_none() {
         let rows = |value: f64| Rows { wide: vec![DMatrix::from_row_slice(1, 2, &[1.0, value])], ..Rows::default() };
         assert!(StackedSystem::new(2, rows(0.0)).is_none());
         assert!(StackedSystem::new(2, rows(f64::NAN)).is_none());

@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_columns_and_columns_of_zeros_give_numbers() {
+    fn equal_and_zero_columns_give_finite_results() {
         let a = DMatrix::from_row_slice(3, 3, &[1., 1., 0., 2., 2., 0., 3., 3., 0.]);
         let b = DVector::from_vec(vec![2., 4., 6.]);
         for nonnegative in [[true; 3], [false; 3]] {

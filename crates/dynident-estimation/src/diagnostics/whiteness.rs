@@ -76,7 +76,7 @@ mod tests {
     /// Of 400 white series the test at 5 % rejects 20 ± 4.4; the tolerance is 4 σ. It always rejects an AR(1) series
     /// with ρ = 0.5.
     #[test]
-    fn rejects_white_residuals_as_often_as_it_says() {
+    fn white_residuals_are_rejected_at_the_nominal_rate() {
         let mut random = Random::new(7);
         let mut rejected = 0;
         for _ in 0..400 {
@@ -97,7 +97,7 @@ mod tests {
 
     /// Q computed directly for a short series.
     #[test]
-    fn is_the_formula() {
+    fn ljung_box_equals_the_formula() {
         let r: Vec<f64> = (0..30).map(|k| f64::from((k * 7) % 11) - 5.0).collect();
         let mut whiteness = Whiteness::default();
         for r in &r {

@@ -372,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_that_are_left_out_change_no_bit() {
+    fn skipped_zeros_change_no_bit() {
         let (size, chunks) = (23, 4);
         let triangular = |column: usize| column + 1;
         let few = |column: usize| if column.is_multiple_of(3) || column == size - 2 { 0 } else { 13 };

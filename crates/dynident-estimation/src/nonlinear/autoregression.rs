@@ -105,7 +105,7 @@ mod tests {
     /// e_t = 1.2 e_{t−1} − 0.5 e_{t−2} + w_t: coefficients of 4000 samples have errors of about √((1 − a_2²)/N) =
     /// 0.014; tolerance 4 σ. The filtered residual is w.
     #[test]
-    fn an_autoregression_is_found_and_taken_away() {
+    fn autoregression_is_estimated_and_removed() {
         let mut random = Random::new(5);
         let w: Vec<f64> = (0..4000).map(|_| random.normal()).collect();
         let mut e = vec![0.0; w.len()];

@@ -335,7 +335,7 @@ mod tests {
     /// With as many moments as unknowns: θ = Στs/Σqs, c = Σqs/Σs² for any noise; and Var θ = (σ_τ² + θ² σ_q²)/(c² Σs²)
     /// by the delta method, which is exact for linearised rows.
     #[test]
-    fn the_scalar_case_is_the_closed_form() {
+    fn scalar_case_equals_the_closed_form() {
         let mut model = line(&mut Random::new(3));
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let (qs, ts, ss) = (dot(&model.q, &model.s), dot(&model.tau, &model.s), dot(&model.s, &model.s));
@@ -446,7 +446,7 @@ mod tests {
     /// of four parameters: the RMS has a sampling error of 1/√(2·240) = 5 %, the coverage of 240 intervals one of 1.4
     /// %; up to twice that for correlated parameters. Tolerance 3 σ.
     #[test]
-    fn a_pendulum_reaches_the_bound_with_honest_intervals() {
+    fn pendulum_reaches_the_bound_with_correct_intervals() {
         let problem = begun(&["J", "m", "f", "o"], &[0.4, 0.8, -0.2, 0.2, 0.5], &[1.0, 4.0, 0.0, 0.0]);
         let mut random = Random::new(7);
         let rows = Pendulum::recorded(&mut random).linearised(&TRUE_MOTION, &TRUE_PARAMETERS).unwrap();
@@ -477,7 +477,7 @@ mod tests {
     /// Without noise the estimate is exact up to the minimum σ of a channel: 1e-9 of its size, over √500 rows, times
     /// the condition number.
     #[test]
-    fn without_noise_the_truth_comes_out() {
+    fn noise_free_data_give_the_true_values() {
         let (mut q, mut tau) = (Vec::new(), Vec::new());
         for k in 0..500 {
             let [x, dx, ddx] = Pendulum::state(k, &TRUE_MOTION);
@@ -496,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_determined_is_named() {
+    fn undetermined_unknowns_are_named() {
         struct Still(Line);
         impl SimultaneousModel for Still {
             type Error = EstimationError;

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_that_no_draw_holds_is_an_error() {
+    fn directions_absent_from_all_draws_are_errors() {
         let blocks = vec![(DMatrix::zeros(1, 1), DVector::zeros(1)); 3];
         assert!(replicated(&[blocks], &DMatrix::zeros(1, 1)).is_err());
     }

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_not_a_number_and_never_hangs() {
+    fn invalid_arguments_give_nan_and_terminate() {
         assert!(chi_squared_tail(1.0, 0.0).is_nan() && f_tail(f64::NAN, 1.0, 1.0).is_nan());
         assert!(student_half_width(1.0, 3.0).is_nan() && student_half_width(0.95, f64::NAN).is_nan());
         assert!(chi_squared_tail(f64::NAN, 1.0).is_nan() && student_half_width(0.95, f64::INFINITY).is_finite());

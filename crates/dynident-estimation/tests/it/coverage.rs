@@ -75,17 +75,17 @@ fn assert_coverage(weighted: bool) {
 }
 
 #[test]
-fn ordinary_intervals_hold_the_truth_under_coloured_noise() {
+fn ordinary_intervals_cover_under_coloured_noise() {
     assert_coverage(false);
 }
 
 #[test]
-fn weighted_intervals_hold_the_truth_under_coloured_noise() {
+fn weighted_intervals_cover_under_coloured_noise() {
     assert_coverage(true);
 }
 
 #[test]
-fn segments_too_short_for_the_correlation_show_it() {
+fn too_short_segments_show_correlated_scores() {
     let segment_correlation = |settings| {
         let problem = simulated(&mut Random::new(5), settings);
         let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();

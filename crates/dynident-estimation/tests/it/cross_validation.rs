@@ -102,7 +102,7 @@ fn a_selection_of_columns_is_the_factor_of_those_columns() {
 }
 
 #[test]
-fn too_little_data_is_said() {
+fn too_few_data_are_reported() {
     let rows = rows();
     let short = problem(&[0, 1, 2, 3], &rows, 0..30);
     assert!(matches!(CrossValidation::new(&short, 5), Err(EstimationError::TooFewSegments { clusters: 3 })));

@@ -71,7 +71,7 @@ fn more_data_remove_the_bias_of_instruments_but_not_of_least_squares() {
 }
 
 #[test]
-fn the_test_has_its_level_and_its_power() {
+fn hausman_test_has_its_level_and_power() {
     let settings = HausmanSettings { level: 0.05, ..Default::default() };
     let mut random = Random::new(11);
     let (mut false_alarms, mut found) = (0, 0);
@@ -153,7 +153,7 @@ fn weak_and_useless_instruments_are_named() {
 }
 
 #[test]
-fn too_few_rows_and_joints_at_rest_are_refused_or_survived() {
+fn too_few_rows_are_refused_and_resting_joints_accepted() {
     let mut random = Random::new(5);
     let few = problem_of(&experiment(&mut random, 2, 0.1), 2);
     let refused = instrumental_variables(&few, &InstrumentalSettings::default());

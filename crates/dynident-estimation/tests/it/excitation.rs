@@ -55,7 +55,7 @@ fn found(rows: &[DMatrix<f64>], made: &[DMatrix<f64>], scales: Option<&[f64]>) -
 }
 
 #[test]
-fn what_noise_makes_is_held() {
+fn columns_of_noise_are_held() {
     let (rows, made, torques) = at_rest();
     let unexcited = found(&rows, &made, None);
     // Of the two constant columns the exact one is selected.
@@ -88,7 +88,7 @@ fn what_noise_makes_is_held() {
 }
 
 #[test]
-fn neither_order_nor_units_matter() {
+fn order_and_units_do_not_matter() {
     let (rows, made, _) = at_rest();
     let plain = found(&rows, &made, None).columns;
     let order = [4, 2, 0, 5, 3, 1];
@@ -111,7 +111,7 @@ fn neither_order_nor_units_matter() {
 }
 
 #[test]
-fn without_noise_nothing_but_dependence_is_held() {
+fn without_noise_only_dependent_columns_are_held() {
     let (rows, made, _) = at_rest();
     let none: Vec<DMatrix<f64>> = made.iter().map(|rows| rows * 0.0).collect();
     assert_eq!(found(&rows, &none, None).columns, [5]);

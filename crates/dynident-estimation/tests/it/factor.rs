@@ -44,7 +44,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
     #[test]
-    fn the_gram_matrix_is_kept(seed in 0_u64..1_000_000, count in 0_usize..400, columns in 0_usize..50) {
+    fn gram_matrix_is_preserved(seed in 0_u64..1_000_000, count in 0_usize..400, columns in 0_usize..50) {
         let w = rows(&mut Random::new(seed), count, columns);
         let factor = TriangularFactor::from_rows(columns, w.as_slice(), count).unwrap();
         prop_assert_eq!(factor.rows(), count);
@@ -105,7 +105,7 @@ proptest! {
 
     /// The cached total is updated by later rows, and derived factors have their own totals.
     #[test]
-    fn a_kept_total_is_that_of_all_rows(seed in 0_u64..1_000_000, columns in 1_usize..9, counts in prop::array::uniform2(1_usize..90)) {
+    fn cached_total_equals_that_of_all_rows(seed in 0_u64..1_000_000, columns in 1_usize..9, counts in prop::array::uniform2(1_usize..90)) {
         let mut random = Random::new(seed);
         let settings = SegmentSettings { max_segments: 4, first_length_rows: 3 };
         let mut segmented = SegmentedFactor::new(columns, settings).unwrap();
@@ -134,7 +134,7 @@ proptest! {
     }
 
     #[test]
-    fn segments_hold_the_same_rows(seed in 0_u64..1_000_000, columns in 0_usize..12, most in 2_usize..9, first in 1_usize..20, calls in prop::collection::vec(0_usize..70, 0..12)) {
+    fn segments_contain_the_same_rows(seed in 0_u64..1_000_000, columns in 0_usize..12, most in 2_usize..9, first in 1_usize..20, calls in prop::collection::vec(0_usize..70, 0..12)) {
         let mut random = Random::new(seed);
         let settings = SegmentSettings { max_segments: most, first_length_rows: first };
         let mut segmented = SegmentedFactor::new(columns, settings).unwrap();
@@ -312,7 +312,7 @@ fn sample_by_sample_is_the_same_triangle() {
 }
 
 #[test]
-fn a_sample_with_a_number_that_is_none_is_refused_whole() {
+fn samples_with_nan_are_refused_whole() {
     let (mut factor, _) = recursive(4, 12, &[5, 0, 2], 9, Level::detect());
     let before = factor.to_triangular();
     for bad in [f64::NAN, f64::INFINITY, -1e150] {

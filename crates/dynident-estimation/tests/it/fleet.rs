@@ -23,7 +23,7 @@ const TRIALS: [[f64; 4]; 13] = [
 /// Published results of DerSimonian and Laird's method for these trials (log risk ratios): Q = 152.23, τ² = 0.3088,
 /// mean -0.7141 ± 0.1787, to the printed digits.
 #[test]
-fn the_trials_of_a_vaccine() {
+fn vaccine_trials_give_the_published_result() {
     let trial = |[cases, others, cases_without, others_without]: [f64; 4]| {
         let (all, without) = (cases + others, cases_without + others_without);
         let variance = cases.recip() - all.recip() + cases_without.recip() - without.recip();
@@ -53,7 +53,7 @@ fn fleet(random: &mut Random, robots: usize, between: f64) -> Vec<Member> {
 /// Of 1,000 fleets of equal robots at a false-alarm rate of 5 %, at most 50 + 3 √50 = 71 report a robot; the same for
 /// fleets with a natural spread.
 #[test]
-fn healthy_robots_are_seldom_named() {
+fn false_alarms_of_outliers_have_the_nominal_rate() {
     for between in [0.0, 2.0, 20.0] {
         let mut random = Random::new(11);
         let mut named = 0;
@@ -68,7 +68,7 @@ fn healthy_robots_are_seldom_named() {
 /// Two of twenty robots deviate strongly in one parameter each: both are reported with the parameter, and the rest
 /// does not differ.
 #[test]
-fn robots_that_are_unlike_are_named_with_the_reason() {
+fn outliers_are_named_with_the_reason() {
     for seed in 0..20 {
         let mut members = fleet(&mut Random::new(seed), 20, 0.0);
         members[4].values[3] += 60.0;
@@ -84,7 +84,7 @@ fn robots_that_are_unlike_are_named_with_the_reason() {
 /// Of 1,000 unchanged robots at most 71 are reported as drifting at 5 %, also if the weeks scatter by twice their
 /// error bars; a drifting robot is reported.
 #[test]
-fn what_does_not_wander_is_seldom_named() {
+fn false_alarms_of_drift_have_the_nominal_rate() {
     for scatter in [1.0, 2.0] {
         let mut random = Random::new(5);
         let (mut named, mut seen) = (0, 0);
@@ -112,7 +112,7 @@ fn drifts(members: &[Member], weeks: &[f64]) -> Vec<bool> {
 }
 
 #[test]
-fn what_cannot_be_compared_is_said() {
+fn incomparable_members_are_reported() {
     let one = |value: f64, std: f64| Member { name: "one".to_owned(), values: vec![value], std: vec![std] };
     let said = |members: &[Member], rate: f64| spread(members, rate).unwrap_err().to_string();
     assert!(said(&[one(1.0, 1.0), one(1.0, 1.0)], 0.01).contains("at least: expected 3, found 2"));

@@ -21,7 +21,7 @@ fn fit(columns: &[Vec<f64>], tau: &[f64], segments: SegmentSettings, covariance:
 /// With segments of one row it is the textbook form. Double precision, condition number below 100: its square times
 /// rounding is 1e-12.
 #[test]
-fn newey_west_is_that_of_statsmodels() {
+fn newey_west_agrees_with_statsmodels() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../golden/statsmodels_newey_west.json");
     let golden: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let numbers =
@@ -44,7 +44,7 @@ fn columns(random: &mut Random, rows: usize, count: usize) -> Vec<Vec<f64>> {
 
 /// Two of four parameters are zero and are dropped; the result equals ordinary least squares on the other two.
 #[test]
-fn what_the_data_do_not_tell_is_dropped() {
+fn insignificant_parameters_are_dropped() {
     let mut random = Random::new(3);
     let w = columns(&mut random, 400, 4);
     let tau: Vec<f64> = (0..400).map(|k| 2.0 * w[0][k] - 3.0 * w[2][k] + 0.1 * random.normal()).collect();
@@ -69,7 +69,7 @@ fn what_the_data_do_not_tell_is_dropped() {
 
 /// A poorly determined parameter that is significantly different from zero is kept by the F-test.
 #[test]
-fn what_the_residual_needs_stays() {
+fn parameters_needed_by_the_residual_stay() {
     let mut random = Random::new(4);
     let w = columns(&mut random, 400, 2);
     let tau: Vec<f64> = (0..400).map(|k| 50.0 * w[0][k] + 0.05 * w[1][k] + 0.1 * random.normal()).collect();
@@ -88,7 +88,7 @@ fn reduced_nothing() -> Estimate {
 
 /// Columns a and a + small b have estimates with a correlation near −1.
 #[test]
-fn near_twins_are_the_strongest_pair() {
+fn similar_columns_are_the_strongest_pair() {
     let mut random = Random::new(6);
     let mut w = columns(&mut random, 300, 3);
     w[2] = w[0].iter().zip(&w[2]).map(|(a, b)| a + 0.1 * b).collect();

@@ -55,7 +55,7 @@ fn equals_fits_that_leave_one_segment_out() {
 }
 
 #[test]
-fn intervals_hold_where_segments_are_few() {
+fn intervals_cover_with_few_segments() {
     // Three segments per parameter. 600 intervals in the daily run, 2,400 in the long run: a coverage of 95 % has a
     // sampling error of √(0.95·0.05/600) = 0.9 % (0.5 %); lower limit 0.92 (3 σ). With about ten degrees of freedom
     // the interval should be wider than 1.96 std; the conservative jackknife compensates for this. CR1 must be worse.
@@ -79,7 +79,7 @@ fn intervals_hold_where_segments_are_few() {
 }
 
 #[test]
-fn segments_and_columns_without_motion_are_no_trouble() {
+fn segments_and_columns_without_motion_are_accepted() {
     let mut random = Random::new(5);
     let moving = rows(&mut random, 120, 0.5);
     let still = |row: &Vec<f64>| [vec![0.0; COLUMNS], vec![0.1 * row[COLUMNS]]].concat();

@@ -40,7 +40,7 @@ fn problem(random: &mut Random, noise: f64, shared: bool, felt: bool) -> (Linear
 }
 
 #[test]
-fn without_noise_the_truth_comes_back() {
+fn noise_free_data_give_the_true_gains() {
     for (shared, felt) in [(false, true), (true, true), (true, false)] {
         let (rows, known) = problem(&mut Random::new(1), 0.0, shared, felt);
         let found = joint_gains(&GainProblem { rows: &rows, known }, &WeightedSettings::default()).unwrap();
@@ -55,7 +55,7 @@ fn without_noise_the_truth_comes_back() {
 }
 
 #[test]
-fn intervals_hold_the_truth() {
+fn intervals_cover_the_true_values() {
     let mut random = Random::new(77);
     let (mut inside, mut runs) = (0_usize, 0);
     for _ in 0..150 {
@@ -73,7 +73,7 @@ fn intervals_hold_the_truth() {
 }
 
 #[test]
-fn a_joint_that_feels_no_load_is_named() {
+fn joints_without_load_are_named() {
     let (rows, known) = problem(&mut Random::new(9), 0.3, false, false);
     let found = joint_gains(&GainProblem { rows: &rows, known: known.clone() }, &WeightedSettings::default()).unwrap();
     assert!(found.gains[0].identified && !found.gains[1].identified);

@@ -34,7 +34,7 @@ fn recording(random: &mut Random, with_load: bool) -> LinearProblem {
 }
 
 #[test]
-fn intervals_of_the_second_step_hold_the_truth() {
+fn intervals_of_the_second_step_cover() {
     let mut random = Random::new(5);
     let (mut inside, mut without, mut runs) = (0, 0, 0);
     for _ in 0..400 {
@@ -58,7 +58,7 @@ fn intervals_of_the_second_step_hold_the_truth() {
 }
 
 #[test]
-fn known_exactly_it_is_the_fit_of_what_is_left() {
+fn exactly_known_columns_leave_the_fit_of_the_others() {
     let problem = recording(&mut Random::new(3), true);
     let known = KnownColumns { columns: vec![1], values: vec![-1.1], covariance: DMatrix::zeros(1, 1) };
     let settings = WeightedSettings { covariance: CovarianceMethod::White, ..WeightedSettings::default() };
@@ -74,7 +74,7 @@ fn known_exactly_it_is_the_fit_of_what_is_left() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused() {
+fn mismatched_columns_are_refused() {
     let problem = recording(&mut Random::new(3), true);
     let of = |columns: Vec<usize>, values: Vec<f64>| {
         let covariance = DMatrix::zeros(columns.len(), columns.len());

@@ -41,7 +41,7 @@ fn fitted(joints: &[(DMatrix<f64>, DVector<f64>); 2]) -> (LinearProblem, Estimat
 }
 
 #[test]
-fn the_ratio_is_that_of_refitted_rows() {
+fn ratio_equals_that_of_refitted_rows() {
     let joints = rows(5, 0.4);
     let (problem, estimate) = fitted(&joints);
     let found = left_out_ratios(&problem, &estimate, BLOCKS).unwrap();
@@ -81,7 +81,7 @@ fn the_ratio_is_that_of_refitted_rows() {
 }
 
 #[test]
-fn a_right_model_keeps_its_promise_and_a_drifting_one_does_not() {
+fn correct_models_predict_their_error_and_drifting_ones_do_not() {
     for seed in 0..20 {
         let joints = rows(seed, 0.0);
         let (problem, estimate) = fitted(&joints);
@@ -97,7 +97,7 @@ fn a_right_model_keeps_its_promise_and_a_drifting_one_does_not() {
 }
 
 #[test]
-fn one_block_that_alone_tells_a_parameter_says_nothing() {
+fn blocks_that_alone_determine_a_parameter_give_finite_ratios() {
     let mut joints = rows(1, 0.0);
     joints[1].0.view_mut((0, 1), (3 * ROWS / 4, 1)).fill(0.0);
     let (problem, estimate) = fitted(&joints);

@@ -119,7 +119,7 @@ fn noise_in_the_motion_does_not_bias_and_the_error_bars_are_right() {
 }
 
 #[test]
-fn what_is_no_covariance_or_has_another_shape_is_named() {
+fn invalid_covariances_and_shapes_are_named() {
     let bad = |change: &dyn Fn(&mut MaximumLikelihoodSettings)| {
         let mut settings = settings(&[0.1], &[1.0]);
         change(&mut settings);

@@ -39,7 +39,7 @@ fn profile(case: &Case, index: usize, value: f64, width: f64) -> (f64, f64) {
 }
 
 #[test]
-fn ends_are_where_the_profile_meets_its_threshold() {
+fn interval_ends_lie_on_the_profile_threshold() {
     let mut kinds = [0; 3];
     for seed in [1, 2, 3, 5, 6, 7, 9, 10, 11] {
         let case = case(seed, 3);

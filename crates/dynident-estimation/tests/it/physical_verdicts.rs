@@ -107,7 +107,7 @@ fn contradictions_are_named() {
 
 /// The search for an interior start ignores the data, so an unlimited offset would be undetermined.
 #[test]
-fn limits_away_from_the_prior_are_met_beside_a_scalar_without_any() {
+fn limits_far_from_the_prior_are_met_with_a_free_scalar() {
     let mut heavy = body("link");
     let least = 2.0 * heavy.reference[0];
     heavy.mass_kg = Some([least, 1.2 * least]);
@@ -118,7 +118,7 @@ fn limits_away_from_the_prior_are_met_beside_a_scalar_without_any() {
 }
 
 #[test]
-fn bodies_given_as_known_stay_and_bodies_without_mass_are_allowed() {
+fn known_bodies_stay_and_massless_bodies_are_allowed() {
     let (mut arm, mut tool) = (body("arm"), body("tool"));
     arm.known = Some([0.0; 10]);
     tool.known = Some(rough_body(0.5, 0.05));

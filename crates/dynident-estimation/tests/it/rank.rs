@@ -73,7 +73,7 @@ fn unexcited_columns_are_named_and_fixed() {
 }
 
 #[test]
-fn unexcited_columns_take_their_fallback_and_the_rest_answers_to_it() {
+fn unexcited_columns_take_their_fallback_and_others_adapt() {
     let (w, tau) = deficient();
     let problem = one_joint(&w, &tau).with_fallback(vec![9.0, 9.0, 7.0, 1.0, 9.0, 4.0]).unwrap();
     for estimate in [
@@ -105,7 +105,7 @@ fn noise_free_torque_is_solved_exactly_and_the_iteration_ends() {
 }
 
 #[test]
-fn silent_joints_and_empty_columns_stay_finite() {
+fn zero_torques_and_empty_columns_stay_finite() {
     // All torques zero; then also all columns zero.
     let mut random = Random::new(5);
     let w = DMatrix::from_fn(60, 2, |_, _| random.normal());
@@ -133,7 +133,7 @@ fn a_prior_excites_what_the_data_do_not() {
 }
 
 #[test]
-fn too_little_data_is_an_error_that_says_so() {
+fn too_few_data_are_an_error() {
     let w = DMatrix::from_fn(3, 3, |i, j| ((i + 2 * j) % 4) as f64 + f64::from(u8::from(i == j)));
     let problem = one_joint(&w, &DVector::from_element(3, 1.0));
     assert!(matches!(ordinary_least_squares(&problem, &WHITE), Err(EstimationError::TooFewRows { rows: 3, .. })));
@@ -198,7 +198,7 @@ fn the_iteration_limit_is_a_status() {
 }
 
 #[test]
-fn an_estimate_serialises_and_its_correlations_are_sound() {
+fn estimates_serialise_with_valid_correlations() {
     let (w, tau) = deficient();
     let estimate = ordinary_least_squares(&one_joint(&w, &tau), &WHITE).unwrap();
     let json = serde_json::to_value(&estimate).unwrap();

@@ -136,7 +136,7 @@ fn white() -> SplineMotionSettings {
 /// Errors in units of their error bars must have an RMS near one: for 6 runs of 11 parameters the sampling error is
 /// 1/√(2·66) = 9 %; tolerance 3 σ plus 10 % for the uncertainty of the smoothness.
 #[test]
-fn errors_are_as_large_as_their_bars() {
+fn errors_agree_with_their_error_bars() {
     for colour in [0.0, 0.8] {
         let (mut squares, mut count) = (0.0, 0);
         for seed in 0..dynident_testing::count(6, 60) as u64 {
@@ -164,7 +164,7 @@ fn errors_are_as_large_as_their_bars() {
 
 /// Two pieces with a gap are equivalent to one log of their length, and a held parameter does not change.
 #[test]
-fn pieces_have_motions_of_their_own() {
+fn pieces_have_separate_motions() {
     let mut random = Random::new(7);
     let whole = record(1, (200.0, 2000), (5e-4, 0.05, 0.0), &mut random);
     let part = |run: core::ops::Range<usize>| SplineRecord {

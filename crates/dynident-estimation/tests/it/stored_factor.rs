@@ -13,7 +13,7 @@ fn factor(rows: usize, columns: usize, seed: u64) -> SegmentedFactor {
 }
 
 #[test]
-fn numbers_come_back_to_the_last_bit() {
+fn stored_values_are_restored_bit_identically() {
     for (rows, columns) in [(0, 3), (1, 1), (4, 3), (39, 3), (200, 3), (1000, 7)] {
         let own = factor(rows, columns, 3);
         let (shape, numbers) = (own.shape(), own.numbers());
@@ -32,7 +32,7 @@ fn numbers_come_back_to_the_last_bit() {
 
 /// Merging neighbours keeps `‖τ − Wθ‖²` up to rounding of sums of several hundred squares.
 #[test]
-fn fewer_segments_hold_the_same_rows() {
+fn fewer_segments_contain_the_same_rows() {
     let own = factor(700, 5, 9);
     let theta = [1.0, -2.0, 0.5, 0.0, 3.0];
     let whole = own.total().residual_sum_of_squares(&theta).unwrap();
@@ -46,7 +46,7 @@ fn fewer_segments_hold_the_same_rows() {
 }
 
 #[test]
-fn numbers_of_no_factor_are_refused() {
+fn invalid_stored_factors_are_refused() {
     let own = factor(1000, 3, 1);
     let (shape, numbers) = (own.shape(), own.numbers());
     let said = |shape, numbers: &[f64]| SegmentedFactor::from_numbers(shape, numbers).unwrap_err().to_string();

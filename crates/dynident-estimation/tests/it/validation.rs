@@ -36,7 +36,7 @@ fn figures_of_a_small_example() {
 }
 
 #[test]
-fn nothing_and_silence_give_no_ratios() {
+fn empty_and_zero_signals_give_no_ratios() {
     let mut validation = Validation::new(vec!["a".into()]);
     let report = validation.report();
     assert_eq!((report.samples, report.rmse_nm, report.relative_error_percent, report.r_squared), (0, 0.0, None, None));

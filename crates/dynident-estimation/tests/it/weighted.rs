@@ -83,7 +83,7 @@ fn noise_converges_to_the_plain_iteration_and_faster() {
 }
 
 #[test]
-fn values_alone_are_those_of_the_estimate() {
+fn values_alone_equal_those_of_the_estimate() {
     let rows = rows(&mut Random::new(7));
     let (problem, settings) = (problem(&rows), WeightedSettings::default());
     let (values, estimate) =

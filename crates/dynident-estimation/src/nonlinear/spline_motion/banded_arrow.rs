@@ -284,7 +284,7 @@ mod tests {
     /// Random rows against nalgebra's dense Cholesky: agreement to rounding, 1e-9 of entries of order one at a
     /// condition number below 1e4.
     #[test]
-    fn the_banded_arrow_is_the_dense_matrix() {
+    fn banded_arrow_equals_the_dense_matrix() {
         let mut random = Random::new(3);
         for (size, window, arrow) in [(23, 6, 4), (12, 12, 0), (5, 1, 3)] {
             let mut matrix = BandedArrow::new(size, window - 1, arrow);
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_that_no_row_sees_is_named() {
+    fn unknowns_without_rows_are_named() {
         let mut matrix = BandedArrow::new(3, 1, 0);
         matrix.add_row(0, &[1.0, 0.5], &[], 0.0);
         matrix.add_row(0, &[0.2, 1.0], &[], 0.0);

@@ -247,7 +247,7 @@ mod tests {
     /// The functions sum to one; a cubic is exact (its coefficients are the blossom at the knots); and the integral of
     /// its squared third derivative is exact.
     #[test]
-    fn splines_hold_polynomials() {
+    fn splines_reproduce_polynomials() {
         let spline = Spline::new(41, 4, 20.0);
         for sample in 0..41 {
             let [values, rates, second] = spline.at(sample);

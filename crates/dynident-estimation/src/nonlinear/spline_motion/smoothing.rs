@@ -234,7 +234,7 @@ mod tests {
 
     /// White noise of 2 mrad on a motion of three harmonics: σ of 2000 samples has an error of 1.6 %; tolerance 4 σ.
     #[test]
-    fn noise_and_smoothness_come_from_the_positions() {
+    fn noise_and_smoothness_are_estimated_from_positions() {
         let mut random = Random::new(11);
         let truth = |t: f64| (2.0 * t).sin() + 0.5 * (3.1 * t).cos() + 0.2 * (7.3 * t).sin();
         let rate = |t: f64| 2.0 * (2.0 * t).cos() - 1.55 * (3.1 * t).sin() + 1.46 * (7.3 * t).cos();
@@ -256,7 +256,7 @@ mod tests {
 
     /// Constant positions: no motion and no division by zero.
     #[test]
-    fn a_joint_at_rest_is_at_rest() {
+    fn a_resting_joint_has_no_velocity() {
         let q = vec![0.7; 500];
         let (_, found) = smoothed(&[vec![&q]], 100.0, &[50, 20, 10, 5, 2]);
         assert!(found[0].coefficients[0].iter().all(|c| (c - 0.7).abs() < 1e-9));
