@@ -16,6 +16,7 @@ use dynident_identification::{
 };
 use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
+/// A robot and its recordings.
 #[derive(Clone, Copy, Debug)]
 pub struct CutoffCell {
     /// The robot.

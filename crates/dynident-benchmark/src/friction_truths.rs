@@ -112,6 +112,7 @@ impl FrictionTruth {
     }
 }
 
+/// A robot, its recordings and its friction.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionCell {
     /// The robot.
