@@ -1,4 +1,4 @@
-//! The default cut-off against the best that can be had with the truth in hand, as a table: robots × motions × noise.
+//! The default cut-off compared with the best possible one, as a table: robots × motions × noise.
 //!
 //! ```text
 //! cargo run --release -p dynident-benchmark --example cutoffs -- [RUNS] [ROWS] [simultaneous]

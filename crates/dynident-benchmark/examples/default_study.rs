@@ -1,12 +1,12 @@
-//! A study of files and columns alone against the best with the truth in hand, plain least squares and each estimator
-//! by name: robots × motions × friction × noise × lag.
+//! A study with files and columns only, compared with the best possible one, plain least squares and each estimator by
+//! name: robots × motions × friction × noise × lag.
 //!
 //! ```text
 //! cargo run --release -p dynident-benchmark --example default_study -- --runs 4 --out DIR
 //! ```
 //!
-//! The table goes to the screen, line by line, then what was to be reached; `DIR/default.csv` has all figures.
-//! `--quick` is one run of the cheapest cases.
+//! Prints the table line by line, then the goals; `DIR/default.csv` contains all results. `--quick` runs the fastest
+//! cases once.
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 
@@ -17,25 +17,25 @@ use dynident_benchmark::default_study::{
 use std::error::Error;
 use std::path::PathBuf;
 
-/// Sets what `identify` does without keys against what can be done with the truth in hand.
+/// Compares the defaults of `identify` with the best possible choices.
 #[derive(Parser)]
 struct Options {
     /// Recordings of each case.
     #[arg(long, default_value_t = 2)]
     runs: u64,
-    /// Number of the first: others than those of the book tell whether what was chosen on these holds.
+    /// Number of the first recording; other recordings than those of the book test the choices made on these.
     #[arg(long, default_value_t = 0)]
     first: u64,
-    /// Only cases whose line of numbers and words holds this text.
+    /// Only cases whose label contains this text.
     #[arg(long, default_value = "")]
     only: String,
-    /// Threads; figures are the same for any number.
+    /// Threads; the results do not depend on their number.
     #[arg(long, default_value_t = 1)]
     threads: usize,
-    /// Leave the estimators by name out.
+    /// Skip the estimators by name.
     #[arg(long)]
     without_names: bool,
-    /// One recording of the three cheapest cases.
+    /// One recording of the three fastest cases.
     #[arg(long)]
     quick: bool,
     /// Folder for default.csv.

@@ -1,8 +1,8 @@
-//! Families and criteria of excitation design side by side: the same limits, the same processor time. Prints the table
-//! of the book's page on designs.
+//! Compares families and criteria of excitation design with equal limits and processor time. Prints the table of the
+//! book's page on designs.
 //!
-//! Time is that of this process on one core, so that what else the robot does counts little: designs of a modest budget
-//! follow one another, each with the next seed, until the time is used up, and the best stands in the table.
+//! Time is the processor time of this process on one core. Designs of a small budget are repeated with the next seed
+//! until the time is used up; the table shows the best.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing a table is what this program is for")]
 
@@ -14,14 +14,14 @@ use dynident::{DesignFile, RunOptions, Study, design_study};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Designs by every family and criterion, equal limits and processor time.
+/// Designs of every family and criterion with equal limits and processor time.
 #[derive(Parser)]
 #[command(version)]
 struct Options {
     /// Processor seconds for each.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
-    /// Only families whose name holds one of these.
+    /// Only families whose name contains one of these.
     #[arg(long, value_delimiter = ',')]
     families: Vec<String>,
     /// Only these criteria.
@@ -38,7 +38,7 @@ struct Options {
     studies: Vec<String>,
 }
 
-/// Families by the name in the table, as a study has them.
+/// Families by the name in the table, with their study keys.
 const FAMILIES: [(&str, &str); 9] = [
     ("Fourier, 5 harmonics", r#"kind = "fourier""#),
     ("Fourier, 10 harmonics", "kind = \"fourier\"\nharmonics = 10"),
@@ -95,7 +95,7 @@ fn robot(path: &str) -> String {
     stem.trim_start_matches("design_").replace('_', ", ")
 }
 
-/// Designs until the time is used up; the figures of the best.
+/// Repeats designs until the time is used up; results of the best.
 fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) -> Result<String, String> {
     let mut study = Study::load(path).map_err(|error| error.to_string())?;
     let section = study.design.get_or_insert_default();
@@ -104,7 +104,7 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
     section.optimiser = OptimiserChoice::Gradient;
     section.search.starts = Some(options.starts);
     section.search.rounds = Some(options.rounds);
-    // Only what the table's page names.
+    // Only the limits listed on the page of the table.
     section.defaults = AssumedLimits::none();
     let run = RunOptions { data: None, threads: 1, progress: &dynident::Silent };
     let begun = clock();
@@ -112,7 +112,7 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
     while designs == 0 || clock() - begun < options.seconds {
         designs += 1;
         study.design.get_or_insert_default().search.seed = designs;
-        // The clock ends a design early, with its best so far.
+        // The clock ends a design early, with its best result.
         let left = options.seconds - (clock() - begun);
         let limit = clock() + left.max(0.05 * options.seconds);
         let watch = |_: &_| if clock() > limit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -128,7 +128,7 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
         return Ok(format!("none inside the limits | | | {designs} | {evaluations} | {spent:.1}"));
     };
     let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
-    // Error bars are for the study's torque noise, 1 Nm here.
+    // Error bars are for the study's torque noise, here 1 Nm.
     let trace: Option<f64> = file.forecast.iter().map(|parameter| parameter.std.map(|std| std * std)).sum();
     Ok(format!(
         "{} | {} | {} | {designs} | {evaluations} | {spent:.1}",
@@ -138,7 +138,6 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
     ))
 }
 
-/// Processor seconds of this process.
 fn clock() -> f64 {
     #[cfg(unix)]
     {

@@ -1,4 +1,4 @@
-//! Friction chosen by default against friction stated as it is, as a table: robots × motions × friction truths.
+//! Automatically selected friction compared with the true laws, as a table: robots × motions × friction laws.
 //!
 //! ```text
 //! cargo run --release -p dynident-benchmark --example friction -- [RUNS] [ROWS]

@@ -1,12 +1,12 @@
-//! What the iteration reaches under noise: every example's robot over many seeds, the error of its parameters in units
-//! of the Cramér-Rao bound, tracking, and runs.
+//! Results of the iteration under noise: every example's robot over many seeds, with the error of its parameters in
+//! units of the Cramér-Rao bound, tracking, and runs.
 //!
 //! ```text
 //! cargo run --release -p dynident-benchmark --example iterations -- [SEEDS] [STUDY.toml ..]
 //! ```
 //!
-//! The trajectory is looked for once. Every seed has its own noise and, where the robot differs from its description,
-//! its own robot.
+//! The trajectory is designed once. Every seed has its own noise and, if the robot differs from its description, its
+//! own robot.
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 
@@ -90,7 +90,7 @@ fn row(path: &Path, seeds: u64) -> Result<String, Box<dyn Error>> {
     let improvement = files.iter().filter_map(|file| file.tracking_improvement).fold(f64::INFINITY, f64::min);
     let ratios: Vec<f64> = files.iter().filter_map(|file| file.error_over_bound).collect();
     let square = ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / ratios.len() as f64;
-    // Spread of the seeds' mean squares, over their number: parameters of one run are not independent.
+    // Sampling error from the spread of the seeds' mean squares, because parameters of one run are correlated.
     let variance =
         ratios.iter().map(|ratio| (ratio * ratio - square).powi(2)).sum::<f64>() / (ratios.len().max(2) - 1) as f64;
     let bar = (variance / ratios.len() as f64).sqrt() / (2.0 * square.sqrt());

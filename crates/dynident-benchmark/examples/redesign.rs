@@ -1,13 +1,12 @@
-//! What redesigned motions bring: three runs along one motion against three of which two are redesigned, over seeds of
-//! noise and robot.
+//! Benefit of redesigned motions: three runs along one motion compared with three of which two are redesigned, over
+//! seeds of noise and robot.
 //!
 //! ```text
 //! cargo run --release -p dynident-benchmark --example redesign -- [SEEDS] [STUDY.toml]
 //! ```
 //!
-//! The figure is the root mean square of the ten widest axes of the parameters' ellipsoid, from the covariance that was
-//! found after each run, measured by the torque error that they make over random states within the limits; states that
-//! no design has seen. In every row it stands over that of the first run.
+//! The result is the RMS of the ten widest axes of the parameters' ellipsoid from the covariance after each run,
+//! measured by their torque error over random states within the limits, relative to the first run.
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 
@@ -31,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = arguments.next().map_or_else(|| PathBuf::from("examples/iterate_ur10.toml"), PathBuf::from);
     let mut study = Study::load(&path)?;
     let section = study.iteration.get_or_insert_default();
-    // So many runs whatever they show.
+    // A fixed number of runs.
     (section.max_runs, section.settled.parameter_sigmas, section.settled.parameter_tolerance) = (RUNS, 0.0, 0.0);
     let root = task_root(&study, &path)?;
     let mut sums = [[0.0; RUNS]; 2];
@@ -81,7 +80,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Every run of an iteration.
 fn runs(study: &Study, path: &Path) -> Result<Vec<RunRecord>, Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let options = RunOptions { data: None, threads: 2, progress: &Silent };

@@ -1,8 +1,8 @@
-//! The default cut-off against the best that can be had with the truth in hand: robots × motions × noise.
+//! The default cut-off compared with the best possible one: robots × motions × noise.
 //!
-//! Every run has a random Fourier motion, exact torque with friction, white noise on positions and torque. The error is
-//! that of the fitted model's torque on another random motion without noise: root mean square over joints, each in
-//! units of its torque's spread.
+//! Every run has a random Fourier motion, exact torque with friction, and white noise on positions and torque. The
+//! error is that of the fitted model's torque on another random motion without noise: RMS over joints, each in units
+//! of the standard deviation of its torque.
 
 use crate::accuracy::BenchmarkError;
 use crate::simulated_logs::{
@@ -16,7 +16,7 @@ use dynident_identification::{
 };
 use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
-/// A robot, its motions and its noise.
+/// A robot and its recordings.
 #[derive(Clone, Copy, Debug)]
 pub struct CutoffCell {
     /// The robot.
@@ -36,7 +36,7 @@ const fn cell(
     CutoffCell { robot, log: SimulatedLog { harmonics, duration_s, rate_hz, position_noise_rad, torque_noise } }
 }
 
-/// The registry: one line for each cell.
+/// The registry: one line per cell.
 pub const CUTOFF_CELLS: &[CutoffCell] = &[
     cell(UR10, 5, 10.0, 500.0, 1e-5, 0.01),
     cell(UR10, 5, 10.0, 500.0, 1e-4, 0.01),
@@ -53,43 +53,43 @@ pub const CUTOFF_CELLS: &[CutoffCell] = &[
     cell(PANDA, 20, 30.0, 500.0, 1e-4, 0.03),
 ];
 
-/// Candidates, in units of what the spectrum asks for.
-const MULTIPLES: [f64; 9] = [0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0, 5.657, 8.0];
-/// Place of what the spectra ask for.
-const OF_SPECTRUM: usize = 2;
-/// Velocity at which Coulomb friction has reached 76 %: the study file's default.
+/// Candidates in units of the cut-off from the spectrum.
+const CUTOFF_MULTIPLES: [f64; 9] = [0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0, 5.657, 8.0];
+/// Index of the cut-off from the spectrum.
+const SPECTRUM_INDEX: usize = 2;
+/// Velocity at which Coulomb friction has reached 76 %: the default of a study.
 const COULOMB_WIDTH: f64 = 0.02;
 
-/// Errors of one cell, root mean square over its runs, as shares.
+/// Errors of one cell, RMS over its runs, as shares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutoffFigures {
-    /// What the positions' spectra ask for, mean over the runs, Hz.
+    /// Cut-off from the positions' spectra, mean over the runs, Hz.
     pub spectrum_hz: f64,
-    /// Error with that cut-off.
+    /// Error with the cut-off from the spectra.
     pub of_spectrum: f64,
-    /// Error of the default.
+    /// Error with the default cut-off.
     pub of_default: f64,
-    /// Error of motion and parameters at once, with no cut-off, and the runs in which that did not settle; none where
-    /// it was not asked for.
+    /// Error of motion and parameters estimated together without a cut-off, and the runs that did not converge; `None`
+    /// if not computed.
     pub simultaneous: Option<(f64, usize)>,
-    /// Error of the best cut-off, the same in all runs.
+    /// Error with the best cut-off, which is the same in all runs.
     pub best: f64,
-    /// The best cut-off in units of what the spectra ask for.
+    /// Best cut-off in units of that from the spectra.
     pub best_multiple: f64,
 }
 
 impl CutoffFigures {
-    /// The default's error over that of the best cut-off.
+    /// Error of the default relative to that of the best cut-off.
     pub fn default_over_best(&self) -> f64 {
         self.of_default / self.best
     }
 }
 
-/// Fits `runs` recordings of a cell with the default cut-off and with each of a ladder; and motion and parameters at
-/// once if `simultaneous`.
+/// Fits `runs` recordings of a cell with the default cut-off and with each candidate; and motion and parameters
+/// together if `simultaneous`.
 ///
 /// # Errors
-/// A robot, motion or recording that cannot be made, a default fit that fails.
+/// A robot, motion or recording that cannot be created, a default fit that fails.
 pub fn cutoff_figures(cell: &CutoffCell, runs: u64, simultaneous: bool) -> Result<CutoffFigures, BenchmarkError> {
     let failed = |reason: String| BenchmarkError::Excitation { robot: cell.robot.name.to_owned(), reason };
     let (model, made) = (cell.robot.model().map_err(failed)?, &cell.log);
@@ -102,7 +102,7 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64, simultaneous: bool) -> Resul
     let robot = ParametricModel::new(model.clone(), terms_per_joint(&model, |_| drive));
     let robot = robot.map_err(|source| failed(source.to_string()))?;
     let regressor = RegressorModel::from(robot.clone());
-    let (mut squares, mut spectrum_hz, mut of_default) = ([0.0; MULTIPLES.len()], 0.0, 0.0);
+    let (mut squares, mut spectrum_hz, mut of_default) = ([0.0; CUTOFF_MULTIPLES.len()], 0.0, 0.0);
     let (mut of_simultaneous, mut unsettled) = (0.0, 0);
     for run in 0..runs {
         let motion = excitation(&model, made.harmonics, made.duration_s, made.rate_hz, 10 + run).map_err(failed)?;
@@ -132,19 +132,19 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64, simultaneous: bool) -> Resul
             unsettled += usize::from(!settled);
         }
         of_default += error(None)?.powi(2) / runs as f64;
-        for (square, multiple) in squares.iter_mut().zip(MULTIPLES) {
-            // A filter that leaves no rows, or that does not exist at this rate, is no candidate.
+        for (square, multiple) in squares.iter_mut().zip(CUTOFF_MULTIPLES) {
+            // Filters that leave no rows or are impossible at this rate are excluded.
             let found = Some(multiple * asked_hz).filter(|hz| *hz < 0.45 * made.rate_hz).map(|hz| error(Some(hz)));
             *square += found.and_then(Result::ok).map_or(f64::INFINITY, |error| error.powi(2)) / runs as f64;
         }
     }
-    let least = (0..squares.len()).min_by(|a, b| squares[*a].total_cmp(&squares[*b])).unwrap_or(OF_SPECTRUM);
+    let least = (0..squares.len()).min_by(|a, b| squares[*a].total_cmp(&squares[*b])).unwrap_or(SPECTRUM_INDEX);
     Ok(CutoffFigures {
         spectrum_hz,
-        of_spectrum: squares[OF_SPECTRUM].sqrt(),
+        of_spectrum: squares[SPECTRUM_INDEX].sqrt(),
         of_default: of_default.sqrt(),
         simultaneous: simultaneous.then(|| (of_simultaneous.sqrt(), unsettled)),
         best: squares[least].sqrt(),
-        best_multiple: MULTIPLES[least],
+        best_multiple: CUTOFF_MULTIPLES[least],
     })
 }

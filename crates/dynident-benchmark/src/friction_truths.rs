@@ -1,12 +1,12 @@
-//! Friction chosen by default against friction stated as it is: robots × motions × what friction truly is.
+//! Automatically selected friction compared with the true friction laws: robots × motions × friction laws.
 //!
 //! As in [`cutoffs`](crate::cutoffs), the error is that of the fitted model's torque on another random motion without
-//! noise: root mean square over joints, each in units of its torque's spread.
+//! noise: RMS over joints, each in units of the standard deviation of its torque.
 
 use crate::accuracy::BenchmarkError;
 use crate::simulated_logs::{
-    PANDA, PERIOD_S, SimulatedLog, SimulatedRobot, UR10, excitation, left_unsaid, model_error, recording, rms, torque,
-    truth,
+    PANDA, PERIOD_S, SimulatedLog, SimulatedRobot, UR10, excitation, model_error, recording, rms, torque, truth,
+    unexplained_torque,
 };
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
@@ -22,38 +22,38 @@ use dynident_model::terms::{
 };
 use dynident_model::{Joint, Model};
 
-/// What the friction of every joint truly is, beside an offset.
+/// True friction of every joint, in addition to an offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionTruth {
-    /// Viscous and Coulomb.
+    /// Viscous and Coulomb friction.
     Plain,
-    /// Both by direction: 30 and 40 % more backward.
+    /// Plain, direction-dependent: 30 and 40 % more backward.
     Asymmetric,
-    /// Plain, and half of the Coulomb friction more near rest.
+    /// Plain, with half of the Coulomb friction added near rest.
     Stribeck,
-    /// Viscous, and a step that is not at rest.
+    /// Viscous friction and a smooth step away from rest.
     Sigmoid,
     /// Plain, and a tenth of the load.
     Load,
 }
 
-/// Width of the truth's step, rad/s: not one that the search begins with.
-const WIDTH: f64 = 0.015;
-/// Stribeck velocity, rad/s, and exponent: between the search's candidates.
-const STRIBECK: (f64, f64) = (0.07, 1.5);
-/// Steepness of the shifted step, s/rad, and how far from rest it is, rad/s.
-const SIGMOID: (f64, f64) = (50.0, 0.015);
-/// Share of the load that is lost.
-const LOAD: f64 = 0.1;
-/// A term can be told if what it adds to the best fit without it is so many standard deviations of the noise, over all
+/// Width of the true step, rad/s; not a start value of the search.
+const STEP_WIDTH_RAD_S: f64 = 0.015;
+/// Stribeck velocity, rad/s, and exponent: between the candidates of the search.
+const STRIBECK_VELOCITY_AND_EXPONENT: (f64, f64) = (0.07, 1.5);
+/// Steepness of the shifted step, s/rad, and its velocity, rad/s.
+const SIGMOID_STEEPNESS_AND_VELOCITY: (f64, f64) = (50.0, 0.015);
+/// Friction as a share of the load.
+const LOAD_SHARE: f64 = 0.1;
+/// A term is distinguishable if it improves the best fit by this many standard deviations of the noise, over all
 /// samples together.
-pub(crate) const TOLD: f64 = 10.0;
+pub(crate) const MIN_DETECTABLE_STD: f64 = 10.0;
 
 impl FrictionTruth {
-    /// All of them.
+    /// All laws.
     pub const ALL: [Self; 5] = [Self::Plain, Self::Asymmetric, Self::Stribeck, Self::Sigmoid, Self::Load];
 
-    /// Its name in tables.
+    /// Name for tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Plain => "plain",
@@ -64,14 +64,12 @@ impl FrictionTruth {
         }
     }
 
-    /// Its terms at a joint.
     pub(crate) fn terms(self, joint: usize) -> Vec<TorqueTerm> {
         self.terms_with_shares(joint).into_iter().map(|(term, _)| term).collect()
     }
 
-    /// Its terms at a joint, each with the ratio of its parameter to a usual one.
     fn terms_with_shares(self, joint: usize) -> Vec<(TorqueTerm, f64)> {
-        let shape = CoulombShape::Smooth { width: WIDTH };
+        let shape = CoulombShape::Smooth { width: STEP_WIDTH_RAD_S };
         let viscous = (TorqueTerm::Viscous(Viscous { joint }), 1.0);
         let coulomb = (TorqueTerm::Coulomb(Coulomb { joint, shape }), 1.0);
         let mut terms = match self {
@@ -86,28 +84,28 @@ impl FrictionTruth {
                 [(Direction::Forward, [1.0, 1.0]), (Direction::Backward, [1.3, 1.4])].map(of_direction).concat()
             }
             Self::Stribeck => {
-                let (speed, exponent) = STRIBECK;
+                let (speed, exponent) = STRIBECK_VELOCITY_AND_EXPONENT;
                 vec![viscous, coulomb, (TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape }), 0.5)]
             }
             Self::Sigmoid => {
-                let (steepness, offset_speed) = SIGMOID;
+                let (steepness, offset_speed) = SIGMOID_STEEPNESS_AND_VELOCITY;
                 vec![viscous, (TorqueTerm::Sigmoid(Sigmoid { joint, steepness, offset_speed }), 1.0)]
             }
-            Self::Load => vec![viscous, coulomb, (TorqueTerm::Load(LoadFriction { joint, shape }), LOAD)],
+            Self::Load => vec![viscous, coulomb, (TorqueTerm::Load(LoadFriction { joint, shape }), LOAD_SHARE)],
         };
         terms.push((TorqueTerm::Offset(Offset { joint }), 1.0));
         terms
     }
 
-    /// Ratio of the parameter of one of its terms to a usual one.
+    /// Ratio of the parameter of one of its terms to a typical one.
     pub(crate) fn share(self, term: &TorqueTerm) -> f64 {
         let mut own = term.own_joint().into_iter().flat_map(|joint| self.terms_with_shares(joint));
         own.find(|(own, _)| own == term).map_or(1.0, |(_, share)| share)
     }
 
-    /// Whether the term distinguishes this truth from others: its law is not part of plain friction. Plain friction is
-    /// distinguished by its step.
-    pub(crate) fn is_told_by(self, term: &TorqueTerm) -> bool {
+    /// Whether the term distinguishes this law from others, i.e. its law is not part of plain friction. Plain friction
+    /// is distinguished by its step.
+    pub(crate) fn is_distinguished_by(self, term: &TorqueTerm) -> bool {
         let Some(law) = term.candidate() else { return false };
         let has_law = |truth: Self| truth.terms(0).iter().any(|own| own.candidate() == Some(law));
         if self == Self::Plain { law.is_common_step() } else { has_law(self) && !has_law(Self::Plain) }
@@ -132,31 +130,31 @@ const fn log(harmonics: usize, duration_s: f64, rate_hz: f64, position_noise_rad
     SimulatedLog { harmonics, duration_s, rate_hz, position_noise_rad, torque_noise: 0.01 }
 }
 
-/// The registry: every motion with every friction.
+/// The registry: every motion with every friction law.
 pub fn friction_cells() -> Vec<FrictionCell> {
     let with = |(robot, log)| FrictionTruth::ALL.map(|truth| FrictionCell { robot, log, truth });
     MOTIONS.into_iter().flat_map(with).collect()
 }
 
-/// Figures of one cell over its runs; errors are root mean squares, as shares.
+/// Results of one cell over its runs; errors are RMS values, as shares.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFigures {
-    /// Joints, over all runs, of which the recordings can tell the term.
+    /// Number of joints, over all runs, whose friction law the recordings can distinguish.
     pub tellable: usize,
-    /// Those of which it was chosen.
+    /// Number of these joints for which the law was selected.
     pub told: usize,
-    /// Error of the model with chosen friction.
+    /// Error with selected friction.
     pub of_choice: f64,
-    /// Error with the true terms stated.
+    /// Error with the true terms.
     pub of_truth: f64,
     /// Error with viscous and Coulomb friction.
     pub of_plain: f64,
 }
 
-/// Fits `runs` recordings of a cell with friction chosen, stated as it is, and plain.
+/// Fits `runs` recordings of a cell with selected, true and plain friction.
 ///
 /// # Errors
-/// A robot, motion or recording that cannot be made, a fit that fails.
+/// A robot, motion or recording that cannot be created, a fit that fails.
 pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigures, BenchmarkError> {
     let failed = |reason: String| BenchmarkError::Excitation { robot: cell.robot.name.to_owned(), reason };
     let model = cell.robot.model().map_err(failed)?;
@@ -175,7 +173,8 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
             let terms = found.and_then(|one| one.terms.as_ref());
             if tellable[joint] {
                 figures.tellable += 1;
-                figures.told += usize::from(terms.is_some_and(|terms| terms.iter().any(|t| cell.truth.is_told_by(t))));
+                figures.told +=
+                    usize::from(terms.is_some_and(|terms| terms.iter().any(|t| cell.truth.is_distinguished_by(t))));
             }
         }
         let add = |to: &mut f64, found: &Identification| *to += made.error(found).powi(2) / runs as f64;
@@ -189,15 +188,14 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
     Ok(figures)
 }
 
-/// The drive that a study which says nothing begins with: the step's width is that of a usual arm in the robot's own
-/// units.
+/// Default drive terms of a study without keys; the width of the step is that of a usual arm, scaled to the robot.
 pub(crate) fn usual_drive(model: &Model, joint: usize) -> DriveChoice {
     let width = model.own_scale().velocity(model.joints()[joint].turns(), CoulombShape::USUAL_WIDTH);
     let coulomb = Some(CoulombShape::Smooth { width });
     DriveChoice { viscous: true, coulomb, offset: true, ..DriveChoice::default() }
 }
 
-/// The search for friction of such a study, joint by joint.
+/// Friction search of such a study, by joint.
 pub(crate) fn usual_searches(model: &Model) -> Vec<FrictionSearch> {
     let search = |(joint, description): (usize, &Joint)| {
         let coulomb = usual_drive(model, joint).coulomb;
@@ -206,16 +204,15 @@ pub(crate) fn usual_searches(model: &Model) -> Vec<FrictionSearch> {
     model.joints().iter().enumerate().map(search).collect()
 }
 
-/// For plain friction: the robot without its Coulomb step; none for others.
+/// For plain friction the robot without its Coulomb step, else `None`.
 fn plain_without(plain: &ParametricModel, truth: FrictionTruth) -> Option<ParametricModel> {
     if truth != FrictionTruth::Plain {
         return None;
     }
-    let rest = plain.terms().iter().filter(|term| !truth.is_told_by(term)).cloned().collect();
+    let rest = plain.terms().iter().filter(|term| !truth.is_distinguished_by(term)).cloned().collect();
     plain.with_terms(rest).ok()
 }
 
-/// A recording and what is true of it.
 struct Made {
     log: dynident_recording::Log,
     motion: Motion,
@@ -241,11 +238,11 @@ impl Made {
         Ok(Self { log, motion, exact, torque_noise: made.torque_noise, other, other_exact })
     }
 
-    /// Joints whose exact torque is further from what `without` can say than noise could be.
+    /// Joints whose exact torque differs from the best fit of `without` by more than noise.
     fn tellable(&self, without: &ParametricModel) -> Result<Vec<bool>, EstimationError> {
-        let left = left_unsaid(&RegressorModel::from(without.clone()), &self.motion, &self.exact)?;
+        let left = unexplained_torque(&RegressorModel::from(without.clone()), &self.motion, &self.exact)?;
         let noise = |joint: usize| self.torque_noise * rms(&self.exact[self.motion.of(joint)]);
-        Ok(left.into_iter().enumerate().map(|(joint, left)| left > TOLD * noise(joint)).collect())
+        Ok(left.into_iter().enumerate().map(|(joint, left)| left > MIN_DETECTABLE_STD * noise(joint)).collect())
     }
 
     fn fit(&self, robot: &ParametricModel, chosen: bool) -> Result<Identification, IdentificationError> {

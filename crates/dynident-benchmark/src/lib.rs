@@ -1,7 +1,7 @@
-//! **How accurate, how fast?** [`accuracy`] holds what `dynident benchmark` runs: estimators beside each other and
-//! beside the Cramér-Rao bound; [`cutoffs`] and [`friction_truths`] set the default cut-off and friction
-//! against the best that can be had with the truth in hand, [`default_study`] all that a study without keys does. Speed
-//! is the program `dynident-benchmark`, whose figures stand beside those of other libraries in `benchmarks/`.
+//! **Accuracy benchmarks.** [`accuracy`] is the benchmark of `dynident benchmark`: estimators compared with each other
+//! and with the Cramér-Rao bound. [`cutoffs`] and [`friction_truths`] compare the default cut-off and friction with
+//! the best possible choice, [`default_study`] all defaults of a study without keys. The program `dynident-benchmark`
+//! measures speed; `benchmarks/` compares its results with other libraries.
 
 #![forbid(unsafe_code)]
 

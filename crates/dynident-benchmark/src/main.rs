@@ -1,7 +1,6 @@
-//! Times Dynident's dynamics, its way from samples to triangular factors, a step of an excitation design, one of the
-//! closed loop and reading text, measures what the machine can do at best, counts operations, and prints one JSON line
-//! a figure: the same lines, states and method as the programs in `benchmarks/`, which `benchmarks/compare.sh` sets
-//! side by side.
+//! Times dynamics, triangular factors from samples, a step of an excitation design, a step of the closed loop and
+//! reading text; measures machine limits; counts operations. Prints one JSON line per result, with the same lines,
+//! states and method as the programs in `benchmarks/`, which `benchmarks/compare.sh` compares.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
 
@@ -13,30 +12,30 @@ use dynident_model::load_robot;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Times Dynident on robots and prints JSON lines. Compare figures of one run only, and read the minima.
+/// Times Dynident on robots and prints JSON lines. Compare results of one run only, and use the minima.
 #[derive(Parser)]
 #[command(version)]
 struct Options {
     /// Folder of the robots' URDF files.
     #[arg(long, default_value = "robots")]
     robots: PathBuf,
-    /// Only this processor level (portable, AVX2, AVX-512); all that this processor has unless given.
+    /// Only this processor level (portable, AVX2, AVX-512); default: all levels of this processor.
     #[arg(long)]
     level: Option<String>,
-    /// Samples in a batch. Best is an odd multiple of eight: the columns of a panel then do not fall on the same few
-    /// cache sets.
+    /// Samples in a batch. Use an odd multiple of eight, so that the columns of a panel do not map to the same cache
+    /// sets.
     #[arg(long, default_value_t = 72, value_parser = clap::value_parser!(u16).range(1..=512))]
     block: u16,
-    /// Count the operations of each quantity by scalars that count, in place of timing it; needs the feature `counted`.
+    /// Count the operations of each quantity instead of timing it; needs the feature `counted`.
     #[arg(long)]
     count: bool,
-    /// Measure what the machine can do as well: peak of the processor, memory, text.
+    /// Also measure machine limits: processor peak, memory, text.
     #[arg(long)]
     limits: bool,
-    /// The text that is read with --limits: a recording of the Panda arm, made where there is none.
+    /// Text file for --limits: a recording of the Panda arm, created if missing.
     #[arg(long, default_value = "target/benchmark.csv")]
     csv: PathBuf,
-    /// Rows of the recording if it is made.
+    /// Rows of the recording if it is created.
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     csv_rows: u32,
     /// Only these quantities; with --limits also peak_flops, memory and text.
@@ -50,7 +49,7 @@ struct Options {
 /// The robot whose recording is read as text.
 const RECORDED: &str = "panda_arm7";
 
-/// The level that counts, for all that looks for the best one too.
+/// Counting level, set as the default level too.
 #[cfg(feature = "counted")]
 fn counting() -> Option<Level> {
     Level::count_everywhere().then(Level::counted)
@@ -64,7 +63,7 @@ fn counting() -> Option<Level> {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    // The clock is this thread's: so is all work.
+    // The clock measures this thread, so all work must be on it.
     if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global() {
         eprintln!("{error}");
         return ExitCode::FAILURE;
@@ -81,7 +80,7 @@ fn main() -> ExitCode {
     };
     if levels.is_empty() {
         let names: Vec<&str> = available.iter().map(|level| level.name()).collect();
-        eprintln!("--level {}: this processor has {}", options.level.unwrap_or_default(), names.join(", "));
+        eprintln!("unknown --level {}: use one of {}", options.level.unwrap_or_default(), names.join(", "));
         return ExitCode::from(2);
     }
     println!("{}", speed::environment(&available));

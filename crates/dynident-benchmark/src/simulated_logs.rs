@@ -1,4 +1,4 @@
-//! Recordings whose truth is known: a random Fourier motion, exact torque with friction, white noise on both.
+//! Recordings with known truth: a random Fourier motion, exact torque with friction, white noise on both.
 
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, TriangularFactor};
@@ -11,23 +11,23 @@ use dynident_model::terms::{TermAction, TorqueTerm};
 use dynident_model::{Model, read_urdf};
 use dynident_recording::{JointSamples, Log, filter::cutoff};
 
-/// Seconds of the Fourier motion's period.
+/// Period of the Fourier motion, s.
 pub(crate) const PERIOD_S: f64 = 10.0;
-/// Furthest position and highest speed of a joint, for those with wider limits or none.
-const RANGE: f64 = 3.0;
-const SPEED: f64 = 2.0;
-/// Viscous and dry friction at the root mean square velocity, and offsets, in units of what the bodies ask of the
-/// joint; friction that grows with the load is a share of it.
-const VISCOUS: f64 = 0.15;
-const DRY: f64 = 0.15;
-const OFFSET: f64 = 0.03;
-/// The least of that, Nm: a joint without load has friction too.
-const LEAST_TORQUE: f64 = 0.5;
+/// Limits of position and speed for joints with wider or no limits.
+const MAX_POSITION_RAD: f64 = 3.0;
+const MAX_SPEED_RAD_S: f64 = 2.0;
+/// Viscous and dry friction at RMS velocity, and offsets, relative to the RMS torque of the bodies; load-dependent
+/// friction is a share of the load.
+const VISCOUS_SHARE: f64 = 0.15;
+const COULOMB_SHARE: f64 = 0.15;
+const OFFSET_SHARE: f64 = 0.03;
+/// Minimum of that torque, Nm, because unloaded joints also have friction.
+const MIN_TORQUE_NM: f64 = 0.5;
 
 /// A robot of the tables.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulatedRobot {
-    /// Its name in tables.
+    /// Name for tables.
     pub name: &'static str,
     urdf: &'static str,
 }
@@ -47,22 +47,22 @@ impl SimulatedRobot {
     }
 }
 
-/// How a recording is made.
+/// Settings of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulatedLog {
     /// Harmonics of 0.1 Hz.
     pub harmonics: usize,
     /// Length, s.
     pub duration_s: f64,
-    /// Samples a second, Hz.
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
     /// Standard deviation of the positions' white noise, rad.
     pub position_noise_rad: f64,
-    /// Standard deviation of a torque's white noise in units of its root mean square.
+    /// Standard deviation of a torque's white noise relative to its RMS.
     pub torque_noise: f64,
 }
 
-/// A random Fourier motion of that many harmonics within the robot's ranges and speeds.
+/// A random Fourier motion with `harmonics` harmonics within the robot's ranges and speeds.
 pub(crate) fn excitation(
     model: &Model,
     harmonics: usize,
@@ -74,7 +74,7 @@ pub(crate) fn excitation(
     Ok(sampled(&family, &parameters, duration_s, rate_hz, 0.0))
 }
 
-/// A Fourier series of that many harmonics, and random parameters of it within the robot's ranges and speeds.
+/// A Fourier series with `harmonics` harmonics, and random parameters within the robot's ranges and speeds.
 pub(crate) fn random_series(
     model: &Model,
     harmonics: usize,
@@ -84,17 +84,23 @@ pub(crate) fn random_series(
     let family = Fourier::new(model.dof(), PERIOD_S, &settings).map_err(|source| source.to_string())?;
     let limits = || model.joints().iter().map(|joint| joint.limits);
     let ranges: Vec<[f64; 2]> = limits()
-        .map(|limits| [limits.lower.unwrap_or(-RANGE).max(-RANGE), limits.upper.unwrap_or(RANGE).min(RANGE)])
+        .map(|limits| {
+            [
+                limits.lower.unwrap_or(-MAX_POSITION_RAD).max(-MAX_POSITION_RAD),
+                limits.upper.unwrap_or(MAX_POSITION_RAD).min(MAX_POSITION_RAD),
+            ]
+        })
         .collect();
-    let speeds: Vec<f64> = limits().map(|limits| limits.velocity.unwrap_or(SPEED).min(SPEED)).collect();
+    let speeds: Vec<f64> =
+        limits().map(|limits| limits.velocity.unwrap_or(MAX_SPEED_RAD_S).min(MAX_SPEED_RAD_S)).collect();
     let parameters = family.random(&ranges, &speeds, random);
     Ok((family, parameters))
 }
 
-/// A motion at an even rate, everything `late_s` later than the series says, which repeats before and after its period.
+/// A motion at a constant rate, delayed by `late_s`, and repeated before and after its period.
 pub(crate) fn sampled(family: &Fourier, parameters: &[f64], duration_s: f64, rate_hz: f64, late_s: f64) -> Motion {
     let samples = 0..=(duration_s * rate_hz) as usize;
-    // A family stands still outside of its duration.
+    // A family is at rest outside its duration.
     let phase_s = |sample: usize| (sample as f64 / rate_hz - late_s).rem_euclid(family.duration_s());
     let times: Vec<f64> = samples.map(phase_s).collect();
     let mut motion = Motion::default();
@@ -102,8 +108,8 @@ pub(crate) fn sampled(family: &Fourier, parameters: &[f64], duration_s: f64, rat
     motion
 }
 
-/// The description's bodies, friction and offsets in proportion to what the bodies ask of the joint; `share` says by
-/// how much a term is larger or smaller than that.
+/// Parameters with the nominal bodies, and friction and offsets relative to the torque of the bodies; `share` scales
+/// each term.
 pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(&TorqueTerm) -> f64) -> Vec<f64> {
     let mut parameters = regressor.model().parameter_vector();
     let first = parameters.len();
@@ -111,12 +117,12 @@ pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(
     let bodies = torque(regressor, motion, &regressor.base().values(&parameters));
     let value = |term: &TorqueTerm| {
         let own = motion.of(term.joints()[0]);
-        let torque = rms(&bodies[own.clone()]).max(LEAST_TORQUE);
+        let torque = rms(&bodies[own.clone()]).max(MIN_TORQUE_NM);
         let usual = match term.action() {
             _ if term.needs_load() => 1.0,
-            TermAction::Damping { .. } => VISCOUS * torque / rms(&motion.dq[own]),
-            TermAction::Friction(_) => DRY * torque,
-            _ => OFFSET * torque,
+            TermAction::Damping { .. } => VISCOUS_SHARE * torque / rms(&motion.dq[own]),
+            TermAction::Friction(_) => COULOMB_SHARE * torque,
+            _ => OFFSET_SHARE * torque,
         };
         usual * share(term)
     };
@@ -126,8 +132,8 @@ pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(
     regressor.base().values(&parameters)
 }
 
-/// What encoders and torque sensors say of a motion with this torque (joint-major), and the cut-off that the positions'
-/// spectra ask for, Hz.
+/// Simulated encoder and torque signals of a motion with this torque (joint-major), and the cut-off from the
+/// positions' spectra, Hz.
 pub(crate) fn recording(
     made: &SimulatedLog,
     model: &Model,
@@ -154,7 +160,7 @@ pub(crate) fn recording(
     log.map(|log| (log, asked_hz)).map_err(|source| source.to_string())
 }
 
-/// Root mean square over joints of the error of a torque, each in units of the exact torque's spread; joint-major.
+/// RMS over joints of the error of a torque, each in units of the standard deviation of the exact torque; joint-major.
 pub(crate) fn model_error(motion: &Motion, exact: &[f64], found: &[f64]) -> f64 {
     let dof = exact.len() / motion.samples;
     let joints = (0..dof).map(|joint| {
@@ -179,8 +185,8 @@ pub(crate) fn torque(regressor: &RegressorModel, motion: &Motion, theta: &[f64])
     all
 }
 
-/// What the best fit of a model leaves of each joint's exact torque along a motion: the root of its sum of squares, Nm.
-pub(crate) fn left_unsaid(
+/// Residual norm of the best fit of a model to each joint's exact torque along a motion, Nm.
+pub(crate) fn unexplained_torque(
     regressor: &RegressorModel,
     motion: &Motion,
     exact: &[f64],
@@ -196,7 +202,6 @@ pub(crate) fn left_unsaid(
     (0..regressor.dof()).map(of_joint).collect()
 }
 
-/// The regressor on a motion.
 pub(crate) fn panels(regressor: &RegressorModel, motion: &Motion) -> Panels {
     let (mut panels, mut workspace) = (Panels::default(), BatchWorkspace::new(regressor.model()));
     let mut history = TermHistory::new(regressor.load_parameters.clone());
@@ -213,9 +218,9 @@ pub(crate) fn rms(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Recordings of more than one period stood still after the first: two thirds of 30 s said nothing.
+    /// Recordings longer than one period must not be at rest after the first period.
     #[test]
-    fn a_motion_repeats_as_long_as_it_is_recorded() {
+    fn motions_repeat_during_the_recording() {
         let model = PLANAR.model().unwrap();
         let (family, parameters) = random_series(&model, 5, &mut Random::new(1)).unwrap();
         let (rate_hz, late_s) = (100.0, 0.008);
@@ -229,7 +234,7 @@ mod tests {
                 // Rounding of the time.
                 assert!((dq[k] - dq[k + period]).abs() < 1e-9, "joint {joint}, sample {k}");
             }
-            // What is late begins in the middle of its motion.
+            // A delayed motion begins in the middle of its period.
             assert!((late[0] - late[period]).abs() < 1e-9 && late[0] != 0.0);
         }
     }

@@ -1,9 +1,8 @@
-//! Where algorithms take the inertial numbers of bodies from: one model's, or in every lane another robot's.
+//! Access to inertial parameters: of one model, or of another robot in every lane.
 
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Vec3};
 
-/// The inertial numbers of a tree's steps.
 pub(crate) trait Bodies<T: Scalar>: Copy {
     /// See [`JointStep::mass`].
     fn mass(self, index: usize) -> T;
@@ -13,11 +12,10 @@ pub(crate) trait Bodies<T: Scalar>: Copy {
     fn second(self, index: usize) -> [T; 6];
     /// See [`JointStep::subtree_mass`].
     fn subtree_mass(self, index: usize) -> T;
-    /// Whether [`subtree_mass`](Self::subtree_mass) is zero for certain: its products are left out then.
+    /// Whether [`subtree_mass`](Self::subtree_mass) is always zero, so that its products can be skipped.
     fn is_massless(self, index: usize) -> bool;
 }
 
-/// All lanes hold the bodies of one model.
 impl<T: Scalar> Bodies<T> for &[JointStep] {
     #[inline(always)]
     fn mass(self, index: usize) -> T {

@@ -1,6 +1,6 @@
-//! The recursions in the bodies' own frames, over any scalar: what the torque regressor stands on, whose columns belong
-//! to these frames, and what programs are written from. For numbers [`crate::inverse_dynamics()`] and
-//! [`crate::mass_matrix()`] take the shorter way over the model's inner frames.
+//! Recursions in the bodies' own frames over any scalar, for the torque regressor (whose columns belong to these
+//! frames) and for generated programs. [`crate::inverse_dynamics()`] and [`crate::mass_matrix()`] use the faster
+//! recursions over the model's inner frames.
 
 use crate::composite::Composite;
 use crate::states::BodyState;
@@ -8,7 +8,7 @@ use crate::workspace::CoreScratch;
 use dynident_lanes::Scalar;
 use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3};
 
-/// Recursive Newton-Euler: from `q`, `dq`, `ddq` of the scratch to its `tau`.
+/// Recursive Newton-Euler: computes `tau` of the scratch from its `q`, `dq`, `ddq`.
 #[inline(always)]
 pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let maps = model.maps();
@@ -47,8 +47,8 @@ pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     }
 }
 
-/// One step outward: the motion of a body from its parent's, at the transform that stands in `body`. `gravity` is the
-/// base's acceleration against gravity.
+/// One step outward: motion of a body from that of its parent and the transform in `body`. `gravity` is the
+/// acceleration of the base, minus gravity.
 #[inline(always)]
 pub(crate) fn moved<T: Scalar>(
     map: &JointMap,
@@ -86,8 +86,8 @@ pub(crate) fn moved<T: Scalar>(
     }
 }
 
-/// Force and moment (about the frame origin) that move a body: `f = m a + α × h + ω × (ω × h)` and
-/// `n = I α + ω × I ω + h × a` with `h = m r`, `a` the acceleration of the origin.
+/// Force and moment (about the frame origin) that move a body: `f = m a + α × h + ω × (ω × h)` and `n = I α + ω × I ω
+/// + h × a` with `h = m r`, `a` the acceleration of the origin.
 #[inline(always)]
 pub(crate) fn inertial_wrench<T: Scalar>(
     inertial: &InertialParameters,
@@ -103,7 +103,7 @@ pub(crate) fn inertial_wrench<T: Scalar>(
     (force, moment)
 }
 
-/// Composite rigid bodies: from `q` of the scratch to its first matrix.
+/// Composite rigid bodies: computes the matrix of the scratch from its `q`.
 #[inline(always)]
 pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let (maps, dof) = (model.maps(), model.body_count());
@@ -112,7 +112,7 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
         *composite = Composite::of(inertial);
     }
     let matrix = &mut scratch.matrix;
-    // Joints on different branches do not couple; every entry along a path is written below.
+    // Joints on different branches do not couple; entries along a path are written below.
     matrix.fill(T::ZERO);
     for index in (0..dof).rev() {
         let map = &maps[index];

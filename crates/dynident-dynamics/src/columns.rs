@@ -1,28 +1,26 @@
-//! Where the composite-rigid-body algorithm keeps its columns: one wrench for each joint, several to a bundle.
+//! Storage of the columns of the composite-rigid-body algorithm: one wrench per joint, several per bundle.
 //!
-//! The columns of a run of joints without branches stand side by side in the order of the joints, and every run begins
-//! a bundle of its own; behind a run stand the runs that hang on it. So the columns of a joint's subtree fill whole
-//! bundles, one after the other, but for lanes of joints further in, whose columns do not exist yet and are zero.
+//! The columns of a run of joints without branches are adjacent, in joint order, and every run starts a new bundle,
+//! followed by the runs of its child branches. So the columns of a joint's subtree fill consecutive bundles. Lanes of
+//! inner joints, whose columns do not exist yet, are zero.
 
 use dynident_lanes::Lane;
 use dynident_model::{Model, Vec3};
 
-/// Columns of all joints, and what they give.
 #[derive(Debug)]
 pub(crate) struct ColumnScratch<T: Lane> {
-    /// Bundle and place in it of each joint's column.
+    /// Bundle, and place in it, of each joint's column.
     pub(crate) place: Vec<(usize, usize)>,
-    /// One past the last bundle of each joint's subtree; the first is the joint's own.
+    /// One past the last bundle of each joint's subtree; the first bundle is the joint's own.
     pub(crate) end: Vec<usize>,
     pub(crate) force: Vec<Vec3<T::Bundle>>,
     pub(crate) moment: Vec<Vec3<T::Bundle>>,
-    /// A row of bundles for each joint: work of the columns of its subtree on its axis.
+    /// Work of the columns of each joint's subtree on its axis: one row of bundles per joint.
     pub(crate) rows: Vec<f64>,
-    /// Of all joints and those on the way to them: where the work stands in `rows`, and the two entries of the matrix.
+    /// For all pairs of a joint and an ancestor: index of the work in `rows`, and the two entries of the matrix.
     pub(crate) entries: Vec<Entry>,
 }
 
-/// One entry of the mass matrix and its mirror image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
     pub(crate) work: usize,

@@ -1,4 +1,4 @@
-//! Inertia of a body together with everything that hangs on it.
+//! Inertia of a body together with its subtree.
 
 use dynident_lanes::Scalar;
 use dynident_model::{InertialParameters, Mat3, Transform, Vec3};
@@ -27,7 +27,7 @@ impl<T: Scalar> Composite<T> {
         Mat3([[i[0], i[1], i[2]], [i[1], i[3], i[4]], [i[2], i[4], i[5]]])
     }
 
-    /// Adds `child`, which is described in its own frame, to this composite.
+    /// Adds `child`, given in its own frame.
     #[inline(always)]
     pub(crate) fn add(&mut self, child: &Self, parent_from_child: &Transform<T>) {
         let Transform { rotation, translation: t } = parent_from_child;
@@ -39,8 +39,7 @@ impl<T: Scalar> Composite<T> {
             let row = &rows.0[a];
             row[2].mul_add(r[b][2], row[1].mul_add(r[b][1], row[0] * r[b][0]))
         };
-        // Parallel axes about the new origin: I += 2 (t·h) 1 - t hᵀ - h tᵀ + m (t·t 1 - t tᵀ), with g = h + m t/2
-        // folded in.
+        // Parallel axes about the new origin: I += 2 (t·h) 1 - t hᵀ - h tᵀ + m (t·t 1 - t tᵀ), with g = h + m t/2.
         let g = t.scale_add(child.mass * T::splat(0.5), h);
         let diagonal = t.dot(g) + t.dot(g);
         let shift = |a: usize, b: usize| t[a].mul_add(g[b], g[a] * t[b]);

@@ -1,5 +1,5 @@
-//! Moments of the mass of what hangs on a joint, from frame to frame: first moment `h`, second moment Σ about the
-//! origin of the joint's inner frame. Their mass is a constant of the robot.
+//! Mass moments of a joint's subtree: first moment `h` and second moment Σ about the origin of the joint's inner
+//! frame. The mass is constant.
 
 use crate::bodies::Bodies;
 use crate::hinge::{Hinge, PlacedHinges, with_hinge};
@@ -16,7 +16,6 @@ pub(crate) struct CompositeMoments<T> {
 impl<T: Scalar> CompositeMoments<T> {
     pub(crate) const ZERO: Self = Self { first: Vec3::ZERO, second: [T::ZERO; 6] };
 
-    /// Of one body.
     #[inline(always)]
     pub(crate) fn own(bodies: impl Bodies<T>, index: usize) -> Self {
         Self { first: bodies.first(index), second: bodies.second(index) }
@@ -30,8 +29,8 @@ impl<T: Scalar> CompositeMoments<T> {
         }
     }
 
-    /// In the frame of the parent. Where that turns about an axis at rest only `Σ_xx + Σ_yy` counts, and all of it
-    /// stands in `Σ_xx`.
+    /// In the frame of the parent. If the parent rotates about an axis at rest, only `Σ_xx + Σ_yy` matters, and it is
+    /// stored in `Σ_xx`.
     #[inline(always)]
     pub(crate) fn up(
         &self,
@@ -52,7 +51,7 @@ impl<T: Scalar> CompositeMoments<T> {
         }
     }
 
-    /// About a point from which the origin stands at `t`: `h + m t` and, with `g = h + m t/2`, `Σ + t gᵀ + g tᵀ`.
+    /// Moments about a point that is `-t` from the origin: `h + m t` and, with `g = h + m t/2`, `Σ + t gᵀ + g tᵀ`.
     #[inline(always)]
     fn about_shifted(self, step: &JointStep, bodies: impl Bodies<T>, t: Vec3<T>, index: usize) -> Self {
         let Self { first, second: s } = self;
@@ -89,8 +88,8 @@ impl<T: Scalar> CompositeMoments<T> {
     }
 }
 
-/// From the tips to the base: the moments of joint `index` and all that hangs on it. `next` are those which the body
-/// after it gives, in registers; `kept` those of the others that hang on it, with its own.
+/// Inward step: moments of joint `index` and its subtree. `next` are the moments from the next body, in registers;
+/// `kept` those of the other children and of the body itself.
 #[inline(always)]
 pub(crate) fn gathered<T: Scalar>(
     step: &JointStep,
@@ -106,7 +105,7 @@ pub(crate) fn gathered<T: Scalar>(
     all
 }
 
-/// Hands moments to the parent: in `next` to the body before, in memory to any other.
+/// Passes moments to the parent: in `next` if it is the previous body, else in memory.
 #[inline(always)]
 pub(crate) fn handed_on<T: Scalar>(
     step: &JointStep,
@@ -121,7 +120,7 @@ pub(crate) fn handed_on<T: Scalar>(
     }
     *next = CompositeMoments::ZERO;
     let Some(parent) = step.parent else { return };
-    // A body takes its own moments when the first of its children comes.
+    // A body adds its own moments together with those of its first child.
     let mut sum = if step.hang.is_last_child { CompositeMoments::own(bodies, parent) } else { kept[parent] };
     sum.add(&moved);
     kept[parent] = sum;

@@ -9,12 +9,12 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::Model;
 use dynident_model::terms::JointMotion;
 
-/// The matrix `C(q, q̇)` of Christoffel symbols, row-major, dof × dof, Nm s (N s for a joint that slides): velocities
-/// alone need the torque `C q̇`, and `Ṁ = C + Cᵀ`, so that `Ṁ − 2C` is skew-symmetric. Passive and adaptive control
-/// need it with another velocity behind it, `C(q, q̇) q̇_r`, which no inverse dynamics give.
+/// The matrix `C(q, q̇)` of Christoffel symbols, row-major, dof × dof, Nm s (N s for a prismatic joint): the
+/// velocity-dependent torque is `C q̇`, and `Ṁ = C + Cᵀ`, so that `Ṁ − 2C` is skew-symmetric. Passivity-based and
+/// adaptive controllers need `C(q, q̇) q̇_r` with another velocity, which inverse dynamics do not give.
 ///
-/// With axes `S` and their rates `Ψ̇ = v × S` in the base's frame, inertia `I` and body Coriolis matrix `B` of all that
-/// hangs on a joint are sums, and for a joint `i` on the way to `j`
+/// With axes `S` and their rates `Ψ̇ = v × S` in the base frame, the inertia `I` and the body Coriolis matrix `B` of a
+/// subtree are sums. For a joint `i` on the path from the base to `j`
 ///
 /// ```text
 /// C_ij = S_i · (B_j S_j + I_j Ψ̇_j)      C_ji = S_i · (B_jᵀ S_j) + Ψ̇_i · (I_j S_j)
@@ -22,8 +22,8 @@ use dynident_model::terms::JointMotion;
 ///
 /// Echeandia and Wensing, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for rigid-body
 /// systems*, Journal of Computational and Nonlinear Dynamics 16 (2021) 091004. It is half of the derivative of the
-/// torque by velocity ([`inverse_dynamics_derivatives`](crate::inverse_dynamics_derivatives)), for the torque is
-/// quadratic there. O(n · depth), allocation-free.
+/// torque by velocity ([`inverse_dynamics_derivatives`](crate::inverse_dynamics_derivatives)), because the torque is
+/// quadratic in the velocity. O(n · depth), allocation-free.
 ///
 /// ```
 /// # use dynident_dynamics::{Workspace, coriolis_matrix};
@@ -47,13 +47,13 @@ use dynident_model::terms::JointMotion;
 /// ```
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another tree.
+/// If a vector's length is not the number of joints, or for a workspace of another tree.
 #[doc(alias("christoffel", "centrifugal"))]
 pub fn coriolis_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64], dq: &[f64]) -> &'w [f64] {
     workspace.check(model, &[q, dq]);
     workspace.check_tree(model);
     let Workspace { level, scratch, matrices: [matrix, ..], tree, .. } = workspace;
-    // Accelerations do not matter; any vector of their length does.
+    // The accelerations are not used.
     if let Some(coupling) = model.coupling() {
         tree.take_motion(coupling, q, dq, dq);
         let TreeScratch { q, dq, matrices: [of_tree, ..], .. } = tree;
@@ -62,18 +62,18 @@ pub fn coriolis_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64
         coupling.project_matrix(of_tree, matrix);
     } else {
         let motion = &JointMotion { samples: 1, q, dq, ddq: dq };
-        // Entries of joints on different branches are never written; they stay the zeros of the new workspace.
+        // Entries of joints on different branches are never written and remain zero.
         dispatch_single(*level, Fill { model, scratch, motion, out: MatrixRows { out: matrix, stride: 1 } });
     }
     matrix
 }
 
-/// [`coriolis_matrix`] of every sample of a motion, whose accelerations are not read.
+/// [`coriolis_matrix`] of every sample of a motion; accelerations are not read.
 ///
-/// Allocation-free once the array has grown to the number of samples, but for robots whose joints follow others.
+/// Allocation-free once the array has grown to the number of samples, except for robots with coupled joints.
 ///
 /// # Panics
-/// If an array of the motion has not joints × samples numbers, or workspace or matrices were made for another tree.
+/// If an array of the motion does not have joints × samples values, or for a workspace or matrices of another tree.
 pub fn coriolis_matrices(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -119,7 +119,7 @@ impl Kernel for Fill<'_> {
     }
 }
 
-/// Axes, their rates, and what every body alone contributes.
+/// Axes, their rates, and the contribution of every single body.
 #[inline(always)]
 fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let steps = model.steps();
@@ -136,7 +136,7 @@ fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     }
 }
 
-/// From the tips to the base: what hangs on a joint against all axes on the way to it.
+/// Inward: products of each subtree with all axes on the path to it.
 #[inline(always)]
 fn inward<T: Lane>(model: &Model, scratch: &mut CoreScratch<T>, out: &mut MatrixRows<'_>, sample: usize) {
     let steps = model.steps();

@@ -10,7 +10,7 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{Model, Vec3};
 
-/// Derivatives of the joint torques, row-major, dof × dof: row = torque, column = what it is derived by.
+/// Derivatives of the joint torques, row-major, dof × dof: row = torque, column = variable.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseDynamicsDerivatives<'w> {
     /// `∂τ/∂q`.
@@ -21,23 +21,21 @@ pub struct InverseDynamicsDerivatives<'w> {
     pub by_acceleration: &'w [f64],
 }
 
-/// Derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) by position, velocity and acceleration, without
-/// differences.
+/// Derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) by position, velocity and acceleration, analytic.
 ///
-/// With axes `S`, their rates `Ψ̇ = v × S`, `Ψ̈ = a × S + v × Ψ̇` and inertias all in the base's frame, inertia `I`,
-/// Coriolis matrix `B` and wrench `f` of what hangs on a joint are sums, and for a joint `i` on the way to `j`
+/// With axes `S`, their rates `Ψ̇ = v × S`, `Ψ̈ = a × S + v × Ψ̇` and inertias all in the base frame, the inertia `I`,
+/// Coriolis matrix `B` and wrench `f` of a subtree are sums. For a joint `i` on the path from the base to `j`
 ///
 /// ```text
 /// ∂τ_i/∂q_j = S_i · (2 B_j Ψ̇_j + I_j Ψ̈_j + S_j ×* f_j)      ∂τ_j/∂q_i = 2 Ψ̇_i · (B_jᵀ S_j) + Ψ̈_i · (I_j S_j)
 /// ∂τ_i/∂q̇_j = S_i · (2 B_j S_j + 2 I_j Ψ̇_j)                 ∂τ_j/∂q̇_i = 2 S_i · (B_jᵀ S_j) + 2 Ψ̇_i · (I_j S_j)
 /// ```
 ///
-/// with `a` against gravity: Singh, Russell and Wensing, *Efficient analytical derivatives of rigid-body dynamics using
-/// spatial vector algebra*, RA-L 2022. Every pair costs these products alone: O(n · depth).
-/// Allocation-free.
+/// with `a` minus gravity: Singh, Russell and Wensing, *Efficient analytical derivatives of rigid-body dynamics using
+/// spatial vector algebra*, RA-L 2022. O(n · depth), allocation-free.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another tree.
+/// If a vector's length is not the number of joints, or for a workspace of another tree.
 #[doc(alias("jacobian", "rnea derivatives"))]
 pub fn inverse_dynamics_derivatives<'w>(
     model: &Model,
@@ -60,7 +58,7 @@ pub fn inverse_dynamics_derivatives<'w>(
         }
     } else {
         let motion = &JointMotion { samples: 1, q, dq, ddq };
-        // Entries of joints on different branches are never written; they stay the zeros of the new workspace.
+        // Entries of joints on different branches are never written and remain zero.
         let out = matrices.each_mut().map(|out| MatrixRows { out, stride: 1 });
         dispatch_single(*level, Fill { model, scratch, motion, out });
     }
@@ -68,7 +66,7 @@ pub fn inverse_dynamics_derivatives<'w>(
     InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration }
 }
 
-/// The same derivatives of many samples: entry `(i, k)` of sample `s` stands at `[(i * dof + k) * samples + s]`.
+/// Derivatives of several samples: entry `(i, k)` of sample `s` is at `[(i * dof + k) * samples + s]`.
 #[derive(Debug)]
 pub struct DerivativeArrays<'a> {
     /// `∂τ/∂q`.
@@ -81,11 +79,11 @@ pub struct DerivativeArrays<'a> {
 
 /// [`inverse_dynamics_derivatives`] of every sample of a motion.
 ///
-/// Allocation-free, but for robots whose joints follow others at the first block of a size.
+/// Allocation-free, except for robots with coupled joints at the first block of a size.
 ///
 /// # Panics
-/// If an array of the motion has not joints × samples or one of the derivatives not joints × joints × samples numbers,
-/// or the workspace was made for another size.
+/// If an array does not have joints × samples (derivatives: joints × joints × samples) values, or for a workspace of
+/// another size.
 #[doc(alias("rnea derivatives"))]
 pub fn inverse_dynamics_derivatives_batch(
     model: &Model,
@@ -110,12 +108,12 @@ pub fn inverse_dynamics_derivatives_batch(
 }
 
 /// [`inverse_dynamics_derivatives`] of every sample of a motion, by position, velocity and acceleration in this order,
-/// into arrays that keep the zeros of a tree: as fast as may be.
+/// into arrays that keep the zeros of a tree. Fastest form.
 ///
-/// Allocation-free once the arrays have grown to the number of samples, but for robots whose joints follow others.
+/// Allocation-free once the arrays have grown to the number of samples, except for robots with coupled joints.
 ///
 /// # Panics
-/// If an array of the motion has not joints × samples numbers, or workspace or matrices were made for another tree.
+/// If an array of the motion does not have joints × samples values, or for a workspace or matrices of another tree.
 #[doc(alias("rnea derivatives"))]
 pub fn inverse_dynamics_derivative_matrices(
     model: &Model,
@@ -128,7 +126,7 @@ pub fn inverse_dynamics_derivative_matrices(
     fill(model, workspace, motion, out);
 }
 
-/// Writes the entries of all pairs of joints that meet on a way to the base.
+/// Writes the entries of all pairs of joints on a common path to the base.
 fn fill(model: &Model, workspace: &mut BatchWorkspace, motion: &JointMotion<'_>, mut out: [MatrixRows<'_>; 3]) {
     let BatchWorkspace { level, scratch, tree, .. } = workspace;
     let Some(coupling) = model.coupling() else {
@@ -175,7 +173,7 @@ impl Kernel for Fill<'_> {
     }
 }
 
-/// Axes, their rates, and what every body alone contributes.
+/// Axes, their rates, and the contribution of every single body.
 #[inline(always)]
 fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let steps = model.steps();
@@ -199,7 +197,7 @@ fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     }
 }
 
-/// From the tips to the base: what hangs on a joint against all axes on the way to it.
+/// Inward: products of each subtree with all axes on the path to it.
 #[inline(always)]
 fn inward<T: Lane>(model: &Model, scratch: &mut CoreScratch<T>, out: &mut [MatrixRows<'_>; 3], sample: usize) {
     let steps = model.steps();
@@ -251,7 +249,7 @@ mod tests {
     use dynident_lanes::Dual;
     use dynident_model::sample::{Random, random_tree};
 
-    /// Torques as dual numbers: the oracle, through the inverse dynamics only.
+    /// Oracle: inverse dynamics with dual numbers.
     fn dual_column(model: &Model, state: [&[f64]; 3], which: usize, joint: usize) -> Vec<f64> {
         let mut scratch = CoreScratch::<Dual>::new(model.body_count());
         for (k, values) in state.into_iter().enumerate() {

@@ -8,7 +8,7 @@ use dynident_model::Model;
 /// Kinetic energy `½ q̇ᵀ M(q) q̇` in joules.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another size.
+/// If a vector's length is not the number of joints, or for a workspace of another size.
 pub fn kinetic_energy(model: &Model, workspace: &mut Workspace, q: &[f64], dq: &[f64]) -> f64 {
     workspace.check(model, &[dq]);
     let matrix = mass_matrix(model, workspace, q);
@@ -19,7 +19,7 @@ pub fn kinetic_energy(model: &Model, workspace: &mut Workspace, q: &[f64], dq: &
 /// Potential energy `- Σ gᵀ (m_i p_i + R_i h_i)` in joules, zero for bodies at the base's origin.
 ///
 /// # Panics
-/// If `q` has not one entry per joint, or the workspace was made for another size.
+/// If `q` does not have one entry per joint, or for a workspace of another size.
 pub fn potential_energy(model: &Model, workspace: &mut Workspace, q: &[f64]) -> f64 {
     let gravity = model.gravity();
     let placements = body_placements(model, workspace, q);

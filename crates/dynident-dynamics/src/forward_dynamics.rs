@@ -11,12 +11,12 @@ use dynident_model::{JointStep, Mat3, Model, Vec3};
 /// Joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
 ///
 /// Articulated-body algorithm: Featherstone (2008), section 7.3, over the model's inner frames
-/// ([`JointStep`](dynident_model::JointStep)), with the velocity terms taken from the outward recursion of the inverse
-/// dynamics. Allocation-free. Where a joint moves no inertia at all (massless tip), its
-/// acceleration is undefined and comes out infinite or not a number: check [`Model::bodies_without_prior`] first.
+/// ([`JointStep`](dynident_model::JointStep)); the velocity terms come from the outward recursion of the inverse
+/// dynamics. Allocation-free. The acceleration of a joint that moves no inertia (massless tip) is undefined (infinite
+/// or NaN): check [`Model::bodies_without_prior`] first.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another size.
+/// If a vector's length is not the number of joints, or for a workspace of another size.
 #[doc(alias("aba", "articulated body"))]
 pub fn forward_dynamics<'w>(
     model: &Model,
@@ -36,8 +36,8 @@ pub fn forward_dynamics<'w>(
 
 one_sample_kernel!((q, dq, tau), articulated_bodies, ddq: ddq);
 
-/// Where joints follow others no articulated inertia stands for a subtree alone: `M q̈ = τ - bias` by Cholesky's
-/// factors, which exist where every degree of freedom moves inertia.
+/// Coupled joints: a subtree has no separate articulated inertia, so `M q̈ = τ - bias` is solved by a Cholesky
+/// factorisation, which exists if every degree of freedom moves inertia.
 fn of_coupled_joints<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64], dq: &[f64], tau: &[f64]) -> &'w [f64] {
     mass_matrix_and_bias(model, workspace, q, dq);
     let (dof, Workspace { vector, matrices: [factor, ..], .. }) = (model.dof(), workspace);
@@ -60,7 +60,7 @@ fn of_coupled_joints<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64],
     vector
 }
 
-/// Takes `v wᵀ` (symmetric: w is v times a factor) off a symmetric matrix.
+/// Subtracts `v wᵀ` (symmetric: w is a multiple of v) from a symmetric matrix.
 #[inline(always)]
 fn subtract_outer<T: Scalar>(m: &mut [T; 6], v: Vec3<T>, w: Vec3<T>) {
     m[0] = v[0].neg_mul_add(w[0], m[0]);
@@ -81,7 +81,7 @@ fn cross_columns<T: Scalar>(t: Vec3<T>, m: &Mat3<T>) -> Mat3<T> {
     Mat3([[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]])
 }
 
-/// From `q`, `dq`, `tau` of the scratch to its `ddq`.
+/// Computes `ddq` of the scratch from its `q`, `dq`, `tau`.
 #[inline(always)]
 pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let steps = model.steps();
@@ -91,8 +91,8 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
     let articulated = &mut scratch.articulated[..joints];
     let (tau, ddq) = (&scratch.tau[..joints], &mut scratch.ddq[..joints]);
-    // With q̈ = 0 the outward recursion gives every body's velocity-dependent and gravity acceleration; the wrench that
-    // goes with it is the bias. What is left is linear in the joint accelerations alone.
+    // With q̈ = 0 the outward recursion gives the velocity-dependent and gravity accelerations of the bodies; their
+    // wrench is the bias. The rest is linear in the joint accelerations.
     ddq.fill(T::ZERO);
     outward(model, hinges, motions, wrenches, &scratch.dq[..joints], ddq);
     for (own, step) in articulated.iter_mut().zip(steps) {
@@ -119,9 +119,9 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         own.inverse_inertia = along(column.0, column.1).recip();
         own.rest_torque = tau[index] - along(link.moment, link.force);
         let Some(parent) = step.parent else { continue };
-        // The parent feels the whole inertia and bias, less what the joint gives way. Both are moved to the parent's
-        // frame before the one is taken from the other, so that the division above has time: one body's chain of
-        // dependent steps is what limits this algorithm.
+        // The parent receives the inertia and bias minus the part released by the joint. Both are moved to the
+        // parent's frame before the subtraction, so that the division above has time: dependent steps limit this
+        // algorithm.
         let t = hinges.translation(step, index);
         let ([column_moment, column_force, moment, force], j, m, h) = with_hinge!(hinges, *step, index, |hinge| {
             (
@@ -133,8 +133,8 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         });
         let column_moment = t.cross_add(column_force, column_moment);
         let moment = t.cross_add(force, moment);
-        // To the parent's origin: with T = [t]× the blocks become
-        // M' = M, H' = H + T M, J' = J + T Hᵀ + H Tᵀ + T M Tᵀ = J + T Hᵀ - H' T (T is skew).
+        // To the parent's origin: with T = [t]× the blocks become M' = M, H' = H + T M, J' = J + T Hᵀ + H Tᵀ + T M Tᵀ
+        // = J + T Hᵀ - H' T (T is skew).
         let h_new = h + cross_columns(t, &symmetric(&m));
         let left = cross_columns(t, &h.transpose());
         // H' T row by row: (row)ᵀ T = -(t × row)ᵀ, so - H' T has rows t × row.
@@ -165,7 +165,7 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     joint_accelerations(steps, hinges, articulated, motions, ddq);
 }
 
-/// Outward again: the joint accelerations, and what they add to each body's acceleration.
+/// Outward: joint accelerations and their contributions to the bodies' accelerations.
 #[inline(always)]
 fn joint_accelerations<T: Scalar>(
     steps: &[JointStep],
@@ -191,7 +191,7 @@ fn joint_accelerations<T: Scalar>(
             (Vec3::ZERO, Vec3::ZERO, T::ZERO)
         };
         ddq[index] = (own.rest_torque - pull) * own.inverse_inertia;
-        // From here on alpha and acceleration of the bodies hold only what the joint accelerations cause.
+        // From here on alpha and acceleration contain the contributions of the joint accelerations only.
         let along = if step.turns { &mut alpha } else { &mut acceleration };
         along.0[2] += ddq[index];
         (link.alpha, link.acceleration) = (alpha, acceleration);

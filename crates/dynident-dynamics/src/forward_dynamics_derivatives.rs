@@ -6,8 +6,7 @@ use crate::workspace::Workspace;
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::Model;
 
-/// Joint accelerations under a torque, and their derivatives: row-major, dof × dof, row = acceleration, column = what
-/// it is derived by.
+/// Joint accelerations and their derivatives: row-major, dof × dof, row = acceleration, column = variable.
 #[derive(Clone, Copy, Debug)]
 pub struct ForwardDynamicsDerivatives<'w> {
     /// `q̈`, rad/s² (m/s²).
@@ -20,22 +19,21 @@ pub struct ForwardDynamicsDerivatives<'w> {
     pub by_torque: &'w [f64],
 }
 
-/// Derivatives of [`forward_dynamics`](crate::forward_dynamics()) by position, velocity and torque, without
-/// differences.
+/// Derivatives of [`forward_dynamics`](crate::forward_dynamics()) by position, velocity and torque, analytic.
 ///
-/// `M q̈ + C q̇ + g = τ` holds along with its derivatives, so that with those of the
-/// [inverse dynamics](inverse_dynamics_derivatives) at the accelerations that the torque makes
+/// From the derivatives of `M q̈ + C q̇ + g = τ`, with those of the [inverse dynamics](inverse_dynamics_derivatives)
+/// at the resulting accelerations:
 ///
 /// ```text
 /// ∂q̈/∂q = -M⁻¹ ∂τ/∂q      ∂q̈/∂q̇ = -M⁻¹ ∂τ/∂q̇      ∂q̈/∂τ = M⁻¹
 /// ```
 ///
-/// (Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms*, RSS 2018.) M is taken apart as
-/// `M = Lᵀ L`, where a row of L has entries at the joint and at those on the way to it alone: Featherstone (2008),
-/// section 6.5. Allocation-free.
+/// (Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms*, RSS 2018.) M is factorised as
+/// `M = Lᵀ L`, where a row of L has entries at the joint and its ancestors only: Featherstone (2008), section 6.5.
+/// Allocation-free.
 ///
-/// Where a joint moves no inertia at all (massless tip) there is no inverse, and numbers come out infinite or not a
-/// number: check [`Model::bodies_without_prior`] first.
+/// If a joint moves no inertia (massless tip), the inverse does not exist and the result is infinite or NaN: check
+/// [`Model::bodies_without_prior`] first.
 ///
 /// ```
 /// # use dynident_dynamics::{Workspace, forward_dynamics_derivatives};
@@ -45,7 +43,7 @@ pub struct ForwardDynamicsDerivatives<'w> {
 /// #   </robot>"#;
 /// # let model = dynident_model::read_urdf(text)?.model;
 /// let mut workspace = Workspace::new(&model);
-/// // A pendulum of 0.1 kg m² that stands upright: gravity drives it away from there, by m g l / I = 39.24 1/s².
+/// // A pendulum of 0.1 kg m² in its upright position: gravity accelerates it by m g l / I = 39.24 1/s² per rad.
 /// let found = forward_dynamics_derivatives(&model, &mut workspace, &[0.0], &[0.0], &[0.0]);
 /// assert!((found.by_torque[0] - 10.0).abs() < 1e-12);
 /// assert!((found.by_position[0] - 2.0 * 9.81 * 0.2 / 0.1).abs() < 1e-9);
@@ -53,7 +51,7 @@ pub struct ForwardDynamicsDerivatives<'w> {
 /// ```
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another tree.
+/// If a vector's length is not the number of joints, or for a workspace of another tree.
 #[doc(alias("jacobian", "aba derivatives"))]
 pub fn forward_dynamics_derivatives<'w>(
     model: &Model,
@@ -62,14 +60,14 @@ pub fn forward_dynamics_derivatives<'w>(
     dq: &[f64],
     tau: &[f64],
 ) -> ForwardDynamicsDerivatives<'w> {
-    // Lent out while other algorithms have the workspace.
+    // Taken out while other algorithms use the workspace.
     let mut acceleration = core::mem::take(&mut workspace.acceleration);
     acceleration.copy_from_slice(forward_dynamics(model, workspace, q, dq, tau));
     inverse_dynamics_derivatives(model, workspace, q, dq, &acceleration);
     workspace.acceleration = acceleration;
     let is_coupled = model.coupling().is_some();
     let Workspace { level, dof, parents, matrices, acceleration_derivatives, acceleration, .. } = workspace;
-    // Solutions couple joints of different branches, where the matrices keep zeros.
+    // Solutions couple joints of different branches.
     let [torque_by_position, torque_by_velocity, mass] = matrices;
     let [by_position, by_velocity, by_torque] = acceleration_derivatives;
     by_position.copy_from_slice(torque_by_position);
@@ -84,10 +82,10 @@ pub fn forward_dynamics_derivatives<'w>(
     ForwardDynamicsDerivatives { acceleration, by_position, by_velocity, by_torque }
 }
 
-/// Takes a mass matrix apart, and solves for three matrices at once.
+/// Factorises a mass matrix and solves for three matrices.
 struct Solve<'a, F: Fn(usize) -> Option<usize>> {
     dof: usize,
-    /// The joint before another on its way to the base; where all couple, the one with the number before.
+    /// The parent of a joint; the previous joint if all joints couple.
     before: F,
     mass: &'a mut [f64],
     right: [&'a mut [f64]; 3],
@@ -96,11 +94,11 @@ struct Solve<'a, F: Fn(usize) -> Option<usize>> {
 impl<F: Fn(usize) -> Option<usize>> Kernel for Solve<'_, F> {
     type Output = ();
 
-    // Rows are whole vectors of plain numbers: the compiler fills the level's lanes.
+    // Rows are plain slices: the compiler vectorises for the processor level.
     #[inline(always)]
     fn run<T: Lane>(self) {
         let Self { dof, before, mass, mut right } = self;
-        // M = LᵀL, from the tips on: what is left of the way to the base loses the square of a joint's row.
+        // M = LᵀL, from the tips inward: the square of a joint's row is subtracted from the entries of its ancestors.
         for joint in (0..dof).rev() {
             let row = joint * dof;
             let diagonal = mass[row + joint].sqrt();

@@ -7,31 +7,30 @@ use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
 use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{Model, Vec3};
 
-/// Torques `g(q)` that hold the robot at rest, Nm (N): inverse dynamics without motion.
+/// Torques `g(q)` that hold the robot at rest, Nm (N).
 ///
 /// # Panics
-/// If `q` has not one entry per joint, or the workspace was made for another size.
+/// If `q` does not have one entry per joint, or for a workspace of another size.
 #[doc(alias("generalized gravity", "gravity vector"))]
 pub fn gravity_torque<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
-    // A joint vector of zeros without allocating: robots in this field have at most some tens of joints.
+    // A joint vector of zeros without allocation.
     const ZEROS: [f64; 1024] = [0.0; 1024];
     let rest = &ZEROS[..model.dof()];
     inverse_dynamics(model, workspace, q, rest, rest)
 }
 
-/// `∂g/∂q`, row-major, dof × dof, Nm/rad (N/m): how the torque that holds the robot at rest changes with its position.
-/// The second derivative of the potential energy, so symmetric: the stiffness that gravity adds to a joint's spring, or
-/// takes from it.
+/// `∂g/∂q`, row-major, dof × dof, Nm/rad (N/m): derivative of the gravity torque by the position. It is the second
+/// derivative of the potential energy, so it is symmetric: the stiffness due to gravity.
 ///
-/// With axes `S` in the base's frame, the inertia `I` of what hangs on a joint, and `a` against gravity, for a joint
-/// `i` on the way to `j`
+/// With axes `S` in the base frame, the inertia `I` of a subtree and `a` minus gravity, for a joint `i` on the path
+/// from the base to `j`
 ///
 /// ```text
 /// ∂g_i/∂q_j = S_i · (S_j ×* I_j a + I_j (a × S_j))
 /// ```
 ///
 /// the [derivatives of the inverse dynamics](crate::inverse_dynamics_derivatives) at rest (Singh, Russell and Wensing,
-/// RA-L 2022) without all that is zero there. Allocation-free.
+/// RA-L 2022) without the terms that are zero. Allocation-free.
 ///
 /// ```
 /// # use dynident_dynamics::{Workspace, gravity_torque_derivative};
@@ -41,14 +40,14 @@ pub fn gravity_torque<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]
 /// #   </robot>"#;
 /// # let model = dynident_model::read_urdf(text)?.model;
 /// let mut workspace = Workspace::new(&model);
-/// // A pendulum that stands upright falls: -m g l.
+/// // An upright pendulum is unstable: -m g l.
 /// let stiffness = gravity_torque_derivative(&model, &mut workspace, &[0.0]);
 /// assert!((stiffness[0] + 2.0 * 9.81 * 0.2).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Panics
-/// If `q` has not one entry per joint, or the workspace was made for another tree.
+/// If `q` does not have one entry per joint, or for a workspace of another tree.
 #[doc(alias("gravity gradient", "hessian", "stiffness"))]
 pub fn gravity_torque_derivative<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
     workspace.check(model, &[q]);
@@ -67,7 +66,6 @@ pub fn gravity_torque_derivative<'w>(model: &Model, workspace: &'w mut Workspace
 
 one_sample_kernel!((q), stiffness, out: matrix);
 
-/// The derivative into the scratch's matrix.
 #[inline(always)]
 fn stiffness<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let steps = model.steps();

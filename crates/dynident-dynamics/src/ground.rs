@@ -1,11 +1,10 @@
-//! Bodies in one frame, the base's: axes, velocities and accelerations as twists at the base's origin, and inertias
-//! that simply add up over a subtree.
+//! Spatial quantities in one frame, that of the base: axes, velocities and accelerations are twists at the base's
+//! origin, and the inertia of a subtree is the sum of its bodies' inertias.
 //!
 //! Twists and wrenches are spatial vectors at one point in one frame, angular part first (Featherstone 2008, chapter
-//! 2), so that nothing has to be carried from frame to frame. Inertia is kept as the moments of the mass in place of
-//! the inertia tensor: mass `m`, first moment `h = ∫ x dm`, second moment `Σ = ∫ x xᵀ dm` (the tensor is `tr(Σ) 1 - Σ`;
-//! Wensing, Kim and Slotine, *Linear matrix inequalities for physically consistent inertial parameter identification*,
-//! RA-L 2018, section III).
+//! 2), so no change of frame is needed. Inertia is stored as mass `m`, first moment `h = ∫ x dm` and second moment `Σ
+//! = ∫ x xᵀ dm` (the inertia tensor is `tr(Σ) 1 - Σ`; Wensing, Kim and Slotine, *Linear matrix inequalities for
+//! physically consistent inertial parameter identification*, RA-L 2018, section III).
 
 use crate::hinge::symmetric;
 use dynident_lanes::Scalar;
@@ -21,7 +20,7 @@ pub(crate) struct Spatial<T> {
 impl<T: Scalar> Spatial<T> {
     pub(crate) const ZERO: Self = Self { angular: Vec3::ZERO, linear: Vec3::ZERO };
 
-    /// A joint's axis as a twist: `direction` in the base frame, through `point` for one that turns.
+    /// A joint's axis as a twist: `direction` in the base frame, through `point` for a revolute joint.
     #[inline(always)]
     pub(crate) fn axis(turns: bool, direction: Vec3<T>, point: Vec3<T>) -> Self {
         if turns {
@@ -31,7 +30,7 @@ impl<T: Scalar> Spatial<T> {
         }
     }
 
-    /// Work of a wrench on a twist.
+    /// Power of a wrench on a twist.
     #[inline(always)]
     pub(crate) fn dot(&self, other: &Self) -> T {
         let (a, b) = (self.angular.0, other.angular.0);
@@ -40,7 +39,6 @@ impl<T: Scalar> Spatial<T> {
         c[2].mul_add(d[2], c[1].mul_add(d[1], c[0].mul_add(d[0], angular)))
     }
 
-    /// `self · factor + addend`.
     #[inline(always)]
     pub(crate) fn scale_add(&self, factor: T, addend: &Self) -> Self {
         Self {
@@ -58,7 +56,7 @@ impl<T: Scalar> Spatial<T> {
         }
     }
 
-    /// `self × other + addend`, twists.
+    /// The twist `self × other + addend`.
     #[inline(always)]
     pub(crate) fn cross_add(&self, other: &Self, addend: &Self) -> Self {
         Self {
@@ -85,7 +83,7 @@ impl<T: Scalar> core::ops::AddAssign for Spatial<T> {
     }
 }
 
-/// Moments of the mass of a body or of a subtree about the base's origin, in the base frame.
+/// Mass moments of a body or subtree about the base's origin, in the base frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MassMoments<T> {
     pub(crate) mass: T,
@@ -98,7 +96,7 @@ pub(crate) struct MassMoments<T> {
 impl<T: Scalar> MassMoments<T> {
     pub(crate) const ZERO: Self = Self { mass: T::ZERO, first: Vec3::ZERO, second: [T::ZERO; 6] };
 
-    /// Of a body whose inner frame stands at `placement`.
+    /// Moments of a body whose inner frame is at `placement`.
     #[inline(always)]
     pub(crate) fn of(step: &JointStep, placement: &Transform<T>) -> Self {
         let Transform { rotation, translation: t } = placement;
@@ -120,7 +118,6 @@ impl<T: Scalar> MassMoments<T> {
         self.times_add(twist, &Spatial::ZERO)
     }
 
-    /// `I w + addend`.
     #[inline(always)]
     pub(crate) fn times_add(&self, twist: &Spatial<T>, addend: &Spatial<T>) -> Spatial<T> {
         let s = &self.second;
@@ -148,9 +145,8 @@ impl<T: Scalar> core::ops::AddAssign for MassMoments<T> {
     }
 }
 
-/// How the moments of the mass change while the bodies move at their velocities: momentum `p = ∫ ẋ dm` and
-/// `G = ∫ ẋ xᵀ dm`. With them the Coriolis matrix of Singh, Russell and Wensing (2022) is small: see
-/// [`twice_coriolis_add`](MomentRates::twice_coriolis_add).
+/// Rates of the mass moments at the bodies' velocities: momentum `p = ∫ ẋ dm` and `G = ∫ ẋ xᵀ dm`. They give the
+/// Coriolis matrix of Singh, Russell and Wensing (2022): see [`coriolis_add`](MomentRates::coriolis_add).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MomentRates<T> {
     pub(crate) momentum: Vec3<T>,
@@ -160,7 +156,7 @@ pub(crate) struct MomentRates<T> {
 impl<T: Scalar> MomentRates<T> {
     pub(crate) const ZERO: Self = Self { momentum: Vec3::ZERO, second: Mat3::ZERO };
 
-    /// Of a body at velocity `(ω, u)`: `p = m u + ω × h`, `G = [ω]× Σ + u hᵀ`.
+    /// Rates of a body at velocity `(ω, u)`: `p = m u + ω × h`, `G = [ω]× Σ + u hᵀ`.
     #[inline(always)]
     pub(crate) fn of(moments: &MassMoments<T>, velocity: &Spatial<T>) -> Self {
         let Spatial { angular: w, linear: u } = *velocity;
@@ -174,15 +170,15 @@ impl<T: Scalar> MomentRates<T> {
         }
     }
 
-    /// The spatial momentum `I v`: angular part `∫ x × ẋ dm`, which G holds.
+    /// The spatial momentum `I v`; its angular part `∫ x × ẋ dm` follows from G.
     #[inline(always)]
     pub(crate) fn spatial_momentum(&self) -> Spatial<T> {
         let g = &self.second.0;
         Spatial { angular: Vec3([g[2][1] - g[1][2], g[0][2] - g[2][0], g[1][0] - g[0][1]]), linear: self.momentum }
     }
 
-    /// `B w + addend` with `B = ½ ((v ×*) I - I (v ×) + (I v) ×̄*) = [tr(G) 1 - G, 0; -[p]×, 0]` of the twist's angular
-    /// part.
+    /// `B w + addend` for the twist's angular part, with `B = ½ ((v ×*) I - I (v ×) + (I v) ×̄*) = [tr(G) 1 - G, 0;
+    /// -[p]×, 0]`.
     #[inline(always)]
     pub(crate) fn coriolis_add(&self, angular: Vec3<T>, addend: &Spatial<T>) -> Spatial<T> {
         let g = &self.second.0;
@@ -194,7 +190,7 @@ impl<T: Scalar> MomentRates<T> {
         Spatial { angular: Vec3([row(0), row(1), row(2)]), linear: angular.cross_add(self.momentum, addend.linear) }
     }
 
-    /// Angular part of `Bᵀ y`, the other part is zero: `(tr(G) 1 - Gᵀ) y₁ + p × y₂`.
+    /// Angular part of `Bᵀ y` (the linear part is zero): `(tr(G) 1 - Gᵀ) y₁ + p × y₂`.
     #[inline(always)]
     pub(crate) fn coriolis_transposed(&self, twist: &Spatial<T>) -> Vec3<T> {
         let g = &self.second.0;
@@ -214,8 +210,8 @@ impl<T: Scalar> core::ops::AddAssign for MomentRates<T> {
     }
 }
 
-/// `R Σ Rᵀ + t gᵀ + g tᵀ`, upper triangle, from the rows of `R Σ`: with `g = h + m t/2` the second moment about another
-/// point. A function of its own: a closure called six times would not be compiled for the processor level.
+/// `R Σ Rᵀ + t gᵀ + g tᵀ`, upper triangle, from the rows of `R Σ`: with `g = h + m t/2` the second moment about
+/// another point. A function, because a closure would not be compiled for the processor level.
 #[inline(always)]
 fn carried<T: Scalar>(rows: &[[T; 3]; 3], r: &[[T; 3]; 3], t: Vec3<T>, g: Vec3<T>) -> [T; 6] {
     macro_rules! entry {

@@ -1,5 +1,5 @@
-//! From frame to frame over one joint, by the steps of the model ([`JointStep`]): axes are z, and most constant
-//! rotations are none or a quarter turn about x, so that turning a vector takes four products in place of nine.
+//! Change of frame over one joint with the model's steps ([`JointStep`]): axes are z, and most constant rotations are
+//! the identity or a quarter turn about x, so that rotating a vector takes four products instead of nine.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{JointStep, Mat3, Shift, Vec3};
@@ -40,7 +40,7 @@ impl<T: Scalar> Hinge<T> for AboutZ<T> {
     fn up_symmetric(self, m: &[T; 6]) -> [T; 6] {
         let Self { cosine: c, sine: s } = self;
         let [xx, xy, xz, yy, yz, zz] = *m;
-        // First row of Rz M; the trace of the upper block stays.
+        // First row of Rz M; the trace of the upper block is constant.
         let (a, b) = (s.neg_mul_add(xy, c * xx), s.neg_mul_add(yy, c * xy));
         let first = s.neg_mul_add(b, c * a);
         [first, s.mul_add(a, c * b), s.neg_mul_add(yz, c * xz), (xx + yy) - first, s.mul_add(xz, c * yz), zz]
@@ -93,7 +93,7 @@ impl<T: Scalar> Hinge<T> for AfterQuarter<T> {
     }
 }
 
-/// Any rotation.
+/// A general rotation.
 #[derive(Clone, Copy)]
 pub(crate) struct Turned<T>(pub(crate) Mat3<T>);
 
@@ -123,29 +123,27 @@ impl<T: Scalar> Hinge<T> for Turned<T> {
     }
 }
 
-/// The full symmetric matrix of an upper triangle by rows.
+/// Full symmetric matrix from an upper triangle by rows.
 #[inline(always)]
 pub(crate) fn symmetric<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
     Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
 }
 
-/// Where the joints stand: what hinges are made of.
 #[derive(Debug)]
 pub(crate) struct Hinges<T> {
     cosine: Vec<T>,
     sine: Vec<T>,
-    /// Positions of sliding joints, with offsets those of turning ones.
+    /// Positions of prismatic joints; revolute ones include their offsets.
     position: Vec<T>,
 }
 
 impl<T: Scalar> Hinges<T> {
     pub(crate) fn new(joints: usize) -> Self {
-        // Whole bundles: sines and cosines of several joints are taken at once.
+        // Rounded up to whole bundles: sines and cosines of several joints are computed together.
         let zeros = || vec![T::ZERO; joints.next_multiple_of(T::ANGLES_AT_ONCE)];
         Self { cosine: zeros(), sine: zeros(), position: zeros() }
     }
 
-    /// Places all joints at the positions `q`.
     #[inline(always)]
     pub(crate) fn place(&mut self, steps: &[JointStep], q: &[T]) {
         for ((to, step), q) in self.position.iter_mut().zip(steps).zip(q) {
@@ -154,7 +152,7 @@ impl<T: Scalar> Hinges<T> {
         T::sin_cos_all(&self.position, &mut self.sine, &mut self.cosine);
     }
 
-    /// Places the joints that hang on others: what does not turn with the base needs no more.
+    /// Places only the joints with a parent: results that do not depend on the base's orientation need no more.
     #[inline(always)]
     pub(crate) fn place_below_base(&mut self, steps: &[JointStep], q: &[T]) {
         let joints = steps.len();
@@ -172,14 +170,13 @@ impl<T: Scalar> Hinges<T> {
         }
     }
 
-    /// What was placed, with lengths that the compiler knows to be equal: loops over `joints` joints check no bounds.
+    /// Slices of known equal lengths, so that loops over `joints` joints need no bounds checks.
     #[inline(always)]
     pub(crate) fn placed(&self, joints: usize) -> PlacedHinges<'_, T> {
         PlacedHinges { cosine: &self.cosine[..joints], sine: &self.sine[..joints], position: &self.position[..joints] }
     }
 }
 
-/// The hinges at one position of the robot.
 #[derive(Clone, Copy)]
 pub(crate) struct PlacedHinges<'a, T> {
     cosine: &'a [T],
@@ -208,7 +205,7 @@ impl<T: Scalar> PlacedHinges<'_, T> {
     }
 }
 
-/// `M t + addend` with the origin `t` of a body, of which `shift` says what is zero.
+/// `M t + addend` with the origin `t` of a body; `shift` gives its nonzero entries.
 #[inline(always)]
 pub(crate) fn times_shift<T: Scalar>(shift: Shift, t: Vec3<T>, m: &Mat3<T>, addend: Vec3<T>) -> Vec3<T> {
     macro_rules! along {
@@ -221,12 +218,12 @@ pub(crate) fn times_shift<T: Scalar>(shift: Shift, t: Vec3<T>, m: &Mat3<T>, adde
         Shift::X => along!(0),
         Shift::Y => along!(1),
         Shift::Z => along!(2),
-        // The addend comes last: it is what takes longest to arrive.
+        // The addend is last, because it is available last.
         Shift::Any => m.mul_vec(t) + addend,
     }
 }
 
-/// `t × v + addend` with the origin `t` of a body, of which `shift` says what is zero.
+/// `t × v + addend` with the origin `t` of a body; `shift` gives its nonzero entries.
 #[inline(always)]
 pub(crate) fn cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, addend: Vec3<T>) -> Vec3<T> {
     let [x, y, z] = addend.0;
@@ -239,7 +236,7 @@ pub(crate) fn cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, adden
     }
 }
 
-/// `v × t + addend` with the origin `t` of a body, of which `shift` says what is zero.
+/// `v × t + addend` with the origin `t` of a body; `shift` gives its nonzero entries.
 #[inline(always)]
 pub(crate) fn minus_cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>, addend: Vec3<T>) -> Vec3<T> {
     let [x, y, z] = addend.0;
@@ -252,7 +249,7 @@ pub(crate) fn minus_cross_shift<T: Scalar>(shift: Shift, t: Vec3<T>, v: Vec3<T>,
     }
 }
 
-/// The same hinges for bundles: what they turn stands in several lanes.
+/// The same hinges for bundles: the rotated vectors are in several lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct BundledHinges<'a, T>(pub(crate) PlacedHinges<'a, T>);
 
@@ -280,7 +277,7 @@ fn bundles<T: Lane>(values: [T; 3]) -> [T::Bundle; 3] {
     [values[0].bundle(), values[1].bundle(), values[2].bundle()]
 }
 
-/// Runs `$body` with the hinge of one joint as `$hinge`: compiled once for each kind of rotation.
+/// Runs `$body` with the hinge of one joint as `$hinge`: compiled once for each type of rotation.
 macro_rules! with_hinge {
     ($hinges:expr, $step:expr, $index:expr, |$hinge:ident| $body:expr) => {
         match $step.rotation {

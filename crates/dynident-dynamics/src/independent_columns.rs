@@ -1,53 +1,52 @@
-//! Which columns of a matrix are independent of the columns before them.
+//! Independent columns of a matrix, from left to right.
 
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
-/// What sums of some hundred products in double precision leave of an exact zero, with room.
-const ROUNDING: f64 = 1e-12;
+/// Rounding error of an exact zero for sums of several hundred products, with margin.
+const ROUNDING_SHARE: f64 = 1e-12;
 
-/// The split of a matrix's columns into independent ones and ones that are sums of earlier independent ones.
+/// Split of a matrix's columns into independent ones and combinations of earlier independent ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IndependentColumns {
-    /// Indices of the columns that no combination of earlier columns gives, ascending.
+    /// Indices of the columns that are not combinations of earlier columns, ascending.
     pub independent: Vec<usize>,
     /// Indices of the other columns, ascending.
     pub dependent: Vec<usize>,
-    /// `regrouping[(b, d)]`: how often independent column `b` stands in dependent column `d`, so that
-    /// `A[dependent] = A[independent] · regrouping`. Shape (independent, dependent).
+    /// `regrouping[(b, d)]`: coefficient of independent column `b` in dependent column `d`, so that `A[dependent] =
+    /// A[independent] · regrouping`. Shape (independent, dependent).
     pub regrouping: DMatrix<f64>,
-    /// The smallest share of a column's norm that was still called independent (1 when there is no independent column).
+    /// Smallest remaining share of a column that was accepted as independent (1 without independent columns).
     pub weakest_independent: f64,
-    /// The largest share of a column's norm that was called dependent (0 when there is no dependent column).
+    /// Largest remaining share of a column that was called dependent (0 without dependent columns).
     pub strongest_dependent: f64,
 }
 
-/// Splits the columns of `matrix` from left to right: a column is dependent when the part of it that is orthogonal to
-/// all independent columns before it is at most `tolerance` times its own norm, or when the whole column is rounding
-/// noise beside the largest column: below 1e-12 or the square of `tolerance` of it.
+/// Splits the columns of `matrix` from left to right. A column is dependent if the part orthogonal to all earlier
+/// independent columns is at most `tolerance` times its norm, or if the column is rounding noise: its norm is below
+/// 1e-12 or `tolerance²` of the largest.
 ///
-/// Householder reflections that **skip a dependent column without spending a row**: the textbook rule "dependent ⇔
-/// small diagonal entry of R" leans on rounding noise in the spent row and calls whole tails of columns dependent (or
-/// not) by accident. Deterministic; the result does not depend on the rows' order beyond rounding. Zeros at the end of
-/// columns cost nothing, so a matrix in stairs is split in far less than the cube of its size.
+/// Householder reflections that **skip dependent columns without using a row**. The textbook rule (dependent if the
+/// diagonal entry of R is small) depends on rounding noise in the used row and can misclassify all later columns.
+/// Deterministic; the order of rows changes the result by rounding only. Zeros at the end of columns cost nothing, so
+/// a staircase matrix needs far less than cubic time.
 pub fn independent_columns(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
     split_columns(matrix, tolerance)
 }
 
-/// As [`independent_columns`], but a whole column is noise below `tolerance` of the largest: for regressors of a
-/// robot, where a column that hangs on nothing but the rounding of the description's angles (9.81 · 4e-10 for a π
-/// written as 3.141592654) is no direction, whatever its own norm.
+/// As [`independent_columns`], but a column below `tolerance` of the largest is noise. For robot regressors: a column
+/// that is nonzero only because of rounded angles in the robot description (9.81 · 4e-10 for π as 3.141592654) is not
+/// independent.
 pub(crate) fn independent_regressor_columns(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
-    split_above(matrix, tolerance, ROUNDING.max(tolerance))
+    split_above(matrix, tolerance, ROUNDING_SHARE.max(tolerance))
 }
 
-/// The columns of a matrix that need not be stored as a whole.
+/// The columns of a matrix that need not be stored completely.
 pub(crate) trait Columns {
-    /// Length of every column.
     fn rows(&self) -> usize;
 
-    /// Hands all columns to `take`, from left to right; zeros at a column's end may be left out.
+    /// Passes all columns to `take`, from left to right; zeros at a column's end may be omitted.
     fn for_each(&self, take: &mut dyn FnMut(&[f64]));
 }
 
@@ -64,14 +63,14 @@ impl Columns for DMatrix<f64> {
     }
 }
 
-/// [`independent_columns`] of columns as they come. One column is in work at a time: all earlier reflections, then its
-/// own. What is kept are the reflections without their zeros, the triangle of the independent columns, and what the
-/// dependent ones have in its rows.
+/// [`independent_columns`] of streamed columns, one at a time: all earlier reflections, then a new one. Stored are the
+/// reflections without their zeros, the triangle of the independent columns, and the entries of the dependent columns
+/// in its rows.
 pub(crate) fn split_columns(columns: &impl Columns, tolerance: f64) -> IndependentColumns {
-    split_above(columns, tolerance, ROUNDING.max(tolerance * tolerance))
+    split_above(columns, tolerance, ROUNDING_SHARE.max(tolerance * tolerance))
 }
 
-/// Where a column below `noise` times the largest is no direction.
+/// Columns below `noise` times the largest are dependent.
 fn split_above(columns: &impl Columns, tolerance: f64, noise: f64) -> IndependentColumns {
     let rows = columns.rows();
     let mut column = Column { entries: DVector::zeros(rows), end: 0 };
@@ -81,11 +80,11 @@ fn split_above(columns: &impl Columns, tolerance: f64, noise: f64) -> Independen
         norms.push(column.from(0).norm());
     });
     let largest = norms.iter().copied().fold(0.0, f64::max);
-    // A column that is nothing but rounding beside the others would be independent of everything if measured by itself.
+    // A column of rounding noise would be independent if compared with its own norm only.
     let noise = noise * largest;
     let (mut independent, mut dependent) = (Vec::new(), Vec::new());
     let (mut weakest_independent, mut strongest_dependent) = (1.0_f64, 0.0_f64);
-    // Reflection `k` begins at row `k`; row `k` of the triangle at its diagonal.
+    // Reflection `k` begins at row `k`; row `k` of the triangle begins at its diagonal.
     let mut reflections: Vec<Reflection> = Vec::new();
     let mut triangle: Vec<Vec<f64>> = Vec::new();
     let mut regrouped: Vec<Vec<f64>> = Vec::new();
@@ -127,7 +126,7 @@ struct Reflection {
     v: DVector<f64>,
 }
 
-/// The column in work: zeros from row `end` on.
+/// The current column: zero from row `end` on.
 struct Column {
     entries: DVector<f64>,
     end: usize,
@@ -141,8 +140,8 @@ impl Column {
         self.end = entries.len();
     }
 
-    /// The rows from `row` on without the zeros at the end, but full eights of them as long as there are rows: sums are
-    /// taken in eights, and so come out to the last bit as over all rows.
+    /// The rows from `row` on without zeros at the end, rounded up to a multiple of eight: sums are taken in eights,
+    /// so the result is bit-identical to that over all rows.
     fn from(&self, row: usize) -> DVectorView<'_, f64> {
         let length = self.end.saturating_sub(row).next_multiple_of(8).min(self.entries.len() - row);
         DVectorView::from_slice(&self.entries.as_slice()[row..], length)
@@ -156,20 +155,18 @@ impl Column {
     }
 }
 
-/// Dependent columns that are solved side by side.
-const SIDE_BY_SIDE: usize = 32;
+const COLUMNS_PER_BLOCK: usize = 32;
 
-/// Products from which on further threads are worth their start: some milliseconds of work.
-const WORTH_THREADS: usize = 20_000_000;
+/// Number of products from which multithreading is faster (some milliseconds of work).
+const MIN_PRODUCTS_FOR_THREADS: usize = 20_000_000;
 
-/// Back-substitution with the independent columns' triangle gives the regrouping. Each dependent column has entries for
-/// the independent ones before it. Groups of columns are independent, so the result does not depend on the threads of
-/// the pool that share them.
+/// Regrouping by back-substitution with the triangle of the independent columns. Each dependent column has entries for
+/// earlier independent ones. Groups of columns are independent, so the number of threads does not change the result.
 fn solved(triangle: &[Vec<f64>], dependent: &[Vec<f64>]) -> DMatrix<f64> {
     let (level, rank) = (Level::detect(), triangle.len());
     let mut regrouping = DMatrix::zeros(rank, dependent.len());
-    let places = regrouping.as_mut_slice().chunks_mut((rank * SIDE_BY_SIDE).max(1));
-    let groups = dependent.chunks(SIDE_BY_SIDE).zip(places);
+    let places = regrouping.as_mut_slice().chunks_mut((rank * COLUMNS_PER_BLOCK).max(1));
+    let groups = dependent.chunks(COLUMNS_PER_BLOCK).zip(places);
     let solve = |(columns, places): (&[Vec<f64>], &mut [f64])| {
         let solved = dispatch(level, BackSubstitution { triangle, columns });
         for (k, (column, to)) in columns.iter().zip(places.chunks_mut(rank)).enumerate() {
@@ -179,7 +176,7 @@ fn solved(triangle: &[Vec<f64>], dependent: &[Vec<f64>]) -> DMatrix<f64> {
         }
     };
     let products: usize = dependent.iter().map(|column| column.len() * column.len() / 2).sum();
-    if products < WORTH_THREADS {
+    if products < MIN_PRODUCTS_FOR_THREADS {
         groups.for_each(solve);
     } else {
         groups.collect::<Vec<_>>().into_par_iter().for_each(solve);
@@ -193,14 +190,13 @@ struct BackSubstitution<'a> {
 }
 
 impl Kernel for BackSubstitution<'_> {
-    type Output = Vec<[f64; SIDE_BY_SIDE]>;
+    type Output = Vec<[f64; COLUMNS_PER_BLOCK]>;
 
-    /// The loops over the columns side by side become vector instructions of the processor level; each column's own
-    /// sums keep their order.
+    /// The loops over columns vectorise; the sums of each column keep their order.
     #[inline(always)]
     fn run<T: Lane>(self) -> Self::Output {
         let rank = self.columns.iter().map(Vec::len).max().unwrap_or(0);
-        let mut x = vec![[0.0; SIDE_BY_SIDE]; rank];
+        let mut x = vec![[0.0; COLUMNS_PER_BLOCK]; rank];
         for (k, column) in self.columns.iter().enumerate() {
             for (row, entry) in x.iter_mut().zip(column) {
                 row[k] = *entry;
@@ -223,7 +219,7 @@ impl Kernel for BackSubstitution<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{IndependentColumns, ROUNDING, WORTH_THREADS, independent_columns, solved};
+    use super::{IndependentColumns, MIN_PRODUCTS_FOR_THREADS, ROUNDING_SHARE, independent_columns, solved};
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
@@ -235,7 +231,7 @@ mod tests {
             .map(|row| (row..rank).map(|k| if k == row { 9.0 } else { 0.1 * number(row, k) }).collect())
             .collect();
         let dependent: Vec<Vec<f64>> = (0..260).map(|c| (0..rank).map(|row| number(c, row)).collect()).collect();
-        assert!(dependent.len() * rank * rank / 2 > WORTH_THREADS);
+        assert!(dependent.len() * rank * rank / 2 > MIN_PRODUCTS_FOR_THREADS);
         let of = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| solved(&triangle, &dependent))
@@ -244,8 +240,8 @@ mod tests {
     }
 
     #[test]
-    fn a_dependent_column_spends_no_row() {
-        // Columns 2 and 4 depend on earlier ones; a textbook diagonal rule would lose column 3 or 5 here.
+    fn dependent_columns_use_no_row() {
+        // Columns 2 and 4 depend on earlier ones; the textbook rule would lose column 3 or 5 here.
         let a = DMatrix::from_fn(12, 4, |i, j| ((i * 7 + j * 5 + i * i * (j + 1)) % 11) as f64 - 5.0);
         let mut m = DMatrix::zeros(12, 6);
         for (to, from) in [(0, 0), (1, 1), (3, 2), (5, 3)] {
@@ -261,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_of_rounding_noise_is_no_direction() {
+    fn columns_of_rounding_noise_are_dependent() {
         let a = DMatrix::from_fn(8, 3, |i, j| {
             if j == 1 {
                 1e-13 * ((i * 5 % 7) as f64 - 3.0)
@@ -274,7 +270,7 @@ mod tests {
         assert!(split.strongest_dependent < 1e-12 && split.weakest_independent > 0.1);
     }
 
-    /// The split with the whole matrix in memory, every reflection over all rows and columns: the oracle.
+    /// Oracle: the split with the full matrix in memory, every reflection over all rows and columns.
     fn split_in_full(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
         let (rows, columns) = matrix.shape();
         let mut r = matrix.clone();
@@ -285,7 +281,7 @@ mod tests {
         for c in 0..columns {
             let row = independent.len();
             let rest = if row < rows { r.view((row, c), (rows - row, 1)).norm() } else { 0.0 };
-            let noise = norms[c] <= ROUNDING.max(tolerance * tolerance) * largest;
+            let noise = norms[c] <= ROUNDING_SHARE.max(tolerance * tolerance) * largest;
             let share = if noise { 0.0 } else { rest / norms[c] };
             if share <= tolerance {
                 strongest_dependent = strongest_dependent.max(share);
@@ -317,15 +313,15 @@ mod tests {
     }
 
     proptest! {
-        /// Results stand in files that are compared byte for byte, so leaving out zeros may not change the last bit.
+        /// Skipping zeros must not change any bit, because results in files are compared byte by byte.
         #[test]
-        fn zeros_left_out_change_no_bit(
+        fn skipped_zeros_change_no_bit(
             rows in 1..40_usize,
             columns in 1..90_usize,
             slope in 0.0..2.0_f64,
             values in prop::collection::vec(-3.0..3.0_f64, 64),
         ) {
-            // Stairs of some slope, with columns that are sums of the two before and columns with zeros inside.
+            // A staircase of some slope, with columns that are sums of the two before and columns with zeros inside.
             let mut matrix = DMatrix::from_fn(rows, columns, |i, j| {
                 let stair = (i as f64) <= slope * j as f64 + 2.0;
                 if stair && (i + j) % 7 > 0 { values[(i * i + 5 * i * j + 11 * j) % 64] } else { 0.0 }
@@ -339,7 +335,7 @@ mod tests {
 
         #[test]
         fn dependent_columns_are_rebuilt(values in prop::collection::vec(-3.0..3.0_f64, 60), mix in prop::collection::vec(-2..3_i32, 12)) {
-            // 6 independent random columns with 3 combinations appended, each of the first four.
+            // 6 independent random columns and 3 combinations of the first four.
             let base = DMatrix::from_column_slice(10, 6, &values);
             let mixing = DMatrix::from_fn(6, 3, |i, j| if i < 4 { f64::from(mix[4 * j + i]) } else { 0.0 });
             let mut all = base.clone().resize_horizontally(9, 0.0);

@@ -14,8 +14,8 @@ use dynident_model::{JointStep, Mat3, Model, Vec3};
 /// friction and drives. One entry per joint: Nm for revolute joints, N for prismatic ones.
 ///
 /// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section
-/// 5.3; over the model's inner frames ([`JointStep`]). Allocation-free. Bodies without a prior count as massless: see
-/// [`Model::bodies_without_prior`].
+/// 5.3; over the model's inner frames ([`JointStep`]). Allocation-free. Bodies without a prior are treated as
+/// massless: see [`Model::bodies_without_prior`].
 ///
 /// ```
 /// # use dynident_model::{Body, Joint, JointKind, JointLimits, InertialParameters, Link, Mat3, Model, Transform, Vec3};
@@ -28,13 +28,13 @@ use dynident_model::{JointStep, Mat3, Model, Vec3};
 /// #     vec![Body { links: vec![link("bob", Some(rod))] }]).unwrap();
 /// use dynident_dynamics::{Workspace, inverse_dynamics};
 /// let mut workspace = Workspace::new(&model);
-/// // A point mass of 2 kg held out at 0.5 m about +y: gravity pulls with m g l, the hinge holds against it.
+/// // A point mass of 2 kg at 0.5 m from a horizontal hinge: the torque is m g l.
 /// let tau = inverse_dynamics(&model, &mut workspace, &[0.0], &[0.0], &[0.0]);
 /// assert!((tau[0] + 2.0 * 9.81 * 0.5).abs() < 1e-12);
 /// ```
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another size.
+/// If a vector's length is not the number of joints, or for a workspace of another size.
 #[doc(alias("rnea", "newton-euler", "id"))]
 pub fn inverse_dynamics<'w>(
     model: &Model,
@@ -57,10 +57,10 @@ pub fn inverse_dynamics<'w>(
     vector
 }
 
-/// [`inverse_dynamics`] of every sample: `tau[joint * samples + sample]`, joint-major as the motion.
+/// [`inverse_dynamics`] of every sample: `tau[joint * samples + sample]`, joint-major like the motion.
 ///
 /// # Panics
-/// If an array's length is not joints × samples, or the workspace was made for another size.
+/// If an array's length is not joints × samples, or for a workspace of another size.
 #[doc(alias("rnea"))]
 pub fn inverse_dynamics_batch(
     model: &Model,
@@ -110,21 +110,21 @@ impl Kernel for Batch<'_> {
     }
 }
 
-/// From `q`, `dq`, `ddq` of the scratch to its `tau`.
+/// Computes `tau` of the scratch from its `q`, `dq`, `ddq`.
 #[inline(always)]
 pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     scratch.hinges.place(model.steps(), &scratch.q);
     newton_euler_placed(model, scratch);
 }
 
-/// The same with the hinges in place.
+/// As [`newton_euler`] with placed hinges.
 #[inline(always)]
 pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let base = (-model.gravity()).splat();
     newton_euler_of(model.steps(), model.steps(), base, scratch);
 }
 
-/// The same of a tree with bodies of its own, and the base's acceleration: minus gravity.
+/// As [`newton_euler_placed`] with given bodies and the acceleration of the base (minus gravity).
 #[inline(always)]
 pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
     steps: &[JointStep],
@@ -137,7 +137,7 @@ pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
     let (motions, wrenches) = (&mut scratch.motions[..joints], &mut scratch.wrenches[..joints]);
     outward_of((steps, bodies, base), hinges, motions, wrenches, &scratch.dq[..joints], &scratch.ddq[..joints]);
     let tau = &mut scratch.tau[..joints];
-    // What the body after this one asks of it, where it hangs on it: stays in registers.
+    // Wrench on the next body if it is a child of this one; stays in registers.
     let mut next = LinkWrench::ZERO;
     for index in (0..joints).rev() {
         let step = &steps[index];
@@ -168,7 +168,7 @@ pub(crate) fn newton_euler_of<T: Scalar, B: Bodies<T>>(
     }
 }
 
-/// Outward: motion of every body, and the wrench that it needs by itself.
+/// Outward recursion: motion of every body and the wrench that moves this body alone.
 #[inline(always)]
 pub(crate) fn outward<T: Scalar>(
     model: &Model,
@@ -182,7 +182,7 @@ pub(crate) fn outward<T: Scalar>(
     outward_of((model.steps(), model.steps(), base), hinges, motions, wrenches, dq, ddq);
 }
 
-/// The same of a tree with bodies of its own.
+/// As [`outward`] with given bodies.
 #[inline(always)]
 fn outward_of<T: Scalar, B: Bodies<T>>(
     (steps, bodies, base): (&[JointStep], B, Vec3<T>),
@@ -195,7 +195,7 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
     let joints = motions.len();
     let (steps, wrenches, dq, ddq) = (&steps[..joints], &mut wrenches[..joints], &dq[..joints], &ddq[..joints]);
     let base = LinkMotion { acceleration: base, ..LinkMotion::REST };
-    // Of the body before this one: along a chain it stays in registers.
+    // Motion of the previous body: along a chain it stays in registers.
     let mut motion = base;
     for index in 0..joints {
         let step = &steps[index];
@@ -223,8 +223,8 @@ fn outward_of<T: Scalar, B: Bodies<T>>(
     }
 }
 
-/// A body that turns about an axis at rest: motion from the acceleration against gravity in its frame, and the only
-/// part of its wrench that counts, the moment about the axis.
+/// A body that rotates about an axis at rest: its motion from the acceleration minus gravity in its frame, and the
+/// only relevant part of its wrench, the moment about the axis.
 #[inline(always)]
 fn about_resting_axis<T: Scalar>(
     bodies: impl Bodies<T>,
@@ -242,8 +242,8 @@ fn about_resting_axis<T: Scalar>(
     (motion, LinkWrench { force: Vec3::ZERO, moment: about(moment) })
 }
 
-/// One step outward, from angular velocity, angular acceleration and acceleration that arrive from the parent. A point
-/// `x` of a body has the acceleration `a + Γ x` with the spin `Γ = [α]× + [ω]× [ω]×`.
+/// One step outward, from angular velocity, angular acceleration and acceleration of the parent in this frame. A point
+/// `x` of a body has the acceleration `a + Γ x` with `Γ = [α]× + [ω]× [ω]×`.
 #[inline(always)]
 fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> LinkMotion<T> {
     let [mut omega, mut alpha, mut acceleration] = arriving;
@@ -267,8 +267,8 @@ fn moved<T: Scalar>(step: &JointStep, arriving: [Vec3<T>; 3], dq: T, ddq: T) -> 
     LinkMotion { omega, alpha, acceleration, spin }
 }
 
-/// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x is `Γ_z Σ_y - Γ_y Σ_z` and so on
-/// with the rows of Γ and of the second moment Σ. Differences of Γ's diagonal are sums, which do not wait for products.
+/// `f = m a + Γ h` and, about the frame's origin, `n = h × a + ∫ x × Γ x dm`, whose x entry is `Γ_z Σ_y - Γ_y Σ_z`
+/// (and so on) with the rows of Γ and Σ. Differences of Γ's diagonal are computed as sums that need no products.
 #[inline(always)]
 fn wrench<T: Scalar>(turns: bool, bodies: impl Bodies<T>, index: usize, motion: &LinkMotion<T>) -> LinkWrench<T> {
     let g = &motion.spin.0;
@@ -276,7 +276,7 @@ fn wrench<T: Scalar>(turns: bool, bodies: impl Bodies<T>, index: usize, motion: 
     let [hx, hy, hz] = bodies.first(index).0;
     let [xx, xy, xz, yy, yz, zz] = bodies.second(index);
     let (x, y, z) = (g[2][2] - g[1][1], g[0][0] - g[2][2], g[1][1] - g[0][0]);
-    // Turning bodies have neither mass nor first and second moment along the axis: see JointStep.
+    // Revolute bodies have no mass and no first and second moments along the axis: see JointStep.
     let mut f =
         Vec3([g[0][1].mul_add(hy, g[0][0] * hx), g[1][1].mul_add(hy, g[1][0] * hx), g[2][1].mul_add(hy, g[2][0] * hx)]);
     let mut n = Vec3([hy * az, -(hx * az), hx.mul_add(ay, -(hy * ax))]);

@@ -1,15 +1,15 @@
-//! Square matrices over the joints, of many samples: where their entries go.
+//! Square matrices over the joints for several samples.
 
 use crate::same_tree::{parents, same_tree};
 use crate::sample_lanes::put_lanes;
 use dynident_lanes::{AlignedBuffer, Lane};
 use dynident_model::Model;
 
-/// A square matrix over the joints for each of many samples, such as the mass matrix: entry by entry, every entry a row
-/// of samples that begins a cache line.
+/// A square matrix over the joints for each of several samples, for example the mass matrix: stored by entry; every
+/// entry is a row of samples that begins a cache line.
 ///
-/// Joints on different branches of a tree do not couple: their entries are zero whatever the motion (704 of 1024 on a
-/// humanoid of 32 joints). They are made zero once, when the array is made, and never written again.
+/// Entries of joints on different branches are always zero (704 of 1024 for a humanoid of 32 joints). They are zeroed
+/// once, when the array is created, and never written again.
 ///
 /// ```
 /// # use dynident_dynamics::{BatchWorkspace, JointMatrices, mass_matrices};
@@ -35,7 +35,7 @@ pub struct JointMatrices {
 }
 
 impl JointMatrices {
-    /// Matrices for robots with this model's tree, of no samples yet.
+    /// Creates matrices for robots with this model's tree, without samples.
     pub fn new(model: &Model) -> Self {
         Self {
             dof: model.dof(),
@@ -47,12 +47,12 @@ impl JointMatrices {
         }
     }
 
-    /// Joints of the robot: rows and columns.
+    /// Number of joints: rows and columns.
     pub fn dof(&self) -> usize {
         self.dof
     }
 
-    /// Samples that were written last.
+    /// Number of samples of the last computation.
     pub fn samples(&self) -> usize {
         self.samples
     }
@@ -60,17 +60,17 @@ impl JointMatrices {
     /// Entry `(row, column)` of every sample.
     ///
     /// # Panics
-    /// If row or column are not below [`dof`](Self::dof).
+    /// If row or column is not below [`dof`](Self::dof).
     pub fn entry(&self, row: usize, column: usize) -> &[f64] {
         assert!(row < self.dof && column < self.dof, "an entry has two joints");
         &self.values.as_slice()[(row * self.dof + column) * self.stride..][..self.samples]
     }
 
-    /// Where `samples` samples go. Memory is kept while the number stays; all of it is zero where nothing was written.
+    /// Destination for `samples` samples. Memory is reused for the same number; unwritten entries are zero.
     pub(crate) fn resize(&mut self, model: &Model, samples: usize) -> MatrixRows<'_> {
         let same = same_tree(&self.parents, model) && self.is_coupled == model.coupling().is_some();
         assert!(same && self.dof == model.dof(), "the matrices were made for a model with another tree");
-        // Whole lanes, and an odd number of cache lines: entries do not fall on the same few sets of a cache.
+        // Whole lanes, and an odd number of cache lines, so that entries do not map to the same cache sets.
         let stride = 8 * (samples.div_ceil(8) | 1);
         if stride != self.stride {
             self.stride = stride;
@@ -82,7 +82,7 @@ impl JointMatrices {
     }
 }
 
-/// Rows of samples, one for each entry: entry `k` of sample `s` stands at `out[k * stride + s]`.
+/// One row of samples per entry: entry `k` of sample `s` is at `out[k * stride + s]`.
 #[derive(Debug)]
 pub(crate) struct MatrixRows<'a> {
     pub(crate) out: &'a mut [f64],
@@ -90,7 +90,7 @@ pub(crate) struct MatrixRows<'a> {
 }
 
 impl MatrixRows<'_> {
-    /// Makes the entries of joints on different branches zero.
+    /// Zeroes the entries of joints on different branches.
     pub(crate) fn clear_across_branches(&mut self, model: &Model) {
         let joints = model.body_count();
         let steps = model.steps();
@@ -108,11 +108,10 @@ impl MatrixRows<'_> {
         }
     }
 
-    /// Writes the lanes that are samples `at..` of an entry; a type of one lane has one sample.
+    /// Writes the lanes, samples `at..`, of an entry; a type with one lane has one sample.
     #[inline(always)]
     pub(crate) fn put<T: Lane>(&mut self, entry: usize, at: usize, value: T) {
         if T::LANES == 1 {
-            // One sample: a plain matrix.
             self.out[entry] = value.lane(0);
             return;
         }

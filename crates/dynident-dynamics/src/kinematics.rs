@@ -1,4 +1,4 @@
-//! Forward kinematics: where every body stands.
+//! Forward kinematics: poses of the bodies.
 
 use crate::workspace::Workspace;
 use dynident_model::{Model, Transform};
@@ -6,7 +6,7 @@ use dynident_model::{Model, Transform};
 /// `base_from_body` of every body at position `q`: rotation, and the origin of the body's frame in metres.
 ///
 /// # Panics
-/// If `q` has not one entry per joint, or the workspace was made for another size.
+/// If `q` does not have one entry per joint, or for a workspace of another size.
 #[doc(alias("forward kinematics", "fk"))]
 pub fn body_placements<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [Transform] {
     workspace.check(model, &[q]);

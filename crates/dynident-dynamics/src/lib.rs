@@ -1,25 +1,24 @@
-//! **What torque does a motion need, and which parameters can torque tell?** Rigid-body algorithms, the torque
-//! regressor and base parameters.
+//! **Rigid-body dynamics**: inverse and forward dynamics, torque regressor and base parameters.
 //!
-//! Free functions named after the quantity, over an immutable [`Model`](dynident_model::Model) and a per-thread
-//! [`Workspace`]. They allocate nothing once the workspace exists. Each algorithm is written once over a small scalar
-//! trait and runs on one sample, on lanes of samples, and on dual numbers (the tests' oracle).
+//! Free functions named after the quantity, with an immutable [`Model`](dynident_model::Model) and a per-thread
+//! [`Workspace`]. They do not allocate once the workspace exists. Each algorithm is written once over a scalar trait
+//! and runs on one sample, on lanes of samples, and on dual numbers (the oracle of the tests).
 //!
 //! | quantity | function | algorithm |
 //! | --- | --- | --- |
-//! | joint torques of a motion | [`inverse_dynamics()`]; of many samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
+//! | joint torques of a motion | [`inverse_dynamics()`]; several samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
-//! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`]; of many samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
-//! | Coriolis matrix, `Ṁ = C + Cᵀ` | [`coriolis_matrix`]; of many samples: [`coriolis_matrices`] | analytic, in one frame |
+//! | mass matrix | [`mass_matrix()`]; with bias torque: [`mass_matrix_and_bias`]; several samples: [`mass_matrix_batch`], [`mass_matrices`] | composite bodies (CRBA) |
+//! | Coriolis matrix, `Ṁ = C + Cᵀ` | [`coriolis_matrix`]; several samples: [`coriolis_matrices`] | analytic, in one frame |
 //! | torque of gravity, its derivative, energies | [`gravity_torque`], [`gravity_torque_derivative`], [`kinetic_energy`], [`potential_energy`] | |
-//! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
-//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; of many samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
-//! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, by `M = LᵀL` along the tree |
-//! | where the bodies are | [`body_placements`] | forward kinematics |
+//! | torques and mass matrix over a custom scalar | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
+//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`]; several samples: [`inverse_dynamics_derivatives_batch`], [`inverse_dynamics_derivative_matrices`] | analytic, in one frame |
+//! | derivatives of the acceleration by q, q̇, τ | [`forward_dynamics_derivatives`] | from those of the torque, with `M = LᵀL` along the tree |
+//! | poses of the bodies | [`body_placements`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
-//! | regressor of chosen columns, many samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |
+//! | regressor of selected columns, several samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |
 //! | base parameters | [`BaseParameters`]; cross-check: [`numerical_rank`] | from the robot's structure |
-//! | **all of it for identification** | [`ParametricModel`] | robot, torque terms, base parameters, layout, nominal values |
+//! | **complete model for identification** | [`ParametricModel`] | robot, torque terms, base parameters, layout, nominal values |
 //!
 //! ```
 //! use dynident_dynamics::{Workspace, forward_dynamics, inverse_dynamics, mass_matrix};

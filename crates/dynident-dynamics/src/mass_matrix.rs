@@ -17,7 +17,7 @@ use dynident_model::{JointStep, Model, Vec3};
 /// frames ([`JointStep`](dynident_model::JointStep)). Allocation-free.
 ///
 /// # Panics
-/// If `q` has not one entry per joint, or the workspace was made for another tree.
+/// If `q` does not have one entry per joint, or for a workspace of another tree.
 #[doc(alias("crba", "inertia matrix", "joint-space inertia"))]
 pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
     workspace.check(model, &[q]);
@@ -34,13 +34,14 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
     &matrices[0]
 }
 
-/// [`mass_matrix`] of every sample, from positions that are joint-major: entry `(i, k)` of sample `s` stands at
-/// `out[(i * dof + k) * samples + s]`.
+/// [`mass_matrix`] of every sample, from joint-major positions: entry `(i, k)` of sample `s` is at `out[(i * dof + k)
+/// * samples + s]`.
 ///
-/// Allocation-free, but for robots whose joints follow others at the first block of a size.
+/// Allocation-free, except for robots with coupled joints at the first block of a size.
 ///
-/// # Panics If `q` has not joints × samples or `out` not joints × joints × samples numbers, or the workspace was made
-/// for another tree.
+/// # Panics
+/// If `q` does not have joints × samples or `out` not joints × joints × samples values, or for a workspace of another
+/// tree.
 #[doc(alias("crba"))]
 pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64], samples: usize, out: &mut [f64]) {
     workspace.check(model, samples, &[q]);
@@ -53,12 +54,12 @@ pub fn mass_matrix_batch(model: &Model, workspace: &mut BatchWorkspace, q: &[f64
     fill(model, workspace, q, samples, out);
 }
 
-/// [`mass_matrix`] of every sample, into an array that keeps the zeros of a tree: as fast as may be.
+/// [`mass_matrix`] of every sample, into an array that keeps the zeros of a tree. Fastest form.
 ///
-/// Allocation-free once `out` has grown to the number of samples, but for robots whose joints follow others.
+/// Allocation-free once `out` has grown to the number of samples, except for robots with coupled joints.
 ///
 /// # Panics
-/// If `q` has not joints × samples numbers, or workspace or matrices were made for another tree.
+/// If `q` does not have joints × samples values, or for a workspace or matrices of another tree.
 #[doc(alias("crba"))]
 pub fn mass_matrices(
     model: &Model,
@@ -72,7 +73,7 @@ pub fn mass_matrices(
     fill(model, workspace, q, samples, out.resize(model, samples));
 }
 
-/// Writes the entries of all pairs of joints that couple.
+/// Writes the entries of all pairs of coupled joints.
 fn fill(model: &Model, workspace: &mut BatchWorkspace, q: &[f64], samples: usize, mut out: MatrixRows<'_>) {
     let BatchWorkspace { level, scratch, tree, .. } = workspace;
     if let Some(coupling) = model.coupling() {
@@ -130,7 +131,7 @@ impl Kernel for Batch<'_> {
     }
 }
 
-/// From placed hinges to the matrix of one sample. Entries of joints on different branches are never written.
+/// Matrix of one sample from placed hinges. Entries of joints on different branches are never written.
 #[inline(always)]
 pub(crate) fn matrix_of_sample<T: Lane>(
     model: &Model,
@@ -150,12 +151,12 @@ pub(crate) fn matrix_of_sample<T: Lane>(
     }
 }
 
-/// From placed hinges to samples `at..` of `out`; lanes are samples.
+/// Samples `at..` of `out` from placed hinges; lanes are samples.
 ///
-/// What hangs on a joint is one rigid body: first moment `h`, second moment Σ about the origin of the joint's frame.
-/// Along (about) z it needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`, the joint's column; carried inward, its part
-/// along (about) the axis of every joint on the way is an entry of the matrix. A column goes all the way to the base in
-/// registers, and so do moments along a chain.
+/// A joint's subtree is one rigid body with first moment `h` and second moment Σ about the origin of the joint's
+/// frame. Unit acceleration along (about) z needs the wrench `f = z × h`, `n = (tr(Σ) 1 - Σ) z`, the joint's column.
+/// Its projection on the axis of every ancestor joint is an entry of the matrix. Columns, and moments along a chain,
+/// stay in registers.
 #[inline(always)]
 pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
     steps: &[JointStep],
@@ -204,7 +205,7 @@ pub(crate) fn composite_rigid_bodies<T: Lane, B: Bodies<T>>(
     }
 }
 
-/// The same for one sample, to the rows of `columns`: columns travel together, several in a bundle.
+/// As [`composite_rigid_bodies`] for one sample, into the rows of `columns`, with several columns per bundle.
 #[inline(always)]
 fn composite_rigid_bodies_in_bundles<T: Lane>(
     model: &Model,

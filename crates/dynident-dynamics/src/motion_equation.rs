@@ -1,4 +1,4 @@
-//! Both sides of the equation of motion at once, for simulation.
+//! Mass matrix and bias of the equation of motion, for simulation.
 
 use crate::inverse_dynamics::newton_euler_placed;
 use crate::mass_matrix::matrix_of_sample;
@@ -11,11 +11,11 @@ use dynident_model::Model;
 /// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias =
 /// τ`.
 ///
-/// The same numbers as [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics())
-/// without acceleration, with the transforms of the joints made once. Allocation-free.
+/// The same values as [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics()) with
+/// zero acceleration, with the joint transforms computed once. Allocation-free.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another tree.
+/// If a vector's length is not the number of joints, or for a workspace of another tree.
 #[doc(alias("nonlinear effects", "coriolis", "nle"))]
 pub fn mass_matrix_and_bias<'w>(
     model: &Model,

@@ -1,12 +1,12 @@
-//! The algorithms over a scalar of the caller's own: dual numbers, intervals, symbols of a program to be written.
+//! The algorithms over a custom scalar: dual numbers, intervals, symbols for code generation.
 
 use crate::body_frames::{composite_rigid_bodies, newton_euler};
 use crate::workspace::CoreScratch;
 use dynident_lanes::Scalar;
 use dynident_model::Model;
 
-/// [`inverse_dynamics`](crate::inverse_dynamics()) over any [`Scalar`]: `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid
-/// bodies, one entry per joint. Allocates its scratch, so it is not for control loops.
+/// [`inverse_dynamics`](crate::inverse_dynamics()) over any [`Scalar`]: `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the
+/// rigid bodies, one entry per joint. Allocates its scratch, so it is not suitable for control loops.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints.
@@ -31,7 +31,7 @@ pub fn inverse_dynamics_over<T: Scalar>(model: &Model, q: &[T], dq: &[T], ddq: &
 /// [`mass_matrix`](crate::mass_matrix()) over any [`Scalar`]: `M(q)`, row-major, dof × dof. Allocates its scratch.
 ///
 /// # Panics
-/// If `q` has not one entry per joint.
+/// If `q` does not have one entry per joint.
 pub fn mass_matrix_over<T: Scalar>(model: &Model, q: &[T]) -> Vec<T> {
     let mut scratch = CoreScratch::new(model.body_count());
     let Some(coupling) = model.coupling() else {

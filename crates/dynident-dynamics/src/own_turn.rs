@@ -1,6 +1,6 @@
-//! From frame to frame over one joint in the bodies' own frames: what [`crate::hinge`] is for inner frames. A joint
-//! about an axis of its frame that stands along an axis of the parent's turns two entries of a vector and passes the
-//! third on: five products in place of nine.
+//! Change of frame over one joint in the bodies' own frames, like [`crate::hinge`] for inner frames. If the joint axis
+//! is an axis of both its frame and the parent's, the rotation changes two entries of a vector and copies the third:
+//! five products instead of nine.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{JointMap, Mat3, Vec3};
@@ -9,22 +9,22 @@ use dynident_model::{JointMap, Mat3, Vec3};
 pub(crate) trait OwnTurn<T: Scalar>: Copy {
     /// `Rᵀ v`.
     fn down(self, v: Vec3<T>) -> Vec3<T>;
-    /// What a turn about the axis at the rate `dq` and acceleration `ddq` adds to angular velocity and acceleration.
+    /// Adds a rotation about the axis at rate `dq` and acceleration `ddq` to angular velocity and acceleration.
     fn rates(self, omega: Vec3<T>, alpha: Vec3<T>, dq: T, ddq: T) -> (Vec3<T>, Vec3<T>);
 }
 
-/// A joint that leaves axis `PARENT` of the parent's frame on axis `CHILD` of its own.
+/// A joint whose axis is axis `PARENT` of the parent's frame and axis `CHILD` of its own.
 #[derive(Clone, Copy)]
 pub(crate) struct Along<T, const PARENT: usize, const CHILD: usize> {
-    /// The other two rows and columns.
+    /// Entries of the other two rows and columns.
     pub(crate) block: [[T; 2]; 2],
-    /// One or minus one.
+    /// Plus or minus one.
     pub(crate) across: T,
-    /// The axis along `CHILD`: one or minus one.
+    /// Direction of the axis along `CHILD`: plus or minus one.
     pub(crate) axis: T,
 }
 
-/// The two axes besides one, in order.
+/// The two other axes, in order.
 const fn others(axis: usize) -> [usize; 2] {
     [(axis == 0) as usize, 2 - (axis == 2) as usize]
 }
@@ -33,7 +33,6 @@ impl<T: Scalar, const PARENT: usize, const CHILD: usize> Along<T, PARENT, CHILD>
     const ROWS: [usize; 2] = others(PARENT);
     const COLUMNS: [usize; 2] = others(CHILD);
 
-    /// From the joint's numbers at a position.
     #[inline(always)]
     pub(crate) fn new(map: &JointMap, sine: T, cosine: T) -> Self {
         let ([a, b], [c, d]) = (Self::ROWS, Self::COLUMNS);
@@ -51,7 +50,6 @@ impl<T: Scalar, const PARENT: usize, const CHILD: usize> Along<T, PARENT, CHILD>
 }
 
 impl<T: Lane, const PARENT: usize, const CHILD: usize> Along<T, PARENT, CHILD> {
-    /// The same for bundles.
     #[inline(always)]
     pub(crate) fn bundled(self) -> Along<T::Bundle, PARENT, CHILD> {
         let [[a, b], [c, d]] = self.block;
@@ -76,7 +74,7 @@ impl<T: Scalar, const PARENT: usize, const CHILD: usize> OwnTurn<T> for Along<T,
     #[inline(always)]
     fn rates(self, omega: Vec3<T>, alpha: Vec3<T>, dq: T, ddq: T) -> (Vec3<T>, Vec3<T>) {
         let rate = self.axis * dq;
-        // ω × axis q̇, entry by entry of the two others in cyclic order.
+        // ω × axis q̇, entry by entry in cyclic order.
         let (next, last) = ((CHILD + 1) % 3, (CHILD + 2) % 3);
         let (mut omega, mut alpha) = (omega, alpha);
         alpha.0[next] = omega.0[last].mul_add(rate, alpha.0[next]);
@@ -87,23 +85,21 @@ impl<T: Scalar, const PARENT: usize, const CHILD: usize> OwnTurn<T> for Along<T,
     }
 }
 
-/// Any rotation about any axis.
 #[derive(Clone, Copy)]
-pub(crate) struct Anyhow<T> {
+pub(crate) struct GeneralTurn<T> {
     pub(crate) rotation: Mat3<T>,
     pub(crate) axis: Vec3<T>,
 }
 
-impl<T: Lane> Anyhow<T> {
-    /// The same for bundles.
+impl<T: Lane> GeneralTurn<T> {
     #[inline(always)]
-    pub(crate) fn bundled(self) -> Anyhow<T::Bundle> {
+    pub(crate) fn bundled(self) -> GeneralTurn<T::Bundle> {
         let [a, b, c] = self.rotation.0;
-        Anyhow { rotation: Mat3([bundles(a), bundles(b), bundles(c)]), axis: Vec3(bundles(self.axis.0)) }
+        GeneralTurn { rotation: Mat3([bundles(a), bundles(b), bundles(c)]), axis: Vec3(bundles(self.axis.0)) }
     }
 }
 
-impl<T: Scalar> OwnTurn<T> for Anyhow<T> {
+impl<T: Scalar> OwnTurn<T> for GeneralTurn<T> {
     #[inline(always)]
     fn down(self, v: Vec3<T>) -> Vec3<T> {
         self.rotation.transpose_mul_vec(v)
@@ -120,7 +116,7 @@ pub(crate) fn bundles<T: Lane>(values: [T; 3]) -> [T::Bundle; 3] {
     [values[0].bundle(), values[1].bundle(), values[2].bundle()]
 }
 
-/// Runs `$body` with the turn of one joint as `$turn`: compiled once for each pair of axes.
+/// Runs `$body` with the rotation of one joint as `$turn`: compiled once for each pair of axes.
 macro_rules! with_own_turn {
     ($map:expr, $q:expr, $sine:expr, $cosine:expr, |$turn:ident| $body:expr) => {
         with_own_turn!(
@@ -136,7 +132,7 @@ macro_rules! with_own_turn {
             })*
             _ => {
                 let rotation = $crate::workspace::joint_transform($map, $q, $sine, $cosine).rotation;
-                let $turn = $crate::own_turn::Anyhow { rotation, axis: $map.axis.splat() };
+                let $turn = $crate::own_turn::GeneralTurn { rotation, axis: $map.axis.splat() };
                 $body
             }
         }

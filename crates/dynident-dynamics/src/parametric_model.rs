@@ -1,4 +1,4 @@
-//! The one noun of identification: a robot as a function of its parameters.
+//! A robot as a function of its parameters.
 
 use crate::base_parameters::{BaseParameterSettings, BaseParameters, DeclaredFault, fault};
 use crate::regressor_panels::{Column, PanelLayout};
@@ -6,28 +6,28 @@ use dynident_model::terms::{Coupling, Declared, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, Model};
 use thiserror::Error;
 
-/// Why a parametric model could not be put together.
+/// Errors of [`ParametricModel`].
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ParametricModelError {
-    /// A torque term of a joint that is not there.
-    #[error("torque term {term} acts on a joint that the model of {joints} joints does not have")]
+    /// A torque term acts on a joint that does not exist.
+    #[error("torque term {term}: the joint does not exist (the model has {joints} joints)")]
     NoSuchJoint {
         /// The term's symbol.
         term: String,
         /// Joints of the model.
         joints: usize,
     },
-    /// A coupling whose ratios no drive has, so that their product could leave the range of numbers.
-    #[error("coupling {term}: ratio {ratio}: give ratios of 1e-6 to 1e6 in size")]
+    /// The ratios of a coupling are out of range.
+    #[error("coupling {term}: ratio {ratio} is out of range: use magnitudes from 1e-6 to 1e6")]
     Ratio {
         /// The term's symbol.
         term: String,
         /// The ratio.
         ratio: f64,
     },
-    /// A declared torque of an expression that follows joints which the model does not have.
-    #[error("torque {term} follows joint number {joint}, and the model has {joints}")]
+    /// A declared torque depends on a joint that does not exist.
+    #[error("torque {term}: joint number {joint} does not exist (the model has {joints} joints)")]
     FollowsNoJoint {
         /// The term's symbol.
         term: String,
@@ -36,56 +36,56 @@ pub enum ParametricModelError {
         /// Joints of the model.
         joints: usize,
     },
-    /// A declared torque without a value inside the joints' limits.
+    /// A declared torque is undefined at some state within the joint limits.
     #[error(
-        "torque {term} = {law}: no value at {at}, which is inside the joints' limits: keep roots, logarithms and divisions from what they do not take with max(.., 0) or the like, or narrow the limits"
+        "torque {term} = {law}: no value at {at}, which is inside the joints' limits: keep the arguments of roots, logarithms and divisions valid, for example with max(.., 0), or narrow the limits"
     )]
     Undefined {
         /// The term's symbol.
         term: String,
-        /// What it follows.
+        /// Its expression.
         law: String,
         /// Positions and velocities.
         at: String,
     },
-    /// A declared torque that is no torque.
-    #[error("torque {term} = {law}: it is zero (below 1e-9) wherever the joints may go: leave it out")]
+    /// A declared torque is zero everywhere.
+    #[error("torque {term} = {law}: it is zero (below 1e-9) within the joint limits: remove it")]
     Nothing {
         /// The term's symbol.
         term: String,
-        /// What it follows.
+        /// Its expression.
         law: String,
     },
-    /// A declared torque with a name that is none, or that another parameter has.
+    /// The name of a declared torque is invalid or already in use.
     #[error(
-        "torque {term}: the name stands among the parameters' symbols: give it one of its own, a letter and then letters, digits and `_`, at most 60"
+        "torque {term}: the name stands among the parameters' symbols: use a unique name, a letter and then letters, digits and `_`, at most 60"
     )]
     Symbol {
         /// The name.
         term: String,
     },
-    /// Nominal values of another number than there are parameters.
-    #[error("parameters of the prior: {found} entries where {expected} are needed")]
+    /// Wrong number of nominal values.
+    #[error("wrong number of nominal parameters: expected {expected}, found {found}")]
     NominalLength {
-        /// Ten for each body and one for each term.
+        /// Ten per body and one per term.
         expected: usize,
-        /// How many there are.
+        /// Number given.
         found: usize,
     },
-    /// A nominal value that is no number.
-    #[error("prior = {value}: give finite numbers")]
+    /// A nominal value is not finite.
+    #[error("nominal parameter {value} is not finite: use finite numbers")]
     NominalNotFinite {
         /// The value.
         value: f64,
     },
 }
 
-/// A model with torque terms beside its rigid bodies (friction, drives, offsets), its base parameters, the layout of
-/// its regressor, and the nominal values of all parameters.
+/// A model with its torque terms (friction, drives, offsets), base parameters, regressor layout, and nominal values of
+/// all parameters.
 ///
-/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`, with `π` ten inertial parameters for
-/// each body (base to tip) and one value for each term, and `θ = B π` the base parameters ([`BaseParameters`]). Made
-/// once for a robot and used by everything that needs rows, values or symbols.
+/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`: `π` contains ten inertial parameters
+/// per body (base to tip) and one value per term, `θ = B π` are the base parameters ([`BaseParameters`]). Create it
+/// once per robot; everything that needs rows, values or symbols uses it.
 ///
 /// ```
 /// use dynident_dynamics::ParametricModel;
@@ -97,7 +97,7 @@ pub enum ParametricModelError {
 /// let friction = terms_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 /// let pendulum = ParametricModel::new(model, friction)?;
 /// assert_eq!(pendulum.base().expressions(), ["mx1", "mz1", "Iyy1", "fv1"]);
-/// // The first moment of the rod, 2 kg half a metre below its hinge.
+/// // The first moment of the rod: 2 kg, half a metre below its hinge.
 /// assert_eq!(pendulum.nominal_base().unwrap()[1], -1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -113,12 +113,12 @@ pub struct ParametricModel {
 }
 
 impl ParametricModel {
-    /// The parametric model of a robot. Nominal values are those of its description: inertial parameters, viscous and
-    /// Coulomb friction where it has them, zero for all other terms.
+    /// Creates the parametric model of a robot. Nominal values come from the robot description: inertial parameters,
+    /// viscous and Coulomb friction if given, zero for all other terms.
     ///
     /// # Errors
-    /// A term of a joint that the model does not have; a declared torque whose name is taken, that is zero everywhere,
-    /// or that has no value inside the joints' limits.
+    /// A term of a joint that does not exist; a declared torque whose name is in use, that is zero everywhere or
+    /// undefined within the joint limits.
     pub fn new(model: Model, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
         if let Some(term) = terms.iter().find(|term| term.joints().iter().any(|&joint| joint >= model.dof())) {
             return Err(ParametricModelError::NoSuchJoint { term: term.symbol(), joints: model.dof() });
@@ -138,10 +138,10 @@ impl ParametricModel {
         Ok(Self { model, terms, base, layout, nominal, nominal_base })
     }
 
-    /// The same with other nominal values: ten for each body, then one for each term.
+    /// Replaces the nominal values: ten per body, then one per term.
     ///
     /// # Errors
-    /// Another number of values than there are parameters, or values that are not finite.
+    /// Wrong number of values, or values that are not finite.
     pub fn with_nominal(mut self, nominal: Vec<f64>) -> Result<Self, ParametricModelError> {
         let expected = 10 * self.model.body_count() + self.terms.len();
         if nominal.len() != expected {
@@ -155,8 +155,8 @@ impl ParametricModel {
         Ok(self)
     }
 
-    /// The same robot with other torque terms. Nominal values of bodies and of terms that stay are kept; those of new
-    /// terms are the description's.
+    /// The same robot with other torque terms. Keeps the nominal values of bodies and remaining terms; those of new
+    /// terms come from the robot description.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -173,8 +173,8 @@ impl ParametricModel {
         Ok(other)
     }
 
-    /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set
-    /// of rows for choosing among them. Base parameters and terms stay as they are.
+    /// Adds terms after the base columns of the layout, even if they depend on these: one set of rows for term
+    /// selection. Base parameters and terms do not change.
     #[must_use]
     pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut columns = self.base.base_columns();
@@ -192,7 +192,7 @@ impl ParametricModel {
         &self.model
     }
 
-    /// Torque terms beside the rigid bodies, in the order of their parameters.
+    /// Torque terms in addition to the rigid bodies, in the order of their parameters.
     pub fn terms(&self) -> &[TorqueTerm] {
         &self.terms
     }
@@ -202,18 +202,17 @@ impl ParametricModel {
         &self.base
     }
 
-    /// Regressor blocks of the joints, of the base columns.
+    /// Regressor blocks of the joints, for the base columns.
     pub fn layout(&self) -> &PanelLayout {
         &self.layout
     }
 
-    /// Nominal values of all parameters: ten for each body (zeros where the description has none), then one for each
-    /// term.
+    /// Nominal values of all parameters: ten per body (zeros if the robot description has none), then one per term.
     pub fn nominal(&self) -> &[f64] {
         &self.nominal
     }
 
-    /// Nominal values of the layout's columns; `None` while a moving body's inertial parameters are unknown.
+    /// Nominal values of the layout's columns; `None` if the inertial parameters of a moving body are unknown.
     pub fn nominal_base(&self) -> Option<&[f64]> {
         self.nominal_base.as_deref()
     }
@@ -229,7 +228,7 @@ impl ParametricModel {
     }
 }
 
-/// That declared torques have names of their own, and values wherever the joints may go.
+/// Checks that declared torques have unique names and values within the joint limits.
 fn check_declared(model: &Model, terms: &[TorqueTerm]) -> Result<(), ParametricModelError> {
     for (place, term) in terms.iter().enumerate() {
         let TorqueTerm::Declared(declared) = term else { continue };
@@ -262,7 +261,7 @@ fn check_declared(model: &Model, terms: &[TorqueTerm]) -> Result<(), ParametricM
     Ok(())
 }
 
-/// All parameters by the description: inertials, and what it says of damping and friction.
+/// All parameters from the robot description: inertials, damping and friction.
 fn described(model: &Model, terms: &[TorqueTerm]) -> Vec<f64> {
     let mut parameters = model.parameter_vector();
     parameters.extend(terms.iter().map(|term| term.described(model).unwrap_or(0.0)));

@@ -1,10 +1,10 @@
 //! The torque regressor of the bodies: joint torques as a linear function of the inertial parameters.
 //!
-//! Row `j`, block of body `i` (a body that joint `j` moves): virtual work of the body's wrench on the joint's axis,
-//! `Y_ji = e_jᵀ N_i + l_jᵀ F_i`, where `(e_j, l_j)` is the axis as a twist at the frame of body `i` and `N_i`, `F_i` (3
-//! × 10) are moment and force of the body as functions of its ten parameters. Axes travel outward from frame to frame
-//! with the bodies (Atkeson, An and Hollerbach 1986 in the form of Featherstone's spatial vectors), so a serial arm
-//! costs one small rotation and one 6 × 10 product per pair.
+//! Row `j`, block of body `i` (a body moved by joint `j`): power of the body's wrench on the joint's axis, `Y_ji =
+//! e_jᵀ N_i + l_jᵀ F_i`, where `(e_j, l_j)` is the axis as a twist at the frame of body `i` and `N_i`, `F_i` (3 × 10)
+//! are moment and force of the body as functions of its ten parameters. Axes are transformed outward from frame to
+//! frame with the bodies (Atkeson, An and Hollerbach 1986 in the form of Featherstone's spatial vectors), so a serial
+//! arm costs one small rotation and one 6 × 10 product per pair.
 
 use crate::hinge::{minus_cross_shift, times_shift};
 use crate::own_turn::{OwnTurn, bundles, with_own_turn};
@@ -22,7 +22,7 @@ use dynident_model::{Mat3, Model, Vec3};
 /// Allocation-free.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another tree.
+/// If a vector's length is not the number of joints, or for a workspace of another tree.
 #[doc(alias("joint torque regressor", "observation matrix", "idm"))]
 pub fn torque_regressor<'w>(
     model: &Model,
@@ -38,7 +38,7 @@ pub fn torque_regressor<'w>(
         tree.take_motion(coupling, q, dq, ddq);
         let TreeScratch { q, dq, ddq, regressor: out, .. } = tree;
         dispatch_single(*level, Single { model, scratch, q, dq, ddq, out });
-        // A row is ten numbers a body long: as many samples of one joint, as the coupling sees it.
+        // A row is treated like samples of one joint: ten values per body.
         regressor.fill(0.0);
         coupling.add_projected(&tree.regressor, 10 * model.body_count(), regressor);
     } else {
@@ -64,20 +64,20 @@ impl Kernel for Single<'_> {
         take(&mut scratch.core.q, self.q);
         take(&mut scratch.core.dq, self.dq);
         take(&mut scratch.core.ddq, self.ddq);
-        // Entries of joints that do not move a body are never written; they stay the zeros of the new workspace.
+        // Entries of joints that do not move a body are never written and remain zero.
         let mut sink = DenseRows { columns: 10 * self.model.body_count(), out: self.out };
         regressor_blocks(self.model, &mut scratch.core, &mut scratch.axes, &mut sink);
     }
 }
 
-/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be determined to be
-/// inlined into the code of each processor level.
+/// Destination of the regressor blocks. A trait instead of a closure, because only methods are reliably inlined into
+/// the code of each processor level.
 pub(crate) trait BlockSink<T: Lane> {
-    /// Before the entries of body `body`.
+    /// Called before the entries of body `body`.
     #[inline(always)]
     fn begin(&mut self, _body: usize) {}
 
-    /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.
+    /// Receives the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint per lane group.
     fn put(&mut self, body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>);
 }
 
@@ -91,12 +91,12 @@ impl<T: Lane> BlockSink<T> for DenseRows<'_> {
     fn put(&mut self, body: usize, path: &[u32], bundle: usize, work: &impl Entries<T::Bundle>) {
         let joints = &path[bundle * T::PER_BUNDLE..];
         if T::PER_BUNDLE == 4 {
-            // Rows of four: two, and two that overlap.
+            // Ten entries as three overlapping groups of four.
             let first = T::Bundle::transposed([work.of::<0>(), work.of::<1>(), work.of::<2>(), work.of::<3>()]);
             let (w6, w7) = (work.of::<6>(), work.of::<7>());
             let middle = T::Bundle::transposed([work.of::<4>(), work.of::<5>(), w6, w7]);
             let last = T::Bundle::transposed([w6, w7, work.of::<8>(), work.of::<9>()]);
-            // Written out, because a loop would first put all of them into memory.
+            // Unrolled, because a loop would first write all of them to memory.
             macro_rules! rows {
                 ($($place:literal)*) => {
                     $(if let Some(&joint) = joints.get($place) {
@@ -124,7 +124,7 @@ impl<T: Lane> BlockSink<T> for DenseRows<'_> {
     }
 }
 
-/// Runs over all bodies and bundles of axes, and hands the ten entries of each to `sink`.
+/// Computes the ten entries of all bodies and bundles of axes and passes them to `sink`.
 #[inline(always)]
 pub(crate) fn regressor_blocks<T: Lane>(
     model: &Model,
@@ -139,7 +139,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
     let (q, dq, ddq) = (&core.q[..joints], &core.dq[..joints], &core.ddq[..joints]);
     let (sine, cosine) = (&core.sine[..joints], &core.cosine[..joints]);
     let base = LinkMotion { acceleration: (-model.gravity()).splat(), ..LinkMotion::REST };
-    // Of the body before this one: along a chain it stays in registers.
+    // Motion of the previous body: along a chain it stays in registers.
     let mut motion = base;
     for index in 0..joints {
         let (map, step) = (&maps[index], &steps[index]);
@@ -156,7 +156,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
         };
         let origin = times_shift(map.shift, translation, &motion.spin, motion.acceleration);
         let bundled_translation = Vec3(bundles(translation.0));
-        // Axes of the bodies before this one, its parent among them, and its own.
+        // Axes of earlier bodies, including the parent, and of this body.
         let (angular, own_angular) = axes.angular.split_at_mut(start);
         let (linear, own_linear) = axes.linear.split_at_mut(start);
         let above = angular[inherited.clone()].iter().zip(&linear[inherited]);
@@ -184,7 +184,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
         if step.branches {
             motions[index] = motion;
         }
-        // The joint's own axis takes the last place of the path.
+        // The joint's own axis is the last one of the path.
         let (bundle, place) = ((path.len() - 1) / T::PER_BUNDLE, (path.len() - 1) % T::PER_BUNDLE);
         if place == 0 {
             axes.angular[start + bundle] = Vec3::ZERO;
@@ -198,7 +198,7 @@ pub(crate) fn regressor_blocks<T: Lane>(
         sink.begin(index);
         let mut rest = axes.bundle_start[index + 1] - start;
         if T::PER_BUNDLE == 1 && map.turns {
-            // The joint's own axis goes through the frame's origin: no linear part.
+            // The joint's own axis passes through the frame's origin: no linear part.
             rest -= 1;
             macro_rules! along {
                 ($child:literal) => {
@@ -228,8 +228,8 @@ fn spin<T: Scalar>(omega: Vec3<T>, alpha: Vec3<T>) -> Mat3<T> {
     Mat3([[-(yy + zz), xy - az, xz + ay], [xy + az, -(xx + zz), yz - ax], [xz - ay, yz + ax, -(xx + yy)]])
 }
 
-/// A body's wrench as a function of its ten parameters, at one motion, by as few numbers as hold it: in a batch they
-/// stay in registers from joint to joint.
+/// A body's wrench as a function of its ten parameters at one motion, in the fewest values, so that they stay in
+/// registers for all joints of a batch.
 struct WrenchBasis<B> {
     /// Acceleration of the origin minus gravity: the force of a unit mass.
     acceleration: Vec3<B>,
@@ -247,7 +247,7 @@ impl<B: Lane> WrenchBasis<B> {
     fn new<T: Lane<Bundle = B>>(motion: &LinkMotion<T>) -> Self {
         let LinkMotion { omega, alpha, acceleration, spin } = motion;
         let [wx, wy, wz] = omega.0;
-        // The same products as in the spin: they are taken once.
+        // Products shared with the spin.
         let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
         Self {
             acceleration: Vec3(bundles(acceleration.0)),
@@ -285,18 +285,18 @@ impl<B: Lane> WrenchBasis<B> {
     }
 }
 
-/// The work of a body's wrench on a twist, parameter by parameter.
+/// Power of a body's wrench on a twist, by parameter.
 pub(crate) trait Entries<B> {
-    /// The work that one unit of parameter `PARAMETER` does.
+    /// Power per unit of parameter `PARAMETER`.
     fn of<const PARAMETER: usize>(&self) -> B;
 }
 
-/// Of any twist.
+/// For any twist.
 struct Work<'a, B> {
     wrench: &'a WrenchBasis<B>,
     angular: Vec3<B>,
     linear: Vec3<B>,
-    /// h contributes force (α× + ω×ω×) h and moment h × a: e·(h × a) = h·(a × e), and this is a × e.
+    /// h contributes the force (α× + ω×ω×) h and the moment h × a: e·(h × a) = h·(a × e); this is a × e.
     turned: Vec3<B>,
 }
 
@@ -318,7 +318,7 @@ impl<B: Lane> Entries<B> for Work<'_, B> {
                 let addend = force[0][k].mul_add(linear[0], turned[k]);
                 force[2][k].mul_add(linear[2], force[1][k].mul_add(linear[1], addend))
             }
-            // The rows of `moment` times the axis, with signs where they cost nothing.
+            // The rows of `moment` times the axis, with signs folded in.
             _ => {
                 let ([x, y, z], WrenchBasis { alpha, spin: Mat3(g), products: p, squares, .. }) = (angular.0, *wrench);
                 match PARAMETER {
@@ -334,10 +334,10 @@ impl<B: Lane> Entries<B> for Work<'_, B> {
     }
 }
 
-/// Of a turn about axis `AXIS` of the body's frame.
+/// For a rotation about axis `AXIS` of the body's frame.
 struct OwnWork<'a, B, const AXIS: usize> {
     wrench: &'a WrenchBasis<B>,
-    /// One or minus one.
+    /// Plus or minus one.
     axis: B,
 }
 

@@ -1,11 +1,11 @@
-//! The reverse sweep of the torque regressor: from derivatives of a cost by every regressor entry to its derivatives by
-//! the motion.
+//! Reverse sweep of the torque regressor: derivatives of a cost by the motion from its derivatives by every regressor
+//! entry.
 //!
-//! With `V` the cost's derivatives by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i +
-//! l_jᵀ F_i` for each body `i` and each joint `j` that moves it (see `regressor.rs`). Backwards through that: every
-//! pair gives its share to the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`; shares then travel inward from
-//! frame to frame, and what each joint's turning or sliding changes on the way is the derivative by its position.
-//! One sweep gives all derivatives, at about twice the cost of the regressor.
+//! With the derivatives `V` by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i + l_jᵀ
+//! F_i` for each body `i` and each joint `j` that moves it (see `regressor.rs`). In reverse, every pair contributes to
+//! the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`. The contributions are then transformed inward from
+//! frame to frame; the changes by each joint's motion give the derivative by its position. One sweep gives all
+//! derivatives at about twice the cost of the regressor.
 
 use crate::body_frames::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
@@ -17,7 +17,7 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 
-/// Derivatives of a cost by a block's motion, joint-major as the motion.
+/// Derivatives of a cost by the motion of a block, joint-major.
 #[derive(Debug)]
 pub struct MotionGradient<'a> {
     /// By the positions.
@@ -28,15 +28,15 @@ pub struct MotionGradient<'a> {
     pub by_ddq: &'a mut [f64],
 }
 
-/// Adds to `gradient` the derivatives of a cost by the motion, given its derivatives by every regressor entry:
-/// `adjoint` holds them in the shape that [`regressor_panels`](crate::regressor_panels()) fills (its torque columns are
-/// not read). Exact; terms included.
+/// Adds the derivatives of a cost by the motion to `gradient`. `adjoint` contains the derivatives by every regressor
+/// entry in the shape of [`regressor_panels`](crate::regressor_panels()) (torque columns are not read). Exact;
+/// includes terms.
 ///
 /// Allocation-free.
 ///
 /// # Panics
-/// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to a
-/// model with another tree.
+/// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to
+/// another tree.
 pub fn regressor_panels_adjoint(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -129,7 +129,7 @@ fn add_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
     }
 }
 
-/// Where the cost's derivatives by the regressor stand.
+/// Derivatives of the cost by the regressor.
 struct Source<'a> {
     layout: &'a PanelLayout,
     adjoint: &'a Panels,
@@ -137,8 +137,8 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Derivatives by the ten entries of body `body` in the row of the `k`-th joint on its path; zero for columns that
-    /// the layout leaves out and for lanes past the end.
+    /// Derivatives by the ten entries of body `body` in the row of the `k`-th joint on its path; zero for columns
+    /// outside the layout and for lanes past the end.
     #[inline(always)]
     fn block<T: Lane>(&self, body: usize, k: usize, joint: usize) -> [T; 10] {
         let samples = self.adjoint.samples();
@@ -164,7 +164,7 @@ impl Source<'_> {
     }
 }
 
-/// From `q`, `dq`, `ddq` of the core scratch and the source to the derivatives in `adjoint.joints`.
+/// Computes the derivatives in `adjoint.joints` from `q`, `dq`, `ddq` of the core scratch and the source.
 #[inline(always)]
 fn reverse_sweep<T: Lane>(
     model: &Model,
@@ -198,7 +198,7 @@ fn reverse_sweep<T: Lane>(
                 &mut share,
             );
         }
-        // Inward: what the joint's motion turns, and what its rates add.
+        // Inward: contributions of the joint's position and rates.
         let axis = map.axis.splat::<T>();
         let rate = axis.scale(core.dq[index]);
         let Transform { rotation, translation } = &body.parent_from_body;
@@ -258,7 +258,7 @@ fn reverse_sweep<T: Lane>(
     }
 }
 
-/// The axes of the joints on the path to each body, angular and linear, in the body's frame.
+/// Axes of the joints on the path to each body, angular and linear, in the body's frame.
 #[inline(always)]
 fn place_axes<T: Lane>(
     maps: &[JointMap],
@@ -285,8 +285,8 @@ fn place_axes<T: Lane>(
     }
 }
 
-/// One body and one axis: with the weights as a body's ten parameters, the axis gets their wrench, and the body's
-/// motion gets what the wrench's work on the axis varies by.
+/// One body and one axis: with the weights as the body's ten parameters, the axis receives their wrench, and the
+/// body's motion the derivative of the wrench's power on the axis.
 #[inline(always)]
 fn pair_share<T: Scalar>(
     weights: &[T; 10],
@@ -319,8 +319,8 @@ mod tests {
     use dynident_model::InertialParameters;
     use dynident_model::sample::{Random, random_tree};
 
-    /// The cost `Σ V_j · Y_j` of one sample is `Σ τ_j` with the weights of row `j` as inertial parameters: dual numbers
-    /// through the inverse dynamics are the oracle.
+    /// Oracle: the cost `Σ V_j · Y_j` of one sample is `Σ τ_j` with the weights of row `j` as inertial parameters,
+    /// differentiated by dual numbers through the inverse dynamics.
     fn oracle(model: &Model, weights: &[Vec<f64>], state: [&[f64]; 3], which: usize, variable: usize) -> f64 {
         let mut scratch = CoreScratch::<Dual>::new(model.dof());
         let mut sum = 0.0;
@@ -390,7 +390,7 @@ mod tests {
                         for variable in 0..dof {
                             let expected = oracle(&model, &weights, [&state[0], &state[1], &state[2]], which, variable);
                             let found = gradient[which][variable * samples + s];
-                            // The issue asks for 1e-9; rounding of some thousand products of order ten stays far below.
+                            // Required: 1e-9; rounding of several thousand products of order ten is far smaller.
                             assert!(
                                 (found - expected).abs() <= 1e-11 * (1.0 + expected.abs().max(100.0)),
                                 "seed {seed}, {}, derivative {which} of joint {variable}: {found} against {expected}",

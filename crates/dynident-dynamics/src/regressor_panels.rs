@@ -1,7 +1,7 @@
-//! The regressor of blocks of samples, joint by joint: what the triangular factors take in.
+//! The regressor of blocks of samples by joint, as input of the triangular factors.
 //!
-//! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its
-//! own narrow panel: columns after one another, each with one value per sample. The whole regressor is never stored.
+//! A joint's row has entries only for the bodies that it moves and for its terms, so each joint has a separate, narrow
+//! panel: one column after the other, with one value per sample. The full regressor is never stored.
 
 use crate::regressor::{BlockSink, Entries, regressor_blocks, torque_regressor};
 use crate::same_tree::{parents, same_tree};
@@ -20,7 +20,7 @@ pub enum Column {
     Body {
         /// The body.
         body: usize,
-        /// Which of its ten parameters.
+        /// Index of the parameter, 0 to 9.
         parameter: usize,
     },
     /// The parameter of a term.
@@ -28,7 +28,7 @@ pub enum Column {
 }
 
 impl Column {
-    /// The parameter's symbol with the body's or joint's number from 1: `m2`, `mx2`, `Izz1`, `fv3`.
+    /// Symbol of the parameter with the body's or joint's number from 1: `m2`, `mx2`, `Izz1`, `fv3`.
     pub fn symbol(&self) -> String {
         match self {
             Self::Body { body, parameter } => format!("{}{}", INERTIAL_NAMES[*parameter], body + 1),
@@ -54,35 +54,32 @@ pub fn all_columns(model: &Model, terms: &[TorqueTerm]) -> Vec<Column> {
     bodies.chain(terms.iter().cloned().map(Column::Term)).collect()
 }
 
-/// Which columns every joint's panel has, and where.
+/// Columns of every joint's panel, and their positions.
 #[derive(Clone, Debug)]
 pub struct PanelLayout {
     columns: Vec<Column>,
     joints: Vec<JointPanel>,
-    /// For each body, bit `k` says whether the layout has its parameter `k`.
+    /// For each body, bit `k` is set if the layout has its parameter `k`.
     parameters: Vec<u16>,
-    /// For each body, each joint on its path: the place of the body's first column in that joint's panel. Its others
-    /// follow.
+    /// For each body and each joint on its path: position of the body's first column in that joint's panel.
     places: Vec<usize>,
-    /// Where each body's places start.
+    /// Start of each body's entries in `places`.
     place_start: Vec<usize>,
-    /// Parents of the bodies it was made for.
     parents: Vec<Option<usize>>,
-    /// Where joints follow others.
     coupled: Option<Box<CoupledPanels>>,
 }
 
-/// The panels of robots whose joints follow others: those of the joints of the tree, and what each adds to which column
-/// of which degree of freedom.
+/// Panels for robots with coupled joints: panels of the joints of the tree, and their contributions to the columns of
+/// the degrees of freedom.
 #[derive(Clone, Debug)]
 struct CoupledPanels {
     coupling: JointCoupling,
-    /// Of the joints of the tree: the bodies' columns.
+    /// Bodies' columns of the joints of the tree.
     tree: PanelLayout,
     shares: Vec<ColumnShare>,
 }
 
-/// A column in the panel of a joint of the tree, as part of one in the panel of a degree of freedom.
+/// Contribution of a column in the panel of a tree joint to a column in the panel of a degree of freedom.
 #[derive(Clone, Copy, Debug)]
 struct ColumnShare {
     tree_joint: usize,
@@ -94,18 +91,16 @@ struct ColumnShare {
 
 #[derive(Clone, Debug, Default)]
 struct JointPanel {
-    /// Global column of every panel column.
     columns: Vec<usize>,
-    /// The terms among them: place in the panel, and index into the global columns.
+    /// Terms: place in the panel, and index of the global column.
     terms: Vec<(usize, usize)>,
 }
 
 impl PanelLayout {
-    /// The layout for the given columns (any subset of [`all_columns`], in its order).
+    /// Creates the layout for the given columns (a subset of [`all_columns`], in its order).
     ///
     /// # Panics
-    /// If a column names a body or joint that the model does not have, or the bodies' columns are not in ascending
-    /// order.
+    /// If a column refers to a body or joint that does not exist, or the bodies' columns are not in ascending order.
     pub fn new(model: &Model, columns: Vec<Column>) -> Self {
         let Some(coupling) = model.coupling() else { return Self::of_tree(model, columns) };
         let is_body = |column: &&Column| matches!(column, Column::Body { .. });
@@ -144,7 +139,7 @@ impl PanelLayout {
         Self { columns, joints, parameters: Vec::new(), places: Vec::new(), place_start: Vec::new(), parents, coupled }
     }
 
-    /// The layout of the joints of the tree, as if each moved by itself.
+    /// Layout of the joints of the tree without couplings.
     fn of_tree(model: &Model, columns: Vec<Column>) -> Self {
         let count = model.body_count();
         let mut joints = vec![JointPanel::default(); count];
@@ -159,8 +154,7 @@ impl PanelLayout {
         for (global, column) in columns.iter().enumerate() {
             match column {
                 Column::Body { body, parameter } => {
-                    // A body's columns then stand together in every panel, and the hot loop needs to know only where
-                    // they begin.
+                    // Columns of a body are consecutive in every panel, so the hot loop needs only the first one.
                     assert!(last < Some((*body, *parameter)), "the columns of bodies ascend");
                     last = Some((*body, *parameter));
                     for (k, &joint) in paths[*body].iter().enumerate() {
@@ -204,7 +198,7 @@ impl PanelLayout {
         assert!(coupling == model.coupling(), "the panel layout was made for a model whose joints follow others");
     }
 
-    /// Takes panels of the joints of the tree together into those of the degrees of freedom, `Y = Gᵀ Y_tree`.
+    /// Combines the panels of the tree joints into those of the degrees of freedom, `Y = Gᵀ Y_tree`.
     fn gather(&self, coupled: &CoupledPanels, tree: &Panels, panels: &mut Panels) {
         let samples = panels.samples;
         for (joint, panel) in self.joints.iter().enumerate() {
@@ -219,9 +213,8 @@ impl PanelLayout {
         }
     }
 
-    /// The layout of the joints of the tree and, in `room`, the derivatives of a cost by the entries of their panels
-    /// from those by the entries of the degrees of freedom: the adjoint of gathering. `None` where all joints move by
-    /// themselves.
+    /// Layout of the tree joints and, in `room`, the derivatives of a cost by their panel entries from those of the
+    /// degrees of freedom (the adjoint of [`gather`](Self::gather)). `None` without coupled joints.
     pub(crate) fn scattered<'l>(&'l self, panels: &Panels, room: &mut Panels) -> Option<&'l PanelLayout> {
         let coupled = self.coupled.as_ref()?;
         let samples = panels.samples;
@@ -240,16 +233,16 @@ impl PanelLayout {
         Some(&coupled.tree)
     }
 
-    /// Which of the ten parameters of `body` have columns, as bits, and where these begin in the panel of the `k`-th
-    /// joint on the way to it; they follow one another.
+    /// Bits of the parameters of `body` with columns, and the position of the first of these consecutive columns in
+    /// the panel of the `k`-th joint on its path.
     #[inline(always)]
     pub(crate) fn body_columns(&self, body: usize, k: usize) -> (u16, usize) {
         (self.parameters[body], self.places[self.place_start[body] + k])
     }
 }
 
-/// The panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one
-/// column after the other; the last one is for the joint's torque and is left as it was.
+/// Panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one after
+/// the other; the last one is for the joint's torque and is not written here.
 #[derive(Debug, Default)]
 pub struct Panels {
     samples: usize,
@@ -257,17 +250,15 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// Panels that use memory from before.
     pub(crate) fn in_buffers(joints: Vec<AlignedBuffer>) -> Self {
         Self { samples: 0, joints }
     }
 
-    /// The memory, for later panels.
     pub(crate) fn into_buffers(self) -> Vec<AlignedBuffer> {
         self.joints
     }
 
-    /// Makes room for `samples` samples of `layout`; memory is kept from block to block.
+    /// Resizes for `samples` samples of `layout`; memory is reused from block to block.
     pub fn resize(&mut self, layout: &PanelLayout, samples: usize) {
         self.samples = samples;
         self.joints.resize_with(layout.dof(), AlignedBuffer::new);
@@ -300,12 +291,12 @@ impl Panels {
 }
 
 /// Fills the regressor columns of all panels from the motion of a block of samples (joint-major). The torque columns
-/// are left alone.
+/// do not change.
 ///
 /// Allocation-free once `panels` has grown to the block's size.
 ///
 /// # Panics
-/// If an array's length is not joints × samples, or layout or workspace belong to a model with another tree.
+/// If an array's length is not joints × samples, or layout or workspace belong to another tree.
 #[doc(alias("regressor", "observation matrix"))]
 pub fn regressor_panels(
     model: &Model,
@@ -317,12 +308,11 @@ pub fn regressor_panels(
     regressor_panels_following(model, workspace, layout, motion, &mut TermHistory::default(), panels);
 }
 
-/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: terms with memory go
-/// on where `history` left them, load-dependent ones know their load, and others their temperature.
-///
+/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: `history` provides
+/// the memory of terms, the load of load-dependent terms, and temperatures.
 /// # Panics
-/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the
-/// layout's columns. Temperatures of another number than joints × samples count as none.
+/// As [`regressor_panels`](regressor_panels()), or if the number of load parameters differs from the number of columns.
+/// Temperatures are ignored unless there are joints × samples of them.
 pub fn regressor_panels_following(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -350,8 +340,8 @@ pub fn regressor_panels_following(
     fill_terms(layout, motion, history, panels);
 }
 
-/// Fills nothing but the columns of terms, as [`regressor_panels_following`] does; those of bodies are left as they
-/// were. Load-dependent terms need the load that bodies' columns make, and have columns of zeros here.
+/// Fills the columns of terms only, like [`regressor_panels_following`]; those of bodies do not change. Load-dependent
+/// terms need the bodies' columns and are zero here.
 ///
 /// # Panics
 /// If an array's length is not joints × samples.
@@ -369,8 +359,8 @@ pub fn term_panels_following(
     history.load_parameters = load_parameters;
 }
 
-/// [`regressor_panels_following`] for one sample at a time: the same panels to rounding, in less than half the time
-/// that a block of one sample takes.
+/// [`regressor_panels_following`] for a single sample: equal to rounding, in less than half the time of a block of one
+/// sample.
 ///
 /// # Panics
 /// As [`regressor_panels_following`], or if the motion has more than one sample.
@@ -397,7 +387,7 @@ pub fn regressor_panels_of_sample(
     fill_terms(layout, motion, history, panels);
 }
 
-/// Fills the columns of terms; those of bodies are there.
+/// Fills the columns of terms; those of bodies must be filled before.
 fn fill_terms(layout: &PanelLayout, motion: &JointMotion<'_>, history: &mut TermHistory, panels: &mut Panels) {
     let samples = motion.samples;
     if history.temperature_c.len() != layout.dof() * samples {
@@ -424,7 +414,7 @@ fn fill_terms(layout: &PanelLayout, motion: &JointMotion<'_>, history: &mut Term
     }
 }
 
-/// The torque that the bodies ask of one joint.
+/// Torque of the bodies on one joint.
 fn load_of(
     columns: &[Column],
     panel: &JointPanel,
@@ -461,7 +451,7 @@ impl Kernel for Fill<'_> {
         let scratch = scratch.of::<T>();
         let samples = motion.samples;
         for group in (0..samples).step_by(T::LANES) {
-            // The last group of a block reaches back over samples that are done: they come out the same again, and all
+            // The last group of a block is shifted back over finished samples, which get the same values, so that all
             // groups are full.
             let at = group.min(samples.saturating_sub(T::LANES));
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
@@ -477,7 +467,7 @@ struct IntoPanels<'a> {
     layout: &'a PanelLayout,
     panels: &'a mut Panels,
     at: usize,
-    /// Which parameters of the body have columns, and where these begin in the panels of the joints on the way to it.
+    /// Bits of the body's parameters with columns, and the first columns in the panels of the joints on its path.
     present: u16,
     places: &'a [usize],
 }
@@ -496,8 +486,7 @@ impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
         let present = self.present;
         let start = self.places[bundle] * samples + self.at;
         let mut rest = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
-        // Written out, because a loop over the entries would first put all of them into memory. Behind the last column
-        // stands that of the torque.
+        // Unrolled, because a loop would first write all entries to memory. The torque column follows the last column.
         macro_rules! store {
             ($($parameter:literal)*) => {
                 if samples >= T::LANES {

@@ -1,8 +1,8 @@
-//! Samples into lanes, and back.
+//! Copies between samples and lanes.
 
 use dynident_lanes::Lane;
 
-/// Takes one joint vector into scratch scalars.
+/// Copies one joint vector into scratch scalars.
 #[inline(always)]
 pub(crate) fn take<T: Lane>(to: &mut [T], from: &[f64]) {
     for (to, from) in to.iter_mut().zip(from) {
@@ -10,7 +10,7 @@ pub(crate) fn take<T: Lane>(to: &mut [T], from: &[f64]) {
     }
 }
 
-/// Takes samples `at..at + LANES` of a joint-major array into scratch lanes; past the end the last sample repeats.
+/// Copies samples `at..at + LANES` of a joint-major array into scratch lanes; past the end the last sample repeats.
 #[inline(always)]
 pub(crate) fn take_lanes<T: Lane>(to: &mut [T], from: &[f64], samples: usize, at: usize) {
     if at + T::LANES <= samples {
@@ -29,7 +29,7 @@ pub(crate) fn take_lanes<T: Lane>(to: &mut [T], from: &[f64], samples: usize, at
     }
 }
 
-/// Writes the lanes that are samples `at..` of a row, and drops those past its end.
+/// Writes lanes to samples `at..` of a row; lanes past its end are dropped.
 #[inline(always)]
 pub(crate) fn put_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
     if at + T::LANES <= row.len() {

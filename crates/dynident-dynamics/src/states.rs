@@ -1,10 +1,9 @@
-//! What each algorithm keeps for each body while it runs: plain numbers, no rules. The rules are in the algorithms' own
-//! files.
+//! State of each body during the algorithms, as plain data.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
-/// What one body needs while an algorithm over scalars `T` runs.
+/// State of one body during an algorithm over scalars `T`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BodyState<T> {
     /// `parent_from_body` at the current position.
@@ -15,9 +14,9 @@ pub(crate) struct BodyState<T> {
     pub(crate) alpha: Vec3<T>,
     /// Acceleration of the body frame's origin minus gravity, body frame.
     pub(crate) acceleration: Vec3<T>,
-    /// Force on the body (with everything that hangs on it), body frame.
+    /// Force on the body and its subtree, body frame.
     pub(crate) force: Vec3<T>,
-    /// Moment on the body about its frame's origin, body frame.
+    /// Moment on the body and its subtree about its frame's origin, body frame.
     pub(crate) moment: Vec3<T>,
 }
 
@@ -32,12 +31,12 @@ impl<T: Scalar> BodyState<T> {
     };
 }
 
-/// How a body moves, in its inner frame ([`dynident_model::JointStep`]).
+/// Motion of a body in its inner frame ([`dynident_model::JointStep`]).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinkMotion<T> {
     pub(crate) omega: Vec3<T>,
     pub(crate) alpha: Vec3<T>,
-    /// Of the frame's origin, minus gravity.
+    /// Acceleration of the frame's origin minus gravity.
     pub(crate) acceleration: Vec3<T>,
     /// `[α]× + [ω]× [ω]×`.
     pub(crate) spin: Mat3<T>,
@@ -48,7 +47,7 @@ impl<T: Scalar> LinkMotion<T> {
         Self { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO, spin: Mat3::ZERO };
 }
 
-/// Wrench on a body (with everything that hangs on it), in its inner frame.
+/// Wrench on a body and its subtree, in its inner frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinkWrench<T> {
     pub(crate) force: Vec3<T>,
@@ -60,8 +59,8 @@ impl<T: Scalar> LinkWrench<T> {
     pub(crate) const ZERO: Self = Self { force: Vec3::ZERO, moment: Vec3::ZERO };
 }
 
-/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ
-/// α + mass a`; and what its joint needs of it.
+/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force =
+/// couplingᵀ α + mass a`; with the data for its joint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArticulatedInertia<T> {
     /// Symmetric; upper triangle by rows.
@@ -86,14 +85,14 @@ impl<T: Scalar> ArticulatedInertia<T> {
     };
 }
 
-/// The axes of all joints on the way to each body, as twists at the body's frame, several to a bundle.
+/// Axes of all joints on the path to each body, as twists at the body's frame, several per bundle.
 #[derive(Debug)]
 pub(crate) struct AxisScratch<T: Lane> {
     /// Joints from the base to each body, body after body.
     pub(crate) path: Vec<u32>,
-    /// Where each body's path starts in `path`; one more than there are bodies.
+    /// Start of each body's path in `path`, plus the end.
     pub(crate) path_start: Vec<usize>,
-    /// Where each body's bundles start.
+    /// Start of each body's bundles.
     pub(crate) bundle_start: Vec<usize>,
     pub(crate) angular: Vec<Vec3<T::Bundle>>,
     pub(crate) linear: Vec<Vec3<T::Bundle>>,
@@ -113,14 +112,12 @@ impl<T: Lane> AxisScratch<T> {
     }
 }
 
-/// Scratch of the reverse sweep.
 #[derive(Debug)]
 pub(crate) struct AdjointScratch<T> {
     pub(crate) path: Vec<u32>,
     pub(crate) path_start: Vec<usize>,
-    /// Axes of the joints on the way to each body, as twists at the body's frame: angular, linear.
+    /// Axes of the joints on the path to each body, as twists at the body's frame: angular, linear.
     pub(crate) axes: Vec<(Vec3<T>, Vec3<T>)>,
-    /// The cost's derivatives by them.
     pub(crate) by_axes: Vec<(Vec3<T>, Vec3<T>)>,
     pub(crate) by_motion: Vec<BodyAdjoint<T>>,
     pub(crate) joints: Vec<JointAdjoint<T>>,

@@ -1,13 +1,12 @@
-//! Robots whose joints follow others: the algorithms run over the joints of the tree, and this is where motions arrive
-//! from the degrees of freedom and results wait to go back, by `q_tree = G q + q_0` and `tau = Gᵀ tau_tree`
-//! ([`JointCoupling`]). Empty, and passed by, for all other robots.
+//! Scratch for robots with coupled joints. The algorithms run over the joints of the tree: motions are converted from
+//! the degrees of freedom by `q_tree = G q + q_0` and results back by `tau = Gᵀ tau_tree` ([`JointCoupling`]). Empty
+//! and unused for other robots.
 
 use crate::joint_matrices::MatrixRows;
 use dynident_lanes::AlignedBuffer;
 use dynident_model::terms::JointMotion;
 use dynident_model::{JointCoupling, Model};
 
-/// For one sample.
 #[derive(Debug)]
 pub(crate) struct TreeScratch {
     pub(crate) q: Vec<f64>,
@@ -16,7 +15,7 @@ pub(crate) struct TreeScratch {
     pub(crate) tau: Vec<f64>,
     /// Square matrices over the joints of the tree, row-major.
     pub(crate) matrices: [Vec<f64>; 3],
-    /// Rows of the joints of the tree, ten columns for each body.
+    /// Regressor rows of the joints of the tree, ten columns per body.
     pub(crate) regressor: Vec<f64>,
 }
 
@@ -34,13 +33,11 @@ impl TreeScratch {
         }
     }
 
-    /// The positions of the joints of the tree.
     pub(crate) fn positions(&mut self, coupling: &JointCoupling, q: &[f64]) -> &[f64] {
         coupling.positions(q, 1, &mut self.q);
         &self.q
     }
 
-    /// Takes one sample of a motion in.
     pub(crate) fn take_motion(&mut self, coupling: &JointCoupling, q: &[f64], dq: &[f64], ddq: &[f64]) {
         coupling.positions(q, 1, &mut self.q);
         coupling.rates(dq, 1, &mut self.dq);
@@ -48,20 +45,19 @@ impl TreeScratch {
     }
 }
 
-/// For blocks of samples; grows to their size and keeps it.
+/// Scratch for blocks of samples; grows to their size.
 #[derive(Debug, Default)]
 pub(crate) struct TreeBatch {
     /// Positions, velocities, accelerations.
     pub(crate) motion: [Vec<f64>; 3],
-    /// Torques; or derivatives by the motion.
+    /// Torques, or derivatives by the motion.
     pub(crate) results: [Vec<f64>; 3],
-    /// Square matrices over the joints of the tree, entry by entry.
+    /// Square matrices over the joints of the tree, by entry.
     pub(crate) matrices: [Vec<f64>; 3],
-    /// One panel of the regressor for each joint of the tree.
     pub(crate) panels: Vec<AlignedBuffer>,
 }
 
-/// The motion of the joints of the tree, in `room`.
+/// Motion of the joints of the tree, stored in `room`.
 pub(crate) fn expanded<'r>(
     coupling: &JointCoupling,
     motion: &JointMotion<'_>,
@@ -81,7 +77,7 @@ pub(crate) fn expanded<'r>(
     JointMotion { samples, q, dq, ddq }
 }
 
-/// `Gᵀ A G` of the matrices of `samples` samples, entry by entry as [`crate::mass_matrix_batch`] has them.
+/// `Gᵀ A G` of the matrices of `samples` samples, by entry as in [`crate::mass_matrix_batch`].
 pub(crate) fn project_matrices(coupling: &JointCoupling, tree: &[f64], samples: usize, to: &mut MatrixRows<'_>) {
     let (joints, dof) = (coupling.joints(), coupling.dof());
     let MatrixRows { out, stride } = to;

@@ -1,12 +1,12 @@
-//! A body in the base's frame with all that derivatives by the joints' motion ask of it.
+//! A body in the base frame with the quantities for derivatives by the joint motion.
 
 use crate::ground::{MassMoments, MomentRates, Spatial};
 use crate::hinge::{Hinge, PlacedHinges, with_hinge};
 use dynident_lanes::Scalar;
 use dynident_model::{JointStep, Transform, Vec3};
 
-/// What the derivatives of the inverse dynamics need of a body, all in the base's frame. Inertia and wrench are the
-/// body's own at first, then those of everything that moves with it.
+/// State of a body for the derivatives of the inverse dynamics, in the base frame. Moments, rates and wrench are first
+/// those of the body, then those of its subtree.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VariedBody<T> {
     /// `base_from_body`.
@@ -16,7 +16,7 @@ pub(crate) struct VariedBody<T> {
     pub(crate) acceleration: Spatial<T>,
     /// The joint's axis `S` as a twist.
     pub(crate) axis: Spatial<T>,
-    /// `2 Ψ̇ = 2 v × S`: how the axis moves.
+    /// `2 Ψ̇ = 2 v × S`: twice the rate of the axis.
     pub(crate) twice_rate: Spatial<T>,
     /// `Ψ̈ = a × S + v × Ψ̇`, with velocity and acceleration of the parent.
     pub(crate) second_rate: Spatial<T>,
@@ -38,8 +38,8 @@ impl<T: Scalar> VariedBody<T> {
         wrench: Spatial::ZERO,
     };
 
-    /// Takes a place behind `parent` by the joint of `step`, at number `index` of the hinges, and its axis and own
-    /// inertia there.
+    /// Computes placement, axis and inertia from those of `parent` and the joint of `step`, number `index` of the
+    /// hinges.
     #[inline(always)]
     pub(crate) fn follow(&mut self, parent: &Self, step: &JointStep, index: usize, hinges: &PlacedHinges<'_, T>) {
         let above = &parent.placement;
@@ -51,11 +51,11 @@ impl<T: Scalar> VariedBody<T> {
         self.moments = MassMoments::of(step, &self.placement);
     }
 
-    /// Takes its velocity behind `parent`, its joint moving at `dq`, and what changes with it; returns how the axis
-    /// moves, `Ψ̇ = v × S`.
+    /// Computes the velocity from that of `parent` and the joint velocity `dq`, with dependent quantities; returns the
+    /// rate of the axis, `Ψ̇ = v × S`.
     #[inline(always)]
     pub(crate) fn move_along(&mut self, parent: &Self, dq: T) -> Spatial<T> {
-        // The parent's velocity and the body's own move the axis alike: S × S = 0.
+        // The parent's velocity can be used, because S × S = 0.
         let rate = parent.velocity.cross(&self.axis);
         self.velocity = self.axis.scale_add(dq, &parent.velocity);
         self.twice_rate = Spatial { angular: rate.angular + rate.angular, linear: rate.linear + rate.linear };

@@ -12,19 +12,15 @@ use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 
-/// Scratch of all algorithms over one lane type.
 #[derive(Debug)]
 pub(crate) struct Scratch<T: Lane> {
     pub(crate) core: CoreScratch<T>,
-    /// Columns of the mass matrix, in bundles.
     pub(crate) columns: ColumnScratch<T>,
-    /// Ancestor axes of the torque regressor, in bundles.
     pub(crate) axes: AxisScratch<T>,
-    /// Of the regressor's reverse sweep.
     pub(crate) adjoint: AdjointScratch<T>,
 }
 
-/// The part of the scratch that every [`Scalar`], duals too, can use.
+/// Scratch for any [`Scalar`], including dual numbers.
 #[derive(Debug)]
 pub(crate) struct CoreScratch<T> {
     pub(crate) q: Vec<T>,
@@ -37,10 +33,10 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) composites: Vec<Composite<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia<T>>,
     pub(crate) hinges: Hinges<T>,
-    /// Of bodies on which others than the next one hang.
+    /// Motions of bodies with children other than the next body.
     pub(crate) motions: Vec<LinkMotion<T>>,
     pub(crate) wrenches: Vec<LinkWrench<T>>,
-    /// Of bodies on which others than the next one hang.
+    /// Moments of bodies with children other than the next body.
     pub(crate) moments: Vec<CompositeMoments<T>>,
     pub(crate) varied: Vec<VariedBody<T>>,
     /// Square matrix over the joints of the tree, row-major.
@@ -69,7 +65,7 @@ impl<T: Scalar> CoreScratch<T> {
         }
     }
 
-    /// Takes sines, cosines and all `parent_from_body` from the positions in `self.q`.
+    /// Computes sines, cosines and all `parent_from_body` from the positions in `self.q`.
     #[inline(always)]
     pub(crate) fn place(&mut self, maps: &[JointMap]) {
         T::sin_cos_all(&self.q, &mut self.sine, &mut self.cosine);
@@ -83,7 +79,7 @@ impl<T: Scalar> CoreScratch<T> {
 #[inline(always)]
 pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: T) -> Transform<T> {
     if map.turns {
-        // Loops and no closures: one that is not inlined is compiled without the lanes' instructions.
+        // Loops instead of closures: a closure that is not inlined is compiled without vector instructions.
         let mut rotation = [[T::ZERO; 3]; 3];
         for i in 0..3 {
             for j in 0..3 {
@@ -101,20 +97,20 @@ pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: 
     }
 }
 
-/// A scratch whose lane type was chosen at run time.
+/// A scratch whose lane type was selected at run time.
 pub(crate) struct AnyScratch(Box<dyn Any + Send + Sync>);
 
 impl AnyScratch {
-    /// The scratch of lane type `T`, which must be the type it was made for.
+    /// The scratch of lane type `T`, which must be the type of its creation.
     #[inline(always)]
     pub(crate) fn of<T: Lane>(&mut self) -> &mut Scratch<T> {
         self.0.downcast_mut().expect("a workspace keeps the processor level that it was made for")
     }
 }
 
-/// `struct Single`, the kernel of an algorithm for one sample: takes joint vectors into the scratch, runs the algorithm
-/// on it, and gives numbers of the scratch back. A macro, because only code that stands inside a [`Kernel`] is compiled
-/// for each processor level.
+/// Defines `struct Single`, the kernel of an algorithm for one sample: copies joint vectors into the scratch, runs the
+/// algorithm and copies the results. A macro, because only code inside a [`Kernel`] is compiled for each processor
+/// level.
 macro_rules! one_sample_kernel {
     (($($input:ident),*), $algorithm:ident, $($output:ident: $field:ident $([$index:literal])?),*) => {
         struct Single<'a> {
@@ -157,33 +153,30 @@ impl Kernel for MakeScratch<'_> {
 
 /// Scratch memory for one sample at a time. Every thread owns one; the [`Model`] is shared.
 ///
-/// Functions that take a workspace allocate nothing and return slices into it.
+/// Functions with a workspace do not allocate and return slices into it.
 pub struct Workspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
-    /// Parents of the bodies it was made for: the regressor's scratch follows the tree.
     pub(crate) parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
     pub(crate) vector: Vec<f64>,
-    /// Entries of joints on different branches are zero, and no algorithm writes them.
+    /// Entries of joints on different branches are zero; no algorithm writes them.
     pub(crate) matrices: [Vec<f64>; 3],
-    /// Derivatives of the forward dynamics, which have all entries.
     pub(crate) acceleration_derivatives: [Vec<f64>; 3],
     pub(crate) acceleration: Vec<f64>,
     pub(crate) regressor: Vec<f64>,
     pub(crate) placements: Vec<Transform>,
-    /// Where joints follow others.
     pub(crate) tree: TreeScratch,
 }
 
 impl Workspace {
-    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this
+    /// Creates a workspace for models of this size (for the torque regressor: of this tree), at the best level of this
     /// processor.
     pub fn new(model: &Model) -> Self {
         Self::with_level(model, Level::detect())
     }
 
-    /// A workspace at a chosen processor level.
+    /// Creates a workspace at a chosen processor level.
     pub fn with_level(model: &Model, level: Level) -> Self {
         let (dof, bodies) = (model.dof(), model.body_count());
         Self {
@@ -206,7 +199,6 @@ impl Workspace {
         self.level
     }
 
-    /// For algorithms whose scratch follows the tree.
     pub(crate) fn check_tree(&self, model: &Model) {
         assert!(same_tree(&self.parents, model), "the workspace was made for a model with another tree");
     }
@@ -232,24 +224,22 @@ pub struct BatchWorkspace {
     pub(crate) dof: usize,
     parents: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
-    /// Where joints follow others.
     pub(crate) tree: TreeBatch,
 }
 
 impl BatchWorkspace {
-    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this
+    /// Creates a workspace for models of this size (for the torque regressor: of this tree), at the best level of this
     /// processor.
     pub fn new(model: &Model) -> Self {
         Self::with_level(model, Level::detect())
     }
 
-    /// A workspace at a chosen processor level.
+    /// Creates a workspace at a chosen processor level.
     pub fn with_level(model: &Model, level: Level) -> Self {
         let scratch = dispatch(level, MakeScratch(model));
         Self { level, dof: model.dof(), parents: parents(model), scratch, tree: TreeBatch::default() }
     }
 
-    /// For algorithms whose scratch follows the tree.
     pub(crate) fn check_tree(&self, model: &Model) {
         assert!(same_tree(&self.parents, model), "the workspace was made for a model with another tree");
     }

@@ -1,4 +1,4 @@
-//! Functions that take a workspace allocate nothing after their first call: counted by a global allocator.
+//! Functions with a workspace do not allocate after their first call; a global allocator counts.
 
 #![allow(unsafe_code, reason = "a global allocator cannot be written without")]
 
@@ -19,13 +19,13 @@ use std::cell::Cell;
 use std::hint::black_box;
 
 thread_local! {
-    /// Requests of this thread alone: the test harness has threads of its own.
+    /// Allocations of this thread only, because the test harness has its own threads.
     static REQUESTS: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
 
-// Sound: every request goes to the system's allocator as it came.
+// Sound: every request is passed on to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
@@ -51,7 +51,6 @@ fn count() {
     REQUESTS.set(REQUESTS.get() + 1);
 }
 
-/// Memory requests of the second call.
 fn requests_when_warm(mut call: impl FnMut()) -> usize {
     call();
     let before = REQUESTS.get();
@@ -59,7 +58,7 @@ fn requests_when_warm(mut call: impl FnMut()) -> usize {
     REQUESTS.get() - before
 }
 
-/// Keeps the compiler from leaving out a call whose result nobody needs.
+/// Prevents the compiler from removing a call with an unused result.
 fn use_up<T>(value: T) {
     black_box(value);
 }

@@ -8,7 +8,7 @@ use dynident_estimation::{SegmentSettings, SegmentedFactor, TriangularFactor};
 use dynident_lanes::Level;
 use std::time::Instant;
 
-/// Columns that joints 1 to 7 of a Panda arm see.
+/// Number of columns of joints 1 to 7 of a Panda arm.
 const COLUMNS: [usize; 7] = [43, 42, 35, 28, 21, 14, 7];
 const SAMPLES: usize = 10_000;
 

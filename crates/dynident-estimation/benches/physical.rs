@@ -1,11 +1,11 @@
-//! Time of a physically consistent fit from a finished factor: 7 and 30 bodies, best and median of several random
-//! problems. Prints one line per case.
+//! Time of a physically consistent fit from a factor: 7 and 30 bodies, best and median of several random problems.
+//! Prints one line per case.
 //! `cargo bench -p dynident-estimation --bench physical`
 //!
-//! With `-- --intervals` it prints the time of one interval of 7 bodies, of which each end is a program of its own.
+//! `-- --intervals` prints the time of one interval of 7 bodies instead.
 //!
-//! With `-- --problems FIRST LAST [--both-routes]` it prints the random problems of the tests as JSON lines instead,
-//! each with the answers found here, for `benchmarks/bench_lmi.py`.
+//! `-- --problems FIRST LAST [--both-routes]` prints the random problems of the tests with their solutions as JSON
+//! lines instead, for `benchmarks/bench_lmi.py`.
 
 #![allow(clippy::print_stdout, reason = "a benchmark prints")]
 #![allow(clippy::unwrap_used, reason = "a benchmark fails as tests do")]
@@ -40,7 +40,7 @@ fn main() {
     }
 }
 
-/// Processor time of this thread, s, which other work on the robot does not lengthen; wall time where there is none.
+/// Processor time of this thread, s, independent of other load; wall time if it is not available.
 fn seconds(start: Instant) -> f64 {
     let own = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = own.and_then(|text| text.split(' ').next().and_then(|field| field.parse::<f64>().ok()));

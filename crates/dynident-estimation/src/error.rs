@@ -1,21 +1,23 @@
-//! What can be wrong with the numbers that reach an estimator.
+//! Errors of the estimators.
 
 use thiserror::Error;
 
-/// Why rows could not be absorbed, a problem not assembled or an estimate not made.
+/// Errors of factors, problems and estimators.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EstimationError {
-    /// A slice of rows does not have the announced shape.
-    #[error("{what}: expected {expected} numbers, found {found}; give every row one number per column and the torque")]
+    /// A slice of rows has the wrong length.
+    #[error(
+        "{what}: expected {expected} numbers, found {found}; give one number per column plus the torque for every row"
+    )]
     Shape {
-        /// Which argument.
+        /// The argument.
         what: &'static str,
-        /// Numbers that the announced shape has.
+        /// Expected number of values.
         expected: usize,
-        /// Numbers given.
+        /// Number of values given.
         found: usize,
     },
-    /// A number in a row is NaN, infinite or too large to be squared.
+    /// A value in a row is NaN, infinite or too large to be squared.
     #[error(
         "row {row}, column {column}: {value} cannot be used in a fit (largest magnitude {limit:e}); remove this sample or fix its source"
     )]
@@ -24,64 +26,64 @@ pub enum EstimationError {
         row: usize,
         /// Column, from 0; the torque is the last one.
         column: usize,
-        /// The number.
+        /// The value.
         value: f64,
-        /// The largest magnitude accepted.
+        /// Largest accepted magnitude.
         limit: f64,
     },
-    /// Two things that must describe the same columns or joints do not.
+    /// Numbers of columns, joints or rows do not agree.
     #[error("{what}: expected {expected}, found {found}")]
     Mismatch {
-        /// What was compared.
+        /// The quantity that was compared.
         what: String,
-        /// What is needed.
+        /// Expected number.
         expected: usize,
-        /// What was given.
+        /// Number given.
         found: usize,
     },
-    /// A column or joint number is out of range or given twice.
+    /// A column number is out of range or duplicate.
     #[error("log {log}, joint {joint}: column number {column} is given twice or is not below {columns}")]
     Column {
         /// The log.
         log: String,
         /// The joint.
         joint: String,
-        /// The offending number.
+        /// The invalid column number.
         column: usize,
-        /// How many columns the problem has.
+        /// Number of columns of the problem.
         columns: usize,
     },
-    /// A setting has no meaning.
+    /// A setting is out of range.
     #[error("setting {setting} = {value}: {fix}")]
     Setting {
         /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// What to give instead.
+        /// The fix.
         fix: &'static str,
     },
-    /// There are not more rows than free parameters, so nothing can be said about the noise.
+    /// There are not more rows than free parameters, so the noise cannot be estimated.
     #[error(
-        "{what}: {rows} rows for {parameters} free parameters leave no freedom to judge the noise; give a longer log or fewer columns"
+        "{what}: {rows} rows for {parameters} free parameters are too few to estimate the noise; use a longer log or fewer columns"
     )]
     TooFewRows {
-        /// All rows, or one joint's share.
+        /// All rows, or the rows of one joint.
         what: String,
         /// Rows.
         rows: usize,
-        /// Parameters that these rows pay for.
+        /// Free parameters that these rows determine; a joint's share need not be whole.
         parameters: f64,
     },
     /// Cluster-robust covariance needs at least two segments.
     #[error(
-        "{clusters} time segment(s) in all: a covariance from segments needs at least two; use shorter segments, a longer log or the white-noise covariance"
+        "too few time segments ({clusters}): a covariance from segments needs at least two; use shorter segments, a longer log or the white-noise covariance"
     )]
     TooFewSegments {
         /// Segments found.
         clusters: usize,
     },
-    /// Joints of one log are cut into different segments, so a joint covariance across them has no meaning.
+    /// The joints of one log are cut into different segments, so a covariance across joints is undefined.
     #[error(
         "log {log}: the segments of joint {joint} differ from those of the log's first joint; absorb the same rows for all joints or treat joints as independent"
     )]
@@ -91,10 +93,10 @@ pub enum EstimationError {
         /// The joint.
         joint: String,
     },
-    /// A prior was given to an estimator that has no noise level to weigh it against.
+    /// Ordinary least squares has no noise level to weigh a prior against.
     #[error("ordinary least squares has no noise level to weigh a prior against; use weighted least squares")]
     PriorWithoutNoiseLevel,
-    /// Magnitudes lie so far apart that the result is not a number a computer holds.
+    /// The estimate overflows because the magnitudes of columns and torque differ too much.
     #[error(
         "the estimate of {name} overflows: columns and torque differ by too many powers of ten; check units and scales"
     )]
@@ -102,38 +104,38 @@ pub enum EstimationError {
         /// The column.
         name: String,
     },
-    /// What a caller's own estimator gave is no estimate.
-    #[error("the estimator `{name}`: {problem}")]
+    /// A custom estimator returned an invalid result.
+    #[error("invalid result of the estimator `{name}`: {problem}")]
     Own {
         /// Its name.
         name: String,
-        /// What is wrong, and what to give.
+        /// The problem and its fix.
         problem: String,
     },
-    /// The parameters that an iteration begins with cannot be simulated.
+    /// The start parameters of an iteration cannot be simulated.
     #[error(
-        "the simulation does not get through with the starting values; start from a description or an estimate that is a physically consistent set"
+        "the simulation fails with the start values; start from a physically consistent robot description or estimate"
     )]
     NoSimulation,
-    /// Unknowns of the motion, or parameters beside it, that the rows leave open.
+    /// The rows do not determine an unknown of the motion or a parameter.
     #[error(
-        "the rows do not separate {name} from the unknowns before it; leave it out, give the motion fewer unknowns, or a longer or livelier log"
+        "the rows do not determine {name} separately from the unknowns before it; remove it, use fewer unknowns for the motion, or use a longer or more exciting log"
     )]
     Undetermined {
-        /// The unknown.
+        /// Name of the unknown.
         name: String,
     },
-    /// The problem has no equations.
+    /// The problem has no rows.
     #[error("no rows of any joint: absorb a log before estimating")]
     Empty,
 }
 
-/// That two things which describe the same columns, joints or rows agree in number.
+/// Checks that two counts agree.
 pub(crate) fn expect(what: &str, expected: usize, found: usize) -> Result<(), EstimationError> {
     if expected == found { Ok(()) } else { Err(EstimationError::Mismatch { what: what.into(), expected, found }) }
 }
 
-/// That a setting means something.
+/// Checks a condition on a setting.
 pub(crate) fn require(
     holds: bool,
     setting: &'static str,
@@ -143,7 +145,7 @@ pub(crate) fn require(
     if holds { Ok(()) } else { Err(EstimationError::Setting { setting, value, fix }) }
 }
 
-/// That a setting is in its range.
+/// Checks the range of a setting.
 pub(crate) fn within(
     setting: &'static str,
     value: f64,

@@ -1,9 +1,9 @@
-//! **What do the measurements say?** From rows `[W | τ]` of numbers to parameters with error bars.
+//! **Estimation from rows `[W | τ]`**: parameters with error bars.
 //!
-//! This crate never knows where samples came from: it sees columns, joints and numbers. Rows of each joint in each log
-//! go into a [`SegmentedFactor`] and are forgotten; the factors make a [`LinearProblem`] over named columns; an
-//! estimator makes an [`Estimate`] of it: values, a covariance that accounts for residuals correlated in time, the
-//! noise of every joint, and what was decided about columns that the data do not excite.
+//! The crate works on columns, joints and numbers and knows no robot and no file format. The rows of each joint in
+//! each log are reduced to a [`SegmentedFactor`]. The factors form a [`LinearProblem`] over named columns. An
+//! estimator solves it and returns an [`Estimate`]: values, a covariance that is valid for residuals correlated in
+//! time, the noise of every joint and the rank decisions for unexcited columns.
 //!
 //! ```
 //! use dynident_estimation::*;
@@ -21,27 +21,27 @@
 //! # Ok::<(), EstimationError>(())
 //! ```
 //!
-//! | what you want | where |
+//! | task | item |
 //! | --- | --- |
 //! | parameters, noise of every joint unknown | [`weighted_least_squares`] |
-//! | gross errors set aside | [`robust_least_squares`] |
+//! | outlier-robust fit | [`robust_least_squares`] |
 //! | noise in position as well as in torque | [`instrumental_variables`], [`hausman_test`] |
-//! | the motion estimated as well | [`spline_motion_least_squares`], [`simultaneous_least_squares`], [`maximum_likelihood`] |
-//! | a simulation that looks like the record | [`simulated_least_squares`] |
+//! | joint estimate of motion and parameters | [`spline_motion_least_squares`], [`simultaneous_least_squares`],
+//! [`maximum_likelihood`] |
+//! | fit of the simulated to the measured motion | [`simulated_least_squares`] |
 //! | errors correlated between joints | [`generalized_least_squares`] |
-//! | errors uneven in time | [`noise_weighted_least_squares`] |
+//! | noise level that varies in time | [`noise_weighted_least_squares`] |
 //! | torque constants of the drives | [`joint_gains`] |
 //! | other error bars | [`CovarianceMethod`] |
-//! | bodies and friction that can be real | [`consistent::physical_fit`] |
-//! | how far a body's parameters can be off | [`consistent::ConsistentIntervals`] |
-//! | only the parameters that the data need | [`essential`] |
-//! | errors on motion that was not used | [`Validation`], [`CrossValidation`] |
-//! | what the residuals look like | [`Whiteness`], [`Normality`], [`SpeedRanges`] |
+//! | physically consistent bodies and friction | [`consistent::physical_fit`] |
+//! | intervals of physically consistent parameters | [`consistent::ConsistentIntervals`] |
+//! | removal of parameters that the data do not need | [`essential`] |
+//! | validation on held-out motion | [`Validation`], [`CrossValidation`] |
+//! | residual diagnostics | [`Whiteness`], [`Normality`], [`SpeedRanges`] |
 //!
-//! The modules, from the bottom up: [`factor`] (rows to triangles, problems, rank), [`uncertainty`] (the estimate and
-//! its covariance), [`linear`] and [`nonlinear`] estimators, [`consistent`] (bodies that can be real) and
-//! [`diagnostics`]. Types that are only part of a result live there; what an identification needs is at the root as
-//! well.
+//! Modules from the bottom up: [`factor`] (triangular factors, problems, rank), [`uncertainty`] (estimate and
+//! covariance), [`linear`] and [`nonlinear`] estimators, [`consistent`] (physical consistency) and [`diagnostics`].
+//! The root re-exports the items that an identification needs; detail types of results remain in the modules.
 
 #![forbid(unsafe_code)]
 

@@ -1,7 +1,7 @@
 //! A buffer whose first value starts a cache line.
 
-/// A growing buffer of `f64` that starts at a multiple of 64 bytes, so that a store of eight lanes never straddles two
-/// cache lines (measured: such stores cost the torque regressor a third of its speed).
+/// A growing buffer of `f64` that starts at a multiple of 64 bytes, so that a store of eight lanes stays within one
+/// cache line (measured: crossing stores cost the torque regressor a third of its speed).
 #[derive(Debug, Default)]
 pub struct AlignedBuffer {
     data: Vec<f64>,
@@ -15,12 +15,12 @@ impl AlignedBuffer {
         Self::default()
     }
 
-    /// Makes the buffer `len` values long. Memory is kept; the values are whatever they were, or zero.
+    /// Sets the length to `len`. Memory is kept; the values are old values or zero.
     pub fn resize(&mut self, len: usize) {
         self.len = len;
         if self.start + len > self.data.len() {
             self.data.resize(len + 8, 0.0);
-            // Eight values are one line; should the platform not know its alignment, any start is correct.
+            // Eight values are one line; if the platform does not support alignment, any start is correct.
             self.start = self.data.as_ptr().align_offset(64).min(8);
         }
     }

@@ -1,14 +1,13 @@
-//! Registers that count what is done with them: how many floating-point operations an algorithm takes, by the algorithm
-//! itself and not by a formula of it.
+//! Registers that count floating-point operations, to measure the cost of an algorithm.
 
 use crate::portable::Portable;
 use crate::register::Register;
 use core::cell::Cell;
 
-/// Floating-point operations of one thread, by kind. A step of a register of four counts four.
+/// Floating-point operations of one thread, by kind. An operation on a register of four counts as four.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
-    /// Sums, differences and products that stand alone.
+    /// Sums, differences and unfused products.
     pub simple: u64,
     /// Multiply-adds.
     pub fused: u64,
@@ -17,7 +16,7 @@ pub struct Operations {
 }
 
 impl Operations {
-    /// All of them, as the peak of a processor is told: a multiply-add is two operations, a quotient is one.
+    /// Total number of operations in the convention of processor peaks: two per multiply-add, one per quotient.
     pub fn flops(self) -> u64 {
         self.simple + 2 * self.fused + self.divisions
     }
@@ -27,8 +26,8 @@ thread_local! {
     static COUNT: Cell<Operations> = const { Cell::new(Operations { simple: 0, fused: 0, divisions: 0 }) };
 }
 
-/// What kernels at [`Level::counted`](crate::Level::counted) have done in this thread since it began, or since this was
-/// last asked. Changes of sign, comparisons and moves count nothing; sine and cosine count as their polynomials.
+/// Operations of kernels at [`Level::counted`](crate::Level::counted) in this thread since the last call (or the
+/// start). Changes of sign, comparisons and moves are not counted; sine and cosine count as their polynomials.
 pub fn counted_operations() -> Operations {
     COUNT.take()
 }
@@ -39,7 +38,7 @@ fn count(change: impl FnOnce(&mut Operations)) {
     COUNT.set(all);
 }
 
-/// `N` numbers that count every step.
+/// `N` numbers that count every operation.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub(crate) struct Counted<const N: usize>(Portable<N, false>);
@@ -136,7 +135,7 @@ mod tests {
     use super::*;
     use crate::{Kernel, Lane, Level, dispatch, dispatch_single};
 
-    /// Horner's rule: `degree` multiply-adds a value, then one of everything else.
+    /// Horner's rule: `degree` multiply-adds per value, then one of every other operation.
     struct Polynomial(usize);
 
     impl Kernel for Polynomial {
@@ -163,7 +162,7 @@ mod tests {
         assert_eq!(count, Operations { simple: 3 * lanes, fused: 5 * lanes, divisions: lanes });
         assert_eq!(count.flops(), 14 * lanes);
         assert_eq!(counted_operations(), Operations::default());
-        // The same numbers as any other level.
+        // Bit-identical to other levels.
         assert_eq!(one.to_bits(), four.to_bits());
         assert_eq!(one, dispatch(Level::portable(), Polynomial(5)));
         assert_eq!(counted_operations(), Operations::default());
@@ -180,11 +179,11 @@ mod tests {
     }
 
     #[test]
-    fn an_angle_counts_as_its_polynomials() {
+    fn angles_are_counted_as_their_polynomials() {
         counted_operations();
         dispatch_single(Level::counted(), SinCos);
-        // By hand from sin_cos.rs: reduction 4 multiply-adds and 1 difference; x², x³ and x⁴; 2 · 5 for the
-        // polynomials; 1 for the sine; 2 for the cosine.
+        // From sin_cos.rs: reduction 4 multiply-adds and 1 difference; x², x³ and x⁴; 2 · 5 for the polynomials; 1 for
+        // the sine; 2 for the cosine.
         assert_eq!(counted_operations(), Operations { simple: 4, fused: 17, divisions: 0 });
     }
 }

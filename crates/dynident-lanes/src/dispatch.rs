@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Instructions {
-    /// Nothing beyond the build target.
+    /// No instructions beyond the build target.
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2(HasAvx2),
@@ -24,14 +24,14 @@ enum Instructions {
 /// The level of [`Level::detect`].
 static CHOSEN: OnceLock<Level> = OnceLock::new();
 
-/// What this processor can do. A value of this type is the proof that the instructions it names exist: it can only be
-/// had from [`Level::detect`], [`Level::available`] and [`Level::portable`].
+/// Processor level. A value is a proof that the processor supports the instructions, because it can only be created by
+/// [`Level::detect`], [`Level::available`] and [`Level::portable`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Level(Instructions);
 
 impl Level {
-    /// The best level of this processor; a lower one if the environment variable `DYNIDENT_INSTRUCTIONS` (`portable`,
-    /// `avx2` or `avx512`) says so, for tests and comparisons. Any other value of the variable counts as none.
+    /// The best level of this processor, or a lower one from the environment variable `DYNIDENT_INSTRUCTIONS`
+    /// (`portable`, `avx2` or `avx512`), for tests and comparisons. Other values of the variable are ignored.
     pub fn detect() -> Self {
         *CHOSEN.get_or_init(|| {
             let named = std::env::var("DYNIDENT_INSTRUCTIONS").ok();
@@ -41,22 +41,22 @@ impl Level {
         })
     }
 
-    /// The level that every processor of the build target has. On 64-bit ARM that includes NEON and the fused
+    /// The level that every processor of the build target supports. On 64-bit ARM it includes NEON and the fused
     /// multiply-add.
     pub fn portable() -> Self {
         Self(Instructions::Portable)
     }
 
-    /// Counts operations in place of being fast, with the numbers of [`portable`](Self::portable): see
-    /// [`counted_operations`](crate::counted_operations). Single samples go one value at a time, so that no half-empty
-    /// bundle counts; batches go four at a time.
+    /// Counts operations, with the numbers of [`portable`](Self::portable): see
+    /// [`counted_operations`](crate::counted_operations). Single samples use one value at a time, so that bundles are
+    /// never partly filled; batches use four.
     #[cfg(feature = "counted")]
     pub fn counted() -> Self {
         Self(Instructions::Counted)
     }
 
-    /// Makes [`detect`](Self::detect) give [`counted`](Self::counted) in this process; false if it has given another
-    /// level already.
+    /// Makes [`detect`](Self::detect) return [`counted`](Self::counted) in this process; returns false if it has
+    /// already returned another level.
     #[cfg(feature = "counted")]
     pub fn count_everywhere() -> bool {
         *CHOSEN.get_or_init(Self::counted) == Self::counted()
@@ -74,7 +74,7 @@ impl Level {
         levels
     }
 
-    /// How many samples [`dispatch`] puts side by side at this level.
+    /// Number of samples that [`dispatch`] processes together at this level.
     pub fn lanes(self) -> usize {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
@@ -97,10 +97,10 @@ impl Level {
     }
 }
 
-/// The fused multiply-add belongs to every 64-bit ARM processor.
+/// Every 64-bit ARM processor has the fused multiply-add.
 const FUSED: bool = cfg!(target_arch = "aarch64");
 
-/// Runs `kernel` on as many samples side by side as `level` offers.
+/// Runs `kernel` on the number of samples of `level` at a time.
 #[inline]
 pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
     match level.0 {
@@ -114,7 +114,7 @@ pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
     }
 }
 
-/// Runs `kernel` on one sample at a time, with the instructions of `level` for what vectorises inside a sample.
+/// Runs `kernel` on one sample at a time; code that vectorises inside a sample uses the instructions of `level`.
 #[inline]
 pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
     match level.0 {
@@ -122,7 +122,7 @@ pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2(proof) => enter_avx2::<K, Wide<Portable<1, true>, Avx2>>(proof, kernel),
         #[cfg(target_arch = "x86_64")]
-        // Measured: inside one sample four lanes beat eight (half-empty registers, slower shuffles).
+        // Measured: inside one sample four lanes are faster than eight (half-empty registers, slower shuffles).
         Instructions::Avx512(proof) => enter_avx512::<K, Wide<Portable<1, true>, Avx2>>(proof, kernel),
         #[cfg(feature = "counted")]
         Instructions::Counted => kernel.run::<Wide<Counted<1>>>(),
@@ -181,7 +181,6 @@ mod tests {
     fn every_level_computes_the_same() {
         let values: Vec<f64> = (0..64).map(f64::from).collect();
         for level in Level::available() {
-            // Exact: sums of squares of small integers.
             assert_eq!(dispatch(level, SumOfSquares(&values)), 85_344.0, "{}", level.name());
             assert_eq!(dispatch_single(level, SumOfSquares(&values)), 85_344.0, "{}", level.name());
         }

@@ -4,8 +4,7 @@ use crate::real::Real;
 use crate::scalar::Scalar;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// `value + derivative·ε` with `ε² = 0`: carries the exact directional derivative through any algorithm over
-/// [`Scalar`].
+/// `value + derivative·ε` with `ε² = 0`: computes the exact directional derivative of any algorithm over [`Scalar`].
 ///
 /// ```
 /// use dynident_lanes::{Dual, Scalar};
@@ -107,8 +106,8 @@ impl Scalar for Dual {
 }
 
 impl Dual {
-    /// `value` of a function with this slope. A slope that is not finite counts only where the argument changes: a root
-    /// at zero has one.
+    /// Applies a function with this value and slope. An infinite slope (a root at zero) is ignored for a constant
+    /// argument.
     fn through(self, value: f64, slope: f64) -> Self {
         Self { value, derivative: if self.derivative == 0.0 { 0.0 } else { slope * self.derivative } }
     }

@@ -1,16 +1,16 @@
-//! Hyperbolic tangent and decay of all lanes at once: what smooth friction is made of.
+//! Hyperbolic tangent and decay of all lanes at once, for smooth friction.
 //!
 //! `e^y = 2^n e^r` with n the integer nearest to `y / ln 2` and `|r| ≤ ln 2 / 2`, reduced by ln 2 in two parts (Cody
 //! and Waite, *Software Manual for the Elementary Functions*, 1980); `e^r − 1` by its power series to degree 13, whose
-//! next term is below 2^-57 of the sum. With `m = e^{2|x|} − 1` the tangent is `m / (m + 2)`: no digits are lost near
-//! zero.
+//! next term is below 2^-57 of the sum. With `m = e^{2|x|} − 1` the tangent is `m / (m + 2)`, which keeps all digits
+//! near zero.
 
 use crate::register::Register;
 
 // ln 2 as the sum of two parts, the first with 33 significant bits, so that n times it is exact.
 const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-/// 1.5 · 2^52: adding it rounds to the nearest integer and leaves that integer in the low bits.
+/// 1.5 · 2^52: adding it rounds to the nearest integer, which is then in the low bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// Exponent bias of a double.
 const BIAS: u64 = 1023;
@@ -29,10 +29,10 @@ const SERIES: [f64; 12] = [
     1.0 / 479_001_600.0,
     1.0 / 6_227_020_800.0,
 ];
-/// From here on the tangent is 1 to the last bit.
-const TANH_IS_ONE: f64 = 22.0;
-/// From here on `e^-x` is no normal number.
-const LARGEST_DECAY: f64 = 708.0;
+/// The tangent of larger arguments is 1 in double precision.
+const MAX_TANH_ARGUMENT: f64 = 22.0;
+/// `e^-x` of larger arguments is subnormal.
+const MAX_DECAY_ARGUMENT: f64 = 708.0;
 
 /// `2^n` and `e^r − 1` with `e^y = 2^n e^r`; |y| at most 708.
 #[inline(always)]
@@ -47,19 +47,19 @@ fn reduced<R: Register>(y: R) -> (R, R) {
     (rounded.bits_plus(BIAS).bits_shifted_by_52(), r.mul(r).mul_add(q, r))
 }
 
-/// Hyperbolic tangent of every lane; not a number where the lane is none.
+/// Hyperbolic tangent of every lane; NaN for NaN.
 #[inline(always)]
 pub(crate) fn tanh<R: Register>(x: R) -> R {
     let sign = x.and(R::splat(-0.0));
-    let size = R::splat(TANH_IS_ONE).min(x.xor(sign));
+    let size = R::splat(MAX_TANH_ARGUMENT).min(x.xor(sign));
     let (power, less_one) = reduced(size.add(size));
     let m = power.mul_add(less_one, power.sub(R::ONE));
     m.div(m.add(R::splat(2.0))).xor(sign)
 }
 
-/// `e^-x` of every lane, none of which is negative; not a number where the lane is none.
+/// `e^-x` of every nonnegative lane; NaN for NaN.
 #[inline(always)]
 pub(crate) fn decay<R: Register>(x: R) -> R {
-    let (power, less_one) = reduced(R::ZERO.sub(R::splat(LARGEST_DECAY).min(x)));
+    let (power, less_one) = reduced(R::ZERO.sub(R::splat(MAX_DECAY_ARGUMENT).min(x)));
     power.mul_add(less_one, power)
 }

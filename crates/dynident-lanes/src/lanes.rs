@@ -1,4 +1,4 @@
-//! Lanes: one, four or eight `f64` that take every step together.
+//! Lanes: one, four or eight `f64` that are processed together.
 
 use crate::exponential::{decay, tanh};
 use crate::real::Real;
@@ -8,9 +8,9 @@ use crate::sin_cos::sin_cos;
 use core::marker::PhantomData;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// A [`Real`] that is a row of samples. Its step and decay are within 4 units of the last place.
+/// A [`Real`] that contains several samples. Its step and decay are accurate to 4 units in the last place.
 pub trait Lane: Real {
-    /// How many samples stand side by side.
+    /// Number of samples.
     const LANES: usize;
 
     /// The first [`LANES`](Lane::LANES) values of `values`.
@@ -37,7 +37,7 @@ pub trait Lane: Real {
         lanes[index]
     }
 
-    /// The same with `value` in lane `index`.
+    /// Replaces the value in lane `index`.
     ///
     /// # Panics
     /// If `index` is not below [`LANES`](Lane::LANES).
@@ -51,7 +51,7 @@ pub trait Lane: Real {
         Self::load(&lanes)
     }
 
-    /// True when every lane is at most that of `bound`; false when one of them is not a number.
+    /// True if every lane is at most that of `bound`; false if one of them is NaN.
     fn all_at_most(self, bound: Self) -> bool;
 
     /// Sum over the lanes, from first to last.
@@ -62,15 +62,15 @@ pub trait Lane: Real {
         lanes[..Self::LANES].iter().sum()
     }
 
-    /// A square of four lanes by four values, transposed: lane `k` of value `i` goes to lane `i` of value `k`. Values
-    /// of more or fewer lanes are given back as they are.
+    /// Transposes four values of four lanes: lane `k` of value `i` goes to lane `i` of value `k`. Values with another
+    /// number of lanes are returned unchanged.
     fn transposed(values: [Self; 4]) -> [Self; 4];
 
-    /// The lane type that holds several values of this one side by side: several joints of a single sample, or just one
-    /// value where the lanes are samples already. What vectorises *inside* one sample is written over bundles.
+    /// Lane type for several values of this type: several joints of a single sample, or one value if the lanes are
+    /// samples already. Code that vectorises *inside* one sample uses bundles.
     type Bundle: Lane;
 
-    /// How many values of this type one [`Bundle`](Lane::Bundle) holds: more than one only where a value is one sample.
+    /// Number of values of this type in a [`Bundle`](Lane::Bundle): more than one only if a value is one sample.
     const PER_BUNDLE: usize = Self::Bundle::LANES / Self::LANES;
 
     /// The bundle with this value in every place.
@@ -176,13 +176,13 @@ impl<R: Register, B: Register> Scalar for Wide<R, B> {
 
     #[inline(always)]
     fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {
-        // A bundle takes several angles at once; where it holds one, this is the plain loop.
+        // A bundle takes several angles at once; with one value per bundle this is a plain loop.
         let count = angles.len().min(sines.len()).min(cosines.len());
         let (angles, sines, cosines) = (&angles[..count], &mut sines[..count], &mut cosines[..count]);
         let whole = count - count % Self::PER_BUNDLE;
         let mut start = 0;
         while start < whole {
-            // As many as a constant says: no inner loop is left.
+            // The constant length avoids an inner loop.
             let end = start + Self::PER_BUNDLE;
             sin_cos_bundle(&angles[start..end], &mut sines[start..end], &mut cosines[start..end]);
             start = end;
@@ -198,7 +198,7 @@ impl<R: Register, B: Register> Scalar for Wide<R, B> {
     }
 }
 
-/// Sines and cosines of as many angles as one bundle holds, or fewer.
+/// Sines and cosines of at most as many angles as one bundle contains.
 #[inline(always)]
 fn sin_cos_bundle<R: Register, B: Register>(
     angles: &[Wide<R, B>],
@@ -324,7 +324,7 @@ impl<R: Register, B: Register> Lane for Wide<R, B> {
     }
 }
 
-/// Row `k` has a one at place `k`. A product with it places a value without a detour over memory.
+/// Row `k` has a one at place `k`. A product with it places a value without using memory.
 const UNIT: [[f64; 8]; 8] = {
     let mut rows = [[0.0; 8]; 8];
     let mut k = 0;

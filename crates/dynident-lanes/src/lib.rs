@@ -1,5 +1,4 @@
-//! **On how many numbers at once?** The bottom room of Dynident: one small scalar trait, the types that
-//! implement it, and the run-time choice between them.
+//! **Vectorisation**: a small scalar trait, the types that implement it, and the run-time choice between them.
 //!
 //! Every algorithm of the dynamics core is written once over [`Scalar`] and runs
 //! * on one sample ([`dispatch_single`]),
@@ -7,9 +6,9 @@
 //!   chosen at run time, so that one portable binary is fast everywhere),
 //! * on dual numbers ([`Dual`]: exact derivatives, and the oracle for hand-written ones).
 //!
-//! Friction laws, which need more functions, are written over [`Real`].
+//! Friction laws use more functions and are written over [`Real`].
 //!
-//! This is the only crate of the core that contains `unsafe`, in one file: `x86.rs`.
+//! The only crate of the core with `unsafe` code, in one file: `x86.rs`.
 
 #![deny(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Functions of many values, as many at once as the processor takes.
+//! Functions of many values, vectorised.
 
 use crate::dispatch::{Level, dispatch};
 use crate::kernel::Kernel;
@@ -10,8 +10,8 @@ pub trait LaneFunction {
     fn of<T: Lane>(&self, x: T) -> T;
 }
 
-/// Writes `function` of the values to `out`, as many as there are in the shorter of the two; the same wherever in the
-/// slice a value stands.
+/// Writes `function` of the values to `out`, up to the shorter length. The result does not depend on the position of a
+/// value in the slice.
 pub fn map_all(values: &[f64], out: &mut [f64], function: &impl LaneFunction) {
     dispatch(Level::detect(), All { values, out, function });
 }
@@ -62,7 +62,7 @@ mod tests {
         }
     }
 
-    /// What four units of the last place are of a value.
+    /// Equal to four units in the last place.
     fn near(found: f64, expected: f64) -> bool {
         found == expected || (found - expected).abs() <= 4.0 * f64::EPSILON * expected.abs()
     }
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_are_right_and_what_is_no_number_stays_none() {
+    fn range_limits_are_correct_and_nan_stays_nan() {
         let mut out = [0.0; 6];
         map_all(&[0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e300], &mut out, &Step(1.0));
         assert_eq!(out[..4], [0.0, -0.0, 1.0, -1.0]);
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_is_the_same_wherever_it_stands() {
+    fn values_do_not_depend_on_their_lane() {
         let values = values();
         let (mut all, mut one) = (vec![0.0; values.len()], [0.0]);
         map_all(&values, &mut all, &Step(0.02));

@@ -2,8 +2,8 @@
 
 use crate::register::Register;
 
-/// `N` numbers without any instruction beyond the build target's; `FUSED` allows the fused multiply-add, which must
-/// only be asked for where the processor has it: elsewhere it is a slow library call.
+/// `N` numbers without instructions beyond the build target. `FUSED` allows the fused multiply-add; use it only for
+/// processors with this instruction, because otherwise it is a slow library call.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub(crate) struct Portable<const N: usize, const FUSED: bool>([f64; N]);
@@ -155,7 +155,7 @@ mod tests {
     use crate::kernel::Kernel;
     use crate::lanes::Lane;
 
-    /// The square of the numbers 0 to 15 by rows, transposed in bundles of four.
+    /// The numbers 0 to 15 by rows, transposed in bundles of four.
     struct Square;
 
     impl Kernel for Square {

@@ -1,11 +1,11 @@
-//! The scalar of friction laws: the four operations and the functions of real numbers that laws are made of.
+//! The scalar of friction laws: arithmetic and functions of real numbers.
 
 use crate::scalar::Scalar;
 
 /// A [`Scalar`] with functions of real numbers.
 ///
-/// A law `f(q̇)` that is written once over `Real` gives its value on `f64`, a column of samples on lanes
-/// ([`map_all`](crate::map_all)), its slope on [`Dual`](crate::Dual) and generated code on symbols.
+/// A law `f(q̇)` written over `Real` gives its value for `f64`, a column of samples for lanes
+/// ([`map_all`](crate::map_all)), its slope for [`Dual`](crate::Dual) and generated code for symbols.
 pub trait Real: Scalar {
     /// `self / divisor`.
     fn over(self, divisor: Self) -> Self;
@@ -13,25 +13,25 @@ pub trait Real: Scalar {
     /// Magnitude.
     fn abs(self) -> Self;
 
-    /// The lesser of the two; `other` where one of them is not a number.
+    /// Smaller value; `other` if one of them is NaN.
     fn min(self, other: Self) -> Self;
 
-    /// The greater of the two; `other` where one of them is not a number.
+    /// Larger value; `other` if one of them is NaN.
     fn max(self, other: Self) -> Self;
 
-    /// The sign: -1, 0 or 1, and zero while the magnitude is at most `dead_band`. Its derivative is taken as zero.
+    /// Sign -1, 0 or 1; zero if the magnitude is at most `dead_band`. Its derivative is defined as zero.
     fn sign(self, dead_band: f64) -> Self;
 
     /// `tanh(self / width)`.
     fn smooth_step(self, width: f64) -> Self;
 
-    /// `e^{-self}` of a value that is not negative.
+    /// `e^{-self}` of a nonnegative value.
     fn decay(self) -> Self;
 
     /// Natural logarithm of a positive value.
     fn ln(self) -> Self;
 
-    /// `self^exponent` of a value that is not negative.
+    /// `self^exponent` of a nonnegative value.
     fn power(self, exponent: f64) -> Self;
 }
 
@@ -68,7 +68,7 @@ impl Real for f64 {
         self.ln()
     }
 
-    /// The usual exponents without a general power.
+    /// Avoids a general power for common exponents.
     fn power(self, exponent: f64) -> Self {
         const CUBE_ROOT: f64 = 1.0 / 3.0;
         match exponent {

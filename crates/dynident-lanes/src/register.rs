@@ -1,6 +1,6 @@
-//! What a register of `f64` must offer so that [`Wide`](crate::lanes::Wide) can be a scalar.
+//! Operations of a register of `f64`, used by [`Wide`](crate::lanes::Wide).
 
-/// A register (or an array that stands for one) of `f64`.
+/// A register of `f64`, or an array in place of it.
 pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     const LANES: usize;
     /// Zero in every lane.
@@ -8,25 +8,25 @@ pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     /// One in every lane.
     const ONE: Self;
     fn splat(value: f64) -> Self;
-    /// The first `LANES` values; panics if there are fewer.
+    /// Loads the first `LANES` values; panics if there are fewer.
     fn load(values: &[f64]) -> Self;
-    /// To the first `LANES` places; panics if there are fewer.
+    /// Stores to the first `LANES` places; panics if there are fewer.
     fn store(self, out: &mut [f64]);
     /// The value in lane 0.
     fn first(self) -> f64;
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
-    /// Lane `k` of row `i` at lane `i` of row `k`, for registers of four lanes; others are given back as they are.
+    /// Transposes four registers of four lanes; others are returned unchanged.
     fn transposed(rows: [Self; 4]) -> [Self; 4];
     fn div(self, other: Self) -> Self;
-    /// The other sign. As the compiler knows it, which makes it part of the next sum or product where it can.
+    /// Negation, in a form that the compiler can combine with the next sum or product.
     fn neg(self) -> Self;
-    /// `self * factor + addend`, fused where the level has it.
+    /// `self * factor + addend`, fused if the level supports it.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
-    /// `addend - self * factor`, fused where the level has it.
+    /// `addend - self * factor`, fused if the level supports it.
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self;
-    /// Bit patterns, as 64-bit integers a lane.
+    /// Operations on bit patterns, as 64-bit integers per lane.
     fn and(self, other: Self) -> Self;
     fn xor(self, other: Self) -> Self;
     /// Integer `self + addend`.
@@ -35,14 +35,14 @@ pub(crate) trait Register: Copy + core::fmt::Debug + Send + Sync + 'static {
     fn bits_shifted_by_62(self) -> Self;
     /// `bits << 52`.
     fn bits_shifted_by_52(self) -> Self;
-    /// The lesser of the two; `other` where one of them is not a number.
+    /// Smaller value; `other` if one of them is NaN.
     fn min(self, other: Self) -> Self;
-    /// The greater of the two; `other` where one of them is not a number.
+    /// Larger value; `other` if one of them is NaN.
     fn max(self, other: Self) -> Self;
-    /// All ones where the lowest bit is set, else all zeros.
+    /// All ones if the lowest bit is set, else all zeros.
     fn lowest_bit_mask(self) -> Self;
-    /// True when every |lane| is at most `bound` (false when one is not a number).
+    /// True if every |lane| is at most `bound` (false for NaN).
     fn all_within(self, bound: f64) -> bool;
-    /// True when every lane is at most that of `bound` (false when one of the two is not a number).
+    /// True if every lane is at most that of `bound` (false for NaN).
     fn all_at_most(self, bound: Self) -> bool;
 }

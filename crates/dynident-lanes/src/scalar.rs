@@ -1,13 +1,13 @@
-//! The one trait under the dynamics core.
+//! The scalar trait of the dynamics core.
 
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// A number that rigid-body algorithms can be written over: `f64`, lanes of `f64`, dual numbers.
+/// A number for rigid-body algorithms: `f64`, lanes of `f64`, dual numbers.
 ///
-/// Deliberately small: the four operations, [`mul_add`](Scalar::mul_add), [`sin_cos`](Scalar::sin_cos) and
-/// [`recip`](Scalar::recip). There is no ordering, because lanes and duals have no single one; algorithms over
-/// `Scalar` are branch-free in their data.
+/// The trait is small: arithmetic, [`mul_add`](Scalar::mul_add), [`sin_cos`](Scalar::sin_cos) and
+/// [`recip`](Scalar::recip). It has no ordering, because lanes and duals have no unique one; algorithms over `Scalar`
+/// do not branch on their data.
 pub trait Scalar:
     Copy
     + Debug
@@ -29,7 +29,7 @@ pub trait Scalar:
     /// The constant `value` (in every lane, with derivative zero).
     fn splat(value: f64) -> Self;
 
-    /// `self * factor + addend`, fused to one rounding where the processor level has it.
+    /// `self * factor + addend`, fused to one rounding if the processor level supports it.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
 
     /// Sine and cosine of an angle in radians, each within 1e-15 absolute for |angle| up to 1e5 rad, and by the
@@ -39,10 +39,10 @@ pub trait Scalar:
     /// `1 / self`.
     fn recip(self) -> Self;
 
-    /// How many angles [`sin_cos_all`](Scalar::sin_cos_all) takes in one step: whole multiples cost least.
+    /// Number of angles that [`sin_cos_all`](Scalar::sin_cos_all) processes together: whole multiples are fastest.
     const ANGLES_AT_ONCE: usize = 1;
 
-    /// [`sin_cos`](Scalar::sin_cos) of every angle; the shorter of the three slices ends it.
+    /// [`sin_cos`](Scalar::sin_cos) of every angle, up to the shortest slice.
     #[inline(always)]
     fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {
         for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
@@ -66,7 +66,7 @@ impl Scalar for f64 {
         value
     }
 
-    /// Two roundings: a fused `f64::mul_add` is a slow library call where the build target lacks the instruction.
+    /// Two roundings: a fused `f64::mul_add` is a slow library call if the build target lacks the instruction.
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         self * factor + addend

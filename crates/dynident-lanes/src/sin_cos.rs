@@ -1,21 +1,20 @@
 //! Sine and cosine of all lanes at once.
 //!
-//! Reduction to [-π/4, π/4] by a three-part π/2 (Cody and Waite 1980), then the minimax polynomials of the same
-//! interval that the standard mathematical libraries use (fdlibm's `__kernel_sin`, `__kernel_cos`: degrees 13 and 14,
-//! error below 2^-58). Branch-free but for the rare angle beyond [`LARGEST_ANGLE`], where the standard library takes
-//! over.
+//! Reduction to [-π/4, π/4] by a three-part π/2 (Cody and Waite 1980), then the minimax polynomials of the standard
+//! mathematical libraries (fdlibm's `__kernel_sin`, `__kernel_cos`: degrees 13 and 14, error below 2^-58). Branch-free
+//! except for rare angles beyond [`MAX_ANGLE_RAD`], which use the standard library.
 
 use crate::register::Register;
 
-/// Beyond this the three-part reduction loses digits: `n` has to stay exact against 33-bit parts of π/2.
-const LARGEST_ANGLE: f64 = 1.0e5;
+/// Limit of the three-part reduction: `n` must be exact with 33-bit parts of π/2.
+const MAX_ANGLE_RAD: f64 = 1.0e5;
 
 const TWO_OVER_PI: f64 = core::f64::consts::FRAC_2_PI;
 // π/2 as the sum of three parts, the first two with 33 significant bits, so that n times each is exact for n < 2^20.
 const HALF_PI_1: f64 = 1.570_796_326_734_125_6;
 const HALF_PI_2: f64 = 6.077_100_506_303_966e-11;
 const HALF_PI_3: f64 = 2.022_266_248_795_950_6e-21;
-/// 1.5 · 2^52: adding it rounds to the nearest integer and leaves that integer in the low bits.
+/// 1.5 · 2^52: adding it rounds to the nearest integer, which is then in the low bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
 const SIN: [f64; 6] = [
@@ -56,10 +55,10 @@ pub(crate) fn sin_cos<R: Register>(angle: R) -> (R, R) {
     let sign = R::splat(-0.0);
     let sine = s.xor(swap).xor(half_turn(rounded).and(sign));
     let cosine = c.xor(swap).xor(half_turn(rounded.bits_plus(1)).and(sign));
-    if angle.all_within(LARGEST_ANGLE) { (sine, cosine) } else { by_standard_library(angle) }
+    if angle.all_within(MAX_ANGLE_RAD) { (sine, cosine) } else { by_standard_library(angle) }
 }
 
-/// The second lowest bit, moved to the sign's place (with the lowest bit below it, for the caller to mask).
+/// Moves the second lowest bit to the sign (with the lowest bit below it, for the caller to mask).
 #[inline(always)]
 fn half_turn<R: Register>(bits: R) -> R {
     bits.bits_shifted_by_62()
@@ -91,7 +90,7 @@ mod tests {
 
     #[test]
     fn agrees_with_the_standard_library() {
-        // 2e-16 is one unit in the last place of a value near one; the reduction adds at most as much again.
+        // 2e-16 is one unit in the last place of a value near one; the reduction adds at most the same.
         let tolerance = 4.0e-16;
         let mut worst: f64 = 0.0;
         for k in 0..2_000_000_i64 {

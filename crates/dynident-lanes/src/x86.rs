@@ -1,12 +1,12 @@
-//! AVX2 and AVX-512: registers by name, and the way in. **All `unsafe` of Dynident's core is in this file.**
+//! AVX2 and AVX-512 registers and entry functions. **All `unsafe` code of Dynident's core is in this file.**
 //!
-//! Why it is sound: every intrinsic here needs a processor feature. The register types are private to this crate, so
-//! code can only meet them as the type parameter of [`Kernel::run`], and that is called with them by [`enter_avx2`] and
-//! [`enter_avx512`] alone, which demand a proof that the run-time check succeeded: [`HasAvx2`] and [`HasAvx512`] cannot
-//! be made without it. Loads and stores check lengths first.
+//! Soundness: every intrinsic here needs a processor feature. The register types are private to this crate, so they
+//! occur only as type parameter of [`Kernel::run`], which only [`enter_avx2`] and [`enter_avx512`] call with them.
+//! These require a proof of the run-time check: [`HasAvx2`] and [`HasAvx512`] cannot be created otherwise. Loads and
+//! stores check lengths first.
 //!
-//! Why intrinsics at all: the compiler does not turn arrays of eight `f64` into AVX-512 code reliably (measured: ten
-//! times slower; see `docs/decisions/0003-lanes.md`).
+//! Intrinsics are needed because the compiler does not reliably turn arrays of eight `f64` into AVX-512 code
+//! (measured: ten times slower; see `docs/decisions/0003-lanes.md`).
 
 #![allow(unsafe_code, reason = "SIMD intrinsics; see the module documentation for why it is sound")]
 
@@ -26,7 +26,7 @@ impl HasAvx2 {
     }
 }
 
-/// Proof that the processor has AVX-512 F, DQ and VL besides AVX2 and FMA.
+/// Proof that the processor has AVX-512 F, DQ and VL in addition to AVX2 and FMA.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HasAvx512(());
 
@@ -52,13 +52,13 @@ fn with_avx512<K: Kernel, T: Lane>(kernel: K) -> K::Output {
 
 #[inline]
 pub(crate) fn enter_avx2<K: Kernel, T: Lane>(_proof: HasAvx2, kernel: K) -> K::Output {
-    // Sound: the proof says that the processor has these features.
+    // Sound: the proof guarantees these features.
     unsafe { with_avx2::<K, T>(kernel) }
 }
 
 #[inline]
 pub(crate) fn enter_avx512<K: Kernel, T: Lane>(_proof: HasAvx512, kernel: K) -> K::Output {
-    // Sound: the proof says that the processor has these features.
+    // Sound: the proof guarantees these features.
     unsafe { with_avx512::<K, T>(kernel) }
 }
 

@@ -1,4 +1,4 @@
-//! Functions of real numbers: the same on numbers, lanes and dual numbers, with right slopes.
+//! Functions of real numbers: the same for numbers, lanes and dual numbers, with correct slopes.
 
 use dynident_lanes::{Dual, Lane, LaneFunction, Real, Scalar, map_all};
 
@@ -24,7 +24,7 @@ impl LaneFunction for Everything {
 }
 
 #[test]
-fn numbers_lanes_and_duals_have_the_same_functions() {
+fn scalars_lanes_and_duals_have_the_same_functions() {
     let values: Vec<f64> = (-40..=40).map(|k| 0.05 * f64::from(k) + 0.01).collect();
     let mut lanes = vec![0.0; values.len()];
     map_all(&values, &mut lanes, &Everything);
@@ -32,7 +32,7 @@ fn numbers_lanes_and_duals_have_the_same_functions() {
         let (number, dual) = (Everything::over(x), Everything::over(Dual::variable(x)));
         assert_eq!(dual.value, number);
         assert!((lane - number).abs() <= 1e-14 * number.abs().max(1.0), "{x}: {lane} {number}");
-        // A central difference with this step is right to about 1e-9.
+        // A central difference with this step is accurate to about 1e-9.
         let step = 1e-5;
         let slope = (Everything::over(x + step) - Everything::over(x - step)) / (2.0 * step);
         assert!((dual.derivative - slope).abs() < 1e-7 * slope.abs().max(1.0), "{x}: {} {slope}", dual.derivative);
@@ -40,7 +40,7 @@ fn numbers_lanes_and_duals_have_the_same_functions() {
 }
 
 #[test]
-fn slopes_at_rest_and_far_out_are_finite() {
+fn derivatives_at_zero_and_large_values_are_finite() {
     let at = Dual::variable;
     assert_eq!(at(0.0).abs().power(0.5), Dual::ZERO);
     assert_eq!(at(1e200).power(2.0).decay(), Dual::ZERO);

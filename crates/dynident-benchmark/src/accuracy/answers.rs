@@ -1,4 +1,4 @@
-//! How the benchmark calls each estimator.
+//! Calls of the estimators.
 
 use super::pipeline;
 use super::rows::Rows;
@@ -15,7 +15,7 @@ use dynident_identification::consistent::{ConsistencySettings, consistent_parame
 use dynident_identification::estimators::{Estimator, PeriodicModel, PeriodicRecord, SplineTorque};
 use dynident_recording::MotionBlock;
 
-/// What `identify` says of these rows.
+/// The estimate of `identify` for these rows.
 pub(super) fn estimated(
     rows: &Rows<'_>,
     estimator: Estimator,
@@ -28,15 +28,14 @@ pub(super) fn weighted(rows: &Rows<'_>, covariance: CovarianceMethod) -> Result<
     estimated(rows, Estimator::Weighted, covariance)
 }
 
-/// The fit to the record filtered at twice the automatic cut-off.
+/// Fit to the record filtered at twice the automatic cut-off.
 pub(super) fn wide(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let cutoff_hz = 2.0 * trial.cutoff_hz;
     let motion = pipeline::differentiated(trial.record, cutoff_hz).map_err(|_| EstimationError::Empty)?;
     weighted(&filtered(trial, &motion, cutoff_hz)?, CovarianceMethod::Jackknife)
 }
 
-/// The fit with the regressor of the true motion: an oracle that separates what differentiation costs from what
-/// decimation costs.
+/// Fit with the regressor of the true motion: separates the cost of differentiation from that of decimation.
 pub(super) fn true_motion(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let rows = filtered(trial, &with_motion(trial, &trial.scenario.motion), trial.cutoff_hz)?;
     weighted(&rows, CovarianceMethod::Jackknife)
@@ -48,11 +47,11 @@ fn with_motion(trial: &Trial<'_>, motion: &Motion) -> MotionBlock {
 }
 
 fn filtered<'a>(trial: &Trial<'a>, motion: &MotionBlock, cutoff_hz: f64) -> Result<Rows<'a>, EstimationError> {
-    // A pipeline that fails is a failure of the estimator; the figure does not need the reason.
+    // A failing pipeline is a failure of the estimator; its reason is not needed.
     Rows::new(trial.scenario, motion, Some(cutoff_hz)).map_err(|_| EstimationError::Empty)
 }
 
-/// As `huber` and `tukey` of `identify` on rows that are kept, to a tolerance that is a hundredth of an error bar.
+/// As `huber` and `tukey` of `identify` on stored rows, to a hundredth of an error bar.
 pub(super) fn robust(rows: &Rows<'_>, weight: RowWeight) -> Result<Answer, IdentificationError> {
     let settings =
         RobustSettings { weight, covariance: CovarianceMethod::Jackknife, tolerance: 1.0e-2, ..Default::default() };
@@ -60,15 +59,14 @@ pub(super) fn robust(rows: &Rows<'_>, weight: RowWeight) -> Result<Answer, Ident
     Ok(answer(found.estimate))
 }
 
-/// Instruments are the regressor of what the controller was commanded to do.
+/// Instruments are the regressor of the commanded motion.
 pub(super) fn instrumental(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let instruments = filtered(trial, &with_motion(trial, &trial.scenario.reference), trial.cutoff_hz)?;
     let problem = trial.rows.instrumented(&instruments)?;
     Ok(answer(instrumental_variables(&problem, &InstrumentalSettings::default())?.estimate))
 }
 
-/// The physically consistent parameters that fit all rows of the Fourier series' motion best. They come without error
-/// bars.
+/// The best physically consistent parameters for all rows of the Fourier series' motion, without error bars.
 pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let rows = trial.shared.periodic(trial)?;
     let sigma = rows.estimate(Estimator::Weighted, CovarianceMethod::White)?.joint_sigma;
@@ -78,7 +76,7 @@ pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, IdentificationError>
     Ok(Answer { values: fit.base_values, half_width_95: None, converged: true })
 }
 
-/// Motion and parameters together, from the Fourier fit of the positions and the pipeline's parameters on.
+/// Motion and parameters together, starting from the Fourier fit of the positions and the pipeline's parameters.
 pub(super) fn simultaneous(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let start = trial.rows.estimate(Estimator::Weighted, CovarianceMethod::White)?;
     let record = PeriodicRecord { rate_hz: RATE_HZ, q: trial.record.q.clone(), tau: trial.record.tau.clone() };
@@ -90,14 +88,14 @@ pub(super) fn simultaneous(trial: &Trial<'_>) -> Result<Answer, IdentificationEr
         .into_iter()
         .flat_map(|what| joints.iter().map(move |joint| format!("{what} of {joint}")))
         .collect();
-    // Whitened rows of a model that leaves nothing out: their own information is right.
+    // The model is complete, so the white covariance is correct.
     let settings = SimultaneousSettings { covariance: CovarianceMethod::White, ..SimultaneousSettings::default() };
     let names = trial.rows.problem.columns().to_vec();
     let problem = SimultaneousProblem { names, channels, motion, parameters: start.values };
     Ok(answer(simultaneous_least_squares(&problem, &settings, &mut model)?.estimate))
 }
 
-/// Motion and parameters together without knowing the excitation's frequencies, from the pipeline's parameters on.
+/// Motion and parameters together without known excitation frequencies, starting from the pipeline's parameters.
 pub(super) fn spline_motion(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let start = trial.rows.estimate(Estimator::Weighted, CovarianceMethod::White)?;
     let Record { q, tau, .. } = trial.record.clone();

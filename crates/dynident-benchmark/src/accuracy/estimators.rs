@@ -1,4 +1,4 @@
-//! What the benchmark compares. **To add an estimator, add one line to [`ESTIMATORS`].**
+//! Registry of compared estimators. **To add an estimator, add one line to [`ESTIMATORS`].**
 
 use super::answers::{
     estimated, instrumental, physical, robust, simultaneous, spline_motion, true_motion, weighted, wide,
@@ -11,9 +11,9 @@ use dynident_identification::estimators::{Estimator, NoiseLevels};
 /// An entry of the registry.
 #[derive(Clone, Copy, Debug)]
 pub struct BenchmarkEstimator {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub what: &'static str,
     pub(super) answer: fn(&Trial<'_>) -> Result<Answer, IdentificationError>,
 }
@@ -26,7 +26,7 @@ const fn entry(
     BenchmarkEstimator { name, what, answer }
 }
 
-/// The registry: one line for each estimator, or for each kind of error bar of one.
+/// The registry: one line per estimator, or per covariance method of an estimator.
 pub const ESTIMATORS: &[BenchmarkEstimator] = &[
     entry("ordinary", "ordinary least squares, jackknife error bars", |trial| {
         estimated(trial.rows, Estimator::Ordinary, CovarianceMethod::Jackknife)
@@ -48,12 +48,12 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
     }),
     entry(
         "weighted-wide",
-        "weighted least squares, cut-off twice the automatic one: what the differentiator's filter costs",
+        "weighted least squares, cut-off twice the automatic one: shows the cost of the differentiator's filter",
         wide,
     ),
     entry(
         "weighted-true-motion",
-        "weighted least squares on the true motion, which no one knows: what decimation costs",
+        "weighted least squares on the true motion, which is unknown in practice: shows the cost of decimation",
         true_motion,
     ),
     entry("huber", "reweighted least squares with Huber's weights on the pipeline's rows", |trial| {
@@ -63,7 +63,7 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
     entry("noise-weighted", "rows weighted by the noise around them (Feng)", |trial| {
         estimated(trial.rows, Estimator::NoiseWeighted(NoiseLevels::default()), CovarianceMethod::Jackknife)
     }),
-    entry("generalized", "generalised least squares: joints' errors correlated", |trial| {
+    entry("generalized", "generalised least squares: errors correlated between joints", |trial| {
         estimated(trial.rows, Estimator::Generalized, CovarianceMethod::default())
     }),
     entry("instrumental", "instrumental variables, instruments from the reference motion", instrumental),
@@ -85,7 +85,7 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         let rows = trial.shared.periodic(trial)?;
         estimated(rows, Estimator::NoiseWeighted(NoiseLevels::default()), CovarianceMethod::Jackknife)
     }),
-    entry("physical", "the physically consistent set that fits those rows best", physical),
+    entry("physical", "best physically consistent fit to those rows", physical),
     entry(
         "simultaneous",
         "Fourier series of the motion and parameters from one likelihood, torque noise autoregressive",
@@ -93,7 +93,7 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
     ),
     entry(
         "simultaneous-spline",
-        "the same for any motion, a smoothing spline: nothing is known of the excitation",
+        "the same for any motion, a smoothing spline, without known excitation",
         spline_motion,
     ),
 ];

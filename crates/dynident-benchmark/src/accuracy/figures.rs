@@ -1,9 +1,9 @@
-//! From the answers of many runs to the figures of a cell.
+//! Results of a cell from the answers of its runs.
 
 use super::trial::Answer;
 use serde::Serialize;
 
-/// One parameter in one cell.
+/// Results of one parameter in one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterFigures {
@@ -11,20 +11,19 @@ pub struct ParameterFigures {
     pub symbol: String,
     /// Its true value.
     pub truth: f64,
-    /// The Cramér-Rao bound on its standard deviation.
+    /// Cramér-Rao bound of its standard deviation.
     pub bound: f64,
-    /// The same bound when the motion is unknown as well, and only positions as noisy as these hold information about
-    /// it.
+    /// The bound for unknown motion, with information about the motion from the noisy positions only.
     pub bound_with_motion: f64,
-    /// Mean error of the runs that did not fail.
+    /// Mean error of the runs without failure.
     pub bias: f64,
-    /// Root mean square error of these runs.
+    /// RMS error of these runs.
     pub rmse: f64,
-    /// Share of their 95 % intervals that hold the true value, in percent.
+    /// Coverage of their 95 % intervals, percent.
     pub coverage_percent: Option<f64>,
 }
 
-/// One estimator on one robot at one noise level.
+/// Results of one estimator on one robot at one noise level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CellFigures {
@@ -34,34 +33,34 @@ pub struct CellFigures {
     pub noise: String,
     /// The estimator.
     pub estimator: String,
-    /// Runs made.
+    /// Number of runs.
     pub runs: usize,
-    /// Runs without an answer, not converged, or diverged (error above 50 times that of the start).
+    /// Runs without a result, not converged, or diverged (error above 50 times that of the start).
     pub failures: usize,
-    /// `√(mean over parameters of (bias/bound)²)`. Chance alone leaves about `RMSE over bound / √runs`.
+    /// `√(mean over parameters of (bias/bound)²)`. Its sampling error is about `RMSE over bound / √runs`.
     pub bias_over_bound: Option<f64>,
-    /// `√(mean over parameters of (RMSE/bound)²)`: 1 is the best that any unbiased estimator can do.
+    /// `√(mean over parameters of (RMSE/bound)²)`: 1 is the optimum of an unbiased estimator.
     pub rmse_over_bound: Option<f64>,
-    /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the best that any unbiased estimator can do that is
-    /// not given the motion.
+    /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the optimum of an unbiased estimator with unknown
+    /// motion.
     pub rmse_over_bound_with_motion: Option<f64>,
-    /// The parameter that is worst by RMSE over bound.
+    /// The parameter with the largest RMSE over bound.
     pub worst_parameter: Option<String>,
     /// Its RMSE over bound.
     pub worst_rmse_over_bound: Option<f64>,
-    /// Share of all 95 % intervals that hold the true value, in percent.
+    /// Coverage of all 95 % intervals, percent.
     pub coverage_percent: Option<f64>,
-    /// Mean processor time of one estimate, without the rows that several share, milliseconds. The only figure that
-    /// differs from run to run.
+    /// Mean processor time of one estimate, without shared rows, milliseconds. The only result that varies between
+    /// repetitions.
     pub time_ms: f64,
     /// Every base parameter.
     pub parameters: Vec<ParameterFigures>,
 }
 
-/// Divergence by BIRDy's rule: an error so many times that of the start.
-const DIVERGED: f64 = 50.0;
+/// Limit of divergence as in BIRDy: error relative to that of the start.
+const MAX_ERROR_OVER_START: f64 = 50.0;
 
-/// Whether an answer is usable: converged, finite, and not further from the truth than 50 times the start (norms over
+/// Whether an answer is usable: converged, finite, and at most 50 times as far from the truth as the start (norms over
 /// parameters in units of their bounds).
 pub(super) fn usable(answer: &Answer, truth: &[f64], start: &[f64], bound: &[f64]) -> bool {
     let distance = |values: &[f64]| -> f64 {
@@ -70,10 +69,9 @@ pub(super) fn usable(answer: &Answer, truth: &[f64], start: &[f64], bound: &[f64
     answer.converged
         && answer.values.len() == truth.len()
         && distance(&answer.values).is_finite()
-        && distance(&answer.values) <= DIVERGED * distance(start)
+        && distance(&answer.values) <= MAX_ERROR_OVER_START * distance(start)
 }
 
-/// Names of a cell.
 pub(super) struct Cell<'a> {
     pub(super) robot: &'a str,
     pub(super) noise: &'a str,
@@ -84,7 +82,7 @@ pub(super) struct Cell<'a> {
     pub(super) bound_with_motion: &'a [f64],
 }
 
-/// The figures of a cell: `answers` holds one entry a run, none for a failure.
+/// Results of a cell: `answers` contains one entry per run, `None` for a failure.
 pub(super) fn figures(cell: &Cell<'_>, answers: &[Option<Answer>], time_ms: f64) -> CellFigures {
     let good: Vec<&Answer> = answers.iter().flatten().collect();
     let count = good.len() as f64;
@@ -169,7 +167,7 @@ mod tests {
         Answer { values: vec![value], half_width_95: Some(vec![bar]), converged: true }
     }
 
-    /// Errors +1, -3 and a failure on a parameter with a bound of 2: bias -1, RMSE √5; one of two intervals holds the
+    /// Errors +1, -3 and a failure on a parameter with a bound of 2: bias -1, RMSE √5; one of two intervals covers the
     /// truth.
     #[test]
     fn figures_by_hand() {

@@ -1,7 +1,7 @@
-//! How accurate estimators are: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet
-//! et al., Applied Sciences 11 (2021) 4303).
+//! Accuracy of estimators: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet et
+//! al., Applied Sciences 11 (2021) 4303).
 //!
-//! The registries are [`ESTIMATORS`], [`NOISE_LEVELS`] and [`ROBOTS`]: one line each adds to the benchmark.
+//! To extend the benchmark, add a line to a registry: [`ESTIMATORS`], [`NOISE_LEVELS`] or [`ROBOTS`].
 
 mod answers;
 mod bound_with_motion;
@@ -40,57 +40,57 @@ use thiserror::Error as ThisError;
 /// Name and version of the schema of [`BenchmarkFile`].
 pub const BENCHMARK_SCHEMA: &str = "dynident/benchmark/1";
 
-/// Spread of the starts about the truth, as in BIRDy.
+/// Relative standard deviation of the starts about the truth, as in BIRDy.
 const START_SPREAD: f64 = 0.15;
 
-/// Why a benchmark could not be made.
+/// Errors of the benchmark.
 #[derive(Debug, ThisError)]
 #[non_exhaustive]
 pub enum BenchmarkError {
-    /// A name that is in no registry.
-    #[error("--{option} {name}: not one of {}", known.join(", "))]
+    /// A name that is not in the registry.
+    #[error("unknown --{option} {name}: use one of {}", known.join(", "))]
     Unknown {
-        /// The command line's option.
+        /// The command-line option.
         option: &'static str,
         /// The name.
         name: String,
-        /// What there is.
+        /// The known names.
         known: Vec<&'static str>,
     },
-    /// No runs.
-    #[error("--runs {runs}: give 2 to 100000")]
+    /// Invalid number of runs.
+    #[error("--runs {runs} is out of range: use 2 to 100000")]
     Runs {
         /// The number given.
         runs: usize,
     },
-    /// A description that cannot be read.
+    /// A robot description that cannot be read.
     #[error("robot {robot}: {source}")]
     Robot {
         /// The robot.
         robot: String,
-        /// Why.
+        /// The cause.
         source: Box<UrdfError>,
     },
-    /// No excitation of a robot.
+    /// No excitation was found for a robot.
     #[error("robot {robot}: no excitation: {reason}")]
     Excitation {
         /// The robot.
         robot: String,
-        /// Why.
+        /// The cause.
         reason: String,
     },
-    /// The excitation leaves parameters without a bound.
-    #[error("robot {robot}: the excitation does not determine all base parameters; another seed gives another one")]
+    /// The excitation does not determine all base parameters.
+    #[error("robot {robot}: the excitation does not determine all base parameters; use another seed")]
     NoBound {
         /// The robot.
         robot: String,
     },
-    /// A filter that does not exist.
+    /// An impossible filter.
     #[error("robot {robot}: {source}")]
     Filter {
         /// The robot.
         robot: String,
-        /// Why.
+        /// The cause.
         source: FilterError,
     },
     /// An error of the pipeline.
@@ -104,7 +104,7 @@ impl From<IdentificationError> for BenchmarkError {
     }
 }
 
-/// What is compared.
+/// Selection for the benchmark.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BenchmarkSettings {
@@ -114,7 +114,7 @@ pub struct BenchmarkSettings {
     pub noise: Vec<String>,
     /// Names of [`ESTIMATORS`].
     pub estimators: Vec<String>,
-    /// Runs of each robot at each noise level, the same for all estimators. Default 100.
+    /// Runs per robot and noise level, the same for all estimators. Default 100.
     pub runs: usize,
     /// Seed of excitation, noise and starts. Default 1.
     pub seed: u64,
@@ -132,15 +132,15 @@ impl Default for BenchmarkSettings {
     }
 }
 
-/// What `benchmark` writes.
+/// Output of `benchmark`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BenchmarkFile {
     /// [`BENCHMARK_SCHEMA`].
     pub schema: &'static str,
-    /// What was compared.
+    /// The settings.
     pub settings: BenchmarkSettings,
-    /// The noise levels in full.
+    /// Parameters of the noise levels.
     pub noise_levels: Vec<NoiseLevel>,
     /// Samples per second of a record.
     pub rate_hz: f64,
@@ -148,7 +148,7 @@ pub struct BenchmarkFile {
     pub duration_s: f64,
     /// Harmonics of the excitation.
     pub harmonics: usize,
-    /// What the data are.
+    /// Description of the data.
     pub note: &'static str,
     /// Every estimator on every robot at every noise level.
     pub cells: Vec<CellFigures>,
@@ -158,7 +158,7 @@ impl BenchmarkSettings {
     /// Checks names and numbers.
     ///
     /// # Errors
-    /// [`BenchmarkError::Unknown`] with the names there are, [`BenchmarkError::Runs`].
+    /// [`BenchmarkError::Unknown`] with the known names, [`BenchmarkError::Runs`].
     pub fn validate(&self) -> Result<(), BenchmarkError> {
         if !(2..=100_000).contains(&self.runs) {
             return Err(BenchmarkError::Runs { runs: self.runs });
@@ -169,7 +169,6 @@ impl BenchmarkSettings {
     }
 }
 
-/// The entries of a registry that have the given names.
 fn chosen<T: Copy>(
     option: &'static str,
     registry: &[T],
@@ -188,13 +187,13 @@ fn chosen<T: Copy>(
         .collect()
 }
 
-/// What one run gave: per estimator an answer (none: failure) and its time.
+/// Results of one run: per estimator an answer (`None` for a failure) and its time.
 type Run = Vec<(Option<Answer>, f64)>;
 
-/// Runs the benchmark. Runs go in parallel; all figures but times are the same for any number of threads.
+/// Runs the benchmark with runs in parallel; all results but times are the same for any number of threads.
 ///
 /// # Errors
-/// [`BenchmarkError`]; a failing estimator is a figure, not an error.
+/// [`BenchmarkError`]; a failing estimator is counted as a failure, not an error.
 pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Result<BenchmarkFile, BenchmarkError> {
     settings.validate()?;
     let robots = chosen("robots", ROBOTS, |robot| robot.name, &settings.robots)?;
@@ -215,7 +214,7 @@ pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Resul
             let runs: Vec<Run> = (0..settings.runs)
                 .into_par_iter()
                 .map(|run| {
-                    // A generator for each run: the order in which threads take them does not matter.
+                    // One generator per run, so that the order of threads does not matter.
                     let place = format!("{} {} {run}", robot.name, level.name);
                     let mut random = Random::new(settings.seed ^ hash(place.as_bytes()));
                     let mut of_prior = Random::new(settings.seed ^ hash(format!("{place} prior").as_bytes()));
@@ -289,7 +288,7 @@ fn one_run(
         .collect())
 }
 
-/// FNV-1a: a seed from a place, the same on every robot.
+/// FNV-1a: a seed from text, the same on every computer.
 fn hash(bytes: &[u8]) -> u64 {
     let mut hasher = FnvHasher::default();
     hasher.write(bytes);

@@ -1,4 +1,4 @@
-//! How noisy a recording is: the levels of BIRDy's protocol, and what its white Gaussian noise leaves out.
+//! Noise levels of recordings: those of BIRDy's protocol, and others that are not white Gaussian.
 
 use serde::Serialize;
 
@@ -6,24 +6,24 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NoiseLevel {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
     /// Standard deviation of a position's white noise, degrees.
     pub position_std_deg: f64,
-    /// Steps of the encoder in a turn of the joint; none for an ideal one.
+    /// Encoder steps per turn of the joint; `None` for an ideal encoder.
     pub encoder_steps: Option<u32>,
     /// Standard deviation of a torque's noise, Nm.
     pub torque_std_nm: f64,
-    /// Correlation of a torque's noise from one sample to the next at 1 kHz: AR(1), 0 for white noise.
+    /// Lag-1 correlation of a torque's noise at 1 kHz: AR(1), 0 for white noise.
     pub torque_correlation: f64,
-    /// Share of torque samples with a gross error beside it,
+    /// Share of torque samples with an outlier.
     pub outlier_share: f64,
-    /// of this size, either sign, in standard deviations of the torque's noise.
+    /// Size of an outlier, either sign, in standard deviations of the torque's noise.
     pub outlier_size: f64,
 }
 
 impl NoiseLevel {
-    /// Standard deviation of a position as the encoder reports it, rad: noise, and rounding to its steps.
+    /// Standard deviation of an encoder position, rad: noise and rounding to encoder steps.
     pub(super) fn position_std_rad(&self) -> f64 {
         let step = self.encoder_steps.map_or(0.0, |steps| core::f64::consts::TAU / f64::from(steps));
         self.position_std_deg.to_radians().hypot(step / 12.0_f64.sqrt())
@@ -42,8 +42,7 @@ const fn white(name: &'static str, position_std_deg: f64, torque_std_nm: f64) ->
     }
 }
 
-/// The registry: one line for each level. The first five are BIRDy's (Leboutet et al., Applied Sciences 11 (2021)
-/// 4303).
+/// The registry: one line per level. The first five are BIRDy's (Leboutet et al., Applied Sciences 11 (2021) 4303).
 pub const NOISE_LEVELS: &[NoiseLevel] = &[
     white("standard", 1e-3, 0.05),
     white("low-position", 1e-4, 0.05),

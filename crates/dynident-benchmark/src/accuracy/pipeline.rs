@@ -1,10 +1,9 @@
-//! The pipeline's own way from a record to a motion, in memory.
+//! The pipeline from a record to a motion, in memory.
 
 use super::scenario::{DURATION_S, HARMONICS, RATE_HZ, Record};
 use dynident_recording::{Derivatives, DifferentiatorSettings, FilterError, MotionBlock, cutoff};
 
-/// The record's motion, by the default differentiator with the cut-off that the record itself suggests, and that
-/// cut-off.
+/// The record's motion by the default differentiator with the automatic cut-off, and that cut-off.
 pub(super) fn motion(record: &Record) -> Result<(MotionBlock, f64), FilterError> {
     let positions: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
     let cutoff_hz = cutoff(&positions, RATE_HZ).cutoff_hz;
@@ -16,8 +15,7 @@ pub(super) fn differentiated(record: &Record, cutoff_hz: f64) -> Result<MotionBl
     differentiated_by(&DifferentiatorSettings::default(), record, cutoff_hz)
 }
 
-/// The record's motion by a Fourier series of the excitation's own frequencies, fitted to the positions: what is known
-/// of a periodic motion before the run.
+/// The record's motion by a Fourier series at the excitation's frequencies, fitted to the positions.
 pub(super) fn periodic(record: &Record) -> Result<MotionBlock, FilterError> {
     let settings = DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: HARMONICS, trend: false };
     differentiated_by(&settings, record, 1.0)

@@ -3,16 +3,15 @@
 use super::BenchmarkError;
 use dynident_model::{Model, read_urdf};
 
-/// A robot that the benchmark knows.
+/// A robot of the benchmark.
 #[derive(Clone, Copy, Debug)]
 pub struct BenchmarkRobot {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// Its description.
     urdf: &'static str,
 }
 
-/// The registry: one line for each robot.
+/// The registry: one line per robot.
 pub const ROBOTS: &[BenchmarkRobot] = &[
     BenchmarkRobot { name: "planar2r", urdf: include_str!("../../robots/planar2r.urdf") },
     BenchmarkRobot { name: "ur10", urdf: include_str!("../../robots/ur10.urdf") },

@@ -1,4 +1,4 @@
-//! Rows of one trial as `identify` makes them of a motion, and estimates from them.
+//! Rows of one trial as in `identify`, and estimates from them.
 
 use super::BenchmarkError;
 use super::scenario::Scenario;
@@ -17,16 +17,14 @@ use dynident_identification::{
 use dynident_recording::MotionBlock;
 use std::sync::Arc;
 
-/// Name of the one log.
 const LOG: &str = "run";
 
-/// Rows of all joints: a recording of a motion that is made already, and its triangular factors.
+/// Rows of all joints from a given motion, with their triangular factors.
 #[derive(Debug)]
 pub struct Rows<'a> {
     scenario: &'a Scenario,
     recordings: [Recording; 1],
     settings: IdentificationSettings,
-    /// The joints' rows as triangular factors.
     pub(super) problem: LinearProblem,
     blocks: OnceCell<Vec<Block>>,
 }
@@ -38,7 +36,6 @@ struct Block {
     panel: Vec<f64>,
 }
 
-/// Keeps rows as they leave the parallel filter.
 struct BlockStore(Vec<Block>);
 
 impl RowConsumer for BlockStore {
@@ -49,7 +46,8 @@ impl RowConsumer for BlockStore {
 }
 
 impl<'a> Rows<'a> {
-    /// Filter and decimation follow from the cut-off as in `identify`. Without a cut-off every sample as it is.
+    /// Filter and decimation follow from the cut-off as in `identify`. Without a cut-off all samples are used
+    /// unfiltered.
     pub(super) fn new(
         scenario: &'a Scenario,
         motion: &MotionBlock,
@@ -78,7 +76,7 @@ impl<'a> Rows<'a> {
         Ok(Self { scenario, recordings, settings, problem, blocks: OnceCell::new() })
     }
 
-    /// The estimate that `identify` makes of these rows.
+    /// The estimate of `identify` for these rows.
     pub(super) fn estimate(
         &self,
         estimator: Estimator,
@@ -107,15 +105,14 @@ impl<'a> Rows<'a> {
         Ok(self.blocks.get_or_init(|| kept.0))
     }
 
-    /// Hands every row to a visitor.
     pub(super) fn pass(&self, visit: &mut RowVisitor<'_>) -> Result<(), EstimationError> {
-        // Rows that made factors can be made again.
+        // Rows that were computed once can be computed again.
         self.blocks().map_err(|_| EstimationError::Empty)?.iter().try_for_each(|block| {
             visit(&RowBlock { log: 0, joint: block.joint, rows: block.rows, panel: &block.panel })
         })
     }
 
-    /// These rows with those of `instruments` in front, which must come from the same filter.
+    /// These rows preceded by those of `instruments`, which must have the same filter.
     pub(super) fn instrumented(&self, instruments: &Self) -> Result<InstrumentedProblem, IdentificationError> {
         let (problem, layout) = (&self.problem, self.scenario.model.layout());
         let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec());

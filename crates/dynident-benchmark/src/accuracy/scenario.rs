@@ -1,8 +1,8 @@
-//! A robot with true parameters and an excitation, and what a recording of it looks like.
+//! A robot with true parameters, an excitation, and simulated recordings.
 //!
-//! The motion is given, not simulated: the excitation trajectory followed with the small smooth error that a
-//! speed-proportional lag leaves, `q = q_d - ε q̇_d`. Torque is exact inverse dynamics with friction plus noise. There
-//! is no controller, so torque noise does not feed back into the motion.
+//! The motion is given, not simulated: the excitation trajectory with the small smooth tracking error of a
+//! velocity-proportional lag, `q = q_d - ε q̇_d`. Torque is exact inverse dynamics with friction plus noise. Without a
+//! controller torque noise does not affect the motion.
 
 use super::BenchmarkError;
 use super::noise::NoiseLevel;
@@ -23,38 +23,37 @@ pub const RATE_HZ: f64 = 1000.0;
 pub const DURATION_S: f64 = 10.0;
 /// Harmonics of the excitation, of 0.1 Hz each.
 pub const HARMONICS: usize = 20;
-/// The excitation's frequencies, which are known before a run.
+/// Frequencies of the excitation, which are known.
 pub(super) const SERIES: FourierSeries = FourierSeries { period_s: DURATION_S, harmonics: HARMONICS };
-/// Random trajectories among which the most informative is taken.
+/// Number of random trajectories, of which the most informative one is used.
 const CANDIDATES: usize = 24;
 /// Rate at which candidates are compared.
 const CANDIDATE_RATE_HZ: f64 = 20.0;
 /// ε of the tracking error, s.
 const TRACKING_LAG_S: f64 = 0.005;
-/// Speed at which Coulomb friction has reached 76 %: the study file's default.
+/// Speed at which Coulomb friction has reached 76 %: the default of a study.
 const COULOMB_WIDTH: f64 = 0.02;
-/// Joints without limits get these, so that the excitation is finite.
+/// Speed limit of joints without limits, so that the excitation is finite.
 const SPEED_RAD_S: f64 = 2.0;
 
-/// A robot, its excitation, and the truth about both.
+/// A robot, its excitation, and their true values.
 #[derive(Debug)]
 pub struct Scenario {
     /// The robot's name.
     pub robot: &'static str,
     /// The robot.
     pub model: RegressorModel,
-    /// What the controller was commanded to do.
+    /// The commanded motion.
     pub reference: Motion,
     pub(super) truth: Vec<f64>,
     pub(super) motion: Motion,
-    /// Noise-free torque, joint-major.
     pub(super) torque: Vec<f64>,
 }
 
-/// What encoders and torque sensors say of one run, joint-major.
+/// Simulated encoder and torque signals of one run, joint-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// Samples of each joint.
+    /// Samples per joint.
     pub samples: usize,
     /// Positions, rad.
     pub q: Vec<f64>,
@@ -63,7 +62,7 @@ pub struct Record {
 }
 
 impl Scenario {
-    /// The scenario of a robot; the same for every noise level and run of a seed.
+    /// Creates the scenario of a robot; the same for every noise level and run of a seed.
     pub(super) fn new(robot: &BenchmarkRobot, seed: u64) -> Result<Self, BenchmarkError> {
         let model = robot.model()?;
         let drive = DriveChoice {
@@ -94,7 +93,6 @@ impl Scenario {
         Ok(Self { robot: robot.name, model: parametric, reference, truth, motion, torque })
     }
 
-    /// One run's record.
     pub(super) fn record(&self, noise: &NoiseLevel, random: &mut Random) -> Record {
         let samples = self.motion.samples;
         let position_std = noise.position_std_deg.to_radians();
@@ -121,11 +119,11 @@ impl Scenario {
         Record { samples, q, tau }
     }
 
-    /// What a drawing office knows: bodies with a wrong density, no drives.
+    /// Nominal model: bodies with a wrong density, no drives.
     pub(super) fn prior(&self, random: &mut Random, spread: f64) -> Vec<f64> {
         let mut prior = self.model.model().parameter_vector();
         for body in prior.chunks_exact_mut(10) {
-            // Four standard deviations below, a body would weigh less than nothing.
+            // Lower limit, so that masses remain positive.
             let factor = (1.0 + spread * random.normal()).max(0.25);
             for value in body {
                 *value *= factor;
@@ -135,10 +133,10 @@ impl Scenario {
         prior
     }
 
-    /// The Cramér-Rao bound on every base parameter's standard deviation: the diagonal of `(Σ_j Y_jᵀ Ω⁻¹ Y_j)^(-1/2)`
-    /// for the motion known exactly and torque noise of covariance Ω (AR(1), whitened by `y_t - ρ y_{t-1}`). What
-    /// position noise hides is not in it, so it is a bound for every estimator, and one that cannot quite be reached.
-    /// Outliers do not count: they are there to be set aside.
+    /// Cramér-Rao bound of every base parameter's standard deviation: the diagonal of `(Σ_j Y_jᵀ Ω⁻¹ Y_j)^(-1/2)` for
+    /// exactly known motion and torque noise of covariance Ω (AR(1), whitened by `y_t - ρ y_{t-1}`). It ignores
+    /// position noise, so it is valid for every estimator but not quite reachable. Outliers are ignored because they
+    /// can be rejected.
     pub(super) fn bound(&self, noise: &NoiseLevel) -> Option<Vec<f64>> {
         let (count, samples) = (self.truth.len(), self.motion.samples);
         let mut panels = Panels::default();
@@ -166,7 +164,7 @@ impl Scenario {
                 }
             }
         }
-        // Scaled to a unit diagonal: units of parameters lie far apart.
+        // Scaled to a unit diagonal, because units of parameters differ widely.
         let scale: Vec<f64> = information.diagonal().iter().map(|x| x.sqrt()).collect();
         let scaled = DMatrix::from_fn(count, count, |i, j| information[(i, j)] / (scale[i] * scale[j]));
         let inverse = scaled.cholesky()?.inverse();
@@ -174,11 +172,11 @@ impl Scenario {
     }
 }
 
-/// Drives in proportion to what the bodies ask of the joint: viscous and Coulomb friction of 15 % each, drive inertia
-/// of 20 %, an offset of 3 % of the root mean square torque of inertia and gravity.
+/// Drive parameters relative to the RMS torque of inertia and gravity: viscous and Coulomb friction of 15 % each,
+/// drive inertia of 20 %, an offset of 3 %.
 fn drive_value(term: &TorqueTerm, motion: &Motion, bodies: &[f64], joint: usize) -> f64 {
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
-    // A joint that the bodies hardly load (a last link about its own axis) has friction all the same.
+    // Unloaded joints (a last link about its own axis) also have friction.
     let torque = rms(bodies).max(0.5);
     match term.action() {
         TermAction::Damping { .. } => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
@@ -207,7 +205,7 @@ fn torque(model: &Model, layout: &PanelLayout, motion: &Motion, theta: &[f64]) -
     tau
 }
 
-/// `q = q_d - ε q̇_d` and its derivatives, exactly.
+/// `q = q_d - ε q̇_d` and its exact derivatives.
 fn followed(reference: &Motion) -> Motion {
     let late = |value: &[f64], rate: &[f64]| value.iter().zip(rate).map(|(x, dx)| x - TRACKING_LAG_S * dx).collect();
     let (q, dq) = (late(&reference.q, &reference.dq), late(&reference.dq, &reference.ddq));
@@ -215,8 +213,8 @@ fn followed(reference: &Motion) -> Motion {
     Motion { samples: reference.samples, joints: reference.joints, q, dq, ddq, dddq: reference.dddq.clone() }
 }
 
-/// The random Fourier series with the largest `log det` of its information among a few: no design, but nothing that a
-/// user would not do better.
+/// The random Fourier series with the largest `log det` of its information among several: not optimised, but not worse
+/// than a user's excitation.
 fn excitation(
     robot: &BenchmarkRobot,
     model: &Model,

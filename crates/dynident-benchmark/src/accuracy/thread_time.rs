@@ -1,6 +1,6 @@
-//! The processor time of a thread.
+//! Processor time of a thread.
 
-/// Seconds of processor time of this thread, from an arbitrary start; wall time where the system does not say.
+/// Processor time of this thread in seconds, from an arbitrary start; wall time if it is not available.
 pub(crate) fn thread_seconds() -> f64 {
     #[cfg(target_os = "linux")]
     {

@@ -1,5 +1,5 @@
-//! One simulated experiment, the answer of an estimator, and work that several estimators of a trial share: done for
-//! the first one that needs it, and not part of its time.
+//! One simulated experiment, the answer of an estimator, and data that several estimators of a trial share: computed
+//! on first use, and excluded from the estimator's time.
 
 use super::pipeline;
 use super::rows::Rows;
@@ -9,26 +9,25 @@ use core::cell::{Cell, OnceCell};
 use dynident_estimation::EstimationError;
 use dynident_recording::MotionBlock;
 
-/// One simulated experiment, as estimators see it.
+/// Input of an estimator: one simulated experiment.
 #[derive(Debug)]
 pub struct Trial<'a> {
-    /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true
-    /// parameters are for the judge.
+    /// The robot and its excitation. Estimators may use the model's structure and the reference motion, but not the
+    /// true parameters.
     pub scenario: &'a Scenario,
-    /// The readings of encoders and torque sensors.
+    /// Signals of encoders and torque sensors.
     pub record: &'a Record,
-    /// The record after the pipeline's own choice of cut-off and differentiator.
+    /// The record's motion by the pipeline's automatic cut-off and differentiator.
     pub motion: &'a MotionBlock,
-    /// The cut-off chosen from the record.
+    /// The automatic cut-off.
     pub cutoff_hz: f64,
     /// The pipeline's filtered rows.
     pub rows: &'a Rows<'a>,
-    /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
+    /// Start of an iterative estimator: the true base parameters with 15 % Gaussian error.
     pub start: &'a [f64],
-    /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian
-    /// error, no friction and no drives.
+    /// Nominal model: every body's ten true parameters times a common factor with 15 % Gaussian error, without
+    /// friction and drives.
     pub prior: &'a [f64],
-    /// Work that several estimators share.
     pub(super) shared: &'a TrialData<'a>,
 }
 
@@ -37,20 +36,19 @@ pub struct Trial<'a> {
 pub struct Answer {
     /// The base parameters.
     pub values: Vec<f64>,
-    /// Half the width of each value's 95 % interval; none if the estimator gives no error bars.
+    /// Half-width of each value's 95 % interval; `None` if the estimator gives no error bars.
     pub half_width_95: Option<Vec<f64>>,
-    /// False if the iterations stopped before they converged, which is a failure.
+    /// False if the iterations did not converge, which is a failure.
     pub converged: bool,
 }
 
-/// One trial's shared work.
 #[derive(Debug, Default)]
 pub(super) struct TrialData<'a> {
     periodic: OnceCell<Option<Periodic<'a>>>,
     spent_s: Cell<f64>,
 }
 
-/// The motion as a Fourier series at the excitation's own frequencies, and all rows with it.
+/// The motion as a Fourier series at the excitation's frequencies, and all rows with it.
 #[derive(Debug)]
 struct Periodic<'a> {
     motion: MotionBlock,
@@ -58,7 +56,7 @@ struct Periodic<'a> {
 }
 
 impl<'a> TrialData<'a> {
-    /// Seconds spent here so far.
+    /// Total processor time for shared data, s.
     pub(super) fn spent_s(&self) -> f64 {
         self.spent_s.get()
     }
@@ -68,7 +66,6 @@ impl<'a> TrialData<'a> {
         self.made(trial).map(|periodic| &periodic.rows)
     }
 
-    /// Filtered rows with the Fourier series' motion.
     pub(super) fn periodic_filtered(&self, trial: &Trial<'a>) -> Result<Rows<'a>, EstimationError> {
         let motion = &self.made(trial)?.motion;
         let started_s = thread_seconds();
@@ -88,7 +85,7 @@ impl<'a> TrialData<'a> {
             self.spent_s.set(self.spent_s.get() + thread_seconds() - started_s);
             rows
         };
-        // A pipeline that fails is a failure of the estimator; the figure does not need the reason.
+        // A failing pipeline is a failure of the estimator; its reason is not needed.
         self.periodic.get_or_init(made).as_ref().ok_or(EstimationError::Empty)
     }
 }

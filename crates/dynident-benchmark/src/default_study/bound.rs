@@ -1,5 +1,4 @@
-//! The Cramér-Rao bound of a case: what an estimator could do that is told the true laws, the lag and the noise, and
-//! not the motion.
+//! Cramér-Rao bound of a case for known laws, lag and noise, and unknown motion.
 
 use super::cases::DefaultCase;
 use super::simulated::{Simulated, colour};
@@ -9,15 +8,11 @@ use dynident_estimation::{ChannelNoise, EstimationError, SimultaneousModel, simu
 use dynident_excitation::Motion;
 use dynident_identification::estimators::{FourierSeries, PeriodicModel, PeriodicRecord};
 
-/// Rate at which a period of white noise is looked at, Hz: samples between count as more of the same.
+/// Sampling rate for a period of white noise, Hz; more samples only scale the information.
 const RATE_HZ: f64 = 250.0;
 
-/// Standard deviations of the base parameters that no unbiased estimator falls below, the motion a Fourier series with
-/// unknown coefficients; none where friction depends on more than the motion of one instant. One period is looked at;
-/// others say the same again.
-///
-/// # Errors
-/// Motion that does not tell all parameters.
+/// Lower bound of the base parameters' standard deviations for unbiased estimators, with a Fourier series with unknown
+/// coefficients as motion; `None` for friction with memory. Computed for one period and scaled to all.
 pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f64>>, EstimationError> {
     if made.regressor.needs_load() {
         return Ok(None);
@@ -35,10 +30,10 @@ pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f
     let mut model = PeriodicModel::new(&made.regressor, &record, series, 1);
     let motion = model.fitted_motion().ok_or(EstimationError::Empty)?;
     let rows = model.linearised(&motion, &made.theta)?;
-    // So many samples for one.
+    // Number of samples per used sample.
     let more = (thinning as f64 * case.motion.duration_s / PERIOD_S).sqrt();
     let correlation = colour(case);
-    // An encoder's steps are an error that is spread evenly.
+    // Quantisation error of an encoder: uniform distribution.
     let steps = case.noise.encoder_bits.map_or(0.0, |bits| core::f64::consts::TAU / 2.0_f64.powi(bits));
     let position_std = (case.noise.position_rad.powi(2) + steps * steps / 12.0).sqrt() / more;
     let position = ChannelNoise { std: position_std, autoregression: Vec::new() };
@@ -53,7 +48,7 @@ pub(super) fn bound(case: &DefaultCase, made: &Simulated) -> Result<Option<Vec<f
     Ok(Some(covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect()))
 }
 
-/// Every so many-th sample of a motion, so many.
+/// Takes `samples` samples of a motion, every `step`-th one.
 fn thinned(motion: &Motion, step: usize, samples: usize) -> Motion {
     let of = |all: &[f64]| -> Vec<f64> {
         let joints = all.chunks_exact(motion.samples);

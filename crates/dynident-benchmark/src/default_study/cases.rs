@@ -1,40 +1,40 @@
-//! What the experiment goes through: robots × motions × friction × noise × lag, one line for each case.
+//! Cases of the experiment: robots × motions × friction × noise × lag, one line per case.
 
 use crate::friction_truths::FrictionTruth;
 use crate::simulated_logs::{PANDA, PLANAR, SimulatedRobot, UR10};
 
-/// How a designed motion is made and sampled.
+/// Settings of a designed motion.
 #[derive(Clone, Copy, Debug)]
 pub struct CaseMotion {
     /// Harmonics of 0.1 Hz.
     pub harmonics: usize,
     /// Length, s.
     pub duration_s: f64,
-    /// Samples a second, Hz.
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
 }
 
-/// What sensors add.
+/// Sensor noise.
 #[derive(Clone, Copy, Debug)]
 pub struct CaseNoise {
     /// Standard deviation of the positions' white noise, rad.
     pub position_rad: f64,
-    /// Steps a turn of the encoder, as a power of two; none: no steps.
+    /// Encoder steps per turn, as a power of two; `None` for an ideal encoder.
     pub encoder_bits: Option<i32>,
-    /// Standard deviation of a torque's noise in units of the torque's root mean square.
+    /// Standard deviation of a torque's noise relative to the torque's RMS.
     pub torque: f64,
-    /// After how many seconds the torque's noise is correlated by 1/e; 0: white.
+    /// Correlation time (1/e) of the torque's noise, s; 0 for white noise.
     pub torque_colour_s: f64,
-    /// Share of the torque's samples that are off by twenty standard deviations, either sign.
+    /// Share of the torque's samples with an outlier of twenty standard deviations, either sign.
     pub outlier_share: f64,
 }
 
-/// What friction of all joints truly is.
+/// True friction of all joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CaseFriction {
     /// The same law at all joints.
     All(FrictionTruth),
-    /// Another law at each joint, in the order of [`FrictionTruth::ALL`].
+    /// A different law at each joint, in the order of [`FrictionTruth::ALL`].
     Mixed,
 }
 
@@ -47,7 +47,7 @@ impl CaseFriction {
         }
     }
 
-    /// Its name in tables.
+    /// Name for tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::All(truth) => truth.name(),
@@ -56,7 +56,7 @@ impl CaseFriction {
     }
 }
 
-/// One case: a robot and how it is recorded.
+/// One case: a robot and its recordings.
 #[derive(Clone, Copy, Debug)]
 pub struct DefaultCase {
     /// The robot.
@@ -65,14 +65,14 @@ pub struct DefaultCase {
     pub motion: CaseMotion,
     /// Its friction.
     pub friction: CaseFriction,
-    /// What sensors add.
+    /// Sensor noise.
     pub noise: CaseNoise,
-    /// How much later than the motion the torque is logged, s.
+    /// Delay of the logged torque relative to the motion, s.
     pub lag_s: f64,
 }
 
 impl DefaultCase {
-    /// All that it is made of, in a line: its name in messages, and what its random numbers come from.
+    /// All settings in a line: the name in messages, and the seed of the random numbers.
     pub fn label(&self) -> String {
         let Self { robot, motion, friction, noise, lag_s } = self;
         format!(
@@ -125,7 +125,7 @@ const SIGMOID: CaseFriction = CaseFriction::All(FrictionTruth::Sigmoid);
 const LOAD: CaseFriction = CaseFriction::All(FrictionTruth::Load);
 const MIXED: CaseFriction = CaseFriction::Mixed;
 
-/// The registry. Cheap cases first, so that a short run has some of everything.
+/// The registry. Fast cases first, so that a short run covers all kinds.
 pub const DEFAULT_CASES: &[DefaultCase] = &[
     case(PLANAR, motion(5, 10.0, 250.0), PLAIN, noise(1e-5, 0.01, 0.0), 0.0),
     case(PLANAR, motion(5, 20.0, 500.0), ASYMMETRIC, noise(1e-4, 0.02, 0.01), 2.0),

@@ -1,19 +1,19 @@
-//! From the runs of a case to its figures.
+//! Results of a case from its runs.
 
-use super::fits::{MULTIPLES, NamedEstimator};
+use super::fits::{CUTOFF_MULTIPLES, NamedEstimator};
 use core::iter::Sum;
 
-/// How many of some 95 % intervals hold the truth.
+/// Coverage of 95 % intervals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Covered {
-    /// Those that do.
+    /// Intervals that contain the truth.
     pub inside: usize,
-    /// All of them.
+    /// All intervals.
     pub all: usize,
 }
 
 impl Covered {
-    /// In percent; none where there are no intervals.
+    /// Coverage in percent; `None` without intervals.
     pub fn percent(self) -> Option<f64> {
         (self.all > 0).then(|| 100.0 * self.inside as f64 / self.all as f64)
     }
@@ -26,35 +26,33 @@ impl Sum for Covered {
     }
 }
 
-/// An estimator that was asked for by name.
+/// Results of one estimator by name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorOfName {
-    /// Its error, root mean square over the runs in which it settled, as a share.
+    /// Its RMS error over the runs in which it converged, as a share.
     pub error: f64,
-    /// The default's error in the same runs, of its estimate.
+    /// Error of the default's estimate in the same runs.
     pub of_default: f64,
-    /// Runs in which it settled.
+    /// Runs in which it converged.
     pub settled: usize,
 }
 
-/// What became of an estimator by name in one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum NamedRun {
     NotAsked,
-    /// It gave no answer, or did not settle.
+    /// No result, or not converged.
     Failed,
-    /// Its error.
+    /// Converged, with its error.
     Settled(f64),
 }
 
-/// Figures of one run; errors are shares.
 pub(super) struct RunFigures {
     pub(super) written: f64,
     pub(super) free: f64,
-    /// Of the written model with the true laws stated and all else by default.
+    /// Error of the written model with the true laws and defaults for everything else.
     pub(super) laws_stated: f64,
-    /// With the truth in hand, cut-off by cut-off; infinite where it leaves nothing.
-    pub(super) with_truth: [f64; MULTIPLES.len()],
+    /// Errors with the true laws and lag for each cut-off; infinite for impossible filters.
+    pub(super) with_truth: [f64; CUTOFF_MULTIPLES.len()],
     pub(super) plain: Option<f64>,
     pub(super) plain_weighted: Option<f64>,
     pub(super) by_name: Vec<NamedRun>,
@@ -70,69 +68,68 @@ pub(super) struct RunFigures {
     pub(super) asked_hz: f64,
 }
 
-/// Figures of one case; errors are root mean squares over its runs, as shares.
+/// Results of one case; errors are RMS values over its runs, as shares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseFigures {
-    /// Recordings.
+    /// Number of recordings.
     pub runs: usize,
-    /// Error of the model that the default writes: physically consistent.
+    /// Error of the model that the default study writes (physically consistent).
     pub of_default: f64,
     /// Error of the default's estimate.
     pub of_default_free: f64,
-    /// Error of the written model with the true laws stated and all else by default.
+    /// Error of the written model with the true laws and defaults for everything else.
     pub of_laws_stated: f64,
-    /// Error of the written model with the truth in hand: laws, lag and the best cut-off.
+    /// Error of the written model with true laws, true lag and best cut-off.
     pub of_best: f64,
-    /// Error of the estimate with the truth in hand.
+    /// Error of the estimate with true laws, true lag and best cut-off.
     pub of_best_free: f64,
-    /// Its cut-off in units of what the spectra ask for.
+    /// Best cut-off in units of that from the spectra.
     pub best_multiple: f64,
-    /// The default's cut-off in these units, geometric mean.
+    /// Default cut-off in these units, geometric mean.
     pub default_multiple: f64,
-    /// Error of plain least squares; none where it failed in some run.
+    /// Error of plain least squares; `None` if it failed in some run.
     pub of_plain: Option<f64>,
-    /// The same with every joint weighted by its own noise.
+    /// The same with weights by joint noise.
     pub of_plain_weighted: Option<f64>,
-    /// Errors of estimators by name, in the order of [`NamedEstimator::ALL`]; none where one was not asked.
+    /// Errors of estimators by name, in the order of [`NamedEstimator::ALL`]; `None` if not computed.
     pub by_name: Vec<Option<ErrorOfName>>,
-    /// Root mean square over bodies' base parameters and runs of the default's error over the Cramér-Rao bound of
-    /// motion unknown, laws, noise and lag known; none where friction depends on the load.
+    /// RMS over bodies' base parameters and runs of the default's error relative to the Cramér-Rao bound for unknown
+    /// motion and known laws, noise and lag; `None` for load-dependent friction.
     pub over_bound: Option<f64>,
-    /// The default's intervals of bodies' base parameters.
+    /// Coverage of the default's intervals of bodies' base parameters.
     pub bodies: Covered,
-    /// The default's intervals of friction at joints whose laws were all chosen as they are.
+    /// Coverage of the default's friction intervals for joints whose laws were all selected correctly.
     pub friction: Covered,
-    /// Joints, over all runs, of which the recordings can tell the law.
+    /// Number of joints, over all runs, whose law the recordings can distinguish.
     pub tellable: usize,
-    /// Those of which it was chosen.
+    /// Number of these joints for which the law was selected.
     pub told: usize,
-    /// The lag that was found, mean over the runs, s.
+    /// Estimated lag, mean over the runs, s.
     pub lag_found_s: Option<f64>,
-    /// Runs in which its 95 % bar holds the truth.
+    /// Runs in which the 95 % interval of the lag contains the truth.
     pub lag_held: usize,
-    /// Runs in which the default took instruments.
+    /// Runs in which the default used instrumental variables.
     pub instruments: usize,
 }
 
 impl CaseFigures {
-    /// Error of the default's written model over that of the best with the truth in hand.
+    /// Error of the default's written model relative to the best one.
     pub fn over_best(&self) -> f64 {
         self.of_default / self.of_best
     }
 
-    /// What choosing the laws costs: error of the default over that of the true laws stated, all else by default.
+    /// Cost of selecting the laws: error of the default relative to that with the true laws.
     pub fn over_laws_stated(&self) -> f64 {
         self.of_default / self.of_laws_stated
     }
 
-    /// What cut-off and lag cost: error with the true laws stated, all else by default, over the best.
+    /// Cost of cut-off and lag: error with the true laws and defaults for everything else, relative to the best.
     pub fn laws_stated_over_best(&self) -> f64 {
         self.of_laws_stated / self.of_best
     }
 }
 
-/// The figures of a case; `of_best` are written models' errors with the cut-off that is best, `best` its place and
-/// size.
+/// Results of a case; `of_best` are the written models' errors with the best cut-off, `best` is its index and size.
 pub(super) fn summed(runs: &[RunFigures], best: (usize, f64), of_best: &[f64]) -> CaseFigures {
     let count = runs.len();
     let root = |values: &mut dyn Iterator<Item = f64>| {

@@ -1,4 +1,4 @@
-//! The fits that are compared: by default, with the truth in hand, plain, and with each estimator by name.
+//! The compared fits: default, with true laws and lag, plain, and each estimator by name.
 
 use super::cases::DefaultCase;
 use super::simulated::{CaseRobot, Simulated};
@@ -13,14 +13,14 @@ use dynident_identification::{
 };
 use dynident_recording::log::OneOrMany;
 
-/// Cut-offs that are tried with the truth in hand, in units of what the spectra ask for.
-pub(super) const MULTIPLES: [f64; 9] = [0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0, 5.657, 8.0];
-/// A filter is possible below this part of the sampling rate.
-const HIGHEST: f64 = 0.45;
-/// Samples of all joints up to which estimators that estimate the motion as well are asked.
-const MOST_FOR_MOTION: f64 = 75_000.0;
+/// Cut-offs for the fits with true laws and lag, in units of that from the spectra.
+pub(super) const CUTOFF_MULTIPLES: [f64; 9] = [0.5, 0.707, 1.0, 1.414, 2.0, 2.828, 4.0, 5.657, 8.0];
+/// Maximum cut-off relative to the sampling rate.
+const MAX_CUTOFF_OVER_RATE: f64 = 0.45;
+/// Maximum number of samples of all joints for estimators that also estimate the motion.
+const MAX_SAMPLES_FOR_MOTION: f64 = 75_000.0;
 
-/// Settings of `identify` for a study of this robot that has files and columns alone.
+/// Settings of `identify` for a study of this robot with files and columns only.
 pub fn default_settings(robot: &ParametricModel) -> IdentificationSettings {
     let mut settings = with_friction_stated();
     settings.friction = usual_searches(robot.model());
@@ -28,7 +28,7 @@ pub fn default_settings(robot: &ParametricModel) -> IdentificationSettings {
     settings
 }
 
-/// The same where keys state the friction and the drives.
+/// As [`default_settings`] with friction and drives given by keys.
 fn with_friction_stated() -> IdentificationSettings {
     let mut settings = IdentificationSettings::default();
     settings.estimation.estimator = Estimator::Auto(InstrumentSettings::default());
@@ -36,18 +36,18 @@ fn with_friction_stated() -> IdentificationSettings {
 }
 
 impl Simulated {
-    /// As a study without keys does it. Other readings of the logs, which change nothing of the model, are not tried.
+    /// Default fit, as in a study without keys. The set-up check, which does not change the model, is disabled.
     pub(super) fn by_default(&self, robot: &CaseRobot) -> Result<Identification, IdentificationError> {
         let settings = default_settings(&robot.described);
         self.fit(&robot.described, settings)
     }
 
-    /// As by default in all else, with the true laws and their constants stated.
+    /// Default fit with the true laws and their constants.
     pub(super) fn with_laws_stated(&self, robot: &CaseRobot) -> Result<Identification, IdentificationError> {
         self.fit(&robot.with_true_laws, with_friction_stated())
     }
 
-    /// With the true laws, their constants and the true lag stated, and a cut-off; none where it leaves nothing.
+    /// Fit with the true laws, their constants, the true lag and a given cut-off; `None` for an impossible filter.
     pub(super) fn with_truth(
         &self,
         case: &DefaultCase,
@@ -55,7 +55,7 @@ impl Simulated {
         multiple: f64,
         consistent: bool,
     ) -> Option<Identification> {
-        let cutoff_hz = Some(multiple * self.asked_hz).filter(|hz| *hz < HIGHEST * case.motion.rate_hz)?;
+        let cutoff_hz = Some(multiple * self.asked_hz).filter(|hz| *hz < MAX_CUTOFF_OVER_RATE * case.motion.rate_hz)?;
         let mut settings = IdentificationSettings::default();
         settings.motion.differentiator = settings.motion.differentiator.with_cutoff(cutoff_hz);
         settings.motion.torque_lag_s = Some(OneOrMany::One(case.lag_s));
@@ -65,8 +65,8 @@ impl Simulated {
         self.fit(&robot.with_true_laws, settings).ok()
     }
 
-    /// Plain least squares: viscous and smooth Coulomb friction, the cut-off that is chosen by default for that, torque
-    /// as logged; with `Estimator::Ordinary` every joint's newton metre counts alike.
+    /// Plain least squares: viscous and smooth Coulomb friction, the default cut-off for these, torque as logged; with
+    /// `Estimator::Ordinary` all joints have the same weight.
     pub(super) fn plain(&self, robot: &CaseRobot, estimator: Estimator) -> Option<Identification> {
         let mut settings = IdentificationSettings::default();
         settings.motion.torque_lag_s = Some(OneOrMany::One(0.0));
@@ -75,8 +75,8 @@ impl Simulated {
         self.fit(&robot.described, settings).ok()
     }
 
-    /// With the filter, friction and lag of the default fit and another estimator: its error; none where it fails, does
-    /// not settle, or is not asked.
+    /// Error of another estimator with the filter, friction and lag of the default fit; `None` if it fails, does not
+    /// converge, or is not applicable.
     pub(super) fn by_name(&self, robot: &CaseRobot, found: &Identification, estimator: Estimator) -> Option<f64> {
         let robot = robot.described.with_terms(found.model().terms().to_vec()).ok()?;
         let mut settings = IdentificationSettings::default();
@@ -102,12 +102,11 @@ impl Simulated {
         identify(&task, Execution::default())
     }
 
-    /// Error of the estimate itself.
     pub(super) fn free_error(&self, found: &Identification) -> f64 {
         self.error(found.model(), found.base_values())
     }
 
-    /// Error of the model that is written: the consistent set's, where there is one.
+    /// Error of the written model: the physically consistent one if available.
     pub(super) fn written_error(&self, found: &Identification) -> f64 {
         let theta = found.consistent_base_values().unwrap_or_else(|| found.base_values());
         let model: &RegressorModel = found.model();
@@ -115,7 +114,7 @@ impl Simulated {
     }
 }
 
-/// Estimators that are asked for by name.
+/// Estimators compared by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NamedEstimator {
     /// Ordinary least squares.
@@ -128,20 +127,20 @@ pub enum NamedEstimator {
     Huber,
     /// Tukey's weights.
     Tukey,
-    /// Weights by the noise around a row.
+    /// Weights from the local noise.
     NoiseWeighted,
-    /// Instruments of the logs' own motion.
+    /// Instruments from the logs' motion.
     Instrumental,
-    /// Maximum likelihood of a motion that repeats.
+    /// Maximum likelihood of a repeated motion.
     MaximumLikelihood,
-    /// Motion and parameters at once, the motion a spline.
+    /// Motion and parameters together, with a spline motion.
     Simultaneous,
-    /// Motion and parameters at once, the motion a Fourier series whose period is stated.
+    /// Motion and parameters together, with a Fourier series of known period.
     SimultaneousSeries,
 }
 
 impl NamedEstimator {
-    /// All of them, in the order of the table.
+    /// All estimators, in the order of the table.
     pub const ALL: [Self; 10] = [
         Self::Ordinary,
         Self::Weighted,
@@ -155,7 +154,7 @@ impl NamedEstimator {
         Self::SimultaneousSeries,
     ];
 
-    /// Its name in tables.
+    /// Name for tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ordinary => "ordinary",
@@ -171,7 +170,7 @@ impl NamedEstimator {
         }
     }
 
-    /// The estimator for a case; none where it cannot be asked (less than two periods) or would take minutes.
+    /// The estimator for a case; `None` if it is not applicable (less than two periods) or would take minutes.
     pub(super) fn of(self, case: &DefaultCase, dof: usize) -> Option<Estimator> {
         let samples = case.motion.duration_s * case.motion.rate_hz * dof as f64;
         let periods = PeriodSettings { period_s: Some(PERIOD_S), ..PeriodSettings::default() };
@@ -185,7 +184,7 @@ impl NamedEstimator {
             Self::Instrumental => Estimator::Instrumental(InstrumentSettings::default()),
             Self::MaximumLikelihood if case.motion.duration_s < 2.0 * PERIOD_S => return None,
             Self::MaximumLikelihood => Estimator::MaximumLikelihood(periods),
-            Self::Simultaneous | Self::SimultaneousSeries if samples > MOST_FOR_MOTION => return None,
+            Self::Simultaneous | Self::SimultaneousSeries if samples > MAX_SAMPLES_FOR_MOTION => return None,
             Self::Simultaneous => Estimator::SplineMotion(SplineMotionSettings::default()),
             Self::SimultaneousSeries => {
                 Estimator::Simultaneous(PeriodSettings { harmonics: Some(case.motion.harmonics), ..periods })

@@ -1,10 +1,10 @@
-//! **Is the default the expert?** A study of files and columns alone against the best that can be had with the truth in
-//! hand, against plain least squares and against each estimator by name: robots × motions × friction × noise × lag.
+//! **Quality of the defaults**: a study with files and columns only, compared with the best possible one, with plain
+//! least squares and with each estimator by name: robots × motions × friction × noise × lag.
 //!
-//! Every run has a robot whose bodies are not those of its description, a motion designed for it, exact torque with
-//! friction (some milliseconds late), and noise on both. The error of a model is that of its torque on another random
-//! motion without noise: root mean square over joints, each in units of its torque's spread. The same seed for the same
-//! case, so that figures do not depend on which cases are run, in which order or on how many threads.
+//! In every run the robot's bodies differ from the robot description, the motion is designed for it, the exact torque
+//! with friction is delayed by some milliseconds, and both have noise. The error of a model is that of its torque on
+//! another random motion without noise: RMS over joints, each in units of the standard deviation of its torque. Each
+//! case has a fixed seed, so results do not depend on the selection or order of cases or on the number of threads.
 
 mod bound;
 mod cases;
@@ -25,15 +25,15 @@ use dynident_estimation::EstimationError;
 use dynident_identification::Identification;
 use dynident_identification::estimators::Estimator;
 use figures::{NamedRun, RunFigures, summed};
-use fits::MULTIPLES;
+use fits::CUTOFF_MULTIPLES;
 use rayon::prelude::*;
 use simulated::{CaseRobot, Simulated};
 
-/// Fits the recordings `runs` (by number: each has robot, motion and noise of its own) of a case in all ways; the
-/// estimators by name only if `by_name`.
+/// Fits the recordings `runs` (each number has its own robot, motion and noise) of a case in all ways; the estimators
+/// by name only if `by_name`.
 ///
 /// # Errors
-/// A robot, motion or recording that cannot be made, a default fit that fails. What else fails is a figure.
+/// A robot, motion or recording that cannot be created, a default fit that fails. Other failures are results.
 pub fn case_figures(case: &DefaultCase, runs: Range<u64>, by_name: bool) -> Result<CaseFigures, BenchmarkError> {
     let failed = |reason: String| BenchmarkError::Excitation { robot: case.label(), reason };
     let robot = CaseRobot::new(case).map_err(failed)?;
@@ -46,15 +46,15 @@ pub fn case_figures(case: &DefaultCase, runs: Range<u64>, by_name: bool) -> Resu
         })
         .collect::<Result<_, BenchmarkError>>()?;
     let (made, figures): (Vec<Simulated>, Vec<RunFigures>) = done.into_iter().unzip();
-    // The best cut-off is the same in all runs: an expert who knows what to expect, not one who is lucky each time.
+    // The best cut-off is the same in all runs.
     let square = |place: usize| figures.iter().map(|run| run.with_truth[place].powi(2)).sum::<f64>();
-    let best = (0..MULTIPLES.len()).min_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);
+    let best = (0..CUTOFF_MULTIPLES.len()).min_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);
     let written = |made: &Simulated| {
-        let found = made.with_truth(case, &robot, MULTIPLES[best], true);
+        let found = made.with_truth(case, &robot, CUTOFF_MULTIPLES[best], true);
         found.map_or(f64::NAN, |found| made.written_error(&found))
     };
     let of_best: Vec<f64> = made.par_iter().map(written).collect();
-    Ok(summed(&figures, (best, MULTIPLES[best]), &of_best))
+    Ok(summed(&figures, (best, CUTOFF_MULTIPLES[best]), &of_best))
 }
 
 fn run_figures(
@@ -66,8 +66,8 @@ fn run_figures(
     let failed =
         |source: EstimationError| BenchmarkError::Excitation { robot: case.label(), reason: source.to_string() };
     let default = made.by_default(robot)?;
-    // A filter that leaves no rows, or that does not exist at this rate, is no candidate.
-    let ladder = MULTIPLES.map(|multiple| made.with_truth(case, robot, multiple, false));
+    // Filters that leave no rows or are impossible at this rate are excluded.
+    let ladder = CUTOFF_MULTIPLES.map(|multiple| made.with_truth(case, robot, multiple, false));
     let with_truth =
         ladder.each_ref().map(|found| found.as_ref().map_or(f64::INFINITY, |found| made.free_error(found)));
     let bound = bound::bound(case, made).map_err(failed)?;
@@ -83,16 +83,17 @@ fn run_figures(
         Some(ratios.iter().sum::<f64>() / ratios.len() as f64)
     };
     let tellable = made.tellable(case, robot).map_err(failed)?;
-    // What cannot be chosen from a log stays as a study begins.
+    // Terms that cannot be selected from a log stay as at the start of a study.
     let terms_of = |joint: usize| {
         let name = &robot.described.model().joints()[joint].name;
         let own = default.training.friction_choice.iter().find(|one| one.joint == *name)?;
         let stated = || robot.described.terms().iter().filter(|term| term.own_joint() == Some(joint)).cloned();
         Some(own.terms.clone().unwrap_or_else(|| stated().collect()))
     };
-    let is_told = |joint: &usize| {
+    let is_law_selected = |joint: &usize| {
         let truth = case.friction.of(*joint);
-        tellable[*joint] && terms_of(*joint).is_some_and(|terms| terms.iter().any(|term| truth.is_told_by(term)))
+        tellable[*joint]
+            && terms_of(*joint).is_some_and(|terms| terms.iter().any(|term| truth.is_distinguished_by(term)))
     };
     let covered = |place: usize, truth: f64| {
         let estimate = default.estimate();
@@ -119,7 +120,7 @@ fn run_figures(
         bodies: of_bodies,
         friction: of_friction.into_iter().map(|(place, truth)| covered(place, truth)).sum(),
         tellable: tellable.iter().filter(|tellable| **tellable).count(),
-        told: (0..tellable.len()).filter(is_told).count(),
+        told: (0..tellable.len()).filter(is_law_selected).count(),
         lag_found_s: default.torque_lag.common.map(|common| common.lag_s),
         lag_is_held: default.torque_lag.common.is_some_and(|lag| (lag.lag_s - case.lag_s).abs() <= lag.half_width_95_s),
         instruments: default.estimator.name() == "instrumental",
@@ -128,14 +129,14 @@ fn run_figures(
     })
 }
 
-/// Places of the bodies' base parameters in a fit, with their true values.
+/// Positions of the bodies' base parameters in a fit, with their true values.
 fn bodies<'a>(made: &'a Simulated, found: &'a Identification) -> impl Iterator<Item = (usize, f64)> + 'a {
     let columns = found.model().layout().columns().iter().enumerate();
     let bodies = columns.filter(|(_, column)| matches!(column, Column::Body { .. }));
     bodies.filter_map(|(place, column)| Some((place, made.true_value(column)?)))
 }
 
-/// Places of the friction parameters of joints whose laws are all true, with their true values.
+/// Positions of the friction parameters of joints whose laws are all correct, with their true values.
 fn frictions(case: &DefaultCase, made: &Simulated, found: &Identification, dof: usize) -> Vec<(usize, f64)> {
     let columns = found.model().layout().columns();
     let of_joint = |joint: usize| {

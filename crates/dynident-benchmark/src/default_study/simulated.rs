@@ -1,8 +1,10 @@
-//! One recording of a case, with all that is true of it.
+//! One recording of a case, with its true values.
 
 use super::cases::DefaultCase;
-use crate::friction_truths::{FrictionTruth, TOLD, usual_drive};
-use crate::simulated_logs::{PERIOD_S, left_unsaid, model_error, panels, random_series, rms, sampled, torque, truth};
+use crate::friction_truths::{FrictionTruth, MIN_DETECTABLE_STD, usual_drive};
+use crate::simulated_logs::{
+    PERIOD_S, model_error, panels, random_series, rms, sampled, torque, truth, unexplained_torque,
+};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::EstimationError;
 use dynident_excitation::Motion;
@@ -17,25 +19,24 @@ use fnv::FnvHasher;
 use nalgebra::DMatrix;
 use std::hash::Hasher;
 
-/// Random series among which the most informative is taken.
+/// Number of random series, of which the most informative one is used.
 const CANDIDATES: usize = 24;
 /// Rate at which they are compared.
 const CANDIDATE_RATE_HZ: f64 = 20.0;
-/// Rate of the motion that models are tried on.
+/// Rate of the motion on which models are tested.
 const TEST_RATE_HZ: f64 = 100.0;
-/// By how much a body's mass differs from the description at most, as a share, ...
-const MASS_OFF: f64 = 0.25;
-/// ... and by how much it lies elsewhere, m (each axis).
-const PLACE_OFF_M: f64 = 0.02;
-/// Size of an outlier in standard deviations of the noise.
-const OUTLIER: f64 = 20.0;
+/// Maximum relative deviation of a body's mass from the robot description.
+const MAX_MASS_DEVIATION: f64 = 0.25;
+/// Maximum deviation of a body's position, m (each axis).
+const MAX_POSITION_DEVIATION_M: f64 = 0.02;
+const OUTLIER_STD: f64 = 20.0;
 
-/// The robot of a case: as described with the usual terms, and with the terms that are true.
+/// The robot of a case: with the default terms, and with the true terms.
 pub(super) struct CaseRobot {
-    /// The description with viscous and smooth Coulomb friction and an offset at every joint: what a study without keys
-    /// begins with.
+    /// Robot description with viscous and smooth Coulomb friction and an offset at every joint: the start of a study
+    /// without keys.
     pub(super) described: ParametricModel,
-    /// The description with the laws and constants that are true.
+    /// Robot description with the true laws and constants.
     pub(super) with_true_laws: ParametricModel,
 }
 
@@ -49,18 +50,14 @@ impl CaseRobot {
     }
 }
 
-/// A recording and what is true of it.
 pub(super) struct Simulated {
-    /// The robot as it truly is, with the load that its friction feels.
+    /// The true robot, including the load for its friction.
     pub(super) regressor: RegressorModel,
-    /// Its base parameters.
     pub(super) theta: Vec<f64>,
     pub(super) log: Log,
-    /// The cut-off that the positions' spectra ask for, Hz.
+    /// Cut-off from the positions' spectra, Hz.
     pub(super) asked_hz: f64,
-    /// The motion while it was recorded.
     pub(super) motion: Motion,
-    /// Standard deviation of each joint's torque noise.
     pub(super) torque_std: Vec<f64>,
     exact: Vec<f64>,
     other: Motion,
@@ -76,7 +73,7 @@ impl Simulated {
         let laws = robot.with_true_laws.terms().to_vec();
         let regressor = ParametricModel::new(arm, laws).map_err(|source| source.to_string())?;
         let regressor = RegressorModel::from(regressor);
-        // The load is that of the bodies alone.
+        // The load is that of the bodies only.
         let mut bodies = regressor.model().parameter_vector();
         bodies.resize(bodies.len() + regressor.terms().len(), 0.0);
         let load = regressor.base().values(&bodies);
@@ -108,58 +105,58 @@ impl Simulated {
         Ok(Self { regressor, theta, log, asked_hz, motion, torque_std, exact, other, other_exact })
     }
 
-    /// Error of a model's torque on the motion that it has not seen, as a share.
+    /// Error of a model's torque on the test motion, as a share.
     pub(super) fn error(&self, model: &RegressorModel, theta: &[f64]) -> f64 {
         model_error(&self.other, &self.other_exact, &torque(model, &self.other, theta))
     }
 
-    /// The true value of a base parameter; none where the true robot has no such column.
+    /// True value of a base parameter; `None` if the true robot has no such column.
     pub(super) fn true_value(&self, column: &Column) -> Option<f64> {
         let symbol = column.symbol();
         let place = self.regressor.layout().columns().iter().position(|own| own.symbol() == symbol);
         place.map(|place| self.theta[place])
     }
 
-    /// Joints whose friction can be told from viscous and Coulomb friction (where it is that: from viscous friction
-    /// alone): what the best fit without it leaves of the exact torque is beyond what noise could be.
+    /// Joints whose friction law is distinguishable from viscous and Coulomb friction (for plain friction: from
+    /// viscous friction alone): the residual of the best fit without it exceeds the noise.
     pub(super) fn tellable(&self, case: &DefaultCase, robot: &CaseRobot) -> Result<Vec<bool>, EstimationError> {
         let is_left = |term: &&TorqueTerm| {
             term.own_joint().is_none_or(|joint| {
                 let truth = case.friction.of(joint);
-                truth != FrictionTruth::Plain || !truth.is_told_by(term)
+                truth != FrictionTruth::Plain || !truth.is_distinguished_by(term)
             })
         };
         let rest = robot.described.terms().iter().filter(is_left).cloned().collect();
         let without = robot.described.with_terms(rest).map_err(|_| EstimationError::Empty)?;
         let without = RegressorModel::from(without);
-        // Noise that lasts counts for more: as many samples say less.
+        // Correlated noise reduces the effective number of samples.
         let correlation = colour(case);
         let lasting = ((1.0 + correlation) / (1.0 - correlation)).sqrt();
-        let left = left_unsaid(&without, &self.motion, &self.exact)?;
-        let is_beyond = |(left, std): (f64, &f64)| left > TOLD * lasting * std;
+        let left = unexplained_torque(&without, &self.motion, &self.exact)?;
+        let is_beyond = |(left, std): (f64, &f64)| left > MIN_DETECTABLE_STD * lasting * std;
         Ok(left.into_iter().zip(&self.torque_std).map(is_beyond).collect())
     }
 }
 
-/// Correlation of the torque's noise from one sample to the next.
+/// Lag-1 correlation of the torque's noise.
 pub(super) fn colour(case: &DefaultCase) -> f64 {
     let (colour_s, step_s) = (case.noise.torque_colour_s, case.motion.rate_hz.recip());
     if colour_s > 0.0 { (-step_s / colour_s).exp() } else { 0.0 }
 }
 
-/// Bodies that are heavier or lighter than described and lie elsewhere, moved as a whole: still mass distributions.
+/// Bodies with changed mass and position, moved as a whole, so they remain physically consistent.
 fn true_bodies(described: &Model, random: &mut Random) -> Vec<InertialParameters> {
     let off = |body: &InertialParameters, random: &mut Random| {
-        let place = Vec3(core::array::from_fn(|_| random.uniform(-PLACE_OFF_M, PLACE_OFF_M)));
-        let factor = 1.0 + random.uniform(-MASS_OFF, MASS_OFF);
+        let place = Vec3(core::array::from_fn(|_| random.uniform(-MAX_POSITION_DEVIATION_M, MAX_POSITION_DEVIATION_M)));
+        let factor = 1.0 + random.uniform(-MAX_MASS_DEVIATION, MAX_MASS_DEVIATION);
         let moved = body.expressed_in(&Transform { rotation: Mat3::IDENTITY, translation: place });
         InertialParameters(moved.0.map(|parameter| factor * parameter))
     };
     described.inertials().iter().map(|body| off(body, random)).collect()
 }
 
-/// The random series with the largest determinant of its information among a few: nothing that a user would not do
-/// better, but no bad luck either.
+/// The random series with the largest determinant of its information among several: not optimised, but not an unlucky
+/// choice.
 fn designed(
     model: &Model,
     robot: &ParametricModel,
@@ -196,7 +193,6 @@ fn designed(
     best.map(|(_, family, parameters)| (family, parameters)).ok_or_else(none)
 }
 
-/// What an encoder says of positions.
 fn encoded(case: &DefaultCase, q: &[f64], random: &mut Random) -> Vec<f64> {
     let step = case.noise.encoder_bits.map(|bits| core::f64::consts::TAU / 2.0_f64.powi(bits));
     let mut of = |q: &f64| {
@@ -206,7 +202,6 @@ fn encoded(case: &DefaultCase, q: &[f64], random: &mut Random) -> Vec<f64> {
     q.iter().map(&mut of).collect()
 }
 
-/// What a torque sensor says.
 fn measured(case: &DefaultCase, exact: &[f64], std: f64, random: &mut Random) -> Vec<f64> {
     let correlation = colour(case);
     let fresh = std * (1.0 - correlation * correlation).sqrt();
@@ -214,7 +209,7 @@ fn measured(case: &DefaultCase, exact: &[f64], std: f64, random: &mut Random) ->
     let mut of = |tau: &f64| {
         let mut value = tau + error;
         if case.noise.outlier_share > 0.0 && random.uniform(0.0, 1.0) < case.noise.outlier_share {
-            value += OUTLIER * std * if random.uniform(-1.0, 1.0) < 0.0 { -1.0 } else { 1.0 };
+            value += OUTLIER_STD * std * if random.uniform(-1.0, 1.0) < 0.0 { -1.0 } else { 1.0 };
         }
         error = correlation * error + fresh * random.normal();
         value
@@ -222,7 +217,7 @@ fn measured(case: &DefaultCase, exact: &[f64], std: f64, random: &mut Random) ->
     exact.iter().map(&mut of).collect()
 }
 
-/// FNV-1a: a seed from words, the same on every machine.
+/// FNV-1a: a seed from text, the same on every computer.
 fn seed(words: &str) -> u64 {
     let mut hasher = FnvHasher::default();
     hasher.write(words.as_bytes());

@@ -1,38 +1,37 @@
-//! The figures as a table, as CSV, and beside what they are to be.
+//! Results as a table, as CSV, and compared with the goals.
 
 use super::cases::DefaultCase;
 use super::figures::{CaseFigures, Covered};
 use super::fits::NamedEstimator;
 use core::fmt::Write;
 
-/// What the default may cost, and what cut-off and lag may: the error, that with the true laws stated and all else by
-/// default, over that of the best cut-off with laws and lag stated.
-const MOST_OVER_BEST: f64 = 1.15;
-/// What choosing the laws may cost: the default's error over that of the true laws stated, all else by default.
-const MOST_OVER_LAWS: f64 = 1.3;
-/// What its error may be over the Cramér-Rao bound.
-const MOST_OVER_BOUND: f64 = 1.2;
-/// How many of the 95 % intervals hold the truth, percent.
-const COVERAGE: [f64; 2] = [93.0, 97.0];
-/// Share of the joints that can tell whose law is chosen, percent.
-const LEAST_TOLD: f64 = 90.0;
+/// Goal for the cost of all defaults, and of cut-off and lag: error (for the latter with the true laws) relative to
+/// that of the best cut-off with true laws and lag.
+const MAX_ERROR_OVER_BEST: f64 = 1.15;
+/// Goal for the cost of selecting the laws: the default's error relative to that with the true laws.
+const MAX_ERROR_OVER_TRUE_LAWS: f64 = 1.3;
+/// Goal for the error relative to the Cramér-Rao bound.
+const MAX_ERROR_OVER_BOUND: f64 = 1.2;
+/// Goal for the coverage of the 95 % intervals, percent.
+const COVERAGE_PERCENT: [f64; 2] = [93.0, 97.0];
+/// Goal for the share of distinguishable joints with a correct law, percent.
+const MIN_CORRECT_LAWS_PERCENT: f64 = 90.0;
 
-/// Columns of [`csv_line`], without those of the estimators by name, which follow: for each its error in percent and
-/// the runs in which it settled.
+/// Columns of [`csv_line`], followed for each estimator by its error in percent and the runs in which it converged.
 const COLUMNS: &str = "robot,harmonics,length_s,rate_hz,friction,position_noise_rad,encoder_bits,torque_noise,torque_colour_s,outlier_share,lag_ms,runs,default_percent,default_free_percent,laws_stated_percent,best_percent,best_free_percent,best_cutoff_over_spectrum,default_cutoff_over_spectrum,default_over_best,plain_percent,plain_weighted_percent,error_over_bound,bodies_covered,bodies_intervals,friction_covered,friction_intervals,law_told,law_tellable,lag_found_ms,lag_held_runs,instruments_runs";
 
-/// The table's first two lines.
+/// The first two lines of the table.
 pub const TABLE_HEADER: &str = "| robot | motion | friction | noise | lag, ms | default, % | laws stated, % | best, % | over best | plain, % | best by name, % | over bound | bodies cover, % | friction cover, % | law chosen | lag found, ms |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |";
 
-/// The names above all lines of [`csv_line`].
+/// Header of [`csv_line`].
 pub fn csv_header() -> String {
     let names = NamedEstimator::ALL.map(NamedEstimator::name);
     let of_names = names.map(|name| format!("{name}_percent,{name}_settled"));
     format!("{COLUMNS},{}", of_names.join(","))
 }
 
-/// A case and its figures as a line of CSV; what there is not is empty.
+/// A case and its results as a line of CSV; missing values are empty.
 pub fn csv_line(case: &DefaultCase, figures: &CaseFigures) -> String {
     let DefaultCase { robot, motion, friction, noise, lag_s } = case;
     let percent = |share: f64| format!("{:.4}", 100.0 * share);
@@ -87,7 +86,7 @@ pub fn csv_line(case: &DefaultCase, figures: &CaseFigures) -> String {
     line
 }
 
-/// A case and its figures as a line of the table.
+/// A case and its results as a line of the table.
 pub fn table_line(case: &DefaultCase, figures: &CaseFigures) -> String {
     let DefaultCase { robot, motion, friction, noise, lag_s } = case;
     let percent = |share: f64| format!("{:.2}", 100.0 * share);
@@ -129,7 +128,7 @@ pub fn table_line(case: &DefaultCase, figures: &CaseFigures) -> String {
     )
 }
 
-/// What the default is to reach and what it does, a line each.
+/// Goals and results, one line each.
 pub fn goals(done: &[CaseFigures]) -> Vec<String> {
     let of = |ratio: fn(&CaseFigures) -> f64| -> Vec<f64> { done.iter().map(ratio).collect() };
     let (all, laws) = (of(CaseFigures::over_best), of(CaseFigures::over_laws_stated));
@@ -163,29 +162,30 @@ pub fn goals(done: &[CaseFigures]) -> Vec<String> {
         )
     };
     let share = |part: usize, all: usize| 100.0 * part as f64 / all.max(1) as f64;
-    let is_covered =
-        |covered: Covered| covered.percent().is_none_or(|percent| (COVERAGE[0]..=COVERAGE[1]).contains(&percent));
+    let is_covered = |covered: Covered| {
+        covered.percent().is_none_or(|percent| (COVERAGE_PERCENT[0]..=COVERAGE_PERCENT[1]).contains(&percent))
+    };
     let coverage = |what: &str, covered: Covered| {
         format!(
             "95 % intervals of {what} hold the truth in {} to {} %: {:.1} % of {}, {}",
-            COVERAGE[0],
-            COVERAGE[1],
+            COVERAGE_PERCENT[0],
+            COVERAGE_PERCENT[1],
             covered.percent().unwrap_or(f64::NAN),
             covered.all,
             verdict(is_covered(covered))
         )
     };
     vec![
-        within("cut-off and lag, with the laws stated: error over the best", &ratios, MOST_OVER_BEST),
-        within("laws chosen: error over that with the laws stated", &laws, MOST_OVER_LAWS),
-        within("all by default: error over the best", &all, MOST_OVER_BEST),
-        within("error of the bodies over the Cramér-Rao bound", &bounds, MOST_OVER_BOUND),
+        within("cut-off and lag, with the laws stated: error over the best", &ratios, MAX_ERROR_OVER_BEST),
+        within("laws chosen: error over that with the laws stated", &laws, MAX_ERROR_OVER_TRUE_LAWS),
+        within("all by default: error over the best", &all, MAX_ERROR_OVER_BEST),
+        within("error of the bodies over the Cramér-Rao bound", &bounds, MAX_ERROR_OVER_BOUND),
         coverage("bodies", bodies),
         coverage("friction whose law was chosen as it is", friction),
         format!(
-            "law chosen where it can be told, at least {LEAST_TOLD} %: {told} of {tellable}, {:.0} %, {}",
+            "law chosen where it can be told, at least {MIN_CORRECT_LAWS_PERCENT} %: {told} of {tellable}, {:.0} %, {}",
             share(told, tellable),
-            verdict(share(told, tellable) >= LEAST_TOLD)
+            verdict(share(told, tellable) >= MIN_CORRECT_LAWS_PERCENT)
         ),
         format!(
             "better than plain least squares, ordinary and weighted: {} of {} cases, {}",

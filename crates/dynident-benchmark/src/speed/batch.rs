@@ -1,4 +1,4 @@
-//! Lanes of samples: nanoseconds a sample.
+//! Batches of samples: nanoseconds per sample.
 
 use super::clock::Report;
 use super::motion::{Motion, STATES};
@@ -9,7 +9,7 @@ use dynident_dynamics::{
 use dynident_model::Model;
 use std::hint::black_box;
 
-/// Times inverse dynamics, mass matrix, derivatives and the whole regressor (ten columns for every body of every joint)
+/// Times inverse dynamics, mass matrix, derivatives and the full regressor (ten columns for every body of every joint)
 /// in batches.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>, block: usize) {
     let blocks = Motion::random(model, STATES / block * block).blocks(block);

@@ -1,19 +1,19 @@
-//! The clock, the repeats, and the JSON lines.
+//! Clock, repetitions, and JSON lines.
 
 use dynident_lanes::Level;
 
-/// Repeats of one figure, and how long each lasts at least: as in `bench_pinocchio.cpp`.
+/// Repetitions of one result, and minimum duration of each: as in `bench_pinocchio.cpp`.
 pub(super) const REPEATS: usize = 21;
 const REPEAT_NS: f64 = 12e6;
 
-/// Time that this thread has had of the processor, in nanoseconds: what others run in between does not count.
+/// Processor time of this thread, ns.
 #[cfg(unix)]
 pub(super) fn now_ns() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
 }
 
-/// Time since the first call, in nanoseconds: there is no portable thread clock.
+/// Time since the first call, ns, because there is no portable thread clock.
 #[cfg(not(unix))]
 pub(super) fn now_ns() -> f64 {
     use std::{sync::OnceLock, time::Instant};
@@ -21,7 +21,6 @@ pub(super) fn now_ns() -> f64 {
     START.get_or_init(Instant::now).elapsed().as_nanos() as f64
 }
 
-/// Whose figures are printed.
 pub(crate) struct Report<'a> {
     pub(crate) robot: &'a str,
     pub(crate) dof: usize,
@@ -31,8 +30,8 @@ pub(crate) struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Times `sweep`, which does the work `per` times, and prints median, minimum and maximum of one time; at the level
-    /// that counts, the operations of one time in their place.
+    /// Times `sweep`, which does the work `per` times, and prints median, minimum and maximum per unit of work; at the
+    /// counting level the operations instead.
     pub(crate) fn time(&self, quantity: &str, per: usize, mut sweep: impl FnMut()) {
         if !self.only.is_empty() && !self.only.iter().any(|only| only == quantity) {
             return;
@@ -79,7 +78,7 @@ impl Report<'_> {
     }
 }
 
-/// One line about the robot. Without an `algo` it is no figure.
+/// One line about the computer. Without an `algo` it is not a result.
 pub(crate) fn environment(levels: &[Level]) -> String {
     let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let processor = processor.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

@@ -18,9 +18,9 @@ const SAMPLES: usize = 5000;
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
-/// Times one step of 1 ms under joint PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by
-/// both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along sines.
-/// Always at this processor's best level.
+/// Times one step of 1 ms under joint PD control to zero (gains 100 and 20 times the mass matrix' diagonal at zero)
+/// for both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along
+/// sines, at the best level of this processor.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), SimulationError> {
     let dof = model.dof();
     let zeros = vec![0.0; dof];
@@ -35,13 +35,13 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
     let start = Start::At { q: (0..dof).map(|_| random.uniform(-0.3, 0.3)).collect(), dq: zeros.clone() };
     for (quantity, integrator) in [("pd_step_euler", EULER), ("pd_step_rk4", RK4)] {
         let settings = LoopSettings { integrator, start: start.clone(), ..LoopSettings::default() };
-        // Once for what can go wrong.
+        // The first run reports errors.
         closed_loop(&mut plant, controller.as_mut(), &reference, &settings)?;
         report.time(quantity, SAMPLES, || {
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
-    // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some
+    // Dry friction in every joint, in Nm equal to the mass matrix' diagonal at zero in kg m²: some joints stick, some
     // slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
     let terms: Vec<TorqueTerm> = (0..dof).map(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape })).collect();

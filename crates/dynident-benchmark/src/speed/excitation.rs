@@ -1,4 +1,4 @@
-//! What one step of an excitation design takes: cost, limits and exact gradient of a trajectory.
+//! A step of an excitation design: cost, limits and exact gradient of a trajectory.
 
 use super::clock::Report;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
@@ -13,7 +13,7 @@ use std::hint::black_box;
 const SAMPLES: usize = 256;
 
 /// Times the D-criterion of a random Fourier trajectory (5 harmonics, 10 s, base columns) with position, speed and
-/// torque limits, and its gradient by the trajectory's parameters. Always at this processor's best level.
+/// torque limits, and its gradient by the trajectory's parameters, at the best level of this processor.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     let settings = FourierSettings::default();
     let (Ok(family), Ok(limits)) =
@@ -41,7 +41,7 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
         let d = information.of(&motion, 1.0);
         if let Some((_, by_information)) = DOptimal.value_and_derivative(&d) {
             adjoint.reset(motion.joints, motion.samples);
-            // As in a search: only what is broken has a weight.
+            // As in a search: only violated limits have a weight.
             let weights: Vec<f64> = values.iter().map(|value| value.max(0.0)).collect();
             limits.apply_adjoint(&mut workspace, &motion, &weights, &mut adjoint);
             information.apply_adjoint(&motion, 1.0, &by_information, &mut adjoint);

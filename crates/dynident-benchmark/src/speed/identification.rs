@@ -1,4 +1,4 @@
-//! What an identification takes from 10,000 samples: the regressor, and the triangular factors of every joint.
+//! Identification from 10,000 samples: regressor and triangular factors of every joint.
 
 use super::clock::Report;
 use super::motion::Motion;
@@ -13,14 +13,11 @@ use std::hint::black_box;
 
 const SAMPLES: usize = 10_000;
 
-/// Samples in a block: some hundred kilobytes of panels stay in the second-level cache, and a column is an odd number
-/// of cache lines.
+/// Samples per block: panels of several hundred kilobytes stay in the second-level cache, and a column is an odd
+/// number of cache lines.
 const BLOCK: usize = 248;
 
-/// Times both for 10,000 samples of a smooth motion; torques are made beforehand, as in the Python program.
-///
-/// # Errors
-/// If a factor refuses its rows, which makes the figure worthless.
+/// Times both for 10,000 samples of a smooth motion; torques are computed beforehand, as in the Python program.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), EstimationError> {
     let blocks = Motion::fourier(model, SAMPLES, 10.0).blocks(BLOCK);
     let mut workspace = BatchWorkspace::with_level(model, report.level);

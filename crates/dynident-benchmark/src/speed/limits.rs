@@ -1,4 +1,4 @@
-//! What this machine can do at best, measured in the same run as the figures that are held against it.
+//! Limits of this machine, measured in the same run as the results.
 
 use super::clock::{REPEATS, now_ns};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
@@ -7,19 +7,19 @@ use std::hint::black_box;
 use std::io::Read;
 use std::path::Path;
 
-/// Numbers in an array that no cache holds: 64 MiB.
-const FAR: usize = 8 << 20;
-/// Bytes of a text that are taken at once: they stay in the second-level cache.
-const TAKEN: usize = 1 << 18;
+/// Numbers in an array that is larger than any cache: 64 MiB.
+const MEMORY_ARRAY_LEN: usize = 8 << 20;
+/// Bytes of text read at once; they stay in the second-level cache.
+const TEXT_CHUNK_BYTES: usize = 1 << 18;
 
-/// Prints the peak of every level and what memory gives; only those of `only` unless it is empty.
+/// Prints the peak of every level and the memory bandwidth; only those of `only` unless it is empty.
 pub(crate) fn of_processor(levels: &[Level], only: &[String]) {
     let asked = |limit: &str| only.is_empty() || only.iter().any(|only| only == limit);
     if asked("peak_flops") {
         for &level in levels {
-            // As many chains as hide the latency and fit into the registers differ from level to level.
+            // The best number of chains to hide latency within the registers depends on the level.
             let most = [chains::<4>(level), chains::<8>(level), chains::<12>(level)].into_iter().fold(0.0, f64::max);
-            told(level.name(), "peak_flops", most, "multiply-adds of independent chains, two operations each");
+            print_limit(level.name(), "peak_flops", most, "multiply-adds of independent chains, two operations each");
         }
     }
     if asked("memory") {
@@ -27,11 +27,11 @@ pub(crate) fn of_processor(levels: &[Level], only: &[String]) {
     }
 }
 
-fn told(build: &str, limit: &str, per_second: f64, what: &str) {
+fn print_limit(build: &str, limit: &str, per_second: f64, what: &str) {
     println!(r#"{{"job":"limit","build":"{build}","limit":"{limit}","per_second":{per_second:.4e},"what":"{what}"}}"#);
 }
 
-/// The least time of `work`, s.
+/// Minimum time of `work`, s.
 fn least_s(mut work: impl FnMut()) -> f64 {
     work();
     let times = (0..REPEATS).map(|_| {
@@ -42,7 +42,7 @@ fn least_s(mut work: impl FnMut()) -> f64 {
     1e-9 * times.fold(f64::INFINITY, f64::min)
 }
 
-/// `N` chains of `steps` multiply-adds each.
+/// `N` independent chains of `steps` multiply-adds.
 struct Chains<const N: usize> {
     steps: usize,
 }
@@ -51,7 +51,7 @@ impl<const N: usize> Kernel for Chains<N> {
     type Output = f64;
     #[inline(always)]
     fn run<T: Lane>(self) -> f64 {
-        // Their fixed point is one: nothing overflows, nothing becomes subnormal.
+        // The fixed point is one, so nothing overflows or becomes subnormal.
         let (factor, addend) = (T::splat(black_box(0.5)), T::splat(black_box(0.5)));
         let mut values: [T; N] = core::array::from_fn(|k| T::splat(1.0 + k as f64 / 16.0));
         for _ in 0..self.steps {
@@ -71,39 +71,46 @@ fn chains<const N: usize>(level: Level) -> f64 {
     (2 * N * steps * level.lanes()) as f64 / seconds
 }
 
-/// Bytes that are read and written; what the processor reads before it writes does not count.
+/// Bytes read and written, without the reads before writing.
 fn memory() {
-    let (from, more) = (vec![1.0; FAR], vec![2.0; FAR]);
-    let mut to = vec![0.0; FAR];
+    let (from, more) = (vec![1.0; MEMORY_ARRAY_LEN], vec![2.0; MEMORY_ARRAY_LEN]);
+    let mut to = vec![0.0; MEMORY_ARRAY_LEN];
     let seconds = least_s(|| {
         to.copy_from_slice(black_box(&from));
         black_box(&mut to);
     });
-    told("", "copy", 16.0 * FAR as f64 / seconds, "bytes read and written, arrays of 64 MiB");
+    print_limit("", "copy", 16.0 * MEMORY_ARRAY_LEN as f64 / seconds, "bytes read and written, arrays of 64 MiB");
     let seconds = least_s(|| {
         for ((to, from), more) in to.iter_mut().zip(black_box(&from)).zip(black_box(&more)) {
             *to = from + 3.0 * more;
         }
         black_box(&mut to);
     });
-    told("", "triad", 24.0 * FAR as f64 / seconds, "bytes read and written, a = b + 3 c of 64 MiB each");
+    print_limit(
+        "",
+        "triad",
+        24.0 * MEMORY_ARRAY_LEN as f64 / seconds,
+        "bytes read and written, a = b + 3 c of 64 MiB each",
+    );
 }
 
-/// Prints how fast a text can be read that lies in the system's cache, its lines counted, and its numbers read by the
+/// Prints the speed of counting the lines of a text in the system's cache, and of parsing its numbers with the
 /// standard library.
-///
-/// # Errors
-/// If it cannot be read.
 pub(crate) fn of_text(path: &Path) -> std::io::Result<()> {
     let bytes = std::fs::metadata(path)?.len() as f64;
-    let mut taken = vec![0; TAKEN];
+    let mut taken = vec![0; TEXT_CHUNK_BYTES];
     let mut failed = Ok(());
     let seconds = least_s(|| failed = lines(path, &mut taken).map(|lines| _ = black_box(lines)));
     failed?;
-    told("", "newlines", bytes / seconds, "bytes of a text read from the system's cache and looked at for line ends");
+    print_limit(
+        "",
+        "newlines",
+        bytes / seconds,
+        "bytes of a text read from the system's cache and looked at for line ends",
+    );
     let text = std::fs::read_to_string(path)?;
     let (header, rows) = text.split_once('\n').unwrap_or_default();
-    // A tenth of it is enough.
+    // A tenth of the text is sufficient.
     let some: Vec<&str> = rows.lines().take(rows.len() / header.len().max(1) / 30).collect();
     let fields: Vec<&str> = some.iter().flat_map(|line| line.split(',')).collect();
     let length: usize = fields.iter().map(|field| field.len() + 1).sum();
@@ -112,11 +119,15 @@ pub(crate) fn of_text(path: &Path) -> std::io::Result<()> {
             let _ = black_box(field.parse::<f64>());
         }
     });
-    told("", "floats", length as f64 / seconds, "bytes of fields that are split already, read by the standard library");
+    print_limit(
+        "",
+        "floats",
+        length as f64 / seconds,
+        "bytes of fields that are split already, read by the standard library",
+    );
     Ok(())
 }
 
-/// Number of line ends.
 fn lines(path: &Path, taken: &mut [u8]) -> std::io::Result<usize> {
     let (mut file, mut lines) = (File::open(path)?, 0);
     loop {
@@ -124,7 +135,7 @@ fn lines(path: &Path, taken: &mut [u8]) -> std::io::Result<usize> {
         if count == 0 {
             return Ok(lines);
         }
-        // Counts of a byte, so that sixteen of them stand side by side.
+        // Counted in bytes, so that sixteen counts fit into a vector.
         lines += taken[..count]
             .chunks(255)
             .map(|part| usize::from(part.iter().fold(0_u8, |sum, byte| sum + u8::from(*byte == b'\n'))))

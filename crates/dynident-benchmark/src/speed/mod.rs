@@ -1,5 +1,5 @@
-//! Times of dynamics, of the way from samples to triangular factors, of a step of an excitation design, of one of the
-//! closed loop and of reading text, and what the machine can do at best, as JSON lines.
+//! Times of dynamics, triangular factors from samples, a step of an excitation design, a step of the closed loop and
+//! reading text, and limits of the machine, as JSON lines.
 
 mod batch;
 mod clock;
@@ -18,16 +18,11 @@ use dynident_lanes::Level;
 use dynident_model::Model;
 use std::path::Path;
 
-/// Robots that are only timed for their dynamics.
 const DYNAMICS_ONLY: &str = "talos_reduced";
-/// The robot whose way to factors is timed.
 const FACTORS_OF: &str = "panda_arm7";
 
-/// Measures what this machine can do, and times reading the text at `path`: `rows` samples of `model`, made where there
-/// are none.
-///
-/// # Errors
-/// In words, if the text cannot be written or read.
+/// Measures the limits of this machine, and times reading the text at `path`: `rows` samples of `model`, created if
+/// missing.
 pub(crate) fn time_machine(
     name: &str,
     model: &Model,
@@ -47,11 +42,8 @@ pub(crate) fn time_machine(
     Ok(())
 }
 
-/// Times everything of one robot on these processor levels, `block` samples in a batch; only quantities of `only`,
+/// Times everything of one robot on these processor levels, with `block` samples per batch; only quantities of `only`
 /// unless it is empty.
-///
-/// # Errors
-/// In words, if a quantity cannot be computed.
 pub(crate) fn time_robot(
     name: &str,
     model: &Model,

@@ -1,10 +1,10 @@
-//! The states and motions that are timed.
+//! States and motions for timing.
 
 use core::f64::consts::{PI, TAU};
 use dynident_model::Model;
 use dynident_model::sample::Random;
 
-/// States side by side in one sweep: enough that no branch predictor learns them.
+/// States in one sweep: enough to defeat branch prediction.
 pub(crate) const STATES: usize = 512;
 
 /// Random samples, joint-major: positions within the limits (at most one turn), speeds and accelerations within ±1.
@@ -31,7 +31,7 @@ impl Motion {
         motion
     }
 
-    /// A smooth exciting motion of `duration_s`: five harmonics of 0.1 Hz, as the Python program has them.
+    /// A smooth exciting motion of `duration_s`: five harmonics of 0.1 Hz, as in the Python program.
     pub(crate) fn fourier(model: &Model, samples: usize, duration_s: f64) -> Self {
         let mut random = Random::new(3);
         let zeros = || vec![0.0; model.dof() * samples];
@@ -52,7 +52,7 @@ impl Motion {
         motion
     }
 
-    /// The same motion cut into blocks of at most `block` samples, each joint-major by itself.
+    /// The motion in blocks of at most `block` samples, each joint-major.
     pub(crate) fn blocks(&self, block: usize) -> Vec<Self> {
         let dof = self.q.len() / self.samples;
         let cut = |array: &[f64], start: usize, end: usize| -> Vec<f64> {
@@ -72,7 +72,6 @@ impl Motion {
             .collect()
     }
 
-    /// The joint vectors of each sample, one after the other.
     pub(crate) fn by_sample(&self) -> Vec<[Vec<f64>; 3]> {
         let dof = self.q.len() / self.samples;
         let at = |array: &[f64], sample: usize| (0..dof).map(|joint| array[joint * self.samples + sample]).collect();

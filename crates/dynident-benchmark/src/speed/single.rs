@@ -9,10 +9,9 @@ use dynident_dynamics::{
 use dynident_model::Model;
 use std::hint::black_box;
 
-/// One call at `q`, `dq` and `ddq` (or torque), and one number of its result.
+/// One call at `q`, `dq` and `ddq` (or torque), with one number of its result.
 type Call<'a> = dyn FnMut(&mut Workspace, &[f64], &[f64], &[f64]) -> f64 + 'a;
 
-/// Times every algorithm over random states.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     let states = Motion::random(model, STATES).by_sample();
     let mut workspace = Workspace::with_level(model, report.level);
@@ -25,7 +24,7 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     };
     time("rnea", &mut |w, q, dq, ddq| inverse_dynamics(model, w, q, dq, ddq)[0]);
     time("crba", &mut |w, q, _, _| mass_matrix(model, w, q)[0]);
-    // Accelerations of one stand in for torques, as in the rival's program: the path through the algorithm is the same.
+    // Accelerations of one in place of torques, as in the compared program: the code path is the same.
     time("aba", &mut |w, q, dq, tau| forward_dynamics(model, w, q, dq, tau)[0]);
     time("joint_torque_regressor", &mut |w, q, dq, ddq| torque_regressor(model, w, q, dq, ddq)[0]);
     time("aba_derivatives", &mut |w, q, dq, tau| forward_dynamics_derivatives(model, w, q, dq, tau).by_position[0]);

@@ -1,4 +1,4 @@
-//! A recording as text: made once, and read.
+//! A recording as text, created once and read.
 
 use super::clock::Report;
 use super::motion::Motion;
@@ -15,16 +15,13 @@ const RATE_HZ: f64 = 1000.0;
 const BLOCK: usize = 248;
 
 /// Writes `rows` samples at 1 kHz of a smooth motion: time, positions, velocities and torques of every joint, nine
-/// digits each; friction in the joints, white noise on positions and torques. What is there already stays.
-///
-/// # Errors
-/// If it cannot be written.
+/// digits each; with joint friction and white noise on positions and torques. Keeps an existing file.
 pub(crate) fn write(path: &Path, model: &Model, rows: usize) -> Result<(), Error> {
     if path.exists() {
         return Ok(());
     }
     let dof = model.dof();
-    // Under another name first: what was cut short is not taken for whole.
+    // A temporary name prevents use of an incomplete file.
     let unfinished = path.with_extension("part");
     let mut out = BufWriter::new(std::fs::File::create(&unfinished)?);
     write!(out, "t")?;
@@ -61,10 +58,7 @@ pub(crate) fn write(path: &Path, model: &Model, rows: usize) -> Result<(), Error
     std::fs::rename(unfinished, path)
 }
 
-/// Times reading every number of it, a row.
-///
-/// # Errors
-/// If it cannot be read.
+/// Times reading every number of the file, per row.
 pub(crate) fn time_reading(path: &Path, report: &Report<'_>) -> Result<(), RecordingError> {
     let rows = read(path)?;
     let bytes = std::fs::metadata(path).map_err(|source| RecordingError::Io { file: path.to_owned(), source })?.len();
@@ -80,7 +74,6 @@ pub(crate) fn time_reading(path: &Path, report: &Report<'_>) -> Result<(), Recor
     Ok(())
 }
 
-/// Reads all rows, and says how many.
 fn read(path: &Path) -> Result<usize, RecordingError> {
     let (_, mut table) = FileLog::described_by_itself(path).open_with_format()?;
     let mut rows = 0;

@@ -1,4 +1,4 @@
-//! The Monte Carlo benchmark: seeds, threads, and figures that are what they must be.
+//! The Monte Carlo benchmark: seeds, threads, and known results.
 
 use dynident_benchmark::accuracy::{BenchmarkError, BenchmarkFile, BenchmarkSettings, benchmark};
 use dynident_benchmark::cutoffs::{CUTOFF_CELLS, cutoff_figures};
@@ -24,16 +24,16 @@ fn made(threads: usize) -> Result<BenchmarkFile, Box<dyn std::error::Error>> {
 }
 
 #[test]
-fn the_same_for_any_number_of_threads() -> Result<(), Box<dyn std::error::Error>> {
+fn figures_are_identical_for_any_number_of_threads() -> Result<(), Box<dyn std::error::Error>> {
     assert_eq!(made(1)?, made(3)?);
     Ok(())
 }
 
-/// No unbiased estimator beats the bound: with the true motion, 12 runs and 12 or more parameters the root mean square
-/// over the bound has a sampling error of about 1/√(2·12·12) = 6 % if errors were independent; three of these, below.
-/// Above, decimation to the motion's band costs no more than half.
+/// No unbiased estimator is better than the bound: with the true motion, 12 runs and at least 12 parameters the RMS
+/// over the bound has a sampling error of about 1/√(2·12·12) = 6 % for independent errors; lower limit 3 σ. Upper
+/// limit: decimation to the motion's band costs at most half.
 #[test]
-fn the_bound_is_a_bound_and_nearly_reached() -> Result<(), Box<dyn std::error::Error>> {
+fn true_motion_nearly_reaches_the_bound() -> Result<(), Box<dyn std::error::Error>> {
     let file = made(2)?;
     let oracle = file.cells.iter().find(|cell| cell.estimator == "weighted-true-motion").ok_or("no such cell")?;
     assert_eq!((oracle.runs, oracle.failures), (12, 0));
@@ -42,9 +42,9 @@ fn the_bound_is_a_bound_and_nearly_reached() -> Result<(), Box<dyn std::error::E
     Ok(())
 }
 
-/// With the motion unknown as well the simultaneous fit is at its own bound, which lies above that of the motion known.
-/// Chance as above; of its 12 · 16 intervals 95 % hold the truth, with a standard deviation of 1.6 % if parameters
-/// erred on their own, and twice that here; three of these.
+/// With unknown motion the simultaneous fit reaches its bound, which is above that of known motion. Sampling error as
+/// above; the coverage of its 12 · 16 intervals has a standard deviation of 1.6 % for independent parameters, twice
+/// that here; lower limit 3 σ.
 #[test]
 fn the_simultaneous_fit_reaches_the_bound_with_the_motion_unknown() -> Result<(), Box<dyn std::error::Error>> {
     let file = made(2)?;
@@ -67,11 +67,11 @@ fn unknown_names_and_no_runs_are_reported() {
     assert!(matches!(none.validate(), Err(BenchmarkError::Runs { runs: 0 })));
 }
 
-/// The cut-off is chosen by what it does to the parameters, not by the motion's power: a slow motion with quiet
-/// encoders gains by a higher one than the spectrum asks for, and the default takes it. Two runs, so bounds are wider
-/// than the 1.15 that many runs are held to.
+/// The cut-off is selected by its effect on the parameters, not by the motion's power: a slow motion with low encoder
+/// noise needs a higher one than the spectrum suggests, and the default uses it. With two runs the limits are wider
+/// than 1.15.
 #[test]
-fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dyn std::error::Error>> {
+fn slow_motion_gets_the_cutoff_of_its_parameters() -> Result<(), Box<dyn std::error::Error>> {
     let slow = CUTOFF_CELLS.iter().find(|cell| cell.robot.name == "Panda" && cell.log.position_noise_rad == 1e-4);
     let figures = cutoff_figures(slow.ok_or("no such cell")?, 2, false)?;
     assert!(figures.default_over_best() < 1.3, "{figures:?}");
@@ -79,12 +79,10 @@ fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dy
     Ok(())
 }
 
-/// Friction by direction is found, with constants that no grid has: the chosen model errs at most twice as much as one
-/// that is told the true terms and their constants, on a motion where viscous and Coulomb friction err over ten times
-/// as much. A choice without constants between the grid's points, from blocks of consecutive time, errs twelve times as
-/// much.
+/// Direction-dependent friction is found, with constants between grid points: the error is at most twice that with the
+/// true terms and constants, on a motion where viscous and Coulomb friction have over ten times that error.
 #[test]
-fn friction_that_is_chosen_is_nearly_as_good_as_friction_that_is_known() -> Result<(), Box<dyn std::error::Error>> {
+fn selected_friction_is_nearly_as_good_as_known_friction() -> Result<(), Box<dyn std::error::Error>> {
     let cells = friction_cells();
     let cell = cells.iter().find(|cell| cell.truth == FrictionTruth::Asymmetric).ok_or("no such cell")?;
     let figures = friction_figures(cell, 1)?;

@@ -1,5 +1,5 @@
-//! The default against the truth in hand: that the experiment is one of the default, and the same for any number of
-//! threads.
+//! Comparison of the defaults with the best possible choice: uses the real defaults, and does not depend on the number
+//! of threads.
 
 use dynident::{Folders, Study, StudyRobot};
 use dynident_benchmark::default_study::{
@@ -13,9 +13,9 @@ fn figures(case: &DefaultCase, threads: usize) -> Result<CaseFigures, Box<dyn Er
     Ok(pool.install(|| case_figures(case, 0..2, false))?)
 }
 
-/// Whatever becomes the default of a study becomes that of the experiment, or this fails.
+/// The experiment must use the defaults of a study.
 #[test]
-fn the_default_is_that_of_a_study_of_files_and_columns_alone() -> Result<(), Box<dyn Error>> {
+fn default_equals_a_study_of_files_and_columns_only() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("log.csv"), "t,q1,q2,tau1,tau2\n0,0,0,0,0\n0.01,0,0,0,0\n")?;
     std::fs::write(folder.path().join("arm.urdf"), include_str!("../../robots/planar2r.urdf"))?;
@@ -39,10 +39,10 @@ fn the_default_is_that_of_a_study_of_files_and_columns_alone() -> Result<(), Box
     Ok(())
 }
 
-/// The cheapest case, a planar arm. An expert who knows the truth cannot be much worse than the default (chance of two
-/// recordings aside). A lag that is looked for does not make a fit worse than plain least squares. The step of friction
-/// is passed within two samples: behind a low-pass that follows the motion the rows did not tell its width, and the
-/// default had fifteen times the error of the true law; two recordings make a factor of two by chance.
+/// The fastest case, a planar arm. The best possible fit cannot be much worse than the default (except for the
+/// sampling error of two recordings). Lag estimation must not make a fit worse than plain least squares. The friction
+/// step is passed within two samples, so its width is hard to determine; sampling error of two recordings: a factor of
+/// two.
 #[test]
 fn figures_do_not_depend_on_threads_and_are_in_order() -> Result<(), Box<dyn Error>> {
     let case = &DEFAULT_CASES[0];
@@ -57,16 +57,16 @@ fn figures_do_not_depend_on_threads_and_are_in_order() -> Result<(), Box<dyn Err
     assert!(one.of_default < 2.0 * one.of_laws_stated, "{one:?}");
     assert!(one.lag_found_s.is_some_and(|lag_s| lag_s.abs() < 1e-3), "{one:?}");
     assert_eq!((one.told, one.tellable, one.bodies.all), (4, 4, 12));
-    // What is missed is said.
+    // Missed goals are reported.
     assert!(goals(&[one]).iter().any(|goal| goal.ends_with("MISSED")));
     Ok(())
 }
 
-/// A lag of 8 ms at all joints, friction with a bump near rest: friction that is chosen while the lag is in the rows
-/// makes up for a part of it, at each joint for another, and joints were given lags of their own (4 to 8 ms) that were
-/// never put right. A lag that all joints share is taken off first. Its error is some tenths of a millisecond.
+/// A lag of 8 ms at all joints and Stribeck friction: friction that is selected before the lag is compensated would
+/// absorb part of it, with different lags per joint. So the common lag is compensated first; its error is some tenths
+/// of a millisecond.
 #[test]
-fn a_lag_that_all_joints_share_is_found_beside_chosen_friction() -> Result<(), Box<dyn Error>> {
+fn common_lag_and_friction_law_are_found_together() -> Result<(), Box<dyn Error>> {
     let is_it =
         |case: &&DefaultCase| case.robot.name == "UR10" && case.friction.name() == "Stribeck" && case.lag_s == 8e-3;
     let case = DEFAULT_CASES.iter().find(is_it).ok_or("no such case")?;
@@ -76,9 +76,8 @@ fn a_lag_that_all_joints_share_is_found_beside_chosen_friction() -> Result<(), B
     Ok(())
 }
 
-/// Noise of the positions of 1e-3 rad: a step of 0.015 rad/s looked dry at a joint (6.7 times the error with the laws
-/// stated), and terms that nobody has made up for a smeared one (3.6 times). Two recordings make a factor of two by
-/// chance; constants that have to be found as well cost something.
+/// Position noise of 1e-3 rad: a step of 0.015 rad/s must not be mistaken for a discontinuous one, or a smeared step
+/// for additional terms. Sampling error of two recordings: a factor of two; estimated constants add some error.
 #[test]
 fn noise_of_the_positions_does_not_spoil_friction() -> Result<(), Box<dyn Error>> {
     let is_it = |case: &&&DefaultCase| case.noise.position_rad >= 1e-3 && case.motion.duration_s <= 10.0;
@@ -90,9 +89,9 @@ fn noise_of_the_positions_does_not_spoil_friction() -> Result<(), Box<dyn Error>
     Ok(())
 }
 
-/// Estimators that need a motion that repeats were refused in all cases, because it stood still after its first period.
+/// The motion must repeat after its first period, for estimators of periodic motion.
 #[test]
-fn estimators_of_repeated_motion_are_given_one() -> Result<(), Box<dyn Error>> {
+fn estimators_for_repeated_motion_receive_it() -> Result<(), Box<dyn Error>> {
     let is_it = |case: &&DefaultCase| case.robot.name == "planar 2R" && case.friction.name() == "asymmetric";
     let case = DEFAULT_CASES.iter().find(is_it).ok_or("no such case")?;
     let found = case_figures(case, 0..1, true)?;

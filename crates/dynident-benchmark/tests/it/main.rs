@@ -1,4 +1,4 @@
-//! What the benchmark says, and that it says the same again.
+//! Integration tests of the benchmark.
 
 mod accuracy;
 mod default_study;

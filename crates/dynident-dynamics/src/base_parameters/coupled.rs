@@ -1,7 +1,7 @@
-//! Base parameters where joints follow others. The structure of a tree says which columns a joint's torque tells; a
-//! degree of freedom that moves several joints feels sums of these, whose dependencies are those of regressors at
-//! random states. Friction stays apart, as in the structural rule: it mixes with nothing, and each of its functions
-//! of the motion is one condition.
+//! Base parameters of robots with coupled joints. The structural rule applies to the joints of a tree; a degree of
+//! freedom that moves several joints measures sums of their columns, so dependencies are found from regressors at
+//! random states. Friction is separate, as in the structural rule: it does not combine with other columns, and each of
+//! its functions of the motion is one condition.
 
 use super::numerical::ScaledRegressors;
 use super::structural::friction_conditions;
@@ -10,10 +10,10 @@ use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 
-/// The states are the same every time, so that the same robot has the same base parameters.
+/// Fixed, so that the same robot always has the same base parameters.
 const SEED: u64 = 1;
 
-/// The split of all columns (bodies, then terms), where a share below `tolerance` counts as none.
+/// Splits all columns (bodies, then terms); shares below `tolerance` are treated as zero.
 pub(super) fn independent_columns(model: &Model, terms: &[TorqueTerm], tolerance: f64) -> IndependentColumns {
     let ScaledRegressors { mut rows, factors } = ScaledRegressors::new(model, terms, SEED);
     let first_term = model.inertial_count();
@@ -29,7 +29,7 @@ pub(super) fn independent_columns(model: &Model, terms: &[TorqueTerm], tolerance
         row.columns_mut(first_term, terms.len()).tr_copy_from(condition);
     }
     let mut split = independent_regressor_columns(&all, tolerance);
-    // Back to columns as they are: those of terms that rows of their own hold were never scaled.
+    // Undo the scaling; friction columns were not scaled.
     let factor = |column: usize| if is_friction(column) { 1.0 } else { factors[column] };
     for (d, &dependent) in split.dependent.iter().enumerate() {
         for (b, &base) in split.independent.iter().enumerate() {

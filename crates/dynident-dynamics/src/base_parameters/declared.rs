@@ -1,8 +1,8 @@
-//! Declared torques among the base parameters: what a user writes may be what gravity says already (`sin(q)` is the
-//! weight of a link), and no structure tells. So their columns are compared with all others at random states.
+//! Declared torques among the base parameters: a user's expression may equal a gravity torque (`sin(q)` is the weight
+//! of a link), which the structure does not show. So their columns are compared with all others at random states.
 //!
-//! A declared column that the other columns give, in the rows of all joints, is regrouped into them like any dependent
-//! column: nothing tells its coefficient, and base parameters name it.
+//! A declared column that is a combination of the others in the rows of all joints is regrouped like any dependent
+//! column: its coefficient is not identifiable, and base parameters include it.
 
 use super::numerical::stacked;
 use crate::independent_columns::{IndependentColumns, independent_regressor_columns};
@@ -12,26 +12,25 @@ use dynident_model::sample::Random;
 use dynident_model::terms::{JointMotion, TorqueTerm};
 use nalgebra::DMatrix;
 
-/// Seed of the states: the same for every call, so that the choice is.
+/// Fixed, so that the choice is reproducible.
 const SEED: u64 = 27;
-/// States at which a declared torque is tried on its own.
-const TRIALS: usize = 2000;
-/// The largest value of a declared torque's function below which it is nothing.
-const NOTHING: f64 = 1e-9;
+/// Number of states for the check of a single declared torque.
+const CHECKED_STATES: usize = 2000;
+/// A declared torque is zero if its function stays below this value.
+const MIN_TORQUE_VALUE: f64 = 1e-9;
 
-/// What is wrong with a declared torque inside its joints' limits.
+/// Fault of a declared torque within the joint limits.
 pub(crate) enum DeclaredFault {
-    /// It has no value at these positions and velocities of the joints that it follows.
+    /// Undefined at these positions and velocities of its joints.
     Undefined(Vec<(usize, f64, f64)>),
-    /// It is zero everywhere.
     Nothing,
 }
 
-/// Looks for a fault of a declared torque at random states inside the joints' limits, their ends among them. A table
-/// need not reach so far.
+/// Searches for a fault of a declared torque at random states within the joint limits, including their ends. A table
+/// may cover a smaller range.
 pub(crate) fn fault(model: &Model, term: &TorqueTerm) -> Option<DeclaredFault> {
     let function = term.state_function()?;
-    let states = States::inside_limits(model, TRIALS);
+    let states = States::inside_limits(model, CHECKED_STATES);
     let motion = states.motion();
     let mut values = vec![0.0; states.samples];
     function.fill(&motion, &mut values);
@@ -40,11 +39,10 @@ pub(crate) fn fault(model: &Model, term: &TorqueTerm) -> Option<DeclaredFault> {
         return Some(DeclaredFault::Undefined(function.follows().into_iter().map(at).collect()));
     }
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    (largest < NOTHING).then_some(DeclaredFault::Nothing)
+    (largest < MIN_TORQUE_VALUE).then_some(DeclaredFault::Nothing)
 }
 
-/// `split` with the declared columns that depend on others regrouped into them. The structural split has each as a base
-/// column of its own.
+/// Regroups declared columns that depend on others. In the structural split each is a base column.
 pub(super) fn regrouped(
     model: &Model,
     columns: &[Column],
@@ -57,7 +55,7 @@ pub(super) fn regrouped(
     if declared.is_empty() {
         return split;
     }
-    // The declared ones behind all others: a column is tried against those before it.
+    // Declared columns come last, because a column is compared with those before it.
     let order = [others, declared].concat();
     let states = States::inside_limits(model, 4 * order.len() / model.dof().max(1) + 20);
     let tried = order.iter().map(|&column| columns[column].clone()).collect();
@@ -97,7 +95,6 @@ pub(super) fn regrouped(
     }
 }
 
-/// Random states, joint-major.
 struct States {
     samples: usize,
     q: Vec<f64>,
@@ -106,8 +103,8 @@ struct States {
 }
 
 impl States {
-    /// Positions inside the limits of every joint (without: ±π or ±1 m), one in four at an end; velocities as far as
-    /// they go (without: ±2), accelerations within ±5.
+    /// Positions within the limits of every joint (without limits: ±π or ±1 m), one in four at an end; velocities
+    /// within their limits (without: ±2), accelerations within ±5.
     fn inside_limits(model: &Model, samples: usize) -> Self {
         let mut random = Random::new(SEED);
         let mut states = Self { samples, q: Vec::new(), dq: Vec::new(), ddq: Vec::new() };

@@ -1,36 +1,36 @@
-//! What base parameters say of a single parameter.
+//! Determination of single parameters by the base parameters.
 
 use super::BaseParameters;
 use crate::regressor_panels::Column;
 
-/// Entries of the regrouping below this, of the unit that the robot's size gives them, are rounding, of descriptions
-/// too: `1.5708` for π/2 leaves 4e-6.
-const NOTHING: f64 = 1.0e-4;
+/// Entries of the regrouping below this (relative to the robot's size) are rounding, also of robot descriptions:
+/// `1.5708` for π/2 has an error of 4e-6.
+const MIN_REGROUPING_ENTRY: f64 = 1.0e-4;
 
-/// Whether torque tells a parameter.
+/// Whether the torque determines a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Determination {
-    /// Its value by itself.
+    /// The value is determined.
     Measured,
-    /// Only sums of it with others: how they are shared out is not measured.
+    /// Only combinations with other parameters are determined.
     Partly,
-    /// Nothing: the value is the nominal one.
+    /// Not determined: the value is nominal.
     Nominal,
 }
 
 impl BaseParameters {
-    /// For every parameter (ten for each body, then the terms) whether the base parameters determine it, those among
-    /// them that `fixed` names by their number not counted.
+    /// Determination of every parameter (ten per body, then the terms) by the base parameters, except those with the
+    /// numbers in `fixed`.
     ///
-    /// With `θ = π_i + R π_d` a parameter is determined alone if it is independent and no dependent one has a share in
-    /// its row of `R`; it is not in any torque if its column of `R` is zero. `length_m` is a length that the robot's
-    /// links have: entries of `R` are powers of lengths, and what counts as zero grows with them.
+    /// With `θ = π_i + R π_d` a parameter is determined if it is independent and its row of `R` is zero; it does not
+    /// affect the torque if its column of `R` is zero. `length_m` is a typical link length: entries of `R` are powers
+    /// of lengths, and the threshold for zero scales with them.
     pub fn determination(&self, fixed: &[usize], length_m: f64) -> Vec<Determination> {
         let mut all = vec![Determination::Nominal; self.all_columns().len()];
         let size = |column: usize| match &self.all_columns()[column] {
             Column::Body { parameter: 0, .. } => 1.0,
             Column::Body { parameter: 1..=3, .. } => length_m,
-            // Drive inertia stands beside moments of inertia; nothing else of a drive is regrouped.
+            // Drive inertia combines with moments of inertia; other drive parameters are never regrouped.
             Column::Body { .. } | Column::Term(_) => length_m * length_m,
         };
         let mut regrouping = self.regrouping().clone();
@@ -41,7 +41,7 @@ impl BaseParameters {
         }
         let counts = |row: usize| !fixed.contains(&row);
         for (row, &column) in self.independent().iter().enumerate() {
-            let is_alone = regrouping.row(row).iter().all(|share| share.abs() < NOTHING);
+            let is_alone = regrouping.row(row).iter().all(|share| share.abs() < MIN_REGROUPING_ENTRY);
             all[column] = match (counts(row), is_alone) {
                 (true, true) => Determination::Measured,
                 (true, false) => Determination::Partly,
@@ -49,7 +49,7 @@ impl BaseParameters {
             };
         }
         for (place, &column) in self.dependent().iter().enumerate() {
-            let has_share = |(row, share): (usize, &f64)| counts(row) && share.abs() >= NOTHING;
+            let has_share = |(row, share): (usize, &f64)| counts(row) && share.abs() >= MIN_REGROUPING_ENTRY;
             if regrouping.column(place).iter().enumerate().any(has_share) {
                 all[column] = Determination::Partly;
             }
@@ -63,9 +63,9 @@ mod tests {
     use super::*;
     use crate::base_parameters::BaseParameterSettings;
 
-    /// A pendulum about y: only what turns about its axis is felt, and that by itself.
+    /// A pendulum about y: only parameters that rotate about its axis affect the torque, each separately.
     #[test]
-    fn a_pendulum_tells_its_first_moments_and_one_inertia() {
+    fn pendulum_determines_first_moments_and_one_inertia() {
         let text = r#"<robot name="p"><link name="b"/><link name="r"><inertial><mass value="1"/><inertia ixx="1"
             iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j" type="continuous">
             <parent link="b"/><child link="r"/><axis xyz="0 1 0"/></joint></robot>"#;

@@ -4,19 +4,17 @@ use crate::independent_columns::IndependentColumns;
 use crate::regressor_panels::Column;
 use core::fmt::Write;
 
-/// Coefficients below this are rounding noise of the split, not geometry (lengths are given to a micrometre at best).
+/// Coefficients below this are rounding noise of the split, not geometry (lengths have at best micrometre precision).
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
-/// How many digits the factors of a sum have.
 #[derive(Clone, Copy)]
 pub(super) enum Digits {
-    /// Six, without trailing zeros: a name to read.
+    /// Six, without trailing zeros, for names.
     Six,
-    /// As many as read back to the same `f64`.
+    /// Enough to read back the same `f64`.
     All,
 }
 
-/// One sum per independent column.
 pub(super) fn expressions(columns: &[Column], split: &IndependentColumns, digits: Digits) -> Vec<String> {
     let mut sums: Vec<String> = split.independent.iter().map(|&column| columns[column].symbol()).collect();
     for (&dependent, factors) in split.dependent.iter().zip(split.regrouping.column_iter()) {
@@ -33,7 +31,7 @@ pub(super) fn expressions(columns: &[Column], split: &IndependentColumns, digits
     sums
 }
 
-/// Nothing for one.
+/// `None` for one.
 fn coefficient(value: f64, digits: Digits) -> Option<String> {
     if (value - 1.0).abs() < NEGLIGIBLE {
         return None;

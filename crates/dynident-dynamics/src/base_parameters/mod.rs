@@ -1,10 +1,10 @@
-//! Base parameters: the combinations of parameters that joint torques can distinguish.
+//! Base parameters: the identifiable combinations of parameters.
 //!
-//! One choice for one robot: the columns of the regressor from base to tip in the order of
-//! [`all_columns`](crate::all_columns); a column that depends on earlier ones is regrouped into them (Gautier and
-//! Khalil 1990; Gautier 1991). The dependencies come from the robot's structure ([`structural`]); the rank of
-//! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check. Declared torques,
-//! which have no structure, and robots whose joints follow others are judged by random states.
+//! The columns of the regressor are ordered from base to tip as in [`all_columns`](crate::all_columns); a column that
+//! depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from
+//! the robot's structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`],
+//! [`numerical_rank_by_body`]) is the cross-check. Declared torques, which have no structure, and coupled joints use
+//! random states.
 
 mod coupled;
 mod declared;
@@ -27,12 +27,11 @@ use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 
-/// How finely dependence is separated from independence.
+/// Tolerance of the dependence test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseParameterSettings {
-    /// A direction counts as dependent below this share of its size. The default, 2e-5, lies above what rounded angles
-    /// of a description do (`1.5708` for π/2 leaves 4e-6) and below what an offset of a tenth of a millimetre does
-    /// (1e-4).
+    /// A direction is dependent below this share of its size. The default, 2e-5, is above the effect of rounded angles
+    /// in robot descriptions (`1.5708` for π/2: 4e-6) and below that of an offset of a tenth of a millimetre (1e-4).
     pub tolerance: f64,
 }
 
@@ -51,8 +50,8 @@ pub struct BaseParameters {
 }
 
 impl BaseParameters {
-    /// Base parameters from the robot's structure: no data, and no random numbers but where joints follow others and
-    /// for declared torques, at states that are the same every time.
+    /// Computes the base parameters from the robot's structure, without data. Coupled joints and declared torques use
+    /// random states with a fixed seed.
     pub fn new(model: &Model, terms: &[TorqueTerm], settings: &BaseParameterSettings) -> Self {
         let columns = all_columns(model, terms);
         let split = if model.coupling().is_some() {
@@ -90,7 +89,7 @@ impl BaseParameters {
         &self.split.regrouping
     }
 
-    /// The base columns themselves: what a [`PanelLayout`](crate::PanelLayout) needs for a full-rank regressor.
+    /// The base columns, for a [`PanelLayout`](crate::PanelLayout) with a full-rank regressor.
     pub fn base_columns(&self) -> Vec<Column> {
         self.split.independent.iter().map(|&index| self.columns[index].clone()).collect()
     }
@@ -98,7 +97,7 @@ impl BaseParameters {
     /// Values of the base parameters for values of all parameters: `θ = π[independent] + K π[dependent]`.
     ///
     /// # Panics
-    /// If `parameters` has not one value per column.
+    /// If `parameters` does not have one value per column.
     pub fn values(&self, parameters: &[f64]) -> Vec<f64> {
         assert_eq!(parameters.len(), self.columns.len(), "one value per column");
         let mut values: Vec<f64> = self.split.independent.iter().map(|&index| parameters[index]).collect();
@@ -110,15 +109,15 @@ impl BaseParameters {
         values
     }
 
-    /// The parameters that no motion can determine: they stand in no base parameter.
+    /// The parameters that no motion can determine: they are in no base parameter.
     pub fn unidentifiable(&self) -> Vec<usize> {
         let k = &self.split.regrouping;
         let dependent = self.split.dependent.iter().enumerate();
         dependent.filter(|(d, _)| k.column(*d).amax() < expression::NEGLIGIBLE).map(|(_, &column)| column).collect()
     }
 
-    /// The declared torques that cannot be told from other parameters, with the symbols of the base columns whose sum
-    /// they are: nothing tells their coefficients, and these base parameters hold them.
+    /// Declared torques that are combinations of other columns, with the symbols of these base columns: their
+    /// coefficients are not identifiable and are included in these base parameters.
     pub fn coincident(&self) -> Vec<(&TorqueTerm, Vec<String>)> {
         let dependent = self.split.dependent.iter().zip(self.split.regrouping.column_iter());
         let of_declared = dependent.filter_map(|(&column, factors)| match &self.columns[column] {
@@ -138,14 +137,14 @@ impl BaseParameters {
         expression::expressions(&self.columns, &self.split, Digits::Six)
     }
 
-    /// As [`expressions`](Self::expressions), with every factor in the shortest form that reads back to the same `f64`:
-    /// to calculate with. Factors below 1e-9 are left out, as rounding.
+    /// As [`expressions`](Self::expressions) for calculation, with every factor in the shortest form that reads back
+    /// to the same `f64`. Factors below 1e-9 (rounding) are omitted.
     pub fn exact_expressions(&self) -> Vec<String> {
         expression::expressions(&self.columns, &self.split, Digits::All)
     }
 
-    /// How clear the split was: the smallest share that still counted as independent, and the largest that counted as
-    /// dependent. A wide gap means that no tolerance in between would change the choice.
+    /// Gap of the split: smallest independent and largest dependent share. With a wide gap the choice does not depend
+    /// on the tolerance.
     pub fn gap(&self) -> (f64, f64) {
         (self.split.weakest_independent, self.split.strongest_dependent)
     }

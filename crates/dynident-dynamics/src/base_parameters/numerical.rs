@@ -1,4 +1,4 @@
-//! The numerical rank of regressors at random states: the cross-check of the structural base parameters.
+//! Numerical rank of regressors at random states: the cross-check of the structural base parameters.
 
 use crate::independent_columns::independent_regressor_columns;
 use crate::regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels};
@@ -8,20 +8,20 @@ use dynident_model::terms::{JointMotion, TorqueTerm};
 use dynident_model::{Model, Vec3};
 use nalgebra::DMatrix;
 
-/// What random states say about the columns.
+/// Result of the rank test at random states.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumericalRank {
     /// Independent columns by the same left-to-right rule, ascending.
     pub independent: Vec<usize>,
-    /// Smallest share of a column that counted as independent.
+    /// Smallest share of a column that was accepted as independent.
     pub weakest_independent: f64,
-    /// Largest share of a column that counted as dependent.
+    /// Largest share of a column that was called dependent.
     pub strongest_dependent: f64,
 }
 
-/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±ℓ, velocities within ±2 of
-/// rad or ℓ each second, accelerations within ±5) and splits their columns at `tolerance`. The unit of length is ℓ, the
-/// robot's longest link, and gravity stands in rows of its own: a robot a thousand times as long has the same split.
+/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±ℓ, velocities within ±2
+/// rad or ℓ per second, accelerations within ±5) and splits their columns at `tolerance`. The unit of length ℓ is the
+/// robot's longest link, and gravity has separate rows, so the split does not depend on the size of the robot.
 /// Deterministic in `seed`.
 pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance: f64) -> NumericalRank {
     let split = independent_regressor_columns(&ScaledRegressors::new(model, terms, seed).rows, tolerance);
@@ -32,15 +32,15 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
     }
 }
 
-/// Regressors at random states, of numbers without units: lengths count in the robot's longest link, inertia and
-/// gravity each in their largest entry.
+/// Dimensionless regressors at random states: lengths in units of the longest link, inertia and gravity in units of
+/// their largest entries.
 ///
-/// A sum of columns is zero in all states exactly when it is zero at rest, and what motion adds to it is: rows at rest
-/// and rows of what motion adds have the dependencies of their sums, whatever the size of gravity beside inertia.
+/// A combination of columns is zero in all states if and only if it is zero at rest and for the contribution of
+/// motion. So rows at rest and rows of that contribution have the same dependencies, for any ratio of gravity to
+/// inertia.
 pub(super) struct ScaledRegressors {
-    /// Rows of joint after joint of what motion adds, then at rest; all columns.
+    /// Rows of the contribution of motion, joint after joint, then rows at rest; all columns.
     pub(super) rows: DMatrix<f64>,
-    /// Of each column, what it was multiplied by.
     pub(super) factors: Vec<f64>,
 }
 
@@ -86,7 +86,7 @@ impl ScaledRegressors {
             }
             rows.rows_mut(begin, dof * samples).copy_from(&block);
         }
-        // Terms have units of many kinds, and each counts by itself.
+        // Terms have different units, so each is scaled separately.
         for column in bodies..count {
             let largest = rows.column(column).amax();
             if largest > 0.0 {
@@ -98,20 +98,20 @@ impl ScaledRegressors {
     }
 }
 
-/// What a force's lever adds to the torque of a joint: torques grow with one length more than forces.
+/// Additional length factor of the torque of a revolute joint compared with a force.
 fn reach_of_torque(model: &Model, joint: usize, length: f64) -> f64 {
     if model.joints()[joint].turns() { length } else { 1.0 }
 }
 
-/// The longest way from one joint to the next, m; 1 where all stand in one place. Where the first stands does not
-/// matter.
+/// Longest distance between consecutive joints, m; 1 if all are at one point. The position of the first joint is
+/// irrelevant.
 pub(super) fn longest_link_m(model: &Model) -> f64 {
     let links = model.tree_joints().iter().filter(|joint| joint.parent.is_some());
     let longest = links.map(|joint| joint.placement.translation.norm()).fold(0.0, f64::max);
     if longest > 0.0 { longest } else { 1.0 }
 }
 
-/// The regressor of some columns at the states of a motion: rows of joint after joint.
+/// Regressor of some columns at the states of a motion: rows of joint after joint.
 pub(super) fn stacked(model: &Model, columns: Vec<Column>, motion: &JointMotion<'_>) -> DMatrix<f64> {
     let (dof, count, samples) = (model.dof(), columns.len(), motion.samples);
     let layout = PanelLayout::new(model, columns);

@@ -1,10 +1,10 @@
-//! The rank of the bodies' regressor from motions that differ in one joint: the cross-check for robots of any length.
+//! Rank of the bodies' regressor from motions that differ in one joint: the cross-check for long robots.
 //!
-//! Two states that differ in joint `j` alone (its position, velocity and acceleration) give the joints further in
-//! torques whose **difference** depends on body `j` and the bodies further out alone; so do the torques of joint `j`
-//! themselves. The rows of all joints, base to tip, make an upper block triangle, whose rank is at least the sum of the
-//! ranks of its diagonal blocks. One block has ten columns, so the cost grows with the square of a chain's length (its
-//! fourth power for [`numerical_rank`](super::numerical_rank)).
+//! If two states differ in joint `j` only (position, velocity and acceleration), the **difference** of the torques of
+//! the inner joints depends on body `j` and the bodies after it only; so do the torques of joint `j`. The rows of all
+//! joints, base to tip, form an upper block triangle, whose rank is at least the sum of the ranks of its diagonal
+//! blocks. A block has ten columns, so the cost is quadratic in the length of a chain (fourth power for
+//! [`numerical_rank`](super::numerical_rank)).
 
 use super::{NumericalRank, numerical_rank};
 use crate::body_frames::{inertial_wrench, moved};
@@ -15,19 +15,19 @@ use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, JointMap, Model, Transform, Vec3};
 use nalgebra::DMatrix;
 
-/// Pairs of states for one joint: enough at the base, where a pair gives two rows, and more than the two that fix ten
-/// columns anywhere.
+/// Number of state pairs per joint: enough at the base, where a pair gives two rows, and more than the two that are
+/// needed elsewhere.
 fn pairs(joints_on_path: usize) -> usize {
     5 + 20 / joints_on_path
 }
 
-/// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can
-/// separate from those of the bodies before it, at states as those of [`numerical_rank`](super::numerical_rank) that
-/// differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in
-/// `seed`. Where joints follow others none moves alone: there it is [`numerical_rank`](super::numerical_rank).
+/// Lower bound of the rank of the bodies' columns, body by body: the columns of each body that the torques separate
+/// from those of earlier bodies, at states like those of [`numerical_rank`](super::numerical_rank) that differ in one
+/// joint. A structurally independent column must be among these. Deterministic in `seed`. With coupled joints it is
+/// [`numerical_rank`](super::numerical_rank), because no joint moves alone.
 pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
     if model.coupling().is_some() {
-        // Not the states that the base parameters of such robots are found at.
+        // States that differ from those used for the base parameters of such robots.
         return numerical_rank(model, &[], seed + 1, tolerance);
     }
     let maps = model.maps();
@@ -69,7 +69,7 @@ pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> Numer
     all
 }
 
-/// A body's motion on its parent's, with position, velocity and acceleration of the joint at random.
+/// A body's motion for random position, velocity and acceleration of its joint.
 fn random_motion(
     model: &Model,
     map: &JointMap,
@@ -91,7 +91,7 @@ struct Wrench {
 }
 
 impl Wrench {
-    /// The torque or force that it asks of the joint of its frame.
+    /// Torque or force on the joint of its frame.
     fn on(&self, map: &JointMap) -> f64 {
         map.axis.dot(if map.turns { self.moment } else { self.force })
     }
@@ -103,7 +103,7 @@ impl Wrench {
     }
 }
 
-/// What one unit of each inertial parameter asks for.
+/// Wrench per unit of each inertial parameter.
 fn unit_wrenches(body: &BodyState<f64>) -> [Wrench; 10] {
     core::array::from_fn(|k| {
         let unit = InertialParameters(core::array::from_fn(|i| f64::from(i == k)));

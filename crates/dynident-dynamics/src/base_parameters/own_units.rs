@@ -1,11 +1,11 @@
-//! Units of the robot's own, in which its structure is looked at: what counts as rounding does not depend on its size.
+//! Units scaled to the robot, so that the threshold for rounding does not depend on its size.
 
 use super::numerical::longest_link_m;
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{Model, Transform};
 
-/// A power of two near the robot's longest link, and one near its gravity. Products with powers of two are exact: a
-/// robot twice as long has the same structure, bit for bit.
+/// Powers of two near the robot's longest link and its gravity. Products with powers of two are exact: a robot of
+/// twice the size has bit-identical structure.
 pub(super) struct OwnUnits {
     length_m: f64,
     gravity_m_s2: f64,
@@ -19,22 +19,20 @@ impl OwnUnits {
         }
     }
 
-    /// Gravity, as a multiple of the unit.
     pub(super) fn gravity(&self, gravity_m_s2: f64) -> f64 {
         gravity_m_s2 / self.gravity_m_s2
     }
 
-    /// What one unit of a joint's position is, m (rad): how far a torque's row reaches too.
+    /// Unit of a joint's position, m (rad); also the lever of its torque row.
     pub(super) fn reach(&self, turns: bool) -> f64 {
         if turns { 1.0 } else { self.length_m }
     }
 
-    /// A placement with its lengths in the unit.
     pub(super) fn placement(&self, Transform { rotation, translation }: Transform) -> Transform {
         Transform { rotation, translation: translation.scale(1.0 / self.length_m) }
     }
 
-    /// The unit of one of the ten parameters of a body: mass, first moments, moments of inertia.
+    /// Unit of one of the ten parameters of a body: mass, first moments, moments of inertia.
     pub(super) fn of_body(&self, parameter: usize) -> f64 {
         match parameter {
             0 => 1.0,
@@ -43,7 +41,7 @@ impl OwnUnits {
         }
     }
 
-    /// The unit of a term's parameter; 1 for those that stand beside no body's.
+    /// Unit of a term's parameter; 1 for terms that do not combine with bodies.
     pub(super) fn of_term(&self, model: &Model, term: &TorqueTerm) -> f64 {
         let joints = term.joints();
         let levers = || joints.iter().map(|&joint| self.lever(model, joint));
@@ -57,18 +55,18 @@ impl OwnUnits {
         }
     }
 
-    /// How much of the unit of a term is one of a constant torque of joint `joint`.
+    /// Unit of a term relative to that of a constant torque of joint `joint`.
     pub(super) fn constant(&self, model: &Model, term: &TorqueTerm, joint: usize) -> f64 {
         self.of_term(model, term) / (self.gravity_m_s2 * self.lever(model, joint))
     }
 
-    /// Torques have one length more than forces.
+    /// Torques have one more length factor than forces.
     fn lever(&self, model: &Model, joint: usize) -> f64 {
         if model.joints()[joint].turns() { self.length_m } else { 1.0 }
     }
 }
 
-/// The largest power of two that is not above a positive number; 1 for others.
+/// Largest power of two that is not above a positive number; 1 for other numbers.
 fn power_of_two_below(number: f64) -> f64 {
     if number.is_normal() && number > 0.0 { f64::from_bits(number.to_bits() & (0x7ff << 52)) } else { 1.0 }
 }

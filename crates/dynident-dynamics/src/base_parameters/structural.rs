@@ -1,21 +1,22 @@
-//! Which parameters a robot's torques depend on, from its structure alone.
+//! Identifiable parameter combinations from the robot's structure.
 //!
-//! Torques vanish for all motions exactly when every entry `M_jk(q)` of the mass matrix and every gravity torque
-//! vanishes for all `q` (velocity torques follow from the mass matrix). With `C_j(q)` the composite inertia that hangs
-//! on joint `j` and `w` a twist at its frame, `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`, and the gravity torque is the same
-//! with `w = X a_g`. Both are linear in the parameters. Three facts make this finite:
+//! Torques are zero for all motions if and only if every entry `M_jk(q)` of the mass matrix and every gravity torque
+//! is zero for all `q` (velocity torques follow from the mass matrix). With the composite inertia `C_j(q)` of the
+//! subtree of joint `j` and a twist `w` at its frame, `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`; the gravity torque is the
+//! same with `w = X a_g`. Both are linear in the parameters. The conditions are finite for three reasons:
 //!
-//! 1. The twists `w` that can arrive at a joint span a space that one outward recursion builds: each joint turns it by
-//!    `X(q) = X_0 + X_1 cos q + X_2 sin q` (sliding: `X_0 + X_1 q`), and `cos`, `sin` and 1 are independent functions.
+//! 1. One outward recursion computes the space of the twists `w` that can arrive at a joint: each joint transforms it
+//!    by `X(q) = X_0 + X_1 cos q + X_2 sin q` (prismatic: `X_0 + X_1 q`), where `cos`, `sin` and 1 are independent
+//!    functions.
 //! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q`
-//!    (sliding: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
+//!    (prismatic: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
 //!    outward, and one for every other harmonic, on the child alone.
 //! 3. So each body has a small space of functionals of its ten composite parameters, and each functional is one row of
 //!    conditions on all parameters.
 //!
-//! The rows span what is identifiable. The idea of following such spaces outward is that of Wensing, Niemeyer and
-//! Slotine, *A geometric characterization of observability in inertial parameter identification* (2024); drive
-//! inertias, couplings and offsets join as constants in single entries.
+//! The rows span the identifiable directions. The recursion over such spaces follows Wensing, Niemeyer and Slotine, *A
+//! geometric characterization of observability in inertial parameter identification* (2024); drive inertias, couplings
+//! and offsets are added as constants in single entries.
 
 use super::own_units::OwnUnits;
 use crate::body_frames::inertial_wrench;
@@ -28,24 +29,23 @@ use std::collections::HashMap;
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
 
-/// Rows over all columns (bodies, then terms) whose span is what torques depend on: those that each body gives, base to
-/// tip, then those of friction. A body's rows have entries for it, for the bodies further out and for the terms; they
-/// are kept where they arise and carried outward column by column. All in the robot's [`OwnUnits`].
+/// Rows over all columns (bodies, then terms) that span the identifiable directions: those of each body, base to tip,
+/// then those of friction. A body's rows have entries for the body, for its subtree and for the terms. They are stored
+/// at the body and transformed outward column by column. All in the robot's [`OwnUnits`].
 pub(super) struct IdentifiableDirections<'a> {
     model: &'a Model,
     terms: &'a [TorqueTerm],
     units: OwnUnits,
-    /// Of each body: its functionals of its ten composite parameters, with the constants of the terms beside them.
+    /// For each body: functionals of its ten composite parameters, followed by the constants of the terms.
     functionals: Vec<Vec<DVector<f64>>>,
-    /// Of each body: row of its first functional; the last is where the rows of friction begin.
+    /// For each body: row of its first functional; then the first row of friction.
     first_row: Vec<usize>,
-    /// Of each body: the constant part of a composite's way to the parent, transposed.
+    /// For each body: constant part of the transformation of a composite to the parent, transposed.
     carry: Vec<Matrix10>,
-    /// Over the terms alone.
     friction: Vec<DVector<f64>>,
 }
 
-/// The directions that `model` and `terms` allow to be determined, where a share below `tolerance` counts as none.
+/// Identifiable directions of `model` and `terms`; shares below `tolerance` are treated as zero.
 pub(super) fn identifiable_directions<'a>(
     model: &'a Model,
     terms: &'a [TorqueTerm],
@@ -59,9 +59,9 @@ pub(super) fn identifiable_directions<'a>(
         let motion = Harmonics::of(joint, &units);
         let arriving =
             arriving_twists(model, &units, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
-        // Conditions on this body's composite by its own joint, with the constants of the terms beside them.
+        // Conditions on this body's composite from its own joint, followed by the constants of the terms.
         let own = arriving.iter().map(|w| (power(model, j, w), term_constants(model, &units, terms, j, w, slots)));
-        // Conditions that come from further in: all but the constant harmonic bind this composite alone.
+        // Conditions inherited from inner joints: all but the constant harmonic constrain this composite alone.
         let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
             .iter()
@@ -85,7 +85,7 @@ pub(super) fn identifiable_directions<'a>(
 }
 
 impl IdentifiableDirections<'_> {
-    /// The split of all columns, with the regrouping in SI units.
+    /// Split of all columns, with the regrouping in SI units.
     pub(super) fn split(&self, tolerance: f64) -> IndependentColumns {
         let mut split = split_columns(self, tolerance);
         let of_bodies = (0..10 * self.model.dof()).map(|column| self.units.of_body(column % 10));
@@ -111,7 +111,7 @@ impl Columns for IdentifiableDirections<'_> {
         for parent in joints.iter().filter_map(|joint| joint.parent) {
             children[parent] += 1;
         }
-        // Row, and its ten entries for the body: of all bodies that have children to come.
+        // For each body with remaining children: row, and its ten entries for the body.
         let mut blocks: Vec<Vec<(usize, Vector10)>> = vec![Vec::new(); joints.len()];
         for (j, joint) in joints.iter().enumerate() {
             let mut block = Vec::new();
@@ -127,7 +127,7 @@ impl Columns for IdentifiableDirections<'_> {
             let mut column = vec![0.0; self.first_row[j + 1]];
             for k in 0..10 {
                 for (row, f) in &block {
-                    // A reflection depends on the sign of a zero: none is negative.
+                    // Avoid negative zeros: a reflection depends on the sign of a zero.
                     column[*row] = f[k] + 0.0;
                 }
                 take(&column);
@@ -141,26 +141,26 @@ impl Columns for IdentifiableDirections<'_> {
     }
 }
 
-/// Joints back to which a twist's source is known at least: in longer robots only couplings ask further.
-const SOURCES: usize = 48;
+/// Minimum number of joints for which a twist's source is stored; only couplings need more.
+const MIN_SOURCE_SLOTS: usize = 48;
 
-/// Slots for the sources of twists: joint `k` has slot `k` modulo their number, so that a source is known as long as a
-/// coupling may ask for it.
+/// Number of slots for the sources of twists: joint `k` has slot `k` modulo this number, so that a source is stored as
+/// long as a coupling may need it.
 fn source_slots(model: &Model, terms: &[TorqueTerm]) -> usize {
     let reach = terms.iter().map(|term| {
         let joints = term.joints();
         joints.iter().max().zip(joints.iter().min()).map_or(0, |(most, least)| most - least)
     });
-    SOURCES.max(reach.max().unwrap_or(0) + 1).min(model.dof())
+    MIN_SOURCE_SLOTS.max(reach.max().unwrap_or(0) + 1).min(model.dof())
 }
 
-/// A twist that can arrive at a joint, and as which joint's axis (or as gravity, last) its constant part counts.
+/// A twist that can arrive at a joint, and the joint axis (or gravity, last) of its constant part.
 struct ArrivingTwist {
     twist: nalgebra::Vector6<f64>,
     source: DVector<f64>,
 }
 
-/// What one joint does to twists and to inertial parameters, harmonic by harmonic; the constant one first.
+/// Effect of one joint on twists and inertial parameters, by harmonic; the constant one first.
 struct Harmonics {
     twist: Vec<Matrix6<f64>>,
     inertia: Vec<Matrix10>,
@@ -197,7 +197,7 @@ impl Harmonics {
     }
 }
 
-/// 6 × 6 matrix that takes a twist (angular, linear at the origin) from the parent's frame to the child's.
+/// 6 × 6 matrix that transforms a twist (angular, linear at the origin) from the parent's frame to the child's.
 fn twist_to_child(parent_from_child: &Transform) -> Matrix6<f64> {
     let Transform { rotation, translation } = parent_from_child;
     let mut matrix = Matrix6::zeros();
@@ -211,7 +211,7 @@ fn twist_to_child(parent_from_child: &Transform) -> Matrix6<f64> {
     matrix
 }
 
-/// 10 × 10 matrix that takes inertial parameters from the child's frame to the parent's.
+/// 10 × 10 matrix that transforms inertial parameters from the child's frame to the parent's.
 fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
     Matrix10::from_columns(&core::array::from_fn::<_, 10, _>(|k| {
         let unit = InertialParameters(core::array::from_fn(|i| f64::from(i == k)));
@@ -219,7 +219,7 @@ fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
     }))
 }
 
-/// A spanning set of the twists that arrive at joint `j`.
+/// Spanning set of the twists that arrive at joint `j`.
 fn arriving_twists(
     model: &Model,
     units: &OwnUnits,
@@ -243,7 +243,7 @@ fn arriving_twists(
     let mark = |place: usize| DVector::from_fn(slots + 1, |i, _| f64::from(i == place));
     push(&own.into(), mark(j % slots));
     let gravity = model.gravity();
-    // In units of about one, as the axes are.
+    // Scaled to about one, like the axes.
     let size = gravity.norm().max(f64::MIN_POSITIVE);
     let at_base = [ArrivingTwist {
         twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
@@ -256,7 +256,7 @@ fn arriving_twists(
     };
     for w in from {
         let mut source = w.source.clone();
-        // The slot is the joint's own from here on.
+        // From here on the slot belongs to this joint.
         source[j % slots] = 0.0;
         push(&(motion.twist[0] * w.twist), source);
         for matrix in &motion.twist[1..] {
@@ -284,7 +284,7 @@ fn power(model: &Model, j: usize, w: &ArrivingTwist) -> Vector10 {
     })
 }
 
-/// What the terms add to the entry of joint `j` that `w` stands for.
+/// Constants of the terms in the entry of joint `j` for the source of `w`.
 fn term_constants(
     model: &Model,
     units: &OwnUnits,
@@ -305,8 +305,8 @@ fn term_constants(
     })
 }
 
-/// Friction depends on velocities alone, so it mixes with nothing above. Each distinct function of the motion in each
-/// joint's row is one condition; terms that say the same twice share it.
+/// Friction depends on velocities only, so it does not combine with other columns. Each distinct function of the
+/// motion in each joint's row is one condition; duplicate terms share it.
 pub(super) fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
     let mut places: HashMap<(usize, String), usize> = HashMap::new();
     let mut conditions: Vec<DVector<f64>> = Vec::new();
@@ -322,17 +322,16 @@ pub(super) fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
     conditions
 }
 
-/// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt
-/// with pivoting, each vector cleaned twice. (An SVD would do; the one at hand returned 5e-5 for an exact zero on a
-/// matrix of rank three.)
+/// Orthonormal basis of the span, without directions below `tolerance` times the longest vector: pivoted Gram-Schmidt
+/// with reorthogonalisation. (The available SVD returned 5e-5 for an exact zero on a matrix of rank three.)
 fn basis(vectors: &[DVector<f64>], tolerance: f64) -> Vec<DVector<f64>> {
     let longest = vectors.iter().map(DVector::norm).fold(0.0, f64::max);
     let mut rest = vectors.to_vec();
     let mut found: Vec<DVector<f64>> = Vec::new();
     loop {
-        // What is left of a vector only shrinks.
+        // The remainder of a vector can only shrink.
         rest.retain(|vector| vector.norm() > tolerance * longest);
-        // The first of the longest, so that the choice is the same everywhere.
+        // The first of equally long vectors, so that the choice is the same on every processor.
         let norms: Vec<f64> = rest.iter().map(DVector::norm).collect();
         let norm = norms.iter().copied().fold(0.0, f64::max);
         let Some(next) = norms.iter().position(|other| *other == norm).map(|place| &rest[place]) else { return found };

@@ -1,4 +1,4 @@
-//! Base parameters against the paper, against numerical ranks, and against full-parameter torques.
+//! Base parameters compared with the paper, numerical ranks, and full-parameter torques.
 
 use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, numerical_rank, numerical_rank_by_body,
@@ -18,10 +18,10 @@ fn all_terms(model: &Model) -> Vec<TorqueTerm> {
 }
 
 #[test]
-fn the_planar_arm_has_exactly_the_papers_table_2() {
+fn planar_arm_has_the_base_parameters_of_table_2() {
     let mut random = Random::new(1);
-    // a1 = 0.7, so that a1 and its square can be determined from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1
-    // r1y, θ4..6 = Izz2, m2 r2x, m2 r2y.
+    // a1 = 0.7, so that a1 and a1² differ from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1 r1y, θ4..6 = Izz2,
+    // m2 r2x, m2 r2y.
     let model = planar_2r(0.7, random.body(), random.body());
     let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
     let mut expressions = base.expressions();
@@ -37,8 +37,7 @@ fn structure_and_random_states_choose_the_same_columns() {
         let model = random_tree(seed, 1 + seed as usize % 7);
         for terms in [Vec::new(), all_terms(&model)] {
             let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
-            // Random geometry leaves no column closer than 1e-6 to dependence unless it is dependent (then rounding,
-            // about 1e-13).
+            // With random geometry dependent columns are at rounding (about 1e-13) and the others above 1e-6.
             let numerical = numerical_rank(&model, &terms, 77, 1e-8);
             assert_eq!(base.independent(), numerical.independent, "seed {seed}, {} laws", terms.len());
         }
@@ -69,11 +68,11 @@ fn motions_of_one_joint_choose_the_same_columns() {
 
 #[test]
 fn long_chains_keep_their_base_parameters() {
-    // Where regressors of all joints at once can still be split.
+    // Short enough for regressors of all joints at once.
     let model = random_chain(3, 40);
     let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
     assert_eq!(base.independent(), numerical_rank(&model, &[], 77, 1e-8).independent);
-    // Where they cannot, body by body.
+    // Too long for that: body by body.
     let model = random_chain(4, 250);
     let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
     assert_eq!(base.independent(), numerical_rank_by_body(&model, 5, 1e-8).independent);
@@ -98,20 +97,20 @@ fn assert_full_torques(model: &Model, seed: u64) {
     let regressor = torque_regressor(model, &mut ws, &q, &dq, &ddq);
     for (joint, row) in regressor.chunks_exact(10 * dof).enumerate() {
         let by_base: f64 = base.independent().iter().zip(&theta).map(|(&c, t)| row[c] * t).sum();
-        // The regrouping solves triangles of condition up to some thousand.
+        // The regrouping solves triangles with condition numbers up to several thousand.
         let scale = tau.iter().fold(1.0_f64, |m, t| m.max(t.abs()));
         assert!((by_base - tau[joint]).abs() <= 1e-9 * scale, "seed {seed}: {by_base} against {}", tau[joint]);
     }
 }
 
 #[test]
-fn drives_regroup_where_structure_says_so() {
+fn drives_regroup_according_to_structure() {
     let mut random = Random::new(9);
     let model = planar_2r(1.0, random.body(), random.body());
     let terms = all_terms(&model);
     let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
-    // Joint 1's drive turns with link 1 alone: one more parameter for joint 2's drive only, and three of friction and
-    // offset a joint.
+    // Joint 1's drive combines with link 1: one more parameter for joint 2's drive only, and three of friction and
+    // offset per joint.
     assert_eq!(base.count(), 6 + 1 + 6);
     assert!(base.expressions().iter().any(|e| e == "Izz1 + m2 + Ia1"), "{:?}", base.expressions());
     assert_eq!(base.independent(), numerical_rank(&model, &terms, 5, 1e-8).independent);
@@ -138,7 +137,7 @@ fn couplings_and_terms_given_twice_are_found() {
 }
 
 #[test]
-fn without_gravity_fewer_parameters_are_seen() {
+fn without_gravity_fewer_parameters_are_identifiable() {
     let mut random = Random::new(2);
     let model = planar_2r(1.0, random.body(), random.body());
     let weightless = model.clone().with_gravity(dynident_model::Vec3([0.0; 3])).unwrap();

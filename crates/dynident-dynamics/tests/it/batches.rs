@@ -1,4 +1,4 @@
-//! Many samples at once give what one at a time gives, at every processor level.
+//! Batches give the results of single samples at every processor level.
 
 use crate::invariants::cases;
 use dynident_dynamics::{
@@ -8,27 +8,27 @@ use dynident_dynamics::{
 use dynident_lanes::Level;
 use dynident_model::terms::JointMotion;
 
-/// The same recursion in another order of roundings, over some ten bodies.
+/// The same recursion with another order of roundings, over about ten bodies.
 const ROUNDING: f64 = 1e-12;
 
-/// No multiple of any number of lanes, and fewer than any.
+/// Not a multiple of any number of lanes, and fewer than any.
 const SAMPLES: [usize; 2] = [21, 3];
 
 #[test]
-fn matrices_in_batches_are_those_of_single_samples() {
+fn batched_matrices_equal_those_of_single_samples() {
     for case in cases().step_by(3) {
         let (model, dof) = (&case.model, case.model.dof());
         for (level, samples) in Level::available().into_iter().flat_map(|level| SAMPLES.map(|samples| (level, samples)))
         {
             let mut workspace = Workspace::with_level(model, level);
             let mut batch = BatchWorkspace::with_level(model, level);
-            // Every sample another state: entries are told apart.
+            // Every sample is another state, so that mixed-up entries are detected.
             let spread = |vector: &[f64]| -> Vec<f64> {
                 vector.iter().flat_map(|x| (0..samples).map(move |s| x + 0.1 * s as f64)).collect()
             };
             let [q, dq, ddq] = [&case.q, &case.dq, &case.ddq].map(|vector| spread(vector));
             let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
-            // What was there does not stay.
+            // Initial content must be overwritten.
             let [mut matrix, mut by_q, mut by_dq, mut by_ddq] = [(); 4].map(|()| vec![f64::NAN; dof * dof * samples]);
             mass_matrix_batch(model, &mut batch, &q, samples, &mut matrix);
             let derivatives =

@@ -1,5 +1,5 @@
-//! Robots whose joints follow others, held against Pinocchio (`golden/coupled_joints.py`): mimic joints as Pinocchio
-//! itself has them, and a palletising arm whose closed chains Pinocchio's tree is held together by.
+//! Robots with coupled joints compared with Pinocchio (`golden/coupled_joints.py`): mimic joints, and a palletising
+//! arm with closed chains that constraints close in Pinocchio's tree.
 
 use crate::golden::{close, numbers, text};
 use dynident_dynamics::{
@@ -38,7 +38,7 @@ fn palletizer() -> Model {
     tree.with_followers(&followers).unwrap()
 }
 
-/// Joint vectors of the file in the order of the model.
+/// Converts joint vectors of the file to the order of the model.
 fn order(model: &Model, file: &Value) -> Vec<usize> {
     let names: Vec<&str> = file["joints"].as_array().unwrap().iter().map(text).collect();
     assert_eq!(names.len(), model.dof());
@@ -52,7 +52,7 @@ fn ordered(order: &[usize], value: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
+fn mimic_joints_agree_with_pinocchio() {
     let golden = golden();
     for (name, path) in [("followers", "golden/coupled/followers.urdf"), ("panda", "robots/panda.urdf")] {
         let (model, file) = (load_robot(repository(path)).unwrap().model, &golden["mimic"][name]);
@@ -66,7 +66,7 @@ fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
             let theirs: Vec<f64> =
                 order.iter().flat_map(|&i| order.iter().map(|&j| rows[i][j]).collect::<Vec<_>>()).collect();
             close(ROUNDING, mass_matrix(&model, &mut workspace, &q), &theirs, name);
-            // Of a finger of 15 g beside an arm, what is left of 50 Nm has a digit or two fewer.
+            // For a finger of 15 g on an arm, one or two more digits are lost from 50 Nm.
             close(1e-9, forward_dynamics(&model, &mut workspace, &q, &dq, &tau), &ddq, name);
             let placements = body_placements(&model, &mut workspace, &q).to_vec();
             for (joint, placement) in model.tree_joints().iter().zip(placements) {
@@ -77,7 +77,7 @@ fn joints_that_mimic_move_and_weigh_as_in_pinocchio() {
 }
 
 #[test]
-fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
+fn connected_mjcf_chains_agree_with_mujoco() {
     let path = repository("golden/closed_chains.json");
     let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let robot = load_robot(repository("golden/coupled/palletizer.xml")).unwrap();
@@ -97,7 +97,7 @@ fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
         }
         close(1e-9, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, "tau");
     }
-    // The same robot as the URDF with [[robot.loop]], whose elbow is drawn at zero.
+    // The same robot as the URDF with [[robot.loop]], whose elbow is at zero in the drawing.
     for (_, theirs) in palletizer().followers() {
         let own = model.tree_joints().iter().find(|joint| joint.name == theirs.name).unwrap();
         let (own, theirs) = (own.mimic.as_ref().unwrap(), theirs.mimic.as_ref().unwrap());
@@ -111,7 +111,7 @@ fn chains_that_an_mjcf_connects_are_those_of_mujoco() {
 }
 
 #[test]
-fn a_palletising_arm_is_its_tree_held_together() {
+fn palletising_arm_equals_its_constrained_tree() {
     let (model, golden) = (palletizer(), golden());
     let file = &golden["loops"];
     let order = order(&model, file);
@@ -121,25 +121,25 @@ fn a_palletising_arm_is_its_tree_held_together() {
     for state in file["states"].as_array().unwrap() {
         let [q, dq, ddq, tau, applied] =
             ["q", "dq", "ddq", "tau", "applied_tau"].map(|key| ordered(&order, &state[key]));
-        // The chains close where Newton's method closed them.
+        // The chains close at the solution of Newton's method.
         let mut tree = vec![0.0; model.body_count()];
         coupling.positions(&q, 1, &mut tree);
         for (name, theirs) in passive.iter().zip(numbers(&state["passive_q"])) {
             let place = model.tree_joints().iter().position(|joint| joint.name == *name).unwrap();
             assert!((tree[place] - theirs).abs() < 1e-11, "{name}: {} against {theirs}", tree[place]);
         }
-        // Asked of closed chains: 1e-8. Least squares of redundant equations leave about 1e-11.
+        // Required for closed chains: 1e-8. Least squares of redundant equations has errors of about 1e-11.
         close(1e-9, inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq), &tau, "torque");
         let expected = ordered(&order, &state["forward_ddq"]);
         close(1e-9, forward_dynamics(&model, &mut workspace, &q, &dq, &applied), &expected, "acceleration");
     }
-    // What torque tells: as many as the regressors of the closed chains have directions.
+    // Number of base parameters = rank of the regressors of the closed chains.
     let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
     assert_eq!(base.count() as u64, file["base_parameters"].as_u64().unwrap());
 }
 
 #[test]
-fn what_a_loop_is_not_is_said() {
+fn invalid_loops_are_reported() {
     let tree = load_robot(repository("examples/robots/palletizer.urdf")).unwrap().model;
     let changed = |change: &dyn Fn(&mut LoopClosure)| {
         let mut all = cuts();
@@ -149,21 +149,21 @@ fn what_a_loop_is_not_is_said() {
     assert!(matches!(changed(&|cut| cut.links[0] = "tail".into()), LoopError::UnknownLink { link } if link == "tail"));
     assert!(matches!(changed(&|cut| cut.passive[0] = "knee".into()), LoopError::UnknownJoint { .. }));
     assert!(matches!(changed(&|cut| cut.points_m[0][1] = f64::NAN), LoopError::NotFinite { .. }));
-    // Out of the plane of the chain no passive joint reaches.
+    // No passive joint reaches a point out of the plane of the chain.
     assert!(matches!(changed(&|cut| cut.points_m[0][1] = 0.05), LoopError::Open { gap_m, .. } if gap_m > 0.04));
-    // A rod 3 cm longer still closes, but is no parallelogram.
+    // A rod 3 cm longer still closes the chain, but not as a parallelogram.
     assert!(matches!(changed(&|cut| cut.points_m[0][2] = 0.03), LoopError::NotLinear { .. }));
     assert!(matches!(changed(&|cut| cut.passive.push("wrist_joint".into())), LoopError::Undetermined { .. }));
 }
 
 #[test]
-fn base_parameters_of_coupled_joints_carry_the_torque_and_no_more() {
+fn base_parameters_of_coupled_joints_are_minimal() {
     let followers = load_robot(repository("golden/coupled/followers.urdf")).unwrap().model;
     for model in [palletizer(), followers] {
         let choice = DriveChoice { drive_inertia: true, viscous: true, offset: true, ..DriveChoice::default() };
         let terms = terms_per_joint(&model, |_| choice);
         let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
-        // Other states than those it was found at.
+        // States that differ from those used for the base parameters.
         let rank = numerical_rank(&model, &terms, 99, 2e-5);
         assert_eq!(rank.independent, base.independent(), "{}", model.name());
         let mut random = Random::new(5);
@@ -189,9 +189,9 @@ fn base_parameters_of_coupled_joints_carry_the_torque_and_no_more() {
         };
         let full = torque(&PanelLayout::new(&model, base.all_columns().to_vec()), &all);
         let short = torque(&PanelLayout::new(&model, base.base_columns()), &theta);
-        // Dependencies are found to rounding, beside columns that lengths of a metre weigh differently.
+        // Dependencies are accurate to rounding, for columns with different units of length.
         close(1e-9, &short, &full, model.name());
-        // And the bodies' part is the inverse dynamics.
+        // The bodies' part is the inverse dynamics.
         let mut own = all;
         own[..model.inertial_count()].copy_from_slice(&model.parameter_vector());
         own[model.inertial_count()..].fill(0.0);
@@ -201,8 +201,8 @@ fn base_parameters_of_coupled_joints_carry_the_torque_and_no_more() {
     }
 }
 
-/// The same robot with all lengths and masses times these factors; joints that slide and follow joints that turn follow
-/// them further.
+/// The robot with all lengths and masses scaled; the ratios of prismatic joints that follow revolute joints are scaled
+/// as well.
 fn scaled(model: &Model, length: f64, mass: f64) -> Model {
     let placed = |placement: Transform| Transform { translation: placement.translation.scale(length), ..placement };
     let body = |body: &Body| {
@@ -243,8 +243,8 @@ fn scaled(model: &Model, length: f64, mass: f64) -> Model {
     scaled.with_gravity(model.gravity()).unwrap()
 }
 
-/// Links of a millimetre or a kilometre, a gram or a ton: the same base parameters with factors scaled, and gravity the
-/// same all along. 1e-7 of a factor is what the split's own rounding, 1e-12, leaves at a share of 2e-5 and more.
+/// Links of a millimetre or a kilometre, a gram or a ton: the same base parameters with scaled factors, at the same
+/// gravity. 1e-7 of a factor is the rounding of the split, 1e-12, at a share of at least 2e-5.
 #[test]
 fn base_parameters_of_coupled_joints_do_not_depend_on_size() {
     let followers = load_robot(repository("golden/coupled/followers.urdf")).unwrap().model;
@@ -283,7 +283,7 @@ fn base_parameters_of_coupled_joints_do_not_depend_on_size() {
 }
 
 #[test]
-fn derivatives_of_torque_and_regressor_are_those_of_differences() {
+fn torque_and_regressor_derivatives_equal_differences() {
     let model = palletizer();
     let (dof, samples, step) = (model.dof(), 5, 1e-6);
     let mut random = Random::new(3);
@@ -301,7 +301,7 @@ fn derivatives_of_torque_and_regressor_are_those_of_differences() {
             down[which][joint] -= step;
             let slope: Vec<f64> = torque(&up).iter().zip(torque(&down)).map(|(a, b)| (a - b) / (2.0 * step)).collect();
             let column: Vec<f64> = (0..dof).map(|row| matrix[row * dof + joint]).collect();
-            // Central differences of 1e-6 of torques of some 100 Nm.
+            // Central differences of 1e-6 of torques of about 100 Nm.
             let scale = slope.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
             assert!(
                 column.iter().zip(&slope).all(|(a, b)| (a - b).abs() < 1e-7 * scale + 1e-6),
@@ -310,7 +310,6 @@ fn derivatives_of_torque_and_regressor_are_those_of_differences() {
         }
     }
 
-    // A cost with random derivatives by every entry of the panels.
     let layout =
         PanelLayout::new(&model, BaseParameters::new(&model, &[], &BaseParameterSettings::default()).base_columns());
     let motion: Vec<Vec<f64>> = (0..3).map(|_| vector(dof * samples)).collect();

@@ -1,5 +1,4 @@
-//! Base parameters of real robots: against Pinocchio's regressors, against random states, and against a published
-//! study.
+//! Base parameters of real robots compared with Pinocchio's regressors, random states, and a published study.
 
 use crate::golden::{ARMS, Golden, ROBOTS, robot, text};
 use dynident_dynamics::{
@@ -80,8 +79,8 @@ fn counts_columns_and_combinations_agree_with_pinocchio() {
                 .collect();
             assert_eq!(combination.remove(symbol), Some(1.0));
             for (d, &column) in ours.dependent().iter().enumerate() {
-                // The file's coefficients are least-squares solutions, which the condition of some hundred leaves at
-                // 1e-12; it drops those below 1e-9.
+                // The file's coefficients are least-squares solutions, accurate to 1e-12 at a condition number of
+                // about a hundred; it drops those below 1e-9.
                 let theirs = combination.remove(names[column].as_str()).unwrap_or(0.0);
                 let factor = ours.regrouping()[(b, d)];
                 assert!(
@@ -101,8 +100,7 @@ fn counts_columns_and_combinations_agree_with_pinocchio() {
 fn structure_agrees_with_random_states_and_the_split_is_clear() {
     for name in ROBOTS {
         let model = robot(name);
-        // Random states of a humanoid with its drives are some thousand rows and columns: the bodies alone are the
-        // harder part.
+        // A humanoid with drives needs several thousand rows and columns at random states; only its bodies are tested.
         let cases =
             if model.dof() > 9 { vec![Vec::new()] } else { vec![Vec::new(), drive_inertia_and_friction(&model)] };
         for terms in cases {
@@ -117,7 +115,7 @@ fn structure_agrees_with_random_states_and_the_split_is_clear() {
                 numerical.weakest_independent
             );
             assert_eq!(ours.independent(), numerical.independent, "{name}");
-            // The tolerance stands in a gap that no factor of ten closes on either side.
+            // The tolerance is at least a factor of ten from both sides of the gap.
             let tolerance = BaseParameterSettings::default().tolerance;
             assert!(
                 strongest <= 0.1 * tolerance && weakest >= 10.0 * tolerance,
@@ -127,7 +125,7 @@ fn structure_agrees_with_random_states_and_the_split_is_clear() {
     }
 }
 
-/// Many descriptions write π/2 as 1.5708. The robot that is meant keeps its base parameters.
+/// Many robot descriptions contain 1.5708 for π/2. Their base parameters must be those of the exact robot.
 #[test]
 fn rounded_right_angles_add_no_base_parameters() {
     for (name, count) in [("ur10", 36), ("panda_arm7", 43), ("iiwa14", 43)] {
@@ -158,7 +156,7 @@ fn rounded_right_angles_add_no_base_parameters() {
     }
 }
 
-/// π with few digits in front of the first joint tilts gravity by the rounding: a column of 1e-9 beside others of 1.
+/// π with few digits in front of the first joint tilts gravity by the rounding: a column of 1e-9 among others of 1.
 #[test]
 fn a_rounded_half_turn_of_the_base_adds_no_base_parameters() {
     for (name, count) in [("ur10", 36), ("panda_arm7", 43), ("iiwa14", 43)] {
@@ -175,9 +173,8 @@ fn a_rounded_half_turn_of_the_base_adds_no_base_parameters() {
     }
 }
 
-/// The sums at full precision give the base parameters again.
 #[test]
-fn exact_expressions_hold_every_digit() {
+fn exact_expressions_keep_every_digit() {
     for name in ARMS {
         let model = robot(name);
         let ours = base(&model, &[]);
@@ -207,7 +204,7 @@ fn exact_expressions_hold_every_digit() {
             exact = exact.max((sum(expression) - value).abs() / largest);
             short = short.max((sum(&readable) - value).abs() / largest);
         }
-        // Factors below 1e-9 are left out, and a base parameter sums some ten of them.
+        // Factors below 1e-9 are omitted, and a base parameter is a sum of about ten terms.
         assert!(exact <= 1e-8, "{name}: {exact:e}");
         assert!(exact <= short, "{name}: {exact:e} {short:e}");
     }
@@ -230,7 +227,7 @@ fn base_parameters_carry_the_full_torque() {
             let regressor = torque_regressor(&model, &mut workspace, &q, &dq, &ddq);
             for (row, tau) in regressor.chunks_exact(10 * dof).zip(&tau) {
                 let by_base: f64 = ours.independent().iter().zip(&theta).map(|(&column, t)| row[column] * t).sum();
-                // Angles that the description rounds to twelve digits are exact zeros to the structure's tolerance.
+                // Angles rounded to twelve digits are exact zeros within the structure's tolerance.
                 assert!((by_base - tau).abs() <= 1e-9 * largest, "{name}: {by_base} against {tau}");
             }
         }
@@ -261,8 +258,7 @@ fn published_sum(expression: &str) -> BTreeMap<String, f64> {
     sum
 }
 
-/// Stäubli TX40 with drive inertias, friction, offsets and the coupled wrist: 61 base parameters, as figaroh-plus
-/// counts.
+/// Stäubli TX40 with drive inertias, friction, offsets and the coupled wrist: 61 base parameters, as in figaroh-plus.
 #[test]
 fn the_tx40_has_the_published_base_parameters() {
     let Some(folder) = recordings().map(|folder| folder.join("staubli_tx40")).filter(|folder| folder.is_dir()) else {
@@ -303,7 +299,7 @@ fn the_tx40_has_the_published_base_parameters() {
             unpublished.push(sum);
         }
     }
-    // Their table leaves out the drive inertia of joint 6, though their count of 61 holds it.
+    // Their table omits the drive inertia of joint 6, which their count of 61 includes.
     assert_eq!(unpublished, [BTreeMap::from([("Ia6".to_owned(), 1.0)])]);
     assert_eq!(published.len(), 60);
 }

@@ -1,5 +1,4 @@
-//! Invariants of rigid-body dynamics on random trees. Each has an oracle of its own: another algorithm, or a law of
-//! physics.
+//! Invariants of rigid-body dynamics on random trees, each compared with another algorithm or a law of physics.
 
 use dynident_dynamics::{
     BatchWorkspace, JointMatrices, PanelLayout, Panels, TermHistory, Workspace, all_columns, body_placements,
@@ -13,7 +12,7 @@ use dynident_model::sample::{Random, random_tree};
 use dynident_model::terms::JointMotion;
 use dynident_model::{Mimic, MimicSource, Model};
 
-/// Two ways of summing the same products over some ten bodies, in double precision.
+/// Two orders of summation over about ten bodies, in double precision.
 const ROUNDING: f64 = 1e-11;
 
 pub(crate) struct Case {
@@ -23,7 +22,7 @@ pub(crate) struct Case {
     pub(crate) ddq: Vec<f64>,
 }
 
-/// Random trees, and as many some of whose joints follow others.
+/// Random trees, and the same number with coupled joints.
 pub(crate) fn cases() -> impl Iterator<Item = Case> {
     (0..120).map(|case| {
         let seed = case / 2;
@@ -38,10 +37,10 @@ pub(crate) fn cases() -> impl Iterator<Item = Case> {
     })
 }
 
-/// The robot with a third of its joints following one or two others, of which some follow others themselves.
+/// The robot with a third of its joints following one or two others; some of these follow others themselves.
 fn coupled(model: Model, random: &mut Random) -> Model {
     let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-    // What a joint follows has a lower place in this order: no circles, but sources before and after it in the tree.
+    // A joint follows joints that are earlier in this order: no cycles, but sources before and after it in the tree.
     let count = names.len();
     let place = |k: usize| (5 * k + 2) % count.max(1);
     let in_turn = !count.is_multiple_of(5);
@@ -91,7 +90,7 @@ fn forward_dynamics_inverts_inverse_dynamics() {
         let mut ws = Workspace::new(&model);
         let tau = inverse_dynamics(&model, &mut ws, &q, &dq, &ddq).to_vec();
         let back = forward_dynamics(&model, &mut ws, &q, &dq, &tau);
-        // The mass matrix's condition number (up to some thousand here) multiplies the rounding.
+        // Rounding times the condition number of the mass matrix (up to several thousand here).
         assert_close(back, &ddq, 1e-8, "accelerations");
     }
 }
@@ -117,7 +116,7 @@ fn derivative_by_acceleration_is_the_mass_matrix_and_inverse_dynamics_is_affine_
 }
 
 #[test]
-fn derivatives_of_the_acceleration_are_those_of_differences() {
+fn acceleration_derivatives_equal_differences() {
     for Case { model, q, dq, ddq } in cases() {
         let dof = model.dof();
         for level in Level::available() {
@@ -126,8 +125,8 @@ fn derivatives_of_the_acceleration_are_those_of_differences() {
             let mass = nalgebra::DMatrix::from_row_slice(dof, dof, mass_matrix(&model, &mut ws, &q));
             let acceleration = forward_dynamics(&model, &mut ws, &q, &dq, &tau).to_vec();
             let found = forward_dynamics_derivatives(&model, &mut ws, &q, &dq, &tau);
-            assert_eq!(found.acceleration, acceleration, "what the articulated bodies say");
-            // The mass matrix's condition number (up to some thousand here) multiplies the rounding.
+            assert_eq!(found.acceleration, acceleration, "acceleration by articulated bodies");
+            // Rounding times the condition number of the mass matrix (up to several thousand here).
             let identity = nalgebra::DMatrix::from_row_slice(dof, dof, found.by_torque) * &mass;
             assert_close(identity.as_slice(), nalgebra::DMatrix::identity(dof, dof).as_slice(), 1e-9, "inverse");
             let found = [found.by_position, found.by_velocity, found.by_torque].map(<[f64]>::to_vec);
@@ -142,7 +141,7 @@ fn derivatives_of_the_acceleration_are_those_of_differences() {
             };
             for (which, matrix) in found.iter().enumerate() {
                 // Fourth-order differences with a step of 1e-3: error about h^4 times fifth derivatives, which are
-                // large where light bodies hang on heavy ones.
+                // large for light bodies on heavy ones.
                 for joint in 0..dof {
                     let (coarse, fine) = (change(which, joint, 2e-3), change(which, joint, 1e-3));
                     let slope: Vec<f64> = fine.iter().zip(&coarse).map(|(f, c)| (4.0 * f - c) / 3.0).collect();
@@ -167,9 +166,8 @@ fn mass_matrix_is_symmetric_and_positive_definite() {
 
 #[test]
 fn mass_rate_minus_twice_coriolis_is_skew() {
-    // dM/dt - 2 C is skew for the C of Christoffel symbols. Equivalent and free of a choice of C: q̇ᵀ (dM/dt) q̇ = 2
-    // q̇ᵀ C q̇, where dM/dt comes from the mass matrix alone (Richardson-extrapolated differences along q̇) and C q̇
-    // from the inverse dynamics alone.
+    // dM/dt - 2 C is skew for the C of Christoffel symbols. Equivalent without C: q̇ᵀ (dM/dt) q̇ = 2 q̇ᵀ C q̇, with
+    // dM/dt from the mass matrix (Richardson-extrapolated differences along q̇) and C q̇ from the inverse dynamics.
     for Case { model, q, dq, .. } in cases() {
         let dof = model.dof();
         let mut ws = Workspace::new(&model);
@@ -184,15 +182,15 @@ fn mass_rate_minus_twice_coriolis_is_skew() {
         let with_gravity = inverse_dynamics(&model, &mut ws, &q, &dq, &vec![0.0; dof]).to_vec();
         let gravity = gravity_torque(&model, &mut ws, &q);
         let coriolis: f64 = dq.iter().zip(with_gravity.iter().zip(gravity)).map(|(v, (t, g))| v * (t - g)).sum();
-        // Fourth-order differences with a step of 1e-3: error about h^4 times fifth derivatives (some hundreds).
+        // Fourth-order differences with a step of 1e-3: error about h^4 times fifth derivatives (several hundred).
         assert!((rate - 2.0 * coriolis).abs() <= 1e-7 * (1.0 + rate.abs()), "{rate} against {}", 2.0 * coriolis);
     }
 }
 
 #[test]
 fn coriolis_matrix_of_christoffel_symbols_makes_the_difference_skew() {
-    // C_ij = Σ_k ½ (∂_k M_ij + ∂_j M_ik - ∂_i M_jk) q̇_k must give the inverse dynamics' velocity torque and dM/dt - 2
-    // C skew.
+    // C_ij = Σ_k ½ (∂_k M_ij + ∂_j M_ik - ∂_i M_jk) q̇_k must give the velocity torque of the inverse dynamics, and
+    // dM/dt - 2 C must be skew.
     for Case { model, q, dq, .. } in cases().filter(|case| case.model.dof() <= 6) {
         let dof = model.dof();
         let mut ws = Workspace::new(&model);
@@ -211,14 +209,13 @@ fn coriolis_matrix_of_christoffel_symbols_makes_the_difference_skew() {
         let c = nalgebra::DMatrix::from_fn(dof, dof, |i, j| {
             (0..dof).map(|k| 0.5 * (slope[k][(i, j)] + slope[j][(i, k)] - slope[i][(j, k)]) * dq[k]).sum::<f64>()
         });
-        // Fourth-order differences of masses of some tens: as above.
+        // Fourth-order differences of masses of several tens: as above.
         let found = coriolis_matrix(&model, &mut Workspace::new(&model), &q, &dq).to_vec();
         assert_close(&found, &c.transpose().iter().copied().collect::<Vec<f64>>(), 1e-7, "Coriolis matrix");
         let velocity_torque: Vec<f64> = (&c * nalgebra::DVector::from_column_slice(&dq)).iter().copied().collect();
         let total = inverse_dynamics(&model, &mut ws, &q, &dq, &vec![0.0; dof]).to_vec();
         let gravity = gravity_torque(&model, &mut ws, &q).to_vec();
         let expected: Vec<f64> = total.iter().zip(&gravity).map(|(t, g)| t - g).collect();
-        // Fourth-order differences, as above.
         assert_close(&velocity_torque, &expected, 1e-7, "velocity torque");
         let rate = (0..dof).fold(nalgebra::DMatrix::zeros(dof, dof), |sum, k| sum + &slope[k] * dq[k]);
         let skew = rate - 2.0 * c;
@@ -242,7 +239,8 @@ fn gravity_torque_is_the_slope_of_potential_energy() {
                 (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h)
             })
             .collect();
-        // Rounding of energies (some hundred joules) over the step: 1e-16 · 1e2 / 1e-3 = 1e-11, and h^4 of harmonics.
+        // Rounding of energies (several hundred joules) over the step: 1e-16 · 1e2 / 1e-3 = 1e-11, and h^4 of
+        // harmonics.
         assert_close(&slope, &gravity, 1e-8, "gravity");
         let stiffness = gravity_torque_derivative(&model, &mut ws, &q).to_vec();
         let slopes: Vec<Vec<f64>> = (0..model.dof())
@@ -257,15 +255,14 @@ fn gravity_torque_is_the_slope_of_potential_energy() {
                 (0..model.dof()).map(slope).collect()
             })
             .collect();
-        // The second derivative of an energy: symmetric.
+        // The second derivative of an energy is symmetric.
         assert_close(&slopes.concat(), &stiffness, 1e-8, "derivative of gravity");
     }
 }
 
-/// Joints on different branches of a tree have entries that no algorithm writes: what another one left there would
-/// stay.
+/// Entries of joints on different branches are never written, so remains of another algorithm would stay.
 #[test]
-fn a_workspace_keeps_nothing_of_one_algorithm_for_another() {
+fn algorithms_do_not_affect_each_other_in_a_workspace() {
     type Quantity = fn(&Model, &mut Workspace, &[f64], &[f64], &[f64]) -> Vec<f64>;
     let quantities: [Quantity; 7] = [
         |model, ws, q, dq, ddq| {
@@ -306,7 +303,7 @@ fn coriolis_matrix_and_gravity_derivative_are_parts_of_the_derivatives_of_the_to
             let at_rest = inverse_dynamics_derivatives(&model, &mut ws, &q, &zeros, &zeros).by_position.to_vec();
             // The same products in the same order.
             assert_close(coriolis_matrix(&model, &mut ws, &q, &dq), &half, 1e-14, "Coriolis matrix");
-            // Terms that cancel: masses at some metres from the base's origin.
+            // Cancelling terms: masses at some metres from the base's origin.
             assert_close(gravity_torque_derivative(&model, &mut ws, &q), &at_rest, 1e-12, "derivative of gravity");
 
             let torque = inverse_dynamics(&model, &mut ws, &q, &dq, &zeros).to_vec();
@@ -333,7 +330,7 @@ fn coriolis_matrix_and_gravity_derivative_are_parts_of_the_derivatives_of_the_to
 #[test]
 fn energy_balance_holds_along_a_simulated_motion() {
     for Case { model, q, dq, .. } in cases().filter(|case| case.model.dof() <= 5) {
-        // Runge-Kutta 4 over 0.1 s under a torque that varies with time; the work done must equal the gain of energy.
+        // Runge-Kutta 4 over 0.1 s under a time-varying torque; the work must equal the change of energy.
         let dof = model.dof();
         let mut ws = Workspace::new(&model);
         let torque = |t: f64| (0..dof).map(|j| (3.0 * t + j as f64).sin()).collect::<Vec<f64>>();
@@ -362,7 +359,7 @@ fn energy_balance_holds_along_a_simulated_motion() {
             work += h / 6.0 * (k1.2 + 2.0 * k2.2 + 2.0 * k3.2 + k4.2);
         }
         let gain = energy(&mut ws, &q, &dq) - before;
-        // Fourth order with a step of 1e-4 s; light tips reach some 100 rad/s, hence not tighter.
+        // Fourth order with a step of 1e-4 s; light tips reach about 100 rad/s, so the tolerance is not smaller.
         assert!((gain - work).abs() <= 1e-6 * (1.0 + before.abs() + work.abs()), "gain {gain}, work {work}");
     }
 }
@@ -419,7 +416,7 @@ fn gravity_and_placements_follow_a_turned_base() {
     let q = [0.1, -0.4, 0.9, 1.4, -2.0];
     let turned = model.clone().with_base_orientation(0.4, -0.2, 1.0).unwrap();
     let mut ws = Workspace::new(&model);
-    // Potential energy is the same function of world heights: turn all placements instead of gravity.
+    // Potential energy depends on world heights: rotate all placements instead of gravity.
     let turn = dynident_model::Mat3::from_roll_pitch_yaw(0.4, -0.2, 1.0);
     let energy: f64 = body_placements(&model, &mut ws, &q)
         .iter()
@@ -450,8 +447,8 @@ fn locked_joints_change_nothing_but_the_number_of_joints() {
 
 #[test]
 #[should_panic(expected = "another tree")]
-fn a_workspace_of_another_tree_is_refused_not_misread() {
-    // Same number of joints, other branches: the regressor's scratch would follow the wrong paths.
+fn workspaces_of_another_tree_are_refused() {
+    // Same number of joints, other branches: the regressor's scratch would use the wrong paths.
     let (model, other) = (random_tree(2, 6), random_tree(5, 6));
     let parents = |model: &Model| model.joints().iter().map(|joint| joint.parent).collect::<Vec<_>>();
     assert_ne!(parents(&model), parents(&other), "choose seeds with different trees");
@@ -460,9 +457,9 @@ fn a_workspace_of_another_tree_is_refused_not_misread() {
     let _ = torque_regressor(&other, &mut workspace, &zeros, &zeros, &zeros);
 }
 
-/// Mass matrix and bias of one call are those of two, bit for bit: the same operations on the same numbers.
+/// Mass matrix and bias of one call are bit-identical to those of two calls.
 #[test]
-fn the_equation_of_motion_is_its_parts() {
+fn equation_of_motion_equals_the_sum_of_its_terms() {
     for seed in 0..10 {
         let model = random_tree(seed, 1 + seed as usize);
         let dof = model.dof();
@@ -471,7 +468,7 @@ fn the_equation_of_motion_is_its_parts() {
             let mut random = Random::new(seed);
             let mut vector = || (0..dof).map(|_| random.uniform(-2.0, 2.0)).collect::<Vec<f64>>();
             let (q, dq) = (vector(), vector());
-            // Something else in the scratch before.
+            // Other content in the scratch.
             inverse_dynamics(&model, &mut workspace, &dq, &q, &q);
             let (matrix, bias) = mass_matrix_and_bias(&model, &mut workspace, &q, &dq);
             let (matrix, bias) = (matrix.to_vec(), bias.to_vec());

@@ -1,4 +1,4 @@
-//! The integration tests of this crate, linked once.
+//! Integration tests, linked into one binary.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod base_parameters;

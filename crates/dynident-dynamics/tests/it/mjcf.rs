@@ -1,4 +1,4 @@
-//! MJCF models as this reader and as MuJoCo understand them: joints, ranges, drives, masses and torques.
+//! MJCF models compared with MuJoCo: joints, ranges, drives, masses and torques.
 
 use crate::golden::{close, numbers};
 use dynident_dynamics::{Workspace, inverse_dynamics};
@@ -6,7 +6,7 @@ use dynident_model::{InertialParameters, load_robot};
 use dynident_testing::repository;
 use serde_json::Value;
 
-/// Two programs in double precision on one file, MuJoCo by unit quaternions and principal axes: rounding alone.
+/// Two programs in double precision on one file, MuJoCo with quaternions and principal axes: rounding only.
 const RELATIVE: f64 = 1e-10;
 
 #[test]
@@ -21,7 +21,7 @@ fn every_model_has_the_joints_and_torques_of_mujoco() {
         let joints = model.joints();
         assert_eq!(joints.len(), file["joints"].as_array().unwrap().len(), "{name}");
         for (k, joint) in joints.iter().enumerate() {
-            // MuJoCo has joints without a name.
+            // Joints may have no name in MuJoCo.
             if let Some(theirs) = file["joints"][k].as_str() {
                 assert_eq!(joint.name, theirs, "{name}");
             }

@@ -1,8 +1,8 @@
-//! Dynident against Pinocchio 4.1 and MuJoCo 4.0 on every robot of `robots/`, at every processor level.
+//! Dynident compared with Pinocchio 4.1 and MuJoCo 4.0 on every robot of `robots/`, at every processor level.
 //!
-//! Deviations count against the largest entry of an array. The project promises 1e-10. What two careful programs in
-//! double precision leave is less: some hundred roundings of 1e-16 along a chain of at most twenty joints, so 1e-13,
-//! and ten times that where larger terms cancel.
+//! Deviations are relative to the largest entry of an array. Required: 1e-10. The expected rounding is smaller:
+//! several hundred roundings of 1e-16 along a chain of at most twenty joints, i.e. 1e-13, and ten times that for
+//! cancelling terms.
 
 use crate::golden::{ARMS, Golden, ROBOTS, assert_close, numbers, text};
 use dynident_dynamics::{
@@ -15,12 +15,12 @@ use dynident_model::terms::JointMotion;
 use dynident_model::{Model, Transform, Vec3};
 use serde_json::Value;
 
-/// Sums along a chain: see the head of the file.
+/// Sums along a chain, see above.
 const CHAIN: f64 = 1e-12;
 /// Single products of rotations and lengths, without sums over bodies.
 const GEOMETRY: f64 = 1e-13;
-/// The promise itself. Forward dynamics solve with a mass matrix whose condition on a humanoid with fingers is above
-/// 1e6, so that accelerations of the joints with the least inertia carry rounding a million times over.
+/// The required accuracy. The mass matrix of a humanoid with fingers has a condition number above 1e6, so
+/// accelerations of the joints with the least inertia have a million times the rounding.
 const PROMISE: f64 = 1e-10;
 
 struct State {
@@ -46,13 +46,13 @@ fn each(robots: &[&'static str], mut check: impl FnMut(&Golden, &Value, &State, 
 }
 
 #[test]
-fn readers_give_the_same_machine() {
+fn readers_give_the_same_model() {
     for name in ROBOTS {
         let Golden { model, file, .. } = Golden::of("pinocchio", name);
         for (index, joint) in model.joints().iter().enumerate() {
             let parent = joint.parent.map(|parent| model.joints()[parent].name.as_str());
             assert_eq!(parent, file["parents"][&joint.name].as_str(), "{name}: parent of {}", joint.name);
-            // Lumped over fixed joints. Parallel axes cancel where a link lies far from its joint.
+            // Lumped over fixed joints. Terms of parallel axes cancel if a link is far from its joint.
             let theirs = numbers(&file["inertial_parameters"][&joint.name]);
             assert_close(&model.inertials()[index].0, &theirs, CHAIN, &format!("{name}: inertials of {}", joint.name));
         }
@@ -80,7 +80,8 @@ fn inverse_dynamics_agree_under_a_tilted_base() {
         let golden = Golden::of("pinocchio", name);
         let gravity = Vec3(numbers(&golden.file["tilted_gravity_mps2"]).try_into().unwrap());
         let by_gravity = golden.model.clone().with_gravity(gravity).unwrap();
-        // The same as a base turned under the standard gravity g: a rotation with Rᵀ (0, 0, -|g|) along the tilted one.
+        // The same as a base rotated under the standard gravity g: a rotation with Rᵀ (0, 0, -|g|) along the tilted
+        // one.
         let size = gravity.norm();
         let upright = golden.model.clone().with_gravity(Vec3([0.0, 0.0, -size])).unwrap();
         let pitch = (gravity[0] / size).asin();
@@ -105,7 +106,7 @@ fn mass_matrices_and_energies_agree() {
         worst = worst.max(assert_close(mass_matrix(&golden.model, workspace, q), &theirs, CHAIN, what));
         let kinetic = kinetic_energy(&golden.model, workspace, q, dq);
         assert_close(&[kinetic], &[entry["kinetic_energy_j"].as_f64().unwrap()], CHAIN, what);
-        // Heights of bodies above and below the base cancel: measured against the weight at a metre.
+        // Heights of bodies above and below the base cancel: relative to the weight at one metre.
         let potential = potential_energy(&golden.model, workspace, q);
         let theirs = entry["potential_energy_j"].as_f64().unwrap();
         let weight = 9.81 * golden.file["moving_mass_kg"].as_f64().unwrap();
@@ -192,11 +193,11 @@ fn link_placement(model: &Model, bodies: &[Transform], name: &str) -> Transform 
     let moving =
         bodies.iter().zip(model.bodies()).flat_map(|(at, body)| body.links.iter().map(move |link| (*at, link)));
     let resting = model.base().links.iter().map(|link| (Transform::IDENTITY, link));
-    let (at, link) = resting.chain(moving).find(|(_, link)| link.name == name).expect("every link stands in a body");
+    let (at, link) = resting.chain(moving).find(|(_, link)| link.name == name).expect("every link belongs to a body");
     at.then(&link.placement)
 }
 
-/// Metres and entries of rotations are both of the size of one.
+/// Metres and entries of rotations are both of order one.
 fn assert_placement(ours: &Transform, theirs: &Value, what: &str) {
     let rotation = theirs["rotation"].as_array().unwrap().iter().flat_map(numbers);
     let theirs: Vec<f64> = numbers(&theirs["position_m"]).into_iter().chain(rotation).collect();
@@ -259,7 +260,7 @@ fn mujoco_agrees() {
             let [q, dq, ddq] = ["q", "dq", "ddq"].map(|key| golden.vector(&entry[key]));
             let what = format!("{name}, state `{}`", text(&entry["label"]));
             let tau = inverse_dynamics(&golden.model, &mut workspace, &q, &dq, &ddq);
-            // MuJoCo turns inertias to principal axes and back, by quaternions: one digit more is lost.
+            // MuJoCo converts inertias to principal axes and back by quaternions, which loses one more digit.
             assert_close(tau, &golden.vector(&entry["tau"]), 1e-11, &what);
             let matrix = mass_matrix(&golden.model, &mut workspace, &q);
             assert_close(matrix, &golden.symmetric(&entry["mass_matrix_lower"]), 1e-11, &what);

@@ -1,6 +1,5 @@
-//! Robots whose axes stand parallel or at right angles and whose origins lie on axes: what is zero there is left out of
-//! the recursions. The oracle leaves nothing out: the same mechanics in the bodies' own frames, over plain numbers and
-//! dual numbers.
+//! Robots with parallel or perpendicular axes and origins on axes, for which the recursions skip zeros. The oracle
+//! skips nothing: the same mechanics in the bodies' own frames, with plain numbers and dual numbers.
 
 use dynident_dynamics::{
     BatchWorkspace, DerivativeArrays, JointMatrices, PanelLayout, Panels, Workspace, all_columns, forward_dynamics,
@@ -14,13 +13,13 @@ use dynident_model::terms::JointMotion;
 use dynident_model::{JointKind, Mat3, Mimic, MimicSource, Model, Vec3};
 use dynident_testing::count;
 
-/// Two ways of summing the same products over some ten bodies, in double precision, of the size of the largest entry.
+/// Two orders of summation over about ten bodies, in double precision, relative to the largest entry.
 const ROUNDING: f64 = 1e-12;
 
-/// No multiple of any number of lanes, fewer than any, and whole groups.
+/// Not a multiple of any number of lanes, fewer than any, and whole groups.
 const SAMPLES: [usize; 3] = [13, 3, 16];
 
-/// A tree of which every rotation, axis and entry of an origin is as it is on most robots, or general, by chance.
+/// A tree whose rotations, axes and origins are randomly special (as on most robots) or general.
 fn robot(seed: u64) -> Model {
     let mut random = Random::new(seed ^ 0x51ab);
     let plain = random_tree(seed, 1 + seed as usize % 9);
@@ -46,7 +45,7 @@ fn robot(seed: u64) -> Model {
             };
             let turns = [unit(), unit(), unit()];
             joint.axis = turns[0].scale(if random.bits().is_multiple_of(2) { 1.0 } else { -1.0 });
-            // As a URDF writes them: roll, pitch and yaw by multiples of 90°, rounded.
+            // As in a URDF: roll, pitch and yaw by multiples of 90°, rounded.
             let mut quarter = |axis| {
                 let quarters = f64::from(random.bits() as u8 % 4);
                 Mat3::from_axis_angle(axis, core::f64::consts::FRAC_PI_2 * quarters)
@@ -54,7 +53,7 @@ fn robot(seed: u64) -> Model {
             joint.placement.rotation = quarter(turns[1]).mul_mat(&quarter(turns[2]));
         }
         if random.uniform(0.0, 1.0) < 0.2 {
-            // A turn about the joint's own axis changes no zero of the joint's.
+            // A rotation about the joint's own axis changes none of the joint's zeros.
             let turn = Mat3::from_axis_angle(joint.axis, random.uniform(-3.0, 3.0));
             joint.placement.rotation = joint.placement.rotation.mul_mat(&turn);
         }
@@ -71,7 +70,7 @@ fn robot(seed: u64) -> Model {
     model
 }
 
-/// What the way in the bodies' own frames gives of one sample.
+/// Results of the recursions in the bodies' own frames for one sample.
 struct Expected {
     tau: Vec<f64>,
     mass: Vec<f64>,
@@ -112,14 +111,14 @@ fn assert_near(what: &str, found: impl IntoIterator<Item = f64>, expected: &[f64
     assert_eq!(entries, expected.len(), "{what}");
 }
 
-/// `Y π` of rows of ten columns a body, which the robot of the model need not have by itself.
+/// `Y π` of rows with ten columns per body, including followers.
 fn times_parameters(model: &Model, row: impl Iterator<Item = f64>) -> f64 {
     let parameters = model.inertials().iter().flat_map(|body| body.0);
     row.zip(parameters).map(|(entry, parameter)| entry * parameter).sum()
 }
 
 #[test]
-fn one_sample_is_that_of_the_general_way() {
+fn one_sample_equals_the_general_method() {
     for seed in 0..count(160, 3000) as u64 {
         let model = robot(seed);
         let dof = model.dof();
@@ -131,7 +130,7 @@ fn one_sample_is_that_of_the_general_way() {
         for level in Level::available() {
             let mut workspace = Workspace::with_level(&model, level);
             let of = |what: &str| format!("seed {seed}, {}, {what}", level.name());
-            // Twice, and by turns: nothing of one call is left for the next.
+            // Twice in alternation: no call may affect the next one.
             for _ in 0..2 {
                 let found = inverse_dynamics_derivatives(&model, &mut workspace, &q, &dq, &ddq);
                 assert_near(&of("by position"), found.by_position.iter().copied(), &derivatives[0]);
@@ -142,7 +141,7 @@ fn one_sample_is_that_of_the_general_way() {
                 let found = mass_matrix(&model, &mut workspace, &q);
                 assert_near(&of("mass matrix"), found.iter().copied(), &mass);
                 let found = mass_matrix_and_bias(&model, &mut workspace, &q, &dq);
-                assert_near(&of("mass matrix beside the bias"), found.0.iter().copied(), &mass);
+                assert_near(&of("mass matrix with the bias"), found.0.iter().copied(), &mass);
                 assert_near(&of("bias"), found.1.iter().copied(), &bias);
                 let rows = torque_regressor(&model, &mut workspace, &q, &dq, &ddq);
                 let found = rows.chunks_exact(10 * model.body_count());
@@ -150,7 +149,7 @@ fn one_sample_is_that_of_the_general_way() {
                 assert_near(&of("regressor"), found, &tau);
                 let back = forward_dynamics(&model, &mut workspace, &q, &dq, &tau).to_vec();
                 let again = inverse_dynamics_over(&model, &q, &dq, &back);
-                // Torques of accelerations that are not those of the state where a body has almost no inertia.
+                // Compared by torque, because accelerations of a body with almost no inertia are inaccurate.
                 assert_near(&of("torque of the forward dynamics"), again, &tau);
             }
         }
@@ -158,7 +157,7 @@ fn one_sample_is_that_of_the_general_way() {
 }
 
 #[test]
-fn many_samples_are_those_of_the_general_way() {
+fn many_samples_equal_the_general_method() {
     for seed in 0..count(60, 1000) as u64 {
         let model = robot(seed);
         let dof = model.dof();
@@ -176,7 +175,7 @@ fn many_samples_are_those_of_the_general_way() {
             for level in Level::available() {
                 let mut workspace = BatchWorkspace::with_level(&model, level);
                 let mut tau = vec![f64::NAN; dof * samples];
-                // What was there does not stay.
+                // Initial content must be overwritten.
                 let mut dense = [(); 4].map(|()| vec![f64::NAN; dof * dof * samples]);
                 inverse_dynamics_batch(&model, &mut workspace, &motion, &mut tau);
                 let [mass, by_position, by_velocity, by_acceleration] = &mut dense;

@@ -1,5 +1,4 @@
-//! SDF models as this reader and as Drake, which reads them by Gazebo's own library, understand them: joints, limits
-//! and torques.
+//! SDF models compared with Drake, which reads them with Gazebo's library: joints, limits and torques.
 
 use crate::golden::{close, numbers};
 use dynident_dynamics::{Workspace, inverse_dynamics};
@@ -7,16 +6,15 @@ use dynident_model::{Joint, Model, load_robot};
 use dynident_testing::repository;
 use serde_json::Value;
 
-/// Two programs in double precision on one file, poses of several frames after each other: rounding alone.
+/// Two programs in double precision on one file with nested poses: rounding only.
 const RELATIVE: f64 = 1e-10;
 
-/// Where a joint of `hand::bend` stands among Drake's `bend`.
+/// Index of a joint `hand::bend` among Drake's names, where it is `bend`.
 fn place(names: &[&str], joint: &Joint) -> usize {
     let own = joint.name.rsplit("::").next();
     names.iter().position(|name| Some(*name) == own).unwrap()
 }
 
-/// Values in the order of the golden file, put into that of the model.
 fn in_order(model: &Model, names: &[&str], values: &[f64]) -> Vec<f64> {
     model.joints().iter().map(|joint| values[place(names, joint)]).collect()
 }

@@ -1,4 +1,4 @@
-//! From a description to the convex program, and back.
+//! Assembly of the convex program from a [`PhysicalProblem`], and the way back to parameters.
 
 use super::conic::{Block, BlockMap, Certificate, LocalSquares, Program, Row};
 use super::constraints::{cone_name, linear_constraints};
@@ -9,16 +9,14 @@ use super::priors::PriorBody;
 use super::{PhysicalError, PhysicalSettings};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// A program with what its variables and constraints stand for.
+/// A program with the meaning of its variables and constraints.
 #[derive(Clone, Debug)]
 pub(super) struct AssembledProgram {
     pub(super) program: Program,
-    /// Names of the constraints by label.
     pub(super) names: Vec<String>,
-    /// First variable of each free body.
     pub(super) starts: Vec<Option<usize>>,
     first_scalar: usize,
-    /// What the program's objective leaves out of the prior.
+    /// Constant part of the prior, not included in the program's objective.
     pub(super) constant: f64,
 }
 
@@ -87,7 +85,7 @@ impl AssembledProgram {
         assembled
     }
 
-    /// A constraint on standard parameters as one on variables, of unit length.
+    /// Converts a constraint on standard parameters into one on variables, scaled to unit length.
     pub(super) fn row(&self, problem: &PhysicalProblem, entries: &[(usize, f64)], offset: f64, label: usize) -> Row {
         let found = self.functional(problem, entries);
         let length = found.iter().map(|(_, value)| value * value).sum::<f64>().sqrt();
@@ -96,7 +94,7 @@ impl AssembledProgram {
         Row { entries, offset: offset * scale, label }
     }
 
-    /// Coefficients of standard parameters as those of variables; known bodies have none.
+    /// Converts coefficients of standard parameters into those of variables; known bodies have no variables.
     pub(super) fn functional(&self, problem: &PhysicalProblem, entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
         let bodies = problem.bodies.len();
         let mut by_body: Vec<(usize, [f64; 10])> = Vec::new();
@@ -123,7 +121,6 @@ impl AssembledProgram {
         found
     }
 
-    /// Standard parameters of a point.
     pub(super) fn parameters(&self, problem: &PhysicalProblem, x: &DVector<f64>) -> Vec<f64> {
         let mut parameters = Vec::with_capacity(10 * problem.bodies.len() + problem.scalars.len());
         for (index, body) in problem.bodies.iter().enumerate() {
@@ -140,7 +137,7 @@ impl AssembledProgram {
         parameters
     }
 
-    /// A point strictly inside all constraints: the prior itself where it is, else the one with most room.
+    /// A point strictly inside all constraints: the prior if it is inside, else the point with the most room.
     pub(super) fn interior_start(&self, problem: &PhysicalProblem) -> Result<DVector<f64>, PhysicalError> {
         let mut x = DVector::zeros(self.program.variables);
         for first in self.starts.iter().flatten() {
@@ -161,20 +158,21 @@ impl AssembledProgram {
         if self.program.strictly_inside(&x) { Ok(x) } else { self.roomiest(&x) }
     }
 
-    /// Maximises t with `S_k ⪰ t 1` and every unit row at least t. Not positive: the constraints exclude each other,
-    /// and those with multipliers are at odds (a theorem of the alternative: Boyd and Vandenberghe 5.8).
+    /// Maximises t with `S_k ⪰ t 1` and every unit row at least t. If t is not positive, the constraints contradict
+    /// each other, and those with nonzero multipliers are the conflicting ones (theorem of the alternative: Boyd and
+    /// Vandenberghe 5.8).
     fn roomiest(&self, x: &DVector<f64>) -> Result<DVector<f64>, PhysicalError> {
         let phase = RoomProgram::new(&self.program, x);
         let count = self.program.variables;
-        // A start need not have all the room that there is: half of it, by the gap to the dual, will do.
+        // A start with half of the possible room is sufficient, according to the duality gap.
         let enough = |x: &DVector<f64>, now: &Certificate| {
-            x[count] > LEAST_START && x[count] > now.gap * (1.0 + now.objective.abs()) && now.stationarity < 1.0e-3
+            x[count] > SUFFICIENT_ROOM && x[count] > now.gap * (1.0 + now.objective.abs()) && now.stationarity < 1.0e-3
         };
         let solved = interior_point_until(&phase.program, phase.start, (ROOM_TOLERANCE, 300), enough)
             .ok_or(PhysicalError::Breakdown)?;
         let room = solved.x[count];
         let found = solved.x.rows(0, count).into_owned();
-        if room > LEAST_ROOM && self.program.strictly_inside(&found) {
+        if room > MIN_ROOM && self.program.strictly_inside(&found) {
             return Ok(found);
         }
         let mut shares: Vec<(usize, f64)> = Vec::new();
@@ -196,27 +194,26 @@ impl AssembledProgram {
     }
 }
 
-/// Accuracy to which room is found, and the least that counts: what is narrower has no inside in double precision.
+/// Accuracy of the room, and its minimum: a narrower set has no interior in double precision.
 const ROOM_TOLERANCE: f64 = 1.0e-9;
-const LEAST_ROOM: f64 = 1.0e-8;
-/// Room from which on a start need not have all of it.
-const LEAST_START: f64 = 1.0e-6;
+const MIN_ROOM: f64 = 1.0e-8;
+const SUFFICIENT_ROOM: f64 = 1.0e-6;
 
-/// A program that maximises the room t of another's constraints, t its last variable.
+/// A program that maximises the room t of another program's constraints; t is its last variable.
 pub(super) struct RoomProgram {
     pub(super) program: Program,
     pub(super) start: DVector<f64>,
 }
 
-/// Bodies heavier and larger than this many references are not looked at: it keeps the search bounded.
-const LARGEST: f64 = 1.0e6;
+/// Limit of mass and size in multiples of the references, to keep the search bounded.
+const MAX_SIZE_RATIO: f64 = 1.0e6;
 
 impl RoomProgram {
     pub(super) fn new(constrained: &Program, x: &DVector<f64>) -> Self {
         let count = constrained.variables;
         let mut program = Program::new(count + 1);
         let mut least = 1.0_f64;
-        // What nothing constrains (an offset) stays where it is: without data nothing else would hold it.
+        // Unconstrained variables (an offset) are fixed, because without data they would be undetermined.
         let mut held = vec![true; count];
         for block in constrained.blocks.iter().filter(|block| block.entropy == 0.0) {
             let mut map = DMatrix::zeros(10, count + 1);
@@ -235,7 +232,7 @@ impl RoomProgram {
             let entries: Vec<(usize, f64)> =
                 trace.iter().enumerate().filter(|(_, v)| **v != 0.0).map(|(k, &v)| (k, -v)).collect();
             if !entries.is_empty() {
-                let offset = 4.0 * LARGEST + 2.0 * s.trace().abs() - block.offset.dot(&unit);
+                let offset = 4.0 * MAX_SIZE_RATIO + 2.0 * s.trace().abs() - block.offset.dot(&unit);
                 let length = entries.iter().map(|(_, v)| v * v).sum::<f64>().sqrt();
                 let entries = entries.into_iter().map(|(k, v)| (k, v / length)).collect();
                 program.rows.push(Row { entries, offset: offset / length, label: usize::MAX });

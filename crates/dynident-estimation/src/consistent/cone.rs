@@ -1,4 +1,4 @@
-//! What an interior-point method needs of one cone of positive definite 4 × 4 matrices.
+//! Operations on one cone of positive definite 4 × 4 matrices for an interior-point method.
 
 use super::coordinates::{Matrix10, PAIRS, Vector10, matrix_of, vector_of};
 use nalgebra::{Matrix4, Vector4};
@@ -9,9 +9,9 @@ use nalgebra::{Matrix4, Vector4};
 /// 5.3: with `S = L Lᵀ`, `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}` and `R⁻¹ = diag(λ)^{-1/2} Uᵀ
 /// Mᵀ`.
 ///
-/// L is lower and M upper triangular, and both are carried from step to step by triangular factors near one: small
-/// eigenvalues beside large ones keep their digits. R itself mixes them (its columns may turn freely where the λ are
-/// alike), so that variables are seen in the frame of L.
+/// L is lower and M upper triangular. Both are updated in each step by triangular factors near one, so that small
+/// eigenvalues keep their digits. R mixes them (its columns are not unique for nearly equal λ), so variables are
+/// represented in the frame of L.
 #[derive(Clone, Debug)]
 pub(super) struct Scaling {
     pub(super) lambda: Vector4<f64>,
@@ -25,7 +25,7 @@ pub(super) struct Scaling {
 }
 
 impl Scaling {
-    /// None when one of the two is not positive definite in double precision.
+    /// `None` unless both are positive definite in double precision.
     pub(super) fn new(s: &Matrix4<f64>, z: &Matrix4<f64>) -> Option<Self> {
         let l = s.cholesky()?.l();
         let m = upper_factor(z)?;
@@ -45,7 +45,7 @@ impl Scaling {
     /// + ΔZ) R⁻¹`. The pair itself is never formed.
     pub(super) fn moved(&self, ds: &Matrix4<f64>, dz: &Matrix4<f64>) -> Option<Self> {
         let inverse_root = Matrix4::from_diagonal(&self.lambda.map(|value| 1.0 / value.sqrt()));
-        // Seen from L and M: one, and the change.
+        // In the frames of L and M: the unit matrix plus the change.
         let (of_s, of_z) = (self.v * inverse_root, self.u * inverse_root);
         let l = (Matrix4::identity() + of_s * ds * of_s.transpose()).cholesky()?.l();
         let m = upper_factor(&(Matrix4::identity() + of_z * dz * of_z.transpose()))?;
@@ -62,7 +62,7 @@ impl Scaling {
         self.m * self.m.transpose()
     }
 
-    /// The 10 × 10 matrix of `X ↦ L X Lᵀ` on vectors: from the frame to the body's own variables.
+    /// The 10 × 10 matrix of `X ↦ L X Lᵀ` on vectors: from the frame to the body's variables.
     pub(super) fn frame(&self) -> Matrix10 {
         congruence(&self.l)
     }
@@ -77,7 +77,7 @@ impl Scaling {
         congruence(&self.r_inverse)
     }
 
-    /// The same from another pair's frame, whose L it is.
+    /// As [`scaled_frame`](Self::scaled_frame) from the frame of another pair.
     pub(super) fn scaled_frame_of(&self, other: &Self) -> Matrix10 {
         congruence(&(self.r_inverse * other.l))
     }
@@ -118,12 +118,11 @@ pub(super) fn congruence(v: &Matrix4<f64>) -> Matrix10 {
     Matrix10::from_columns(&columns)
 }
 
-/// The smallest eigenvalue of a symmetric matrix, to rounding beside the largest one; NaN for one that is not finite.
+/// Smallest eigenvalue of a symmetric matrix, to rounding of the largest one; NaN for a matrix that is not finite.
 ///
-/// Of the tridiagonal matrix that two reflections leave the least root of the characteristic polynomial, by Laguerre's
-/// iteration from a bound below: where all roots are real it climbs without passing the first one, and its steps shrink
-/// with the third power (Wilkinson, The Algebraic Eigenvalue Problem (1965), 7.8). A step ends several iterations of a
-/// method for all four, and nothing else is wanted of them.
+/// Two reflections make the matrix tridiagonal. Laguerre's iteration then finds the smallest root of the
+/// characteristic polynomial from a lower bound: for real roots it converges monotonically and cubically (Wilkinson,
+/// The Algebraic Eigenvalue Problem (1965), 7.8). This is faster than computing all four eigenvalues.
 pub(super) fn least_eigenvalue(matrix: &Matrix4<f64>) -> f64 {
     let size = matrix.amax();
     if !size.is_finite() || matrix.iter().any(|value| value.is_nan()) {
@@ -133,10 +132,10 @@ pub(super) fn least_eigenvalue(matrix: &Matrix4<f64>) -> f64 {
         return 0.0;
     }
     let (a, b) = tridiagonal(&(matrix / size));
-    // Gershgorin's bound, a little lower, so that rounding does not put it behind the root.
+    // Gershgorin's bound, slightly lower, so that rounding does not put it beyond the root.
     let radius = [b[0].abs(), b[0].abs() + b[1].abs(), b[1].abs() + b[2].abs(), b[2].abs()];
     let mut x = a.iter().zip(&radius).map(|(a, radius)| a - radius).fold(f64::INFINITY, f64::min) - 4.0 * f64::EPSILON;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         // The polynomial and its first two derivatives by its three-term recurrence.
         let (mut p, mut d, mut s) = ([1.0, a[0] - x], [0.0, -1.0], [0.0, 0.0]);
         for k in 1..4 {
@@ -146,7 +145,7 @@ pub(super) fn least_eigenvalue(matrix: &Matrix4<f64>) -> f64 {
             d = [d[1], e * d[1] - p[0] - square * d[0]];
         }
         if p[1] <= 0.0 {
-            // At the root, or behind it by rounding.
+            // At the root, or beyond it by rounding.
             return x * size;
         }
         let (g, curvature) = (d[1] / p[1], s[1] / p[1]);
@@ -160,10 +159,10 @@ pub(super) fn least_eigenvalue(matrix: &Matrix4<f64>) -> f64 {
     matrix.symmetric_eigenvalues().min()
 }
 
-/// Most steps to an eigenvalue: three to six are usual, and clustered ones take more.
-const MOST_STEPS: usize = 40;
+/// Maximum number of steps; three to six are usual, more for clustered eigenvalues.
+const MAX_STEPS: usize = 40;
 
-/// Diagonal and subdiagonal of a tridiagonal matrix with the eigenvalues of a symmetric one (Golub and Van Loan,
+/// Diagonal and subdiagonal of a tridiagonal matrix with the eigenvalues of a symmetric matrix (Golub and Van Loan,
 /// 8.3.1).
 fn tridiagonal(matrix: &Matrix4<f64>) -> ([f64; 4], [f64; 3]) {
     let mut m = *matrix;
@@ -177,7 +176,7 @@ fn tridiagonal(matrix: &Matrix4<f64>) -> ([f64; 4], [f64; 3]) {
         let first = m[(k + 1, k)];
         let norm = (first * first + below).sqrt();
         let head = first + norm.copysign(first);
-        // I - β v vᵀ with v = (head, the rest of the column).
+        // I - β v vᵀ with v = (head, remaining column).
         let mut v = [0.0; 4];
         v[k + 1] = head;
         for i in k + 2..4 {
@@ -205,32 +204,32 @@ fn tridiagonal(matrix: &Matrix4<f64>) -> ([f64; 4], [f64; 3]) {
     ([m[(0, 0)], m[(1, 1)], m[(2, 2)], m[(3, 3)]], b)
 }
 
-/// `ln det` of a positive definite matrix, or none.
+/// `ln det` of a positive definite matrix, else `None`.
 pub(super) fn log_determinant(matrix: &Matrix4<f64>) -> Option<f64> {
     let factor = matrix.cholesky()?;
     let l = factor.l_dirty();
     Some(2.0 * (0..4).map(|k| l[(k, k)].ln()).sum::<f64>())
 }
 
-/// The inverse of a positive definite matrix, symmetric to the last bit, or none.
+/// Inverse of a positive definite matrix, exactly symmetric, else `None`.
 pub(super) fn inverse(matrix: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     let inverse = matrix.cholesky()?.inverse();
     Some(matrix_of(&vector_of(&inverse)))
 }
 
-/// Upper triangular U with `U Uᵀ = S`, or none.
+/// Upper triangular U with `U Uᵀ = S`, or `None`.
 pub(super) fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
-    // The Cholesky factor of the matrix read backwards.
+    // The Cholesky factor of the matrix with reversed rows and columns.
     let flipped = Matrix4::from_fn(|i, j| s[(3 - i, 3 - j)]);
     let l = flipped.cholesky()?.l();
     Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
 }
 
-/// Singular values and both sets of vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan
-/// 8.6.3): small values come out with as many digits as large ones, which a bidiagonal method does not give.
+/// Singular values and vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3), with
+/// full relative accuracy of small values, unlike bidiagonal methods.
 fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
     let (mut b, mut v) = (*a, Matrix4::identity());
-    // Six to eight sweeps settle a 4 × 4 matrix; the limit only guards the loop.
+    // Six to eight sweeps are usual.
     for _ in 0..30 {
         let mut turned = false;
         for p in 0..3 {
@@ -242,7 +241,7 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64
                 }
                 turned = true;
                 let zeta = (beta - alpha) / (2.0 * gamma);
-                // A ζ whose square overflows is a turn by nothing; t is at most one.
+                // If the square of ζ overflows, t is zero; |t| is at most one.
                 let t = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
                 let c = 1.0 / (t * t + 1.0).sqrt();
                 let s = c * t;
@@ -274,17 +273,17 @@ mod tests {
     }
 
     #[test]
-    fn the_scaling_makes_both_sides_one_diagonal() {
-        // On the central path S and Z are far from the unit matrix but their product is μ; here they are not even that.
+    fn scaling_maps_the_pair_to_one_diagonal() {
+        // S and Z need not be on the central path.
         for small in [1.0, 1e-6] {
             let (s, z) = (definite(0.3, small), definite(1.1, 0.5));
             let scaling = Scaling::new(&s, &z).unwrap();
             let diagonal = Matrix4::from_diagonal(&scaling.lambda);
-            // The condition of S times rounding, with room.
+            // Condition number of S times rounding, with margin.
             assert!((scaling.scaled_primal(&s) - diagonal).amax() < 1e-9);
             assert!((scaling.unscaled_dual(&diagonal) - z).amax() < 1e-9);
             assert!((scaling.primal() - s).amax() < 1e-9 && (scaling.dual() - z).amax() < 1e-9);
-            // A step in scaled coordinates is the same as one of the matrices.
+            // A step in scaled coordinates equals a step of the matrices.
             let ds = Matrix4::from_fn(|i, j| {
                 0.1 * (scaling.lambda[i] * scaling.lambda[j]).sqrt() * f64::from(u8::from(i != j))
             });
@@ -306,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_eigenvalue_is_that_of_all_four() {
+    fn least_eigenvalue_is_the_minimum_of_all_four() {
         let turned = |values: [f64; 4], seed: f64| {
             let q = definite(seed, 0.7).qr().q();
             q * Matrix4::from_diagonal(&Vector4::from(values)) * q.transpose()
@@ -316,7 +315,7 @@ mod tests {
         for seed in 0..40 {
             let seed = f64::from(seed);
             tried.push(definite(seed, 1e-3) - Matrix4::identity() * (0.3 * seed));
-            // Alike, nearly alike, and far apart.
+            // Equal, nearly equal and very different eigenvalues.
             tried.push(turned([-2.0, -2.0, 1.0, 1.0], seed));
             tried.push(turned([0.5, 0.5 + 1e-9, 0.5 + 2e-9, 3.0], seed));
             tried.push(turned([1e-14, 1e-7, 1.0, 1e7], seed));
@@ -324,8 +323,8 @@ mod tests {
         }
         for matrix in tried {
             let (own, all) = (least_eigenvalue(&matrix), matrix.symmetric_eigenvalues().min());
-            // Both to a few roundings of the largest entry; where several are alike the polynomial is flat, and the
-            // climb stops where its value is rounding.
+            // Both are accurate to a few roundings of the largest entry; for multiple eigenvalues the polynomial is
+            // flat and the iteration stops at rounding.
             assert!((own - all).abs() <= 1e-13 * matrix.amax(), "{own} {all}");
         }
         assert!(least_eigenvalue(&Matrix4::from_element(f64::NAN)).is_nan());
@@ -333,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn congruence_is_the_product() {
+    fn congruence_equals_the_matrix_product() {
         let (v, x) = (definite(0.2, 2.0), definite(0.9, 1.0));
         assert!((congruence(&v) * vector_of(&x) - vector_of(&(v * x * v))).amax() < 1e-12);
     }

@@ -1,14 +1,14 @@
-//! The convex program that both routes solve, and the certificate by which both are judged.
+//! The convex program of both solution methods and its optimality certificate.
 //!
 //! ```text
 //!     minimise  f(x) = ½‖A x − b‖² + Σ_i ½‖C_i x_i − d_i‖² + g·x − Σ_k γ_k ln det S_k(x)
 //!     subject to  S_k(x) = mat(M_k x + o_k) ⪰ 0,   a_l·x + o_l ≥ 0
 //! ```
 //!
-//! With multipliers Z_k ⪰ 0 and z_l ≥ 0 the optimum is where the gradient of the smooth part equals `Σ M_kᵀ vec(Z_k) +
-//! Σ a_l z_l`, where `S_k Z_k = γ_k 1`, and `s_l z_l = 0` (Boyd and Vandenberghe, Convex Optimization, 5.9.2). A block
-//! with γ > 0 is an entropic prior: its own barrier keeps it inside, and it stops on its central path at γ instead of
-//! zero. A program can limit the data's squares in place of minimising them: one more constraint, convex as well.
+//! With multipliers Z_k ⪰ 0 and z_l ≥ 0 the optimum has gradient `Σ M_kᵀ vec(Z_k) + Σ a_l z_l` of the smooth part,
+//! `S_k Z_k = γ_k 1` and `s_l z_l = 0` (Boyd and Vandenberghe, Convex Optimization, 5.9.2). A block with γ > 0 is an
+//! entropic prior: its own barrier keeps it inside, and it ends on its central path at γ. A program can also limit the
+//! squares of the data instead of minimising them, which is another convex constraint.
 
 use super::cone::log_determinant;
 use super::coordinates::{Vector10, matrix_of, vector_of};
@@ -18,20 +18,20 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 /// One positive semidefinite 4 × 4 block.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// Where its entries come from.
+    /// Linear part of the entries.
     pub(super) map: BlockMap,
     /// Constant part of the entries.
     pub(super) offset: Vector10,
-    /// γ: weight of `−ln det`; zero for a plain constraint.
+    /// γ: weight of `−ln det`; zero for a constraint.
     pub(super) entropy: f64,
-    /// What it stands for, an index into the caller's list of constraints.
+    /// Index in the caller's list of constraints.
     pub(super) label: usize,
 }
 
 /// M of a block.
 #[derive(Clone, Debug)]
 pub(super) enum BlockMap {
-    /// Ten variables of its own, from this one on.
+    /// Ten separate variables, starting at this one.
     Own(usize),
     /// 10 × n.
     General(DMatrix<f64>),
@@ -58,8 +58,8 @@ pub(super) struct Program {
     pub(super) variables: usize,
     pub(super) data: DMatrix<f64>,
     pub(super) target: DVector<f64>,
-    /// What the data's half squares may be: they are a constraint then, and no part of f. Its pair of slack and
-    /// multiplier stands behind those of the rows.
+    /// Limit of the data's half squares. If set, the data are a constraint and not part of f. Its slack and multiplier
+    /// follow those of the rows.
     pub(super) data_limit: Option<f64>,
     pub(super) local: Vec<LocalSquares>,
     pub(super) linear: DVector<f64>,
@@ -67,33 +67,29 @@ pub(super) struct Program {
     pub(super) rows: Vec<Row>,
 }
 
-/// Multipliers of a program.
 #[derive(Clone, Debug)]
 pub(super) struct Multipliers {
     pub(super) blocks: Vec<Matrix4<f64>>,
     pub(super) rows: Vec<f64>,
 }
 
-/// How near a pair of point and multipliers is to the optimum.
+/// Distance of a pair of point and multipliers from the optimum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Certificate {
-    /// `‖∇f − Σ Mᵀ Z − Σ a z‖_∞` over one plus the largest of its terms.
+    /// `‖∇f − Σ Mᵀ Z − Σ a z‖_∞` divided by one plus its largest term.
     pub(super) stationarity: f64,
-    /// The same imbalance itself.
+    /// The same without division.
     pub(super) imbalance: f64,
-    /// The duality gap over `1 + |f|`: what the objective can still fall at most, when `stationarity` is zero.
+    /// Duality gap divided by `1 + |f|`: upper bound of the possible decrease of the objective at zero `stationarity`.
     pub(super) gap: f64,
-    /// f(x).
     pub(super) objective: f64,
 }
 
 impl Certificate {
-    /// The larger of both.
     pub(super) fn residual(&self) -> f64 {
         self.stationarity.max(self.gap)
     }
 
-    /// The duality gap itself.
     pub(super) fn absolute_gap(&self) -> f64 {
         self.gap * (1.0 + self.objective.abs())
     }
@@ -104,7 +100,6 @@ impl Block {
         matrix_of(&(self.offset + self.linear_part(x)))
     }
 
-    /// `M x` as a vector.
     pub(super) fn linear_part(&self, x: &DVector<f64>) -> Vector10 {
         match &self.map {
             BlockMap::Own(first) => Vector10::from_column_slice(&x.as_slice()[*first..first + 10]),
@@ -112,7 +107,6 @@ impl Block {
         }
     }
 
-    /// Adds `Mᵀ v` times `factor` to `sum`.
     pub(super) fn add_transposed(&self, v: &Vector10, factor: f64, sum: &mut DVector<f64>) {
         match &self.map {
             BlockMap::Own(first) => sum.rows_mut(*first, 10).axpy(factor, v, 1.0),
@@ -138,7 +132,7 @@ impl Row {
 }
 
 impl Program {
-    /// A program of nothing but variables.
+    /// A program without objective and constraints.
     pub(super) fn new(variables: usize) -> Self {
         Self {
             variables,
@@ -152,7 +146,7 @@ impl Program {
         }
     }
 
-    /// Gradient of the smooth part (without `−ln det`), and the largest magnitude of the terms that it is a sum of.
+    /// Gradient of the smooth part (without `−ln det`), and the largest magnitude of its terms.
     pub(super) fn gradient(&self, x: &Precise) -> (DVector<f64>, f64) {
         let data = if self.data_limit.is_some() { DVector::zeros(self.variables) } else { -self.data_slope(x) };
         let x = &x.high;
@@ -168,7 +162,7 @@ impl Program {
         (gradient, largest)
     }
 
-    /// `Aᵀ (b − A x)`: how fast the data's half squares fall.
+    /// `Aᵀ (b − A x)`: negative gradient of the data's half squares.
     pub(super) fn data_slope(&self, x: &Precise) -> DVector<f64> {
         let mut slope = DVector::zeros(self.variables);
         if self.data.nrows() > 0 {
@@ -177,12 +171,11 @@ impl Program {
         slope
     }
 
-    /// `½‖A x − b‖²`.
     pub(super) fn data_squares(&self, x: &Precise) -> f64 {
         0.5 * x.data_rest(&self.data, &self.target).norm_squared()
     }
 
-    /// The squares and linear terms of f.
+    /// Quadratic and linear terms of f.
     pub(super) fn smooth_objective(&self, x: &Precise) -> f64 {
         let data = if self.data_limit.is_some() { 0.0 } else { self.data_squares(x) };
         let x = &x.high;
@@ -192,14 +185,13 @@ impl Program {
         data + self.local.iter().map(local).sum::<f64>() + self.linear.dot(x)
     }
 
-    /// Whether x lies strictly inside all constraints.
     pub(super) fn strictly_inside(&self, x: &DVector<f64>) -> bool {
         self.blocks.iter().all(|block| block.value(x).cholesky().is_some())
             && self.rows.iter().all(|row| row.value(x) > 0.0)
     }
 
-    /// Judges a point strictly inside with positive multipliers; the routes share nothing else. Slacks are known better
-    /// to a solver than as the difference of x and its limits.
+    /// Certificate of a strictly interior point with positive multipliers. Slacks are arguments, because solvers know
+    /// them more accurately than as the difference of x and its limits.
     pub(super) fn certificate_of(
         &self,
         x: &Precise,
@@ -214,7 +206,7 @@ impl Program {
             block.add_transposed(&vector_of(z), 1.0, &mut forces);
             let product = vector_of(s).dot(&vector_of(z));
             if block.entropy > 0.0 {
-                // Fenchel and Young: ⟨S, Z⟩ − γ ln det(S Z/γ) − 4γ, zero exactly where S Z = γ 1.
+                // Fenchel-Young gap ⟨S, Z⟩ − γ ln det(S Z/γ) − 4γ, zero exactly if S Z = γ 1.
                 let gamma = block.entropy;
                 let log_s = log_determinant(s)?;
                 let excess = product - gamma * (log_s + log_determinant(&(z / gamma))?) - 4.0 * gamma;
@@ -245,7 +237,6 @@ impl Program {
     }
 }
 
-/// How far inside a point lies.
 #[derive(Clone, Debug)]
 pub(super) struct Slacks {
     pub(super) blocks: Vec<Matrix4<f64>>,

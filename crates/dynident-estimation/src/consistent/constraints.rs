@@ -1,15 +1,14 @@
-//! The constraints in words and in standard parameters.
+//! Linear constraints on standard parameters, with their names.
 
 use super::description::PhysicalProblem;
 
-/// `Σ a π + o ≥ 0` over standard parameters that are free.
+/// `Σ a π + o ≥ 0` over free standard parameters.
 pub(super) struct LinearConstraint {
     pub(super) entries: Vec<(usize, f64)>,
     pub(super) offset: f64,
     pub(super) name: String,
 }
 
-/// All linear constraints of a problem.
 pub(super) fn linear_constraints(problem: &PhysicalProblem) -> Vec<LinearConstraint> {
     let mut found = Vec::new();
     let mut add = |entries: Vec<(usize, f64)>, offset: f64, name: String| {
@@ -18,7 +17,7 @@ pub(super) fn linear_constraints(problem: &PhysicalProblem) -> Vec<LinearConstra
     for (index, body) in problem.bodies.iter().enumerate().filter(|(_, body)| body.known.is_none()) {
         let (first, name) = (10 * index, &body.name);
         if let Some([least, greatest]) = body.mass_kg {
-            // A mass is positive anyhow.
+            // A positive mass needs no constraint.
             if least > 0.0 {
                 add(vec![(first, 1.0)], -least, format!("body {name}: mass at least {least} kg"));
             }
@@ -67,7 +66,6 @@ pub(super) fn linear_constraints(problem: &PhysicalProblem) -> Vec<LinearConstra
     found
 }
 
-/// The name of a body's cone.
 pub(super) fn cone_name(body: &str) -> String {
     format!("body {body}: pseudo-inertia positive definite")
 }

@@ -1,9 +1,9 @@
 //! A body's ten parameters as a symmetric 4 × 4 matrix, whitened by a reference body.
 //!
 //! The pseudo-inertia `P = [Σ h; hᵀ m]`, `Σ = ½ tr(I) 1 − I`, `h = m r` is linear in the ten parameters, and a body is
-//! physically consistent exactly when P is positive definite (Traversaro et al. 2016; Wensing, Kim and Slotine, RA-L 3
-//! (2018) 60, eq. 12). With a reference body `P0 = L Lᵀ` the solver works on `Q = L⁻¹ P L⁻ᵀ`: no units, the reference
-//! is the unit matrix, and bodies of a gram and of a tonne look alike.
+//! physically consistent if and only if P is positive definite (Traversaro et al. 2016; Wensing, Kim and Slotine, RA-L
+//! 3 (2018) 60, eq. 12). With a reference body `P0 = L Lᵀ` the solver works on `Q = L⁻¹ P L⁻ᵀ`, which has no units and
+//! is independent of the size of the body; Q of the reference is the unit matrix.
 
 use nalgebra::{Matrix4, SMatrix, SVector};
 
@@ -14,7 +14,7 @@ pub(super) type Matrix10 = SMatrix<f64, 10, 10>;
 pub(super) const PAIRS: [(usize, usize); 10] =
     [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2), (0, 3), (1, 3), (2, 3), (3, 3)];
 
-/// The ten free entries of a symmetric matrix, off-diagonal ones times √2: inner products are kept, `⟨A, B⟩ = tr(A B)`.
+/// The ten free entries of a symmetric matrix, off-diagonal ones times √2, so that `⟨A, B⟩ = tr(A B)`.
 pub(super) fn vector_of(matrix: &Matrix4<f64>) -> Vector10 {
     Vector10::from_fn(|k, _| {
         let (i, j) = PAIRS[k];
@@ -56,7 +56,6 @@ pub(super) fn pseudo_inertia(p: &[f64]) -> Matrix4<f64> {
     )
 }
 
-/// The ten parameters of a pseudo-inertia.
 pub(super) fn parameters_of(p: &Matrix4<f64>) -> Vector10 {
     Vector10::from([
         p[(3, 3)],
@@ -72,20 +71,19 @@ pub(super) fn parameters_of(p: &Matrix4<f64>) -> Vector10 {
     ])
 }
 
-/// The change between a body's parameters and its whitened coordinates `x = vec(Q)`.
+/// Map between a body's parameters and its whitened coordinates `x = vec(Q)`.
 #[derive(Clone, Debug)]
 pub(super) struct Whitening {
     /// T of `π = T x`.
     pub(super) to_parameters: Matrix10,
     inverse_factor: Matrix4<f64>,
-    /// Mass of the reference body.
     pub(super) mass_kg: f64,
-    /// `√(tr Σ / m)` of the reference body: the size that lengths are measured by.
+    /// `√(tr Σ / m)` of the reference body: the unit of length.
     pub(super) length_m: f64,
 }
 
 impl Whitening {
-    /// None unless the reference is positive definite.
+    /// `None` unless the reference is positive definite.
     pub(super) fn new(reference: &[f64; 10]) -> Option<Self> {
         let p0 = pseudo_inertia(reference);
         let factor = p0.cholesky()?.l();
@@ -100,12 +98,11 @@ impl Whitening {
         finite.then_some(Self { to_parameters, inverse_factor, mass_kg, length_m })
     }
 
-    /// `Q = L⁻¹ P L⁻ᵀ` of ten parameters.
     pub(super) fn whitened(&self, parameters: &[f64]) -> Matrix4<f64> {
         self.inverse_factor * pseudo_inertia(parameters) * self.inverse_factor.transpose()
     }
 
-    /// The reference's own units of the ten parameters: m, m ℓ (three times), m ℓ² (six times).
+    /// Units of the ten parameters from the reference: m, m ℓ (three times), m ℓ² (six times).
     pub(super) fn units(&self) -> [f64; 10] {
         let (m, l) = (self.mass_kg, self.length_m);
         core::array::from_fn(|k| {
@@ -119,7 +116,7 @@ impl Whitening {
         })
     }
 
-    /// The functional `c·x` that gives `w·π`.
+    /// Coefficients c with `c·x = w·π`.
     pub(super) fn functional(&self, w: &[f64; 10]) -> Vector10 {
         self.to_parameters.tr_mul(&Vector10::from(*w))
     }
@@ -133,8 +130,8 @@ mod tests {
     const BODY: [f64; 10] = [2.5, 0.3, -0.2, 0.7, 0.9, 0.02, -0.05, 0.8, 0.1, 0.4];
 
     #[test]
-    fn agrees_with_the_model_and_comes_back() {
-        // Sums and products of a handful of numbers of order one.
+    fn coordinates_agree_with_the_model_and_invert() {
+        // Sums and products of a few numbers of order one.
         let p = pseudo_inertia(&BODY);
         assert!((p - InertialParameters(BODY).pseudo_inertia()).amax() < 1e-15);
         assert!((parameters_of(&p) - Vector10::from(BODY)).amax() < 1e-15);

@@ -1,4 +1,4 @@
-//! What a physical fit is asked: bodies, scalars, the map to base parameters, and the data.
+//! Input of a physical fit: bodies, scalars, the map to base parameters, and the data.
 
 use super::cone::least_eigenvalue;
 use super::coordinates::{Whitening, pseudo_inertia};
@@ -6,25 +6,24 @@ use super::error::PhysicalError;
 use crate::factor::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
 
-/// An interval of a mass or a coordinate, lower limit first.
+/// Interval of a mass or a coordinate, lower limit first.
 pub type Limits = [f64; 2];
 
-/// Ten consecutive standard parameters `[m, m rx, m ry, m rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]` of one body, about its
-/// frame's origin.
+/// Ten consecutive standard parameters `[m, m rx, m ry, m rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]` of one body, about the
+/// origin of its frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalBody {
-    /// Its name in messages.
+    /// Name for messages.
     pub name: String,
-    /// The prior body P0, which is also the unit that the margin is measured in: from CAD, or a rough one from
-    /// [`rough_body`].
+    /// Prior body P0, also the unit of the margin: from CAD, or a rough one from [`rough_body`].
     pub reference: [f64; 10],
-    /// Its values, when they are not to be fitted (all zero for a body without mass).
+    /// Fixed values for a body that is not fitted (all zero for a body without mass).
     pub known: Option<[f64; 10]>,
     /// Limits of the mass, kg.
     pub mass_kg: Option<Limits>,
-    /// Corners of a box (axes of the body frame, metres) that holds the centre of mass.
+    /// Opposite corners of a box around the centre of mass (axes of the body frame, metres).
     pub com_box_m: Option<[[f64; 3]; 2]>,
-    /// An ellipsoid that holds all of the mass, and so the centre of mass too: `tr(P Q) ≥ 0` (Wensing, Kim and Slotine
+    /// Ellipsoid around all of the mass, and so around the centre of mass: `tr(P Q) ≥ 0` (Wensing, Kim and Slotine
     /// 2018, eq. 24).
     pub inside: Option<Ellipsoid>,
 }
@@ -38,29 +37,29 @@ pub struct Ellipsoid {
     pub semi_axes_m: [f64; 3],
 }
 
-/// One standard parameter that is no body's: friction, drive inertia, offset.
+/// A standard parameter that belongs to no body: friction, drive inertia, offset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalScalar {
-    /// Its name in messages.
+    /// Name for messages.
     pub name: String,
-    /// Lower limit; zero for what can only lose energy or store it.
+    /// Lower limit; zero for parameters that dissipate or store energy.
     pub lower: Option<f64>,
     /// Upper limit.
     pub upper: Option<f64>,
-    /// The value that it has when the data say nothing.
+    /// Value in the absence of data.
     pub prior: f64,
-    /// How far from it is ordinary: the unit of its prior `½ γ ((π − prior)/scale)²`. Greater than zero.
+    /// Usual deviation from the prior: the unit of its term `½ γ ((π − prior)/scale)²`. Greater than zero.
     pub scale: f64,
 }
 
-/// `θ = B π`: which sums of standard parameters the data's columns are.
+/// `θ = B π`: base parameters (the data's columns) as combinations of standard parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BaseMap {
     matrix: DMatrix<f64>,
 }
 
 impl BaseMap {
-    /// From B itself, shape (base parameters, standard parameters).
+    /// From B, shape (base parameters, standard parameters).
     ///
     /// # Errors
     /// [`PhysicalError::NotFinite`].
@@ -69,11 +68,11 @@ impl BaseMap {
         Ok(Self { matrix })
     }
 
-    /// From `θ = π[independent] + K π[dependent]`, as base parameters of a structure are given; K has shape
-    /// (independent, dependent).
+    /// From `θ = π[independent] + K π[dependent]`, the form of structural base parameters; K has shape (independent,
+    /// dependent).
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] unless K fits and every column stands in one of the lists, once;
+    /// [`PhysicalError::Mismatch`] for a wrong shape of K or unless every column is in exactly one of the lists;
     /// [`PhysicalError::NotFinite`].
     pub fn from_regrouping(
         independent: &[usize],
@@ -87,7 +86,7 @@ impl BaseMap {
         for &column in independent.iter().chain(dependent) {
             if column >= columns || std::mem::replace(&mut seen[column], true) {
                 return Err(PhysicalError::Mismatch {
-                    what: "columns named once each by the base map".into(),
+                    what: "columns of the base map, not duplicate".into(),
                     expected: columns,
                     found: column,
                 });
@@ -109,10 +108,10 @@ impl BaseMap {
     }
 }
 
-/// Bodies first (ten columns each), then scalars: the standard parameters π in order.
+/// Physical problem over the standard parameters π: bodies first (ten columns each), then scalars.
 ///
-/// The data are rows `R₁ θ ≈ ρ₁` over the base parameters `θ = B π`, each row in units of its own noise, so that `½‖R₁
-/// B π − ρ₁‖²` is half the squared distance from the least-squares solution in standard deviations.
+/// The data are rows `R₁ θ ≈ ρ₁` over the base parameters `θ = B π` in units of their noise, so that `½‖R₁ B π − ρ₁‖²`
+/// is half the squared distance from the least-squares solution in standard deviations.
 #[derive(Clone, Debug)]
 pub struct PhysicalProblem {
     pub(super) base: BaseMap,
@@ -122,19 +121,19 @@ pub struct PhysicalProblem {
     pub(super) triangle: DMatrix<f64>,
     pub(super) rotated: DVector<f64>,
     pub(super) total_mass_kg: Option<Limits>,
-    /// What is believed of each body's mass: its value and its standard deviation, kg.
+    /// Prior of each body's mass: value and standard deviation, kg.
     pub(super) mass_beliefs: Vec<Option<[f64; 2]>>,
 }
 
-/// Least relative width of an interval: narrower, it has no inside in double precision.
-const LEAST_WIDTH: f64 = 1.0e-6;
+/// Minimum relative width of an interval; a narrower one has no interior in double precision.
+const MIN_RELATIVE_WIDTH: f64 = 1.0e-6;
 
 impl PhysicalProblem {
-    /// A problem from a weighted factor over the base parameters
+    /// Creates a problem from a weighted factor over the base parameters
     /// ([`LinearProblem::combined`](crate::LinearProblem::combined) with weights 1/σ_j).
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] if the shapes differ, and everything that is wrong with a single body or scalar:
+    /// [`PhysicalError::Mismatch`] for wrong shapes, and the errors of single bodies and scalars:
     /// [`PhysicalError::InfeasiblePrior`], [`PhysicalError::InfeasibleKnown`], [`PhysicalError::EmptyInterval`],
     /// [`PhysicalError::NotFinite`].
     pub fn new(
@@ -153,14 +152,12 @@ impl PhysicalProblem {
         Ok(Self { base, bodies, whitenings, scalars, triangle, rotated, total_mass_kg: None, mass_beliefs: Vec::new() })
     }
 
-    /// Adds what is believed of the masses, body by body: value and standard deviation, kg. Each counts like one more
-    /// measurement, `½((m − m₀)/σ)²` beside the data's own half squares: next to nothing where the data determine a
-    /// mass, and everything where they do not, for bodies that differ in their mass alone are all alike to a prior
-    /// that measures shapes.
+    /// Adds prior masses for the bodies: value and standard deviation, kg. Each is one more measurement, `½((m −
+    /// m₀)/σ)²`, added to the data's half squares. It is negligible if the data determine the mass. Otherwise it
+    /// determines the mass, because a prior on shape alone does not distinguish bodies that differ only in mass.
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] for another number of beliefs than bodies, [`PhysicalError::NotFinite`] for one that
-    /// is no number.
+    /// [`PhysicalError::Mismatch`] for a wrong number of priors, [`PhysicalError::NotFinite`].
     pub fn with_mass_beliefs(mut self, beliefs: Vec<Option<[f64; 2]>>) -> Result<Self, PhysicalError> {
         expect("beliefs of masses", self.bodies.len(), beliefs.len())?;
         finite("a belief of a mass", &beliefs.iter().flatten().flatten().copied().collect::<Vec<_>>())?;
@@ -168,10 +165,10 @@ impl PhysicalProblem {
         Ok(self)
     }
 
-    /// Limits of the sum of all bodies' masses, known ones included.
+    /// Sets limits of the sum of all bodies' masses, including known ones.
     ///
     /// # Errors
-    /// [`PhysicalError::EmptyInterval`], and [`PhysicalError::TotalMass`] when the bodies' own limits exclude it.
+    /// [`PhysicalError::EmptyInterval`], and [`PhysicalError::TotalMass`] if the bodies' limits exclude it.
     pub fn with_total_mass_kg(mut self, limits: Limits) -> Result<Self, PhysicalError> {
         interval("total mass", limits)?;
         let own = |body: &PhysicalBody, side: usize, free: f64| {
@@ -187,8 +184,8 @@ impl PhysicalProblem {
         Ok(self)
     }
 
-    /// The same problem with the data's optimum at the base parameters `theta`: what is nearest to them in the data's
-    /// own metric?
+    /// The same problem with the optimum of the data at the base parameters `theta`, to find the nearest consistent
+    /// set in the metric of the data.
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`].
@@ -214,8 +211,8 @@ impl PhysicalProblem {
     }
 }
 
-/// A body of a given mass spread evenly about the frame's origin with radius of gyration `length_m` along each axis: a
-/// reference where nothing better is known.
+/// A body of a given mass with radius of gyration `length_m` about each axis, centred at the frame's origin: a
+/// reference if no better one is known.
 ///
 /// ```
 /// let body = dynident_estimation::consistent::rough_body(2.0, 0.1);
@@ -237,7 +234,7 @@ fn checked_body(body: &PhysicalBody) -> Result<Whitening, PhysicalError> {
     if let Some(known) = &body.known {
         finite(&format!("body {name}: a known value"), known)?;
         let least = least_eigenvalue(&pseudo_inertia(known));
-        // Rounding of a thin body's inertia leaves about this of its largest entry.
+        // Rounding of a thin body's inertia relative to its largest entry.
         if least < -1.0e-12 * known.iter().fold(0.0, |a: f64, b| a.max(b.abs())) {
             return Err(PhysicalError::InfeasibleKnown { body: name.clone(), least_eigenvalue: least });
         }
@@ -284,7 +281,7 @@ fn checked_scalar(scalar: &PhysicalScalar) -> Result<(), PhysicalError> {
 fn interval(what: &str, range: Limits) -> Result<(), PhysicalError> {
     let [lower, upper] = range;
     finite(what, &[lower, upper])?;
-    if upper - lower > LEAST_WIDTH * lower.abs().max(upper.abs()) {
+    if upper - lower > MIN_RELATIVE_WIDTH * lower.abs().max(upper.abs()) {
         Ok(())
     } else {
         Err(PhysicalError::EmptyInterval { what: what.into(), lower, upper })

@@ -1,40 +1,39 @@
-//! Whether the consistent set differs from the estimate by more than chance.
+//! Test for a significant difference between the consistent set and the estimate.
 
 use super::PhysicalFit;
 use crate::uncertainty::{Estimate, f_tail};
 use serde::{Deserialize, Serialize};
 
-/// Probability below which a difference counts as more than chance.
-const LEVEL: f64 = 0.01;
+const SIGNIFICANCE_LEVEL: f64 = 0.01;
 
-/// The test of a [`PhysicalFit`] against the estimate that it was made from.
+/// Test of a [`PhysicalFit`] against the estimate from which it was made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ConsistencyTest {
-    /// The squared distance per parameter, over the variance of the estimate as the residuals' correlation in time has
-    /// it: about 1 or below where the difference is chance.
+    /// Squared distance per parameter relative to the variance of the estimate, with residuals correlated in time:
+    /// about 1 or below without a real difference.
     pub f: f64,
-    /// Parameters, and what the error bars were estimated from.
+    /// Degrees of freedom: parameters, and time segments (or rows) behind the error bars.
     pub degrees_of_freedom: [f64; 2],
-    /// Probability of a distance as large if the consistent set were the truth.
+    /// Probability of at least this distance if the consistent set is the truth.
     pub p_value: f64,
-    /// Whether that is below 0.01: the logs contradict the consistent set.
+    /// Whether `p_value` is below 0.01: the data contradict the consistent set.
     pub is_significant: bool,
 }
 
 impl PhysicalFit {
-    /// Tests whether the logs contradict this set: the squared distance `d²` from the estimate ([`moved_sigma`]
-    /// squared, white residuals) of `p` parameters, corrected for residuals that are correlated in time by the mean
-    /// ratio `δ` of the parameters' variances with and without that ([`noise_std`](Estimate::noise_std): both sets
-    /// have the same lag and the same constants of friction, whose errors tell nothing of their difference),
+    /// Tests whether the data contradict this set: squared distance `d²` from the estimate ([`moved_sigma`] squared,
+    /// white residuals) of `p` parameters, divided by the mean ratio `δ` of the parameters' variances with and without
+    /// correlation in time. The variances come from [`noise_std`](Estimate::noise_std), because both sets have the
+    /// same lag and friction constants, whose errors do not affect the difference:
     ///
     /// ```text
     ///     F = d² / (p δ)   against   F(p, ν),   ν = time segments − 1 (of white residuals: rows − parameters)
     /// ```
     ///
     /// the first-order correction of Rao and Scott (Annals of Statistics 12 (1984) 46) in its F form (Thomas and Rao,
-    /// JASA 82 (1987) 630). As the consistent set lies on or inside its limits, it rejects too seldom rather than
-    /// too often. `None` without parameters or degrees of freedom. `estimate` is that of the base parameters alone.
+    /// JASA 82 (1987) 630). Because the consistent set lies on or inside its limits, the test is conservative. `None`
+    /// without parameters or degrees of freedom. `estimate` must contain the base parameters only.
     ///
     /// [`moved_sigma`]: PhysicalFit::moved_sigma
     pub fn difference(&self, estimate: &Estimate) -> Option<ConsistencyTest> {
@@ -54,7 +53,7 @@ impl PhysicalFit {
             f,
             degrees_of_freedom: [parameters, rest],
             p_value,
-            is_significant: p_value < LEVEL,
+            is_significant: p_value < SIGNIFICANCE_LEVEL,
         })
     }
 }

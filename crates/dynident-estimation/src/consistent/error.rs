@@ -1,41 +1,41 @@
-//! What can be wrong with a physical problem before it is solved, or shown to have no solution.
+//! Errors of a physical fit.
 
 use thiserror::Error;
 
-/// Why there is no physical fit.
+/// Why a physical fit failed.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum PhysicalError {
-    /// Two things that must describe the same columns do not.
+    /// Numbers of columns or bodies do not agree.
     #[error("{what}: expected {expected}, found {found}")]
     Mismatch {
-        /// What was compared.
+        /// The quantity that was compared.
         what: String,
-        /// What is needed.
+        /// Expected number.
         expected: usize,
-        /// What was given.
+        /// Number given.
         found: usize,
     },
-    /// A number is NaN or infinite.
-    #[error("{what} is {value}: give finite numbers")]
+    /// A value is NaN or infinite.
+    #[error("{what} is {value}: use finite numbers")]
     NotFinite {
-        /// Which number.
+        /// The quantity.
         what: String,
         /// Its value.
         value: f64,
     },
-    /// A setting has no meaning.
+    /// A setting is out of range.
     #[error("setting {setting} = {value}: {fix}")]
     Setting {
         /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
-        /// What to give instead.
+        /// The fix.
         fix: &'static str,
     },
     /// A body's reference is not a consistent body.
     #[error(
-        "body {body}: its prior is no consistent body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix its mass and inertia or give a rough body of its size"
+        "body {body}: its prior is no consistent body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix its mass and inertia or use a rough body of its size"
     )]
     InfeasiblePrior {
         /// The body.
@@ -43,9 +43,9 @@ pub enum PhysicalError {
         /// Smallest eigenvalue of its pseudo-inertia, in SI units.
         least_eigenvalue: f64,
     },
-    /// A body that is given as known is not a consistent one, nor without mass.
+    /// A known body is neither physically consistent nor massless.
     #[error(
-        "body {body}: the values given as known are no consistent body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix them or leave the body unknown"
+        "body {body}: the known values are not physically consistent (smallest eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix them or estimate the body"
     )]
     InfeasibleKnown {
         /// The body.
@@ -53,41 +53,41 @@ pub enum PhysicalError {
         /// Smallest eigenvalue of its pseudo-inertia, in SI units.
         least_eigenvalue: f64,
     },
-    /// Lower and upper limit of one quantity leave nothing between them.
-    #[error("{what}: the limits {lower} to {upper} leave nothing between them; swap or widen them")]
+    /// The interval of a quantity is empty.
+    #[error("{what}: the interval from {lower} to {upper} is empty; swap or widen the limits")]
     EmptyInterval {
-        /// Which quantity of which body.
+        /// The quantity and its body.
         what: String,
         /// Lower limit.
         lower: f64,
         /// Upper limit.
         upper: f64,
     },
-    /// The total mass cannot be the sum of the bodies' masses.
+    /// The limits of the total mass contradict those of the bodies.
     #[error(
-        "total mass {lower} to {upper} kg: the bodies' own limits allow {least} to {greatest} kg; widen one of them"
+        "contradicting mass limits: total mass {lower} to {upper} kg, sum of the bodies' limits {least} to {greatest} kg; widen one of them"
     )]
     TotalMass {
-        /// Least total asked.
+        /// Lower limit of the total.
         lower: f64,
-        /// Greatest total asked.
+        /// Upper limit of the total.
         upper: f64,
-        /// Sum of the bodies' least masses.
+        /// Sum of the bodies' lower limits.
         least: f64,
-        /// Sum of the bodies' greatest masses.
+        /// Sum of the bodies' upper limits.
         greatest: f64,
     },
-    /// The constraints exclude each other.
-    #[error("no set of bodies meets all constraints (short by {shortfall:.3e} of the reference); at odds are: {}", constraints.join("; "))]
+    /// The constraints contradict each other.
+    #[error("contradicting constraints (violated by {shortfall:.3e} of the reference): {}", constraints.join("; "))]
     Contradictory {
-        /// The constraints that exclude each other.
+        /// The contradicting constraints.
         constraints: Vec<String>,
-        /// By how much the best point misses, in units of the reference bodies.
+        /// Violation at the best point, in units of the reference bodies.
         shortfall: f64,
     },
-    /// The solver could not even start: magnitudes beyond double precision.
+    /// The solver failed at the start: magnitudes are beyond double precision.
     #[error(
-        "the physical fit breaks down in double precision: columns and bodies differ by too many powers of ten; check units and scales"
+        "the physical fit fails in double precision: columns and bodies differ by too many powers of ten; check units and scales"
     )]
     Breakdown,
 }

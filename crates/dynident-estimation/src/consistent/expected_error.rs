@@ -1,4 +1,4 @@
-//! How far the values of a physical fit are to be expected from the truth, by data and description together.
+//! Expected error of a physical fit from data and prior together.
 
 use super::PhysicalPrior;
 use super::description::{PhysicalProblem, expect, finite};
@@ -6,30 +6,29 @@ use super::error::PhysicalError;
 use super::settings::PhysicalSettings;
 use nalgebra::{DMatrix, DVector};
 
-/// What is believed of the truth beside the data.
+/// Prior uncertainty of the truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Belief {
-    /// Standard deviation of a body about its reference as a share: of its mass, of its inertia, and of its extent for
-    /// the centre of mass.
+    /// Relative standard deviation of a body about its reference: of its mass, its inertia, and its extent for the
+    /// centre of mass.
     pub body_share: f64,
-    /// Standard deviation of each scalar about its prior, in its own unit.
+    /// Standard deviation of each scalar about its prior, in the unit of the scalar.
     pub scalar_std: Vec<f64>,
 }
 
-/// Standard deviation of the error of every parameter of a [`physical_fit`](super::physical_fit), bodies' ten each and
-/// then scalars, for a truth that is drawn by `belief`; zero for bodies that are known. `covariance` (base, base) is
-/// that of the base parameters which the fit follows, whatever widened it.
+/// Standard deviation of the error of every parameter of a [`physical_fit`](super::physical_fit) (ten per body, then
+/// the scalars) for a truth drawn from `belief`; zero for known bodies. `covariance` (base, base) is that of the
+/// fitted base parameters, including all its extra terms.
 ///
-/// The fit, linear about its reference, is `x̂ = A GᵀR₁ θ̂ + ..` with `A = (GᵀG + W)⁻¹`: G are the weighted rows over
-/// the unknowns x, which are one standard deviation of the belief long, and W is what the fit's own prior adds. It errs
-/// by `A GᵀR₁ (θ̂ − θ) − A W x`, two independent parts with the covariances `U V Uᵀ`, `U = A GᵀR₁`, and `(A W)(A W)ᵀ`.
-/// So a value that the data tell has the bar of the data, one that they do not tell that of the description, and the
-/// bar counts what a prior leaves open that weighs less than the belief. Limits, which only make errors smaller, are
-/// left out.
+/// Linearised about its reference, the fit is `x̂ = A GᵀR₁ θ̂ + ..` with `A = (GᵀG + W)⁻¹`: G are the weighted rows
+/// over the unknowns x in units of the belief's standard deviation, W is the information of the fit's prior. The error
+/// is `A GᵀR₁ (θ̂ − θ) − A W x`, the sum of two independent parts with covariances `U V Uᵀ`, `U = A GᵀR₁`, and `(A
+/// W)(A W)ᵀ`. So an identifiable value gets the error bar of the data and an unidentifiable one that of the belief.
+/// Limits only reduce errors and are ignored.
 ///
 /// # Errors
-/// [`PhysicalError::Mismatch`] for shapes that do not fit, [`PhysicalError::NotFinite`] for numbers that are none, and
-/// what [`PhysicalSettings::validate`] returns.
+/// [`PhysicalError::Mismatch`] for wrong shapes, [`PhysicalError::NotFinite`], and the errors of
+/// [`PhysicalSettings::validate`].
 pub fn expected_error(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
@@ -44,7 +43,7 @@ pub fn expected_error(
     finite("an entry of the covariance", covariance.as_slice())?;
     finite("a deviation of a scalar", &belief.scalar_std)?;
 
-    // One standard deviation of every unknown in parameters, and the rows of the fit's own prior over the unknowns.
+    // One standard deviation of every unknown in parameters, and the rows of the fit's prior over the unknowns.
     let free: Vec<usize> = (0..problem.bodies.len()).filter(|&body| problem.bodies[body].known.is_none()).collect();
     let unknowns = 10 * free.len() + problem.scalars.len();
     let mut spread = DMatrix::zeros(parameters, unknowns);
@@ -81,7 +80,7 @@ pub fn expected_error(
     }
     let prior_rows = DMatrix::from_fn(prior_rows.len(), unknowns, |row, column| prior_rows[row][column]);
 
-    // A = (GᵀG + W)⁻¹ by the triangle of the stacked rows, which keeps twice the digits.
+    // A = (GᵀG + W)⁻¹ from the triangle of the stacked rows, which has twice the digits.
     let rows = &problem.triangle * (problem.base.matrix() * &spread);
     let mut stacked = DMatrix::zeros(rows.nrows() + prior_rows.nrows(), unknowns);
     stacked.rows_mut(0, rows.nrows()).copy_from(&rows);

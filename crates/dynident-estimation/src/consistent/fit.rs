@@ -5,81 +5,79 @@ use super::cone::least_eigenvalue;
 use super::conic::Program;
 use super::coordinates::pseudo_inertia;
 use super::description::{PhysicalProblem, expect};
-use super::interior_point::{Ending, InteriorPointResult, OnTheWay, interior_point, interior_point_on_the_way};
+use super::interior_point::{CentralPath, Ending, InteriorPointResult, interior_point, interior_point_with_path};
 use super::log_cholesky::log_cholesky;
 use super::{PhysicalError, PhysicalRoute, PhysicalSettings};
 use nalgebra::DVector;
 use serde::Serialize;
 
-/// How a fit ended. Every fit satisfies the constraints, whatever its status; the status says how near to the optimum
-/// it is.
+/// Status of a fit. Every fit satisfies the constraints; the status describes its distance from the optimum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalStatus {
-    /// Optimal within the tolerance asked, by certificate.
+    /// Optimal within the tolerance, by certificate.
     Solved,
-    /// Double precision allowed no further progress; the certificate says how near it came.
+    /// No further progress in double precision; see the certificate for the distance from the optimum.
     Stalled,
-    /// The iterations were used up.
+    /// The iteration limit was reached.
     IterationLimit,
 }
 
-/// What was found of one body.
+/// Result for one body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhysicalBodyFit {
     /// Its name.
     pub name: String,
     /// Smallest eigenvalue of the pseudo-inertia whitened by the reference, `P0^{-1/2} P P0^{-1/2}`: at least the
-    /// margin. Of a known body as it was given.
+    /// margin, except for a known body.
     pub least_whitened_eigenvalue: f64,
     /// Smallest eigenvalue of the pseudo-inertia in SI units.
     pub least_eigenvalue: f64,
-    /// Whether the data want the body outside of what is physically consistent: its margin is used up.
+    /// Whether the body is on the margin, i.e. the data alone give an inconsistent body.
     pub on_the_boundary: bool,
 }
 
 /// A physically consistent fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhysicalFit {
-    /// Standard parameters π: ten for each body, then the scalars.
+    /// Standard parameters π: ten per body, then the scalars.
     pub parameters: Vec<f64>,
-    /// Base parameters `θ = B π`: what the torque depends on.
+    /// Base parameters `θ = B π`, which determine the torque.
     pub base_values: Vec<f64>,
-    /// How it ended.
+    /// Status of the fit.
     pub status: PhysicalStatus,
-    /// Iterations of the solver.
+    /// Number of iterations of the solver.
     pub iterations: usize,
-    /// Stationarity of the Lagrangian: largest entry over one plus the largest of its terms. Of the solution as the
-    /// solver holds it, with twice the digits of `parameters`.
+    /// Stationarity of the Lagrangian: largest entry divided by one plus its largest term. Evaluated for the internal
+    /// solution, which has twice the digits of `parameters`.
     pub stationarity: f64,
-    /// Duality gap over one plus the objective: how much the objective could still fall.
+    /// Duality gap divided by one plus the objective: bound of the possible decrease of the objective.
     pub duality_gap: f64,
-    /// `½‖R₁ B π − ρ₁‖²`: half the squared distance from the data's own optimum, in standard deviations of the rows.
+    /// `½‖R₁ B π − ρ₁‖²`: half the squared distance from the optimum of the data, in standard deviations of the rows.
     pub data_objective: f64,
-    /// γ times the distance from the prior. A consistent set fits the data better by at most γ times how much farther
-    /// from the prior it lies.
+    /// γ times the distance from the prior. Any other consistent set fits the data better by at most γ times its
+    /// additional distance from the prior.
     pub prior_objective: f64,
-    /// `√(2 data_objective)`: how many standard deviations (of white residuals) the fit moved from the data's own
-    /// optimum because of constraints and prior. By chance alone, the true parameters lie about the square root of
-    /// their number away.
+    /// `√(2 data_objective)`: distance, in standard deviations of white residuals, from the optimum of the data due to
+    /// constraints and prior. The expected distance of the true parameters is about the square root of their number.
     pub moved_sigma: f64,
-    /// Body by body.
+    /// Results by body.
     pub bodies: Vec<PhysicalBodyFit>,
-    /// Names of the constraints that hold with equality and push.
+    /// Names of the active constraints.
     pub active: Vec<String>,
 }
 
 impl PhysicalFit {
-    /// The larger of stationarity and duality gap; the points themselves are feasible by construction.
+    /// The larger of stationarity and duality gap; all points are feasible.
     pub fn kkt_residual(&self) -> f64 {
         self.stationarity.max(self.duality_gap)
     }
 
-    /// For every base parameter how far it moved from the estimate `values` in units of the standard deviations `std`;
-    /// none where that is zero.
+    /// Change of every base parameter from the estimate `values` in units of the standard deviations `std`; `None` if
+    /// that is zero.
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] unless both have one entry for each base parameter.
+    /// [`PhysicalError::Mismatch`] for a wrong number of values.
     pub fn moves_in_std(&self, values: &[f64], std: &[f64]) -> Result<Vec<Option<f64>>, PhysicalError> {
         expect("base parameters", self.base_values.len(), values.len())?;
         expect("standard deviations", self.base_values.len(), std.len())?;
@@ -88,23 +86,23 @@ impl PhysicalFit {
     }
 }
 
-/// The bodies, friction and drives that fit the data best among those that are physically consistent:
+/// Finds the physically consistent bodies, friction and drive parameters that fit the data best:
 ///
 /// ```text
 ///     minimise ½‖R₁ B π − ρ₁‖² + γ D(π, π0)
 ///     subject to  P(π_i) ⪰ ε P0_i,  and the limits of masses, total mass, centres of mass and scalars
 /// ```
 ///
-/// A convex problem with one optimum (Sousa and Cortesão, IJRR 33 (2014) 931; Wensing, Kim and Slotine, RA-L 3 (2018)
-/// 60; Lee, Wensing and Park, T-RO 36 (2020) 348). Data see base parameters only; the prior decides what they leave
-/// open: another consistent set fits better by at most γ times how much farther from the prior it lies. The result is
-/// judged by a duality gap that does not depend on the route.
+/// The problem is convex with one optimum (Sousa and Cortesão, IJRR 33 (2014) 931; Wensing, Kim and Slotine, RA-L 3
+/// (2018) 60; Lee, Wensing and Park, T-RO 36 (2020) 348). The data depend on base parameters only, the prior
+/// determines the other directions: any other consistent set fits better by at most γ times its additional distance
+/// from the prior. The duality gap certifies the result independently of the solver.
 ///
 /// ```
 /// use dynident_estimation::consistent::{BaseMap, PhysicalBody, PhysicalProblem, physical_fit, rough_body};
 /// use dynident_estimation::TriangularFactor;
 /// use nalgebra::DMatrix;
-/// // A pendulum's data say that Ixx = 0.02 and m ry = −0.3, each to 1 %. No single body has both with at most 1 kg.
+/// // A pendulum with measured Ixx = 0.02 and m ry = −0.3, each to 1 %. No body of at most 1 kg has both.
 /// let body = PhysicalBody {
 ///     name: "bob".into(), reference: rough_body(1.0, 0.1), mass_kg: Some([0.1, 1.0]),
 ///     known: None, com_box_m: None, inside: None,
@@ -114,15 +112,15 @@ impl PhysicalFit {
 /// let factor = TriangularFactor::from_rows(2, &[5000.0, 0.0, 0.0, 100.0 / 0.3, 100.0, -100.0], 2)?;
 /// let problem = PhysicalProblem::new(BaseMap::new(base)?, vec![body], vec![], &factor)?;
 /// let fit = physical_fit(&problem, &Default::default())?;
-/// // Ixx ≥ m ry² for a centre of mass off the axis: the first moment must give way.
+/// // Ixx ≥ m ry² for a centre of mass off the axis, so the first moment must change.
 /// assert!(fit.parameters[4] * fit.parameters[0] > fit.parameters[2].powi(2));
 /// assert!(fit.bodies[0].on_the_boundary && fit.kkt_residual() < 1e-7);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// [`PhysicalError::Setting`], and [`PhysicalError::Contradictory`] with the names of the constraints that exclude each
-/// other. A solver that does not reach the tolerance is a [`PhysicalStatus`].
+/// [`PhysicalError::Setting`], and [`PhysicalError::Contradictory`] with the names of the contradicting constraints. A
+/// solver that does not reach the tolerance is a [`PhysicalStatus`].
 #[doc(alias("lmi", "sdp", "pseudo-inertia", "physical consistency", "log-cholesky"))]
 pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> Result<PhysicalFit, PhysicalError> {
     settings.validate()?;
@@ -138,27 +136,27 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
     Ok(finished(problem, settings, &assembled, &solved))
 }
 
-/// As [`physical_fit`], with what is on the way of the interior point, whatever the route.
-pub(super) fn physical_fit_on_the_way(
+/// As [`physical_fit`], and also returns the iterates of the interior-point method for any route.
+pub(super) fn physical_fit_with_path(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
-) -> Result<(PhysicalFit, Option<OnTheWay>), PhysicalError> {
+) -> Result<(PhysicalFit, Option<CentralPath>), PhysicalError> {
     settings.validate()?;
     let assembled = AssembledProgram::new(problem, settings);
     let start = assembled.interior_start(problem)?;
     let limits = (settings.tolerance, settings.max_iterations);
-    let found = interior_point_on_the_way(&assembled.program, start, limits);
+    let found = interior_point_with_path(&assembled.program, start, limits);
     let fit = match &found {
         Some((solved, _)) if settings.route == PhysicalRoute::InteriorPoint && solved.ending == Ending::Solved => {
             finished(problem, settings, &assembled, solved)
         }
         _ => physical_fit(problem, settings)?,
     };
-    Ok((fit, found.map(|(_, on_the_way)| on_the_way)))
+    Ok((fit, found.map(|(_, central_path)| central_path)))
 }
 
-/// The interior point, and where it stalls short of the tolerance (2 of 1,000 problems with a prior against data of a
-/// million times its weight) the better of both routes by certificate.
+/// Interior point; if it does not reach the tolerance (2 of 1,000 problems with a prior against data of a million
+/// times its weight), the better result of both routes by certificate.
 fn interior_point_else_log_cholesky(
     program: &Program,
     start: &DVector<f64>,
@@ -188,7 +186,7 @@ fn finished(
     let parameters = assembled.parameters(problem, &solved.x);
     let base = problem.base.matrix() * DVector::from_column_slice(&parameters);
     let data_objective = 0.5 * (&problem.triangle * &base - &problem.rotated).norm_squared();
-    // The program counts its data rows the same way; the rest of its objective is the prior's.
+    // The rest of the program's objective is the prior's term.
     let in_program = 0.5 * (&assembled.program.data * &solved.x - &assembled.program.target).norm_squared();
     let prior_objective = solved.certificate.objective - in_program + assembled.constant;
     let bodies = problem
@@ -212,7 +210,7 @@ fn finished(
         .rows
         .iter()
         .zip(&solved.multipliers.rows)
-        // Strict complementarity: the multiplier is on the larger side of the pair.
+        // Strict complementarity: an active row has the larger multiplier.
         .filter(|(row, z)| **z / scale > row.value(&solved.x).max(1.0e-9))
         .map(|(row, _)| assembled.names[row.label].clone())
         .collect();

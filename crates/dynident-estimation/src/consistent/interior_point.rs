@@ -1,6 +1,6 @@
 //! Route 1: a primal-dual path-following method on the 4 × 4 blocks.
 //!
-//! Every iterate is strictly inside the constraints. Newton's direction is that of Nesterov and Todd with Mehrotra's
+//! Every iterate is strictly inside the constraints. The direction is that of Nesterov and Todd with Mehrotra's
 //! predictor and corrector (Mehrotra, SIAM J. Optimization 2 (1992) 575; Todd, Toh and Tütüncü, SIAM J. Optimization 8
 //! (1998) 769), reduced to least squares in x:
 //!
@@ -8,14 +8,14 @@
 //!     minimise ½‖A Δx − (b − A x)‖² + g·Δx + Σ ½‖R⁻¹ mat(M Δx) R⁻ᵀ − (D + Λ)‖² + Σ ½ (√(z/s) a·Δx − (t/s + z)/√(z/s))²
 //! ```
 //!
-//! A body is seen in the frame of its own factor (`ΔS = L mat(u) Lᵀ`), where its cone's rows are of the size of one,
-//! and the factors of S and Z are carried from step to step by triangular ones near one: eigenvalues of 1e-12 beside
-//! masses of 1e6 references keep their digits, which neither S nor Z could hold. An entropic prior is a pair that stays
-//! at its own weight γ from the beginning; it keeps no other barrier's place.
+//! Each body is represented in the frame of its own factor (`ΔS = L mat(u) Lᵀ`), in which the rows of its cone are of
+//! size one. The factors of S and Z are updated in each step by triangular factors near one, which keeps the digits of
+//! eigenvalues of 1e-12 next to masses of 1e6 references; S and Z themselves would lose them. The pair of an entropic
+//! prior stays at its weight γ from the start.
 
 mod data_limit;
 
-pub(super) use data_limit::{Iterate, Next, OnTheWay, interior_point_on_the_way, interior_point_within_limit};
+pub(super) use data_limit::{CentralPath, Iterate, Next, interior_point_with_path, interior_point_within_limit};
 
 use super::cone::Scaling;
 use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
@@ -24,14 +24,13 @@ use super::precise::Precise;
 use super::stacked::{LocalRows, RightSide, Rows, Singles, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
     /// Certificate within the tolerance.
     Solved,
-    /// No step improves any more in double precision.
+    /// No further improvement in double precision.
     Stalled,
-    /// Iterations used up.
+    /// Iteration limit reached.
     Limit,
 }
 
@@ -44,28 +43,27 @@ pub(super) struct InteriorPointResult {
     pub(super) ending: Ending,
 }
 
-/// How much of the way to the boundary a step may go.
 const FRACTION_TO_BOUNDARY: f64 = 0.99;
 
-/// No step may leave a product of slack and multiplier below this share of their mean (an entropic block's: of its
-/// weight), if the step before did not: near the boundary the next one would be short.
-const WORST_BALANCE: f64 = 0.02;
+/// Minimum product of slack and multiplier after a step, relative to the mean (to its weight for an entropic block). A
+/// smaller product makes the next step short near the boundary.
+const MIN_BALANCE: f64 = 0.02;
 
-/// Below this share the next step does nothing but balance.
-const CENTRE_BELOW: f64 = 0.1;
+/// Below this balance the next step only centres.
+const CENTRING_BALANCE: f64 = 0.1;
 
-/// The relative gap at which multipliers must be in balance with the gradient before μ falls further. Bodies that data
-/// drive far from their references grow by a factor with every step while μ is large, and crawl once it is small: what
-/// is left of the start's imbalance holds them back like a weight on their trace.
-const HOLD_BELOW: f64 = 0.3;
+/// Relative gap below which multipliers must balance the gradient before μ decreases further. Bodies that the data
+/// drive far from their references grow by a factor per step while μ is large, but slowly once μ is small, because the
+/// remaining imbalance of the start acts like a weight on their trace.
+const BALANCING_GAP: f64 = 0.3;
 
-/// How far the imbalance alone may drive a point then, beside the room that the barrier leaves.
-const LARGEST_DRIVE: f64 = 0.3;
+/// Maximum displacement by the imbalance alone relative to the room of the barrier.
+const MAX_DRIVE: f64 = 0.3;
 
-/// μ stops where the gap is this share of the tolerance.
-const LEAST_GAP: f64 = 0.7;
+/// μ stops decreasing when the gap is this share of the tolerance.
+const GAP_SHARE_OF_TOLERANCE: f64 = 0.7;
 
-/// Solves the program from a point strictly inside; none when `start` is not.
+/// Solves the program from a strictly interior point; `None` if `start` is not interior.
 pub(super) fn interior_point(
     program: &Program,
     start: DVector<f64>,
@@ -75,8 +73,7 @@ pub(super) fn interior_point(
     from_state(program, State::new(program, start)?, tolerance, max_iterations, &mut |_, _| false)
 }
 
-/// As [`interior_point`], but what is found may be less exact: the first point that is `enough`, by its variables and
-/// its certificate.
+/// As [`interior_point`], but stops at the first point for which `enough` is true.
 pub(super) fn interior_point_until(
     program: &Program,
     start: DVector<f64>,
@@ -86,7 +83,7 @@ pub(super) fn interior_point_until(
     from_state(program, State::new(program, start)?, limits.0, limits.1, &mut |state, now| enough(&state.x.high, now))
 }
 
-/// From a state to the optimum, or to where `seen` says that it is enough.
+/// Iterates from a state to the optimum or until `seen` returns true.
 fn from_state(
     program: &Program,
     mut state: State,
@@ -97,8 +94,8 @@ fn from_state(
     let mut best = state.solved(program, 0, Ending::Limit)?;
     let mut poor = 0;
     for iteration in 1..=max_iterations {
-        // Lower than the gap that is asked, slacks would only lose digits.
-        let least_gap = LEAST_GAP * tolerance * (1.0 + program.smooth_objective(&state.x).abs());
+        // A gap below the tolerance would only lose digits of the slacks.
+        let least_gap = GAP_SHARE_OF_TOLERANCE * tolerance * (1.0 + program.smooth_objective(&state.x).abs());
         if state.step(program, least_gap).is_none() {
             best.ending = Ending::Stalled;
             break;
@@ -123,7 +120,7 @@ fn from_state(
             best.ending = Ending::Solved;
             break;
         }
-        // Rounding keeps the residual from falling: more steps would only wander.
+        // Rounding limits the residual; more steps do not help.
         let patience = if best.certificate.residual() < 1.0e-4 { 12 } else { 60 };
         if poor >= patience {
             best.ending = Ending::Stalled;
@@ -136,15 +133,13 @@ fn from_state(
     Some(best)
 }
 
-/// A block and its multiplier, in scaled coordinates.
 #[derive(Clone, Debug)]
 struct Cone {
     scaling: Scaling,
-    /// The body whose variables S is, but for a constant: its scaling is the frame of those variables.
+    /// The body whose variables are S up to a constant: its scaling is the frame of those variables.
     owner: Option<usize>,
 }
 
-/// A row's slack and multiplier.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
     slack: f64,
@@ -156,11 +151,10 @@ struct State {
     x: Precise,
     cones: Vec<Cone>,
     rows: Vec<Pair>,
-    /// Whether a whole step was taken: the multipliers then balance the gradient, and keep doing so, to rounding.
+    /// Whether a full step was taken: the multipliers then balance the gradient up to rounding.
     balanced: bool,
 }
 
-/// A direction in scaled coordinates, block by block and row by row.
 struct Direction {
     x: DVector<f64>,
     primal: Vec<Matrix4<f64>>,
@@ -169,28 +163,27 @@ struct Direction {
     row_dual: Vec<f64>,
 }
 
-/// Where the products of slacks and multipliers are to go.
 struct Targets {
     blocks: Vec<Matrix4<f64>>,
     rows: Vec<f64>,
 }
 
-/// A Newton system with what is needed to build its right-hand sides.
+/// A Newton system with the data of its right-hand sides.
 struct Newton<'a> {
     program: &'a Program,
     state: &'a State,
     system: StackedSystem,
-    /// For every row of the program, its coefficients in the frame (not scaled).
+    /// Coefficients of every row of the program in the frame (not scaled).
     framed_rows: Vec<DVector<f64>>,
     singles: Singles,
-    /// `b − A x`, none of it where the data are limited, and the same of the local squares.
+    /// `b − A x` (zero for limited data), and the same for the local squares.
     data_rest: DVector<f64>,
     local_rest: Vec<DVector<f64>>,
     linear: DVector<f64>,
 }
 
 impl State {
-    /// Multipliers on the central path of the start at about the size of the gradient there.
+    /// Multipliers on the central path of the start, of about the size of the gradient there.
     fn new(program: &Program, x: DVector<f64>) -> Option<Self> {
         let (gradient, _) = program.gradient(&Precise::new(x.clone()));
         let mu = (gradient.amax()).clamp(1.0e-3, 1.0e12);
@@ -235,27 +228,27 @@ impl State {
         Some((certificate, multipliers))
     }
 
-    /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first;
-    /// then the multipliers are brought into balance with the gradient while μ is still large; then predictor and
-    /// corrector lower μ, but not below where the products' sum is `least_gap`.
+    /// One step; `None` if double precision allows none. Unbalanced products are centred first; then the multipliers
+    /// are balanced with the gradient while μ is large; then predictor and corrector lower μ until the sum of the
+    /// products is `least_gap`.
     fn step(&mut self, program: &Program, least_gap: f64) -> Option<()> {
         let newton = Newton::new(program, self)?;
         let (mu, balance) = (newton.excess(None), self.balance(program));
-        if balance < CENTRE_BELOW {
+        if balance < CENTRING_BALANCE {
             let centring = newton.direction(&newton.targets(mu), 0.0)?;
-            if let Some((_, next)) = self.followed(program, &newton, &centring, (1.2 * balance).min(CENTRE_BELOW)) {
+            if let Some((_, next)) = self.followed(program, &newton, &centring, (1.2 * balance).min(CENTRING_BALANCE)) {
                 *self = next;
                 return Some(());
             }
         }
         let scale = 1.0 + program.smooth_objective(&self.x).abs();
         let (is_near, drive) = match program.data_limit {
-            Some(_) => (true, data_limit::LARGEST_DRIVE),
-            None => (mu * newton.degree() < HOLD_BELOW * scale, LARGEST_DRIVE),
+            Some(_) => (true, data_limit::MAX_DRIVE),
+            None => (mu * newton.degree() < BALANCING_GAP * scale, MAX_DRIVE),
         };
         if !self.balanced && is_near && newton.residual() > drive * mu.sqrt() {
             let direction = newton.direction(&newton.targets(mu), 1.0)?;
-            if let Some((alpha, next)) = self.followed(program, &newton, &direction, WORST_BALANCE) {
+            if let Some((alpha, next)) = self.followed(program, &newton, &direction, MIN_BALANCE) {
                 *self = next;
                 self.balanced |= alpha >= 1.0;
                 return Some(());
@@ -267,7 +260,7 @@ impl State {
         let sigma = if mu > 0.0 { (after / mu).powi(3).clamp(0.0, 1.0) } else { 0.0 };
         let least = least_gap / newton.degree();
         let mut targets = newton.targets((sigma * mu).max(least));
-        // The corrector's second-order term holds for full steps; scaled down it does no harm after short ones.
+        // The corrector's second-order term is valid for full steps; it is scaled down after short ones.
         let share = alpha * alpha;
         for (k, target) in targets.blocks.iter_mut().enumerate() {
             let product = affine.primal[k] * affine.dual[k];
@@ -279,7 +272,7 @@ impl State {
         if program.data_limit.is_some() {
             newton.bend(&mut targets, &affine, share);
         }
-        let worst = balance.min(WORST_BALANCE);
+        let worst = balance.min(MIN_BALANCE);
         let mut best = self.followed(program, &newton, &newton.direction(&targets, 1.0)?, worst);
         if best.as_ref().is_none_or(|(alpha, _)| *alpha < 0.3) {
             let centred = newton.direction(&newton.targets((sigma.max(0.5) * mu).max(least)), 1.0)?;
@@ -294,8 +287,7 @@ impl State {
         Some(())
     }
 
-    /// The longest part of a direction after which no product of a pair falls too far behind the others: to where the
-    /// boundary is near, the next step would be short.
+    /// Follows a direction as far as no product falls too far below the others.
     fn followed(
         &self,
         program: &Program,
@@ -317,7 +309,7 @@ impl State {
         last
     }
 
-    /// The smallest product of slack and multiplier over their mean; of entropic blocks over where they must end.
+    /// Smallest product of slack and multiplier relative to the mean, for entropic blocks relative to their weight.
     fn balance(&self, program: &Program) -> f64 {
         let (mut sum, mut count, mut least, mut entropic) = (0.0, 0, f64::INFINITY, f64::INFINITY);
         let mut plain = |product: f64| {
@@ -360,7 +352,7 @@ impl State {
             .map(|(l, pair)| {
                 let (ds, dz) = (alpha * direction.row_primal[l], alpha * direction.row_dual[l]);
                 let slack = match (program.rows.get(l), program.data_limit) {
-                    // A small slack is known better by its changes than as a difference of large numbers.
+                    // Updating a small slack is more accurate than a difference of large numbers.
                     (Some(_), _) if ds.abs() < 0.999 * pair.slack => pair.slack + ds,
                     (Some(row), _) => row.value(&x.high),
                     (None, limit) => limit? - program.data_squares(&x),
@@ -373,7 +365,6 @@ impl State {
     }
 }
 
-/// Adds the rows of one block's barrier.
 fn add_block(rows: &mut Rows, map: &BlockMap, cone: &Cone, state: &State) {
     let square = |matrix: &Matrix10| DMatrix::from_column_slice(10, 10, matrix.as_slice());
     match (map, cone.owner) {
@@ -402,7 +393,7 @@ impl<'a> Newton<'a> {
                 rows.frames.push((first, cone.scaling.frame()));
             }
         }
-        // Squares that are limited count by their multiplier.
+        // Limited squares are weighted by their multiplier.
         let limiting = program.data_limit.and_then(|_| state.rows.last()).map(|pair| pair.force);
         let mut data = rows.framed(&program.data);
         if let Some(force) = limiting {
@@ -450,7 +441,7 @@ impl<'a> Newton<'a> {
         })
     }
 
-    /// Products at μ, an entropic block's at no less than its own weight.
+    /// Products at μ; those of an entropic block at its weight.
     fn targets(&self, mu: f64) -> Targets {
         let goal = |block: &Block| if block.entropy > 0.0 { block.entropy } else { mu };
         let blocks = self.program.blocks.iter().map(|block| Matrix4::identity() * goal(block)).collect();
@@ -497,7 +488,7 @@ impl<'a> Newton<'a> {
         Some(Direction { x: u, primal, dual, row_primal, row_dual })
     }
 
-    /// How far products stand above where they must end, on average.
+    /// Mean excess of the products over their final values.
     fn excess(&self, step: Option<(&Direction, f64)>) -> f64 {
         let plain =
             || self.state.cones.iter().zip(&self.program.blocks).enumerate().filter(|(_, (_, b))| b.entropy == 0.0);
@@ -516,8 +507,8 @@ impl<'a> Newton<'a> {
         (blocks.sum::<f64>() + rows.sum::<f64>()) / degree
     }
 
-    /// What a direction is to do: `share` of the dual residual away, and products changed as `wanted` (scaled, `½ (Λ D
-    /// + D Λ)` the new product) and `rows` say.
+    /// Right-hand side of a direction that removes `share` of the dual residual and changes the products to `wanted`
+    /// (scaled, `½ (Λ D + D Λ)` is the new product) and `rows`.
     fn right_side(&self, wanted: &[Matrix4<f64>], rows: &[f64], share: f64) -> RightSide {
         let mut local: Vec<DVector<f64>> = self.local_rest.iter().map(|rest| rest * share).collect();
         let mut wide = vec![&self.data_rest * share];
@@ -538,8 +529,8 @@ impl<'a> Newton<'a> {
         RightSide { local, wide, direct: &self.linear * -share }
     }
 
-    /// The dual residual as the frames see it: over √μ, how far it alone would drive a point beside the room that the
-    /// barrier leaves.
+    /// Dual residual in the frames. Divided by √μ it is the displacement by the imbalance relative to the room of the
+    /// barrier.
     fn residual(&self) -> f64 {
         let now: Vec<Matrix4<f64>> =
             self.state.cones.iter().map(|cone| Matrix4::from_diagonal(&cone.scaling.lambda)).collect();
@@ -547,13 +538,12 @@ impl<'a> Newton<'a> {
         self.system.rows().transposed(&self.right_side(&now, &rows, 1.0)).amax()
     }
 
-    /// How many products there are that μ is the mean of.
+    /// Number of products in the mean μ.
     fn degree(&self) -> f64 {
         let plain = self.program.blocks.iter().filter(|b| b.entropy == 0.0).count();
         (4 * plain + self.state.rows.len()).max(1) as f64
     }
 
-    /// How far a direction can be followed.
     fn longest(&self, d: &Direction) -> f64 {
         let mut alpha = f64::INFINITY;
         for (k, cone) in self.state.cones.iter().enumerate() {

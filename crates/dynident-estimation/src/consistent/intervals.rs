@@ -1,11 +1,11 @@
-//! Intervals of standard parameters that respect what is physically consistent: how far can a mass, a moment of
-//! inertia, a friction go before the data object, every body and term staying physically consistent?
+//! Confidence intervals of standard parameters (mass, moment of inertia, friction) within the physically consistent
+//! sets.
 
 use super::assembly::AssembledProgram;
 use super::conic::Program;
 use super::description::{PhysicalProblem, expect, finite};
-use super::fit::{PhysicalFit, physical_fit_on_the_way};
-use super::interior_point::{Iterate, Next, OnTheWay, interior_point_within_limit};
+use super::fit::{PhysicalFit, physical_fit_with_path};
+use super::interior_point::{CentralPath, Iterate, Next, interior_point_within_limit};
 use super::{PhysicalError, PhysicalSettings};
 use crate::uncertainty::student_half_width;
 use nalgebra::{DMatrix, DVector};
@@ -17,13 +17,14 @@ use serde::{Deserialize, Serialize};
 pub struct IntervalSettings {
     /// Confidence level of each interval. Default 0.95.
     pub level: f64,
-    /// The solver, its margin and its prior. The prior only chooses among bodies that the data leave
-    /// alike; its weight is far below that of a fit: 1e-5 by default.
+    /// Solver, margin and prior. The prior only selects among bodies that fit the data equally well, so its weight is
+    /// far below that of a fit: default 1e-5.
     pub physical: PhysicalSettings,
-    /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's
-    /// `scale`). Default 100.
+    /// An end is open beyond this multiple of the reference's size (the body's own moments, a scalar's `scale`).
+    /// Default 100.
     pub open_beyond: f64,
-    /// Most thresholds for one end, each from how the data gave way at the one before. Default 5; one or two are usual.
+    /// Maximum number of thresholds per end, each from the change of the residuals at the previous one. Default 5; one
+    /// or two are usual.
     pub max_limits: usize,
 }
 
@@ -38,50 +39,49 @@ impl IntervalSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`PhysicalError::Setting`] for a level outside 0.5 to 0.9999, a size below 10, no threshold at all, or as
+    /// [`PhysicalError::Setting`] for a level outside 0.5 to 0.9999, a size below 10, zero thresholds, or as
     /// [`PhysicalSettings::validate`].
     pub fn validate(&self) -> Result<(), PhysicalError> {
         self.physical.validate()?;
         let error = |setting, value, fix| Err(PhysicalError::Setting { setting, value, fix });
         if !(0.5..=0.9999).contains(&self.level) {
-            return error("level", self.level, "give a level from 0.5 to 0.9999, such as 0.95");
+            return error("level", self.level, "use a level from 0.5 to 0.9999, for example 0.95");
         }
         if !(10.0..=1.0e9).contains(&self.open_beyond) {
-            return error("open_beyond", self.open_beyond, "give 10 to 1e9 times the reference's size");
+            return error("open_beyond", self.open_beyond, "use 10 to 1e9 times the size of the reference");
         }
         if self.max_limits == 0 {
-            return error("max_limits", 0.0, "give at least 1");
+            return error("max_limits", 0.0, "use at least 1");
         }
         Ok(())
     }
 }
 
-/// What holds an end of an interval.
+/// The limit that determines an end of an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalEnd {
-    /// Beyond it the data are fitted too badly.
+    /// The data: beyond this value the fit is significantly worse.
     Data,
-    /// Beyond it nothing is physically consistent that the data allow: the body's cone or a limit stops it before the
-    /// data's cost reaches its threshold.
+    /// Physical consistency: the body's cone or a limit is reached before the data's threshold.
     Constraint,
-    /// Neither holds it: the value can be as large as one likes.
+    /// Nothing: the value is unbounded.
     Open,
-    /// The solver came to no end: the value may go farther than is said.
+    /// The solver did not converge: the true end may be farther out.
     Unsettled,
 }
 
-/// An interval of one standard parameter.
+/// Confidence interval of one standard parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ConsistentInterval {
-    /// The value of the consistent set that fits best.
+    /// Value of the best consistent set.
     pub value: f64,
-    /// Lower end; none where it is open.
+    /// Lower end; `None` if open.
     pub lower: Option<f64>,
-    /// Upper end; none where it is open.
+    /// Upper end; `None` if open.
     pub upper: Option<f64>,
-    /// What holds the lower and the upper end.
+    /// The limits that determine the lower and the upper end.
     pub held_by: [IntervalEnd; 2],
 }
 
@@ -91,41 +91,39 @@ pub struct ConsistentInterval {
 ///     { p : min over consistent π with π_i = p of ½‖R₁ B π − ρ₁‖²  ≤  C_min + ½ t² κ_i }
 /// ```
 ///
-/// C_min belongs to the best consistent set, t is Student's quantile, and κ_i is how much larger than for white
-/// residuals the variance of what the data say in the direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the
-/// covariance Σ of the base parameters that is thought honest. Without active constraints this is the usual interval
-/// `π̂_i ± t σ_i`; an end that only physics holds is said to be so, and one that nothing holds is open. Profile
-/// likelihood: Venzon and Moolgavkar, Applied Statistics 37 (1988) 87; here every end is a convex problem, the farthest
-/// that the parameter goes below the threshold, and exact to a hundredth of the half width.
+/// C_min belongs to the best consistent set, t is Student's quantile, and κ_i is the variance inflation by correlated
+/// residuals in the direction of π_i, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of the base parameters.
+/// Without active constraints this is the usual interval `π̂_i ± t σ_i`; ends that only physical consistency limits
+/// and open ends are marked. Profile likelihood: Venzon and Moolgavkar, Applied Statistics 37 (1988) 87. Here every
+/// end is a convex problem (the extreme value of the parameter below the threshold), solved to a hundredth of the
+/// half-width.
 #[derive(Clone, Debug)]
 pub struct ConsistentIntervals {
     problem: PhysicalProblem,
     settings: IntervalSettings,
     best: PhysicalFit,
     assembled: AssembledProgram,
-    /// Where the ends' programs begin.
-    on_the_way: Option<OnTheWay>,
+    central_path: Option<CentralPath>,
     quantile: f64,
-    /// What the data leave of the best set, `ρ₁ − R₁ B π`.
+    /// Residuals of the best set, `ρ₁ − R₁ B π`.
     left: DVector<f64>,
     covariance: Option<DMatrix<f64>>,
     mean_inflation: f64,
-    /// κ of each standard parameter, constraints aside.
+    /// κ of each standard parameter without constraints.
     inflations: Vec<f64>,
-    /// Rough standard deviation of each standard parameter, constraints aside; large where no data are.
+    /// Approximate standard deviation of each standard parameter without constraints; large without data.
     deviations: Vec<f64>,
     sizes: Vec<f64>,
 }
 
-/// A program that moves one parameter.
-struct Farthest {
+struct ExtremeProgram {
     program: Program,
-    /// Largest factor of the parameter by a variable.
+    /// Largest coefficient of the parameter over the variables.
     steepest: f64,
 }
 
 impl ConsistentIntervals {
-    /// The best consistent set, from which intervals are then measured. `covariance` of the base parameters, shape
+    /// Finds the best consistent set, from which intervals are computed. `covariance` of the base parameters, shape
     /// (base, base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
     ///
     /// # Errors
@@ -144,7 +142,7 @@ impl ConsistentIntervals {
             expect("columns of the covariance", base, covariance.ncols())?;
             finite("an entry of the covariance", covariance.as_slice())?;
         }
-        let (best, on_the_way) = physical_fit_on_the_way(problem, &settings.physical)?;
+        let (best, central_path) = physical_fit_with_path(problem, &settings.physical)?;
         let weak = PhysicalSettings {
             prior_weight: PRIOR_SHARE * settings.physical.prior_weight,
             ..settings.physical.clone()
@@ -153,7 +151,7 @@ impl ConsistentIntervals {
         let left = &problem.rotated - &problem.triangle * DVector::from_column_slice(&best.base_values);
         let information = problem.triangle.transpose() * &problem.triangle;
         let sizes = sizes(problem);
-        // What is known of π without constraints, beside the weakest of priors: information in units of the sizes.
+        // Information about π without constraints plus that of the weakest prior, in units of the sizes.
         let map = problem.base.matrix();
         let scaled = DMatrix::from_fn(map.nrows(), map.ncols(), |i, j| map[(i, j)] * sizes[j]);
         let mut hessian = scaled.transpose() * &information * &scaled;
@@ -180,7 +178,7 @@ impl ConsistentIntervals {
             settings,
             best,
             assembled,
-            on_the_way,
+            central_path,
             left,
             mean_inflation,
             inflations,
@@ -189,20 +187,19 @@ impl ConsistentIntervals {
         })
     }
 
-    /// The best consistent set that all intervals hold.
+    /// The best consistent set, which all intervals include.
     pub fn best(&self) -> &PhysicalFit {
         &self.best
     }
 
-    /// The interval of standard parameter `index` (ten for each body, then the scalars). A parameter of a known body
-    /// has no width.
+    /// Interval of standard parameter `index` (ten per body, then the scalars). It has zero width for a known body.
     ///
-    /// # Errors
-    /// [`PhysicalError::Mismatch`] if there is no such parameter.
+    /// [`PhysicalError::Mismatch`] for an index out of range. [`PhysicalError::Mismatch`] if there is no such
+    /// parameter.
     pub fn of(&self, index: usize) -> Result<ConsistentInterval, PhysicalError> {
         if index >= self.sizes.len() {
             return Err(PhysicalError::Mismatch {
-                what: "index of a standard parameter, below".into(),
+                what: "index of a standard parameter, below the number of parameters".into(),
                 expected: self.sizes.len(),
                 found: index,
             });
@@ -218,9 +215,9 @@ impl ConsistentIntervals {
         Ok(ConsistentInterval { value, lower, upper, held_by: [below, above] })
     }
 
-    /// The program that moves a parameter as far as possible, without the data's limit; `weight` is the objective's
-    /// unit. It does not search far beyond the distance at which an end is open.
-    fn farthest(&self, index: usize, side: f64, weight: f64) -> Farthest {
+    /// The program that maximises a parameter, without the limit of the data; `weight` is the unit of the objective.
+    /// The search ends slightly beyond the distance of an open end.
+    fn extreme_program(&self, index: usize, side: f64, weight: f64) -> ExtremeProgram {
         let Self { problem, best, assembled, .. } = self;
         let far = self.settings.open_beyond * self.sizes[index];
         let functional = assembled.functional(problem, &[(index, side)]);
@@ -229,13 +226,12 @@ impl ConsistentIntervals {
         for &(variable, factor) in &functional {
             program.linear[variable] -= weight * factor;
         }
-        let end = side * best.parameters[index] + FARTHER * far;
+        let end = side * best.parameters[index] + SEARCH_RANGE_FACTOR * far;
         program.rows.push(assembled.row(problem, &[(index, -side)], end, usize::MAX));
-        Farthest { program, steepest }
+        ExtremeProgram { program, steepest }
     }
 
-    /// One end: the farthest that the parameter goes while the data's cost stays below its threshold and everything is
-    /// physically consistent, a convex program of its own.
+    /// Computes one end: the extreme value of the parameter in consistent sets whose data cost is below the threshold.
     fn end(&self, index: usize, side: f64) -> (Option<f64>, IntervalEnd) {
         let Self { problem, best, assembled, quantile, .. } = self;
         let (value, size) = (best.parameters[index], self.sizes[index]);
@@ -245,39 +241,39 @@ impl ConsistentIntervals {
         let rise = |inflation: f64| 0.5 * quantile.powi(2) * inflation;
         let mut inflation = self.inflations[index];
         let distance = |x: &DVector<f64>| side * (assembled.parameters(problem, x)[index] - value);
-        let Some(on_the_way) = &self.on_the_way else { return (Some(value), IntervalEnd::Unsettled) };
+        let Some(central_path) = &self.central_path else { return (Some(value), IntervalEnd::Unsettled) };
         let begins_beyond = |inflation: f64| {
-            on_the_way.start((least, least + rise(inflation))).is_some_and(|start| distance(start) >= far)
+            central_path.start((least, least + rise(inflation))).is_some_and(|start| distance(start) >= far)
         };
         if begins_beyond(inflation) {
             return (None, IntervalEnd::Open);
         }
 
-        // The objective in units in which the limit's multiplier is about one.
+        // Scaled so that the limit's multiplier is about one.
         let weight = quantile * inflation.sqrt() / softness;
-        let Farthest { mut program, steepest } = self.farthest(index, side, weight);
+        let ExtremeProgram { mut program, steepest } = self.extreme_program(index, side, weight);
         program.data_limit = Some(least + rise(inflation));
         let mut reached = 0.0;
         let mut held_by = IntervalEnd::Unsettled;
         let mut limits = 1;
         let mut look = |seen: &Iterate<'_>| {
             reached = distance(seen.x);
-            // However far from the optimum: this set is consistent, and the data do not reject it.
+            // This set is consistent and the data do not reject it, even if it is not optimal.
             if reached >= far {
                 held_by = IntervalEnd::Open;
                 return Next::Stop;
             }
             let (room, force) = seen.limit;
-            // The parameter goes with this power of the rise, for its slope is the multiplier: a half where no
-            // constraint joins in, nothing where they hold it alone.
-            let power = force * rise(inflation) / (weight * reached.max(LEAST_WIDTH * softness));
+            // The parameter grows with this power of the cost, because the multiplier is its slope: ½ without active
+            // constraints, 0 if constraints alone limit it.
+            let power = force * rise(inflation) / (weight * reached.max(MIN_WIDTH_SHARE * softness));
             let is_free = power < room / rise(inflation);
-            // How much farther the parameter may be, in units of the objective.
-            let exact = |share: f64| weight * (share * reached).max(LEAST_WIDTH * softness);
-            let enough = exact(if is_free { STILL } else { CLOSE });
-            let is_balanced = seen.certificate.imbalance <= BALANCED * weight * steepest;
+            // Possible further change of the parameter, in units of the objective.
+            let exact = |share: f64| weight * (share * reached).max(MIN_WIDTH_SHARE * softness);
+            let enough = exact(if is_free { CONSTRAINED_END_TOLERANCE } else { END_TOLERANCE });
+            let is_balanced = seen.certificate.imbalance <= MAX_IMBALANCE * weight * steepest;
             if !is_balanced || seen.certificate.absolute_gap() > enough {
-                return Next::On(LEAST_GAP * exact(STILL));
+                return Next::On(GAP_SHARE_OF_TOLERANCE * exact(CONSTRAINED_END_TOLERANCE));
             }
             if is_free {
                 held_by = IntervalEnd::Constraint;
@@ -285,7 +281,7 @@ impl ConsistentIntervals {
             }
             let now = self.inflation(&(&self.left - seen.left));
             let ratio = now / inflation;
-            if (ratio - 1.0).abs() > ALIKE && limits < self.settings.max_limits {
+            if (ratio - 1.0).abs() > MAX_THRESHOLD_CHANGE && limits < self.settings.max_limits {
                 (inflation, limits) = (now, limits + 1);
                 if begins_beyond(inflation) {
                     held_by = IntervalEnd::Open;
@@ -297,14 +293,14 @@ impl ConsistentIntervals {
             reached *= ratio.powf(power.min(1.0));
             Next::Stop
         };
-        interior_point_within_limit(&mut program, on_the_way, least, MOST_ITERATIONS, &mut look);
+        interior_point_within_limit(&mut program, central_path, least, MAX_ITERATIONS, &mut look);
         let [lower, upper] = self.own_limits(index);
-        // The best set is inside, whatever rounding makes of an end beside it.
+        // The interval must include the best set despite rounding.
         let end = (value + side * reached.max(0.0)).max(lower.min(value)).min(upper.max(value));
         (Some(end).filter(|_| held_by != IntervalEnd::Open), held_by)
     }
 
-    /// What a parameter can be whatever the others are: no mass and no moment of inertia is negative.
+    /// Limits of the parameter alone: masses and moments of inertia are not negative.
     fn own_limits(&self, index: usize) -> [f64; 2] {
         let bodies = &self.problem.bodies;
         let Some(body) = bodies.get(index / 10) else {
@@ -318,14 +314,15 @@ impl ConsistentIntervals {
         }
     }
 
-    /// κ from how the data's rows gave way, R₁ times the shift of the base parameters.
+    /// κ in the direction of the moved rows, R₁ times the shift of the base parameters.
     fn inflation(&self, moved: &DVector<f64>) -> f64 {
         let Some(covariance) = &self.covariance else { return 1.0 };
         inflation(&self.problem, covariance, moved).unwrap_or(self.mean_inflation)
     }
 }
 
-/// The honest variance over the white one where rows move by `moved`; none where they hardly do.
+/// Variance with correlated residuals relative to that with white ones in the direction of the moved rows; `None` for
+/// a negligible move.
 fn inflation(problem: &PhysicalProblem, covariance: &DMatrix<f64>, moved: &DVector<f64>) -> Option<f64> {
     let direction = problem.triangle.tr_mul(moved);
     let white = moved.norm_squared();
@@ -333,28 +330,27 @@ fn inflation(problem: &PhysicalProblem, covariance: &DMatrix<f64>, moved: &DVect
     (white >= 1.0e-12 && inflation.is_finite() && inflation > 0.0).then_some(inflation)
 }
 
-/// Relative accuracy of an end: a hundredth of the half width, and of √cost there.
-const CLOSE: f64 = 0.01;
-/// Relative accuracy of an end that constraints alone hold.
-const STILL: f64 = 1.0e-4;
-/// Accuracy beside the deviation that the data alone leave, where the best set is at the end itself.
-const LEAST_WIDTH: f64 = 1.0e-7;
-/// μ stops where the gap is this share of what an end may be wrong by.
-const LEAST_GAP: f64 = 0.5;
-/// Largest imbalance of gradient and multipliers of a point that says anything, beside the objective's slope.
-const BALANCED: f64 = 1.0e-3;
-/// Thresholds that differ by this share are one: the end of the one is the other's to a few hundredths, by its slope.
-const ALIKE: f64 = 0.3;
-/// The last place that is looked at, beside where an end counts as open.
-const FARTHER: f64 = 1.1;
-/// Most iterations for one end.
-const MOST_ITERATIONS: usize = 200;
-/// Weight of the prior in the programs of the ends, as a share of the best set's. There it would hold parameters back
-/// as data do; a share ten times smaller moves ends by less than a hundredth.
+/// Relative accuracy of an end: a hundredth of the half-width.
+const END_TOLERANCE: f64 = 0.01;
+/// Relative accuracy of an end that constraints alone limit.
+const CONSTRAINED_END_TOLERANCE: f64 = 1.0e-4;
+/// Minimum accuracy relative to the unconstrained deviation, for a best set at the end itself.
+const MIN_WIDTH_SHARE: f64 = 1.0e-7;
+/// μ stops decreasing when the gap is this share of the allowed error of an end.
+const GAP_SHARE_OF_TOLERANCE: f64 = 0.5;
+/// Maximum imbalance of gradient and multipliers of a usable point, relative to the objective's slope.
+const MAX_IMBALANCE: f64 = 1.0e-3;
+/// Thresholds that differ by less than this share are treated as equal; the ends then differ by a few hundredths.
+const MAX_THRESHOLD_CHANGE: f64 = 0.3;
+/// End of the search relative to the distance of an open end.
+const SEARCH_RANGE_FACTOR: f64 = 1.1;
+const MAX_ITERATIONS: usize = 200;
+/// Prior weight in the programs of the ends relative to that of the best set. A larger prior would limit parameters as
+/// data do; a tenth of this share moves ends by less than a hundredth.
 const PRIOR_SHARE: f64 = 1.0e-3;
 
-/// What is ordinary for each standard parameter: the reference's mass, its mass times its radius of gyration, its
-/// moment; a scalar's scale.
+/// Typical size of each standard parameter: the reference's mass, mass times radius of gyration, moment; a scalar's
+/// scale.
 fn sizes(problem: &PhysicalProblem) -> Vec<f64> {
     let mut sizes = Vec::new();
     for body in &problem.bodies {
@@ -365,8 +361,8 @@ fn sizes(problem: &PhysicalProblem) -> Vec<f64> {
     sizes
 }
 
-/// Mean of the base parameters' variances over those of white residuals; one where the data leave a base parameter
-/// without a white variance.
+/// Mean ratio of the base parameters' variances to those of white residuals; one if a base parameter has no white
+/// variance.
 fn mean_inflation(covariance: &DMatrix<f64>, information: &DMatrix<f64>) -> f64 {
     let Some(white) = information.clone().cholesky().map(|factor| factor.inverse()) else { return 1.0 };
     let ratios: Vec<f64> = (0..white.nrows())
@@ -382,7 +378,7 @@ mod tests {
     use crate::consistent::{BaseMap, PhysicalBody, PhysicalScalar, rough_body};
     use crate::factor::TriangularFactor;
 
-    /// Free quantile of ordinary intervals at many degrees of freedom.
+    /// Normal quantile.
     const T: f64 = 1.959_964;
 
     fn body() -> PhysicalBody {
@@ -394,7 +390,7 @@ mod tests {
         PhysicalScalar { name: name.into(), lower: Some(0.0), upper: None, prior: 0.0, scale: 1.0 }
     }
 
-    /// One body and one friction, measured one by one: `(column, value, standard deviation)`.
+    /// One body and one friction parameter with separate measurements: `(column, value, standard deviation)`.
     fn problem(measured: &[(usize, f64, f64)]) -> PhysicalProblem {
         let count = measured.len();
         let matrix = DMatrix::from_fn(count, 11, |row, column| f64::from(measured[row].0 == column));
@@ -420,12 +416,12 @@ mod tests {
     }
 
     #[test]
-    fn without_active_constraints_they_are_the_usual_intervals() {
+    fn intervals_without_active_constraints_are_the_usual_ones() {
         let found = intervals(&all(0.01), None);
         for (index, value, deviation) in all(0.01) {
             let interval = found.of(index).unwrap();
             assert_eq!(interval.held_by, [IntervalEnd::Data; 2], "{index}");
-            // CLOSE is a hundredth of the half width; the prior of weight 1e-5 moves less.
+            // The relative accuracy is a hundredth of the half-width; the prior of weight 1e-5 moves less.
             let [lower, upper] = [interval.lower.unwrap(), interval.upper.unwrap()];
             assert!((lower - (value - T * deviation)).abs() < 0.02 * T * deviation, "{index}: {interval:?}");
             assert!((upper - (value + T * deviation)).abs() < 0.02 * T * deviation, "{index}: {interval:?}");
@@ -433,23 +429,23 @@ mod tests {
     }
 
     #[test]
-    fn an_honest_covariance_widens_them() {
+    fn clustered_covariance_widens_intervals() {
         let white = DMatrix::from_diagonal(&DVector::from_iterator(11, all(0.01).iter().map(|row| row.2.powi(2))));
-        let mut honest = white;
-        honest[(10, 10)] *= 9.0;
-        let found = intervals(&all(0.01), Some(&honest));
+        let mut clustered = white;
+        clustered[(10, 10)] *= 9.0;
+        let found = intervals(&all(0.01), Some(&clustered));
         let [friction, mass] = [10, 0].map(|index| found.of(index).unwrap());
-        // The lower end meets zero before 0.5 - 3 * 0.196; the upper is free.
+        // The lower end is at zero, above 0.5 - 3 * 0.196; the upper end is unconstrained.
         assert_eq!(friction.held_by, [IntervalEnd::Constraint, IntervalEnd::Data]);
         assert!(friction.lower.unwrap().abs() < 1e-3);
         assert!((friction.upper.unwrap() - (0.5 + 3.0 * T * 0.1)).abs() < 0.02 * 3.0 * T * 0.1, "{friction:?}");
         assert!((mass.upper.unwrap() - (2.0 + T * 0.01)).abs() < 0.02 * T * 0.01, "{mass:?}");
     }
 
-    /// Data that say −0.1 ± 0.1 of a friction: the best consistent one is zero, and the profile above it is ½((p +
-    /// 0.1)/0.1)² − ½.
+    /// Measured friction −0.1 ± 0.1: the best consistent value is zero, and the profile above it is ½((p + 0.1)/0.1)²
+    /// − ½.
     #[test]
-    fn friction_that_the_data_want_negative() {
+    fn negative_friction_estimates_end_at_zero() {
         let mut measured = all(0.01);
         measured[10].1 = -0.1;
         let interval = intervals(&measured, None).of(10).unwrap();
@@ -459,32 +455,30 @@ mod tests {
         assert!((interval.upper.unwrap() - upper).abs() < 0.02 * upper, "{interval:?}");
     }
 
-    /// Mass and first moment measured, inertia not at all: the parallel axis theorem holds it from below, nothing from
-    /// above.
+    /// Mass and first moment measured, inertia not: the parallel axis theorem limits it from below only.
     #[test]
-    fn an_unmeasured_moment_is_held_by_physical_consistency() {
+    fn physical_consistency_limits_an_unmeasured_moment() {
         let measured = [(0, 2.0, 1e-4), (1, 0.0, 1e-4), (2, 0.6, 1e-4), (3, 0.0, 1e-4), (10, 0.5, 0.1)];
         let found = intervals(&measured, None);
         let interval = found.of(4).unwrap();
         assert_eq!(interval.held_by, [IntervalEnd::Constraint, IntervalEnd::Open], "{interval:?}");
-        // Ixx ≥ (m ry)²/m = 0.18; mass and moment give way by their own errors, of which Ixx has √((0.6 · 1e-4)² +
-        // (0.09 · 1e-4)²). The margin of 1e-4 reference bodies lies above it, and an end is as exact as a thousandth of
-        // the half width: 2e-4 in all.
+        // Ixx ≥ (m ry)²/m = 0.18; mass and moment vary by their own errors, which gives √((0.6 · 1e-4)² + (0.09 ·
+        // 1e-4)²) for Ixx. Margin (1e-4 reference bodies) and accuracy of the end together: 2e-4.
         let expected = 0.18 - T * 6.07e-5;
         assert!((interval.lower.unwrap() - expected).abs() < 2e-4, "{interval:?}");
-        // A product of inertia nobody measured is open on both sides.
+        // An unmeasured product of inertia is open on both sides.
         assert_eq!(found.of(5).unwrap().held_by, [IntervalEnd::Open; 2]);
     }
 
-    /// Only Ixx measured: of a body with Ixx = Σyy + Σzz, |Σyz| is at most half of it, and the sums are no less than
-    /// the margin; what involves x is open.
+    /// Only Ixx = Σyy + Σzz measured: |Σyz| is at most half of it, and the sums are at least the margin; parameters
+    /// that involve x are open.
     #[test]
-    fn one_moment_holds_what_it_contains() {
+    fn a_measured_moment_limits_the_parameters_in_it() {
         let found = intervals(&[(4, 0.02, 1e-6), (10, 0.5, 0.1)], None);
         let product = found.of(8).unwrap();
         assert_eq!(product.held_by, [IntervalEnd::Constraint; 2]);
         for end in [-product.lower.unwrap(), product.upper.unwrap()] {
-            // A prior of weight 1e-5 and the margin keep it off the boundary by less than a hundredth.
+            // A prior of weight 1e-5 and the margin move it by less than a hundredth.
             assert!((end - 0.01).abs() < 1e-4, "{product:?}");
         }
         let mass = found.of(0).unwrap();

@@ -1,4 +1,4 @@
-//! Route 2: Gauss-Newton in log-Cholesky coordinates with a barrier that is lowered step by step.
+//! Route 2: Gauss-Newton in log-Cholesky coordinates with a decreasing barrier.
 //!
 //! Every body is `S = U Uᵀ` with
 //!
@@ -9,17 +9,17 @@
 //!             [   0    0    0    1 ]
 //! ```
 //!
-//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so that any ten numbers are a consistent body. Where the best body
-//! lies on the cone's boundary the bare fit runs away (d → −∞) and never ends. Here `−μ ln det S` keeps the optimum of
-//! every stage finite, and μ falls until the duality gap `μ ν` is below the tolerance. The coordinates map all numbers
-//! one to one onto the cone's interior, so that a stage has one stationary point only: the optimum.
+//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so any ten numbers are a consistent body. If the best body lies
+//! on the cone's boundary, the plain fit diverges (d → −∞). Here `−μ ln det S` keeps the optimum of every stage
+//! finite, and μ decreases until the duality gap `μ ν` is below the tolerance. The coordinates map all numbers one to
+//! one onto the interior of the cone, so the optimum is the only stationary point of a stage.
 //!
-//! A step is the ten numbers of a second such matrix V that multiplies U from the right: upper triangular matrices are
-//! a group, and seen from U every body is the unit matrix, so that the barrier's Hessian is constant and small
-//! eigenvalues keep all their digits. The rest of the Hessian is `Jᵀ H J`: what is left out is multiplied by the
-//! gradient in x, which vanishes at the optimum, so steps become Newton's. Stiff data make curved valleys of straight
-//! ones; a long step may therefore also follow the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, where the theory of
-//! self-concordant barriers promises progress (Boyd and Vandenberghe 9.6.4).
+//! A step is the ten numbers of a second such matrix V that multiplies U from the right. Upper triangular matrices
+//! form a group, and relative to U every body is the unit matrix, so the barrier's Hessian is constant and small
+//! eigenvalues keep their digits. The rest of the Hessian is `Jᵀ H J`; the neglected part is multiplied by the
+//! gradient in x, which is zero at the optimum, so steps become Newton steps. With stiff data straight valleys become
+//! curved; a long step may therefore also follow the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, for which the theory
+//! of self-concordant barriers guarantees progress (Boyd and Vandenberghe 9.6.4).
 
 use super::cone::{congruence, inverse, log_determinant, upper_factor};
 use super::conic::{BlockMap, Certificate, Multipliers, Program, Slacks};
@@ -29,23 +29,23 @@ use super::precise::Precise;
 use super::stacked::{LocalRows, RightSide, Rows, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// μ falls by a factor from stage to stage: by this one at first, then by less after a stage that took many steps and
-/// by more after a short one.
+/// Factors of μ between stages: the first one, the slowest (after a stage with many steps) and the fastest (after a
+/// short stage).
 const REDUCTION: f64 = 0.1;
 const SLOWEST_REDUCTION: f64 = 0.7;
 const FASTEST_REDUCTION: f64 = 0.02;
 
-/// μ times the number of constraints, over the objective, at which the pull towards the references is let go.
-const RELEASE: f64 = 0.3;
+/// Value of μ times the number of constraints, relative to the objective, below which the pull towards the references
+/// is removed.
+const PULL_RELEASE_RATIO: f64 = 0.3;
 
-/// Steps of the last stage without progress of the certificate.
-const PATIENCE: usize = 25;
+const MAX_STEPS_WITHOUT_PROGRESS: usize = 25;
 
 /// One body: its first variable and the constant part of its block.
 type Body = (usize, Vector10);
 
-/// Solves a program all of whose plain blocks have variables of their own; none when `start` is not strictly inside or
-/// a block is shared.
+/// Solves a program whose plain blocks all have separate variables; `None` if `start` is not strictly inside or a
+/// block is shared.
 pub(super) fn log_cholesky(
     program: &Program,
     start: &DVector<f64>,
@@ -88,21 +88,21 @@ pub(super) fn log_cholesky(
         let predicted = point.step(program, &bodies, mu, pull);
         stage += 1;
         if last {
-            if predicted.is_none() || idle > PATIENCE && stage > PATIENCE {
+            if predicted.is_none() || idle > MAX_STEPS_WITHOUT_PROGRESS && stage > MAX_STEPS_WITHOUT_PROGRESS {
                 ending = Ending::Stalled;
                 break;
             }
         } else if predicted.is_none_or(|predicted| predicted <= 0.05 * mu) {
-            // Inside the region where Newton's steps converge quadratically (a decrement below a third).
+            // Region of quadratic convergence of Newton's steps (decrement below a third).
             reduction = match stage {
                 ..5 => (reduction * reduction).max(FASTEST_REDUCTION),
                 5..9 => reduction,
                 _ => reduction.sqrt().min(SLOWEST_REDUCTION),
             };
             stage = 0;
-            // A pull that fell with μ would hold bodies back that must grow by powers of ten, and let them go when
-            // steps are short: it goes while μ is large.
-            if pull > 0.0 && mu * degree <= RELEASE * scale {
+            // The pull is removed while μ is large. If it decreased with μ, it would hold back bodies that must grow
+            // by powers of ten until steps are short.
+            if pull > 0.0 && mu * degree <= PULL_RELEASE_RATIO * scale {
                 let held = pull * point.factors.iter().map(Matrix4::norm_squared).sum::<f64>();
                 pull = if held <= 0.01 * mu { 0.0 } else { 0.1 * pull };
             } else {
@@ -121,24 +121,22 @@ struct Point {
     /// U, one per body.
     factors: Vec<Matrix4<f64>>,
     x: Precise,
-    /// Slacks of the rows.
     rows: Vec<f64>,
 }
 
 /// A Newton step in the bodies' own coordinates.
 struct NewtonStep {
     step: DVector<f64>,
-    /// Decrease of the barrier that its quadratic model predicts.
     predicted: f64,
 }
 
-/// Whether the k-th coordinate of a body is a logarithm on the diagonal, as a number.
+/// 1 if the k-th coordinate of a body is a logarithm on the diagonal, else 0.
 fn is_diagonal(k: usize) -> f64 {
     f64::from(PAIRS[k].0 == PAIRS[k].1)
 }
 
-/// Rows whose squares are the Hessian of one body's barrier, exact in these coordinates: in −ln det V Vᵀ only the
-/// logarithms on the diagonal enter, and tr(G²) is 4 for them and 2 for the others.
+/// Rows whose squares are the Hessian of one body's barrier, exact in these coordinates: −ln det V Vᵀ contains only
+/// the logarithms on the diagonal, and tr(G²) is 4 for them and 2 for the others.
 fn barrier_rows(mu: f64) -> DMatrix<f64> {
     DMatrix::from_fn(10, 10, |i, j| if i == j { ((2.0 + 2.0 * is_diagonal(i)) * mu).sqrt() } else { 0.0 })
 }
@@ -153,7 +151,7 @@ impl Point {
         Slacks { blocks: blocks.collect(), rows: self.rows.clone() }
     }
 
-    /// The point judged with the multipliers that the barrier implies: `Z = μ S⁻¹`, `z = μ/s`.
+    /// Certificate with the multipliers of the barrier: `Z = μ S⁻¹`, `z = μ/s`.
     fn certified(&self, program: &Program, mu: f64) -> Option<(Multipliers, Certificate)> {
         let slacks = self.slacks(program);
         let mut factors = self.factors.iter();
@@ -174,8 +172,8 @@ impl Point {
         Some((multipliers, certificate))
     }
 
-    /// `f − μ Σ ln det S − μ Σ ln s + pull Σ tr S`, or none outside. The pull keeps early stages, whose μ is large,
-    /// near the reference in directions that nothing else holds.
+    /// `f − μ Σ ln det S − μ Σ ln s + pull Σ tr S`, or `None` outside. In early stages with large μ the pull keeps
+    /// undetermined directions near the reference.
     fn barrier(&self, program: &Program, mu: f64, pull: f64) -> Option<f64> {
         let mut sum = program.smooth_objective(&self.x);
         for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
@@ -194,12 +192,12 @@ impl Point {
         sum.is_finite().then_some(sum)
     }
 
-    /// One step; gives the decrease that the model predicted, or none when no length of it goes down.
+    /// One step; returns the predicted decrease, or `None` if no step length decreases the barrier.
     fn step(&mut self, program: &Program, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
         let newton = self.newton_step(program, bodies, mu, pull)?;
         let now = self.barrier(program, mu, pull)?;
         let slack = 4.0e-15 * (1.0 + now.abs());
-        // Armijo's rule: a tenth of the fall that the slope promises.
+        // Armijo's rule: a tenth of the decrease predicted by the slope.
         let better = |candidate: Option<Self>, alpha: f64, best: &mut Option<(f64, Self)>| {
             if let Some(candidate) = candidate
                 && let Some(value) = candidate.barrier(program, mu, pull)
@@ -214,7 +212,7 @@ impl Point {
         let mut alpha = 1.0;
         for _ in 0..50 {
             better(self.moved(program, bodies, &(step * alpha), curved), alpha, &mut best);
-            // Close by, both are the same but for digits that the curve keeps.
+            // For short steps both are equal except for the digits that the curve keeps.
             let short = bodies.iter().all(|(first, _)| (step.rows(*first, 10) * alpha).amax() < 0.1);
             if best.is_none() || !short {
                 better(self.moved(program, bodies, &(step * alpha), straight), alpha, &mut best);
@@ -228,7 +226,7 @@ impl Point {
         None
     }
 
-    /// The step to the lowest point of the barrier's quadratic model; none where the model has no decrease.
+    /// Step to the minimum of the barrier's quadratic model; `None` if the model has no decrease.
     fn newton_step(&self, program: &Program, bodies: &[Body], mu: f64, pull: f64) -> Option<NewtonStep> {
         let frames = bodies.iter().zip(&self.factors).map(|((first, _), u)| (*first, jacobian(u))).collect();
         let mut rows = Rows { frames, ..Rows::default() };
@@ -245,7 +243,6 @@ impl Point {
             let BlockMap::Own(first) = block.map else { return None };
             let value = block.value(&self.x.high);
             block.add_transposed(&vector_of(&inverse(&value)?), block.entropy, &mut outside);
-            // Rows whose squares are γ Q⁻¹ ⊗ Q⁻¹.
             let half = value.cholesky()?.l().solve_lower_triangular(&Matrix4::identity())?;
             let square = DMatrix::from_column_slice(10, 10, congruence(&half).as_slice()) * block.entropy.sqrt();
             rows.local.push(LocalRows { first, matrix: rows.framed_part(first, &square) });
@@ -289,7 +286,6 @@ impl Point {
         .collect()
     }
 
-    /// The point after a step, with V by `change`.
     fn moved(
         &self,
         program: &Program,
@@ -321,7 +317,7 @@ impl Point {
             .iter()
             .zip(&self.rows)
             .map(|(row, &old)| {
-                // A small slack is known better by its changes than as a difference of large numbers.
+                // Updating a small slack is more accurate than a difference of large numbers.
                 let change = row.linear_part(changes);
                 if change.abs() < 0.5 * old { old + change } else { row.value(&x.high) }
             })
@@ -331,15 +327,14 @@ impl Point {
     }
 }
 
-/// What a step does to a body.
 struct Change {
     /// V.
     factor: Matrix4<f64>,
-    /// `V Vᵀ − 1`, with the digits that the difference would lose.
+    /// `V Vᵀ − 1` without cancellation.
     difference: Matrix4<f64>,
 }
 
-/// V of ten numbers: logarithms on the diagonal.
+/// V from ten numbers, with logarithms on the diagonal.
 fn curved(n: &Vector10) -> Option<Change> {
     let mut less = Matrix4::zeros();
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
@@ -351,7 +346,7 @@ fn curved(n: &Vector10) -> Option<Change> {
     usable.then_some(change)
 }
 
-/// V with `V Vᵀ = 1 + G`, G the first-order change of ten numbers; none outside of the cone.
+/// V with `V Vᵀ = 1 + G`, G the first-order change of ten numbers; `None` outside the cone.
 fn straight(n: &Vector10) -> Option<Change> {
     let mut difference = Matrix4::zeros();
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
@@ -376,7 +371,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_jacobian_is_the_derivative_of_both_ways_to_move() {
+    fn jacobian_equals_differences_of_both_curves() {
         let numbers = Vector10::from([0.3, -0.2, 0.4, -1.0, 0.5, -0.3, 0.2, 0.1, -0.6, 0.7]);
         let u = curved(&numbers).unwrap().factor;
         assert!((upper_factor(&(u * u.transpose())).unwrap() - u).amax() < 1e-14);

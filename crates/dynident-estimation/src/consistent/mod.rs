@@ -1,11 +1,11 @@
-//! **Which bodies fit the data?** Inertial parameters that real bodies could have: every pseudo-inertia positive
-//! definite, friction and drive inertia not negative.
+//! **Physically consistent parameters**: every pseudo-inertia positive definite, friction and drive inertia not
+//! negative.
 //!
-//! Data determine base parameters; a [`PhysicalProblem`] says which sums of the bodies' own parameters those are, and
-//! what is known of the bodies beside (mass, a box for the centre of mass, an ellipsoid around it). [`physical_fit`]
-//! finds the consistent set that fits best, a convex problem (linear matrix inequalities) whose solution comes with a
-//! certificate; [`ConsistentIntervals`] how far each parameter can move before the fit becomes significantly worse. Two
-//! solvers that share nothing but the certificate agree on the optimum.
+//! Data determine base parameters. A [`PhysicalProblem`] defines them as combinations of the bodies' standard
+//! parameters and adds known limits (mass, a box for the centre of mass, an ellipsoid around the body).
+//! [`physical_fit`] finds the best consistent set, a convex problem (linear matrix inequalities) with a certified
+//! solution. [`ConsistentIntervals`] computes how far each parameter can move before the fit becomes significantly
+//! worse. Two independent solvers share only the certificate.
 
 mod assembly;
 mod cone;

@@ -1,8 +1,8 @@
 //! Variables with twice the digits: an unevaluated sum of two vectors.
 //!
-//! Data rows of 1e4 times variables of 1e7 leave residuals of one: with the sixteen digits of a double the gradient
-//! could not be made smaller than rounding leaves it, and with it the certificate. Sums and products without loss:
-//! Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005) 1955, algorithms 3.1, 3.3 and 5.3.
+//! Data rows of 1e4 times variables of 1e7 have residuals of one. In double precision rounding would limit the
+//! gradient and the certificate. Error-free sums and products: Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005)
+//! 1955, algorithms 3.1, 3.3 and 5.3.
 
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -10,22 +10,20 @@ use std::sync::OnceLock;
 
 #[derive(Clone, Debug)]
 pub(super) struct Precise {
-    /// The nearest doubles.
     pub(super) high: DVector<f64>,
-    /// What they leave.
     low: DVector<f64>,
-    /// What a program's data leave here: wanted several times of each point.
+    /// Cached residual of a program's data at this point.
     data_rest: OnceLock<DVector<f64>>,
 }
 
-/// `a + b` and what rounding took from it.
+/// `a + b` and its rounding error.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let part = sum - a;
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// The leading half of a double's digits, and the rest.
+/// Leading half of a double's digits, and the remainder.
 #[inline(always)]
 fn split<T: Lane>(a: T) -> (T, T) {
     let scaled = T::splat(134_217_729.0) * a;
@@ -39,12 +37,11 @@ impl Precise {
         Self { high, low, data_rest: OnceLock::new() }
     }
 
-    /// The same point for another program.
+    /// The same point without the cache, for another program.
     pub(super) fn of_another(&self) -> Self {
         Self { high: self.high.clone(), low: self.low.clone(), data_rest: OnceLock::new() }
     }
 
-    /// Adds a vector.
     pub(super) fn add(&mut self, change: &DVector<f64>) {
         self.data_rest.take();
         for ((high, low), change) in self.high.iter_mut().zip(&mut self.low).zip(change) {
@@ -53,12 +50,12 @@ impl Precise {
         }
     }
 
-    /// [`rest`](Self::rest) of the data of the program that this is a point of, which is always the same one.
+    /// Cached [`rest`](Self::rest) of the data of the point's program.
     pub(super) fn data_rest(&self, data: &DMatrix<f64>, target: &DVector<f64>) -> &DVector<f64> {
         self.data_rest.get_or_init(|| self.rest(data, target))
     }
 
-    /// `b − A x`, as if computed with twice the digits; the same bits at every processor level.
+    /// `b − A x` with twice the digits; bit-identical at every processor level.
     fn rest(&self, matrix: &DMatrix<f64>, target: &DVector<f64>) -> DVector<f64> {
         let mut out = target.clone();
         let (high, low) = (self.high.as_slice(), self.low.as_slice());
@@ -68,7 +65,6 @@ impl Precise {
     }
 }
 
-/// `out − A x` in place of `out`.
 struct Rest<'a> {
     /// Column by column.
     matrix: &'a [f64],
@@ -86,7 +82,7 @@ impl Kernel for Rest<'_> {
         let Self { matrix, rows, high, low, out } = self;
         let mut from = 0;
         while from < rows {
-            // Fewer rows than lanes at the end: what stands beside them is computed and not written.
+            // At the end there may be fewer rows than lanes; the extra lanes are not written.
             let count = T::LANES.min(rows - from);
             let entries = |column: usize, buffer: &mut [f64; 8]| -> T {
                 let values = &matrix[column * rows + from..][..count];
@@ -124,14 +120,14 @@ impl Kernel for Rest<'_> {
 mod tests {
     use super::*;
 
-    /// One row after another in plain doubles.
+    /// Row by row in plain doubles.
     fn plainly(x: &Precise, matrix: &DMatrix<f64>, target: &DVector<f64>) -> DVector<f64> {
         DVector::from_fn(target.len(), |row, _| {
             let (mut sum, mut error) = (target[row], 0.0);
             for column in 0..matrix.ncols() {
                 let (a, high) = (matrix[(row, column)], -x.high[column]);
                 let product = a * high;
-                // The error of a product, by an instruction that rounds once.
+                // Error of a product, by fused multiply-add.
                 let lost = a.mul_add(high, -product);
                 let (next, rounding) = two_sum(sum, product);
                 sum = next;
@@ -142,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn every_row_is_the_same_to_the_last_bit_at_every_level() {
+    fn rows_are_bit_identical_at_every_level() {
         for rows in [1, 3, 8, 13] {
             let wave = |i: usize, j: usize| ((i * 7 + j * j * 3) as f64 * 0.61).sin() * 10.0_f64.powi((i % 5) as i32);
             let (matrix, target) = (DMatrix::from_fn(rows, 9, wave), DVector::from_fn(rows, |i, _| wave(i, 11)));
@@ -165,14 +161,14 @@ mod tests {
     }
 
     #[test]
-    fn what_cancels_keeps_its_digits() {
-        // 1e8 (1e8 + 1e-9) − 1e16 = 0.1, of which a double keeps nothing: 1e8 + 1e-9 is 1e8.
+    fn cancelling_terms_keep_their_digits() {
+        // 1e8 (1e8 + 1e-9) − 1e16 = 0.1; in double precision 1e8 + 1e-9 is 1e8.
         let mut x = Precise::new(DVector::from_element(1, 1.0e8));
         x.add(&DVector::from_element(1, 1.0e-9));
         assert_eq!(x.high[0], 1.0e8);
         let rest = x.rest(&DMatrix::from_element(1, 1, 1.0e8), &DVector::from_element(1, 1.0e16));
         assert!((rest[0] + 0.1).abs() < 1e-15);
-        // A product that rounding would change: (1 + 2⁻³⁰)² − 1 − 2⁻²⁹ = 2⁻⁶⁰.
+        // A product with rounding: (1 + 2⁻³⁰)² − 1 − 2⁻²⁹ = 2⁻⁶⁰.
         let odd = 1.0 + (2.0_f64).powi(-30);
         let target = DVector::from_element(1, 1.0 + (2.0_f64).powi(-29));
         let rest = Precise::new(DVector::from_element(1, odd)).rest(&DMatrix::from_element(1, 1, odd), &target);

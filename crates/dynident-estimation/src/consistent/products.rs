@@ -1,12 +1,12 @@
-//! Products of dense rows with a vector, and the two solutions by a packed triangle: a third of a Newton step's time in
-//! plain loops, which the build target's two lanes hold back.
+//! Products of dense rows with a vector and the two solutions with a packed triangle, as vector kernels: a third of
+//! the time of a Newton step.
 
 use crate::factor::row_start;
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 
-/// Columns that share each loaded number of the vector.
-const AT_ONCE: usize = 4;
+/// Columns that share each load of the vector.
+const COLUMNS_PER_BLOCK: usize = 4;
 
 /// Adds `Aᵀ h` to `sum`.
 pub(super) fn add_transposed(matrix: &DMatrix<f64>, h: &[f64], sum: &mut [f64]) {
@@ -22,12 +22,12 @@ pub(super) fn subtract_product(matrix: &DMatrix<f64>, u: &[f64], h: &mut [f64]) 
     }
 }
 
-/// y with `Rᵀ y = b` in place of b; R is packed by rows.
+/// Replaces b by y with `Rᵀ y = b`; R is packed by rows.
 pub(super) fn solve_lower(triangle: &[f64], b: &mut [f64]) {
     dispatch(Level::detect(), Lower { triangle, b });
 }
 
-/// u with `R u = y` in place of y.
+/// Replaces y by u with `R u = y`.
 pub(super) fn solve_upper(triangle: &[f64], y: &mut [f64]) {
     dispatch(Level::detect(), Upper { triangle, y });
 }
@@ -44,11 +44,11 @@ impl Kernel for AddTransposed<'_> {
     #[inline(always)]
     fn run<T: Lane>(self) {
         let rows = self.h.len();
-        let mut columns = self.matrix.chunks_exact(AT_ONCE * rows);
-        let mut sums = self.sum.chunks_exact_mut(AT_ONCE);
+        let mut columns = self.matrix.chunks_exact(COLUMNS_PER_BLOCK * rows);
+        let mut sums = self.sum.chunks_exact_mut(COLUMNS_PER_BLOCK);
         for (columns, sums) in (&mut columns).zip(&mut sums) {
-            let found = dots::<T, AT_ONCE>(columns, self.h);
-            for k in 0..AT_ONCE {
+            let found = dots::<T, COLUMNS_PER_BLOCK>(columns, self.h);
+            for k in 0..COLUMNS_PER_BLOCK {
                 sums[k] += found[k];
             }
         }
@@ -71,10 +71,10 @@ impl Kernel for SubtractProduct<'_> {
     #[inline(always)]
     fn run<T: Lane>(self) {
         let rows = self.h.len();
-        let mut columns = self.matrix.chunks_exact(AT_ONCE * rows);
-        let mut factors = self.u.chunks_exact(AT_ONCE);
+        let mut columns = self.matrix.chunks_exact(COLUMNS_PER_BLOCK * rows);
+        let mut factors = self.u.chunks_exact(COLUMNS_PER_BLOCK);
         for (columns, factors) in (&mut columns).zip(&mut factors) {
-            subtract::<T, AT_ONCE>(columns, factors, self.h);
+            subtract::<T, COLUMNS_PER_BLOCK>(columns, factors, self.h);
         }
         for (column, factor) in columns.remainder().chunks_exact(rows).zip(factors.remainder().chunks_exact(1)) {
             subtract::<T, 1>(column, factor, self.h);
@@ -123,7 +123,7 @@ impl Kernel for Upper<'_> {
     }
 }
 
-/// The inner products of `N` columns, one after another, with `h`.
+/// Inner products of `N` consecutive columns with `h`.
 #[inline(always)]
 fn dots<T: Lane, const N: usize>(columns: &[f64], h: &[f64]) -> [f64; N] {
     let rows = h.len();
@@ -175,7 +175,7 @@ mod tests {
     use nalgebra::DVector;
 
     #[test]
-    fn products_are_the_products_at_every_level() {
+    fn products_agree_at_every_processor_level() {
         let wave = |i: usize, j: usize| ((i * i * 5 + j * 3 + i * j * j * 2) as f64 * 0.37).sin();
         for (rows, columns) in [(0, 3), (1, 1), (5, 9), (16, 7), (23, 12)] {
             let matrix = DMatrix::from_fn(rows, columns, wave);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn both_solutions_are_the_triangles() {
+    fn both_solutions_satisfy_the_triangle() {
         let size = 21;
         let entry = |i: usize, j: usize| if i == j { 2.0 } else { 0.3 * ((i * 7 + j * j) as f64 * 0.61).sin() };
         let packed: Vec<f64> = (0..size).flat_map(|i| (i..size).map(move |j| entry(i, j))).collect();
@@ -205,7 +205,7 @@ mod tests {
             let (mut y, mut u) = (b.clone(), b.clone());
             dispatch(level, Lower { triangle: &packed, b: y.as_mut_slice() });
             dispatch(level, Upper { triangle: &packed, y: u.as_mut_slice() });
-            // The condition of the triangle, some tens, times rounding, with room.
+            // Condition number of the triangle (some tens) times rounding, with margin.
             assert!((dense.tr_mul(&y) - &b).amax() < 1e-12 && (&dense * &u - &b).amax() < 1e-12);
         }
     }

@@ -4,17 +4,17 @@ use super::error::PhysicalError;
 use super::priors::PhysicalPrior;
 use serde::{Deserialize, Serialize};
 
-/// How the convex problem is solved. Both routes end at the same optimum.
+/// Solver of the convex problem. Both have the same optimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalRoute {
-    /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside. Where
-    /// doubles let it come no nearer to the optimum than the tolerance, the other route is tried as well and the better
-    /// one counts.
+    /// Primal-dual interior point on the pseudo-inertias: fast, and equally accurate inside the cone and on its
+    /// boundary. If it does not reach the tolerance in double precision, the other route is tried and the better
+    /// result is used.
     #[default]
     InteriorPoint,
-    /// Gauss-Newton in log-Cholesky coordinates with a falling barrier: an independent check.
+    /// Gauss-Newton in log-Cholesky coordinates with a decreasing barrier: an independent check.
     LogCholesky,
 }
 
@@ -24,18 +24,18 @@ pub enum PhysicalRoute {
 pub struct PhysicalSettings {
     /// The solver. Default `interior-point`.
     pub route: PhysicalRoute,
-    /// Distance from the prior bodies. Default `entropic`.
+    /// Distance measure from the prior bodies. Default `entropic`.
     pub prior: PhysicalPrior,
-    /// γ: what one unit of that distance costs, against half the squared distance from the data's own optimum in
-    /// standard deviations. Default 0.01: the data's fit is given up by at most 0.01 times the distance, which no test
-    /// could notice, while directions that no data reach get the prior's values.
+    /// γ: weight of that distance against half the squared distance from the optimum of the data in standard
+    /// deviations. Default 0.01: the fit to the data is worse by at most 0.01 times the distance, which is not
+    /// significant, and directions without data get the prior's values.
     pub prior_weight: f64,
-    /// ε of `P ⪰ ε P0` for every body. Default 1e-4: mass spread over a hundredth of the reference's size in every
-    /// direction, which any real link has.
+    /// ε of `P ⪰ ε P0` for every body. Default 1e-4: mass extends over a hundredth of the reference's size in every
+    /// direction, which is true for any real link.
     pub margin: f64,
-    /// Largest certificate (stationarity and duality gap, both relative) at which a fit counts as solved. Default 5e-8.
+    /// Maximum certificate (relative stationarity and duality gap) of a solved fit. Default 5e-8.
     pub tolerance: f64,
-    /// Most iterations. Default 2000; the interior point takes 15 to 80, log-Cholesky 60 to 350.
+    /// Maximum number of iterations. Default 2000; the interior point takes 15 to 80, log-Cholesky 60 to 350.
     pub max_iterations: usize,
 }
 
@@ -57,7 +57,7 @@ impl PhysicalSettings {
     ///
     /// # Errors
     /// [`PhysicalError::Setting`] for a prior weight outside 1e-9 to 1e9, a margin outside 1e-9 to 0.5, a tolerance
-    /// outside 1e-10 to 1e-2, or no iterations.
+    /// outside 1e-10 to 1e-2, or zero iterations.
     pub fn validate(&self) -> Result<(), PhysicalError> {
         let within = |setting, value: f64, least: f64, greatest: f64, fix| {
             if (least..=greatest).contains(&value) {
@@ -66,10 +66,10 @@ impl PhysicalSettings {
                 Err(PhysicalError::Setting { setting, value, fix })
             }
         };
-        let fix = "give a weight from 1e-9 to 1e9: without any, directions that no data reach have no answer";
+        let fix = "use a weight from 1e-9 to 1e9; without a prior, directions without data are undetermined";
         within("prior_weight", self.prior_weight, 1.0e-9, 1.0e9, fix)?;
-        within("margin", self.margin, 1.0e-9, 0.5, "give a share of the reference body from 1e-9 to 0.5")?;
-        within("tolerance", self.tolerance, 1.0e-10, 1.0e-2, "give a relative accuracy from 1e-10 to 1e-2")?;
-        within("max_iterations", self.max_iterations as f64, 1.0, f64::INFINITY, "give at least 1")
+        within("margin", self.margin, 1.0e-9, 0.5, "use a share of the reference body from 1e-9 to 0.5")?;
+        within("tolerance", self.tolerance, 1.0e-10, 1.0e-2, "use a relative accuracy from 1e-10 to 1e-2")?;
+        within("max_iterations", self.max_iterations as f64, 1.0, f64::INFINITY, "use at least 1")
     }
 }

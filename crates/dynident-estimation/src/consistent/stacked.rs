@@ -1,14 +1,14 @@
-//! Newton systems as least squares: stacked square-root rows under orthogonal reflections, never normal equations.
+//! Newton systems as least squares on stacked rows, solved with orthogonal reflections instead of normal equations.
 //!
-//! A direction of a barrier method solves `GᵀG u = Gᵀh − g`, where G stacks the rows of the data, of the priors, and of
-//! every constraint in its own scaling. Formed as a matrix, GᵀG loses what stands a factor 1e-16 below its largest
-//! entry, and near the cone's boundary the unit rows of a constraint stand beside data rows of 1e10. G itself loses the
-//! square root of that only. Each body's ten variables are seen in a frame (`Δx = J u`) in which the barrier's rows are
-//! the unit matrix; they need no reflection, and the block triangle that they make with the other rows of the same body
-//! is where the reflections of the data rows begin.
+//! A direction of a barrier method solves `GᵀG u = Gᵀh − g`, where G stacks the rows of the data, the priors and every
+//! constraint in its own scaling. The matrix GᵀG loses everything below 1e-16 of its largest entry, and near the
+//! cone's boundary constraint rows of size one are stacked on data rows of 1e10. G itself loses only the square root
+//! of that. Each body's ten variables are represented in a frame (`Δx = J u`) in which the barrier's rows are the unit
+//! matrix and need no reflection. The data rows are then reflected into the block triangle of these and the other rows
+//! of the same body.
 //!
-//! Solved by the triangle and refined against the rows themselves (corrected seminormal equations: Björck, Linear
-//! Algebra Appl. 88 (1987) 31).
+//! Solved with the triangle and refined with the rows (corrected seminormal equations: Björck, Linear Algebra Appl. 88
+//! (1987) 31).
 
 use super::coordinates::Matrix10;
 use super::products::{add_transposed, solve_lower, solve_upper, subtract_product};
@@ -16,35 +16,33 @@ use crate::factor::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
-/// Rows `[.. C ..]` that see consecutive variables only, in their frame.
+/// Rows `[.. C ..]` with consecutive variables only, in their frame.
 #[derive(Clone, Debug)]
 pub(super) struct LocalRows {
     pub(super) first: usize,
     pub(super) matrix: DMatrix<f64>,
 }
 
-/// What a Newton system is made of.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
-    /// Frames: `Δx[first..first + 10] = J u[first..first + 10]`; variables of no frame are their own.
+    /// Frames: `Δx[first..first + 10] = J u[first..first + 10]`; other variables have no frame.
     pub(super) frames: Vec<(usize, Matrix10)>,
     /// Rows of single bodies and scalars, in the frame.
     pub(super) local: Vec<LocalRows>,
-    /// Rows that couple, in the frame.
+    /// Rows that couple bodies, in the frame.
     pub(super) wide: Vec<DMatrix<f64>>,
 }
 
-/// Where rows that came one by one went.
 #[derive(Clone, Debug)]
 pub(super) struct Singles {
-    /// Those that see one body or one variable only.
+    /// Rows with one body or one variable only.
     local: Vec<usize>,
-    /// The others, which are one matrix.
+    /// Other rows, collected in one matrix.
     wide: Vec<usize>,
 }
 
 impl Singles {
-    /// Appends their right-hand sides, one number for each row.
+    /// Appends their right-hand sides, one number per row.
     pub(super) fn append(&self, h: &[f64], local: &mut Vec<DVector<f64>>, wide: &mut Vec<DVector<f64>>) {
         local.extend(self.local.iter().map(|&row| DVector::from_element(1, h[row])));
         wide.push(DVector::from_iterator(self.wide.len(), self.wide.iter().map(|&row| h[row])));
@@ -58,7 +56,7 @@ pub(super) struct StackedSystem {
     triangle: Vec<f64>,
 }
 
-/// A right-hand side: one vector for each set of rows, and a part that is no row's.
+/// A right-hand side: one vector per set of rows, and a direct part.
 #[derive(Clone, Debug)]
 pub(super) struct RightSide {
     pub(super) local: Vec<DVector<f64>>,
@@ -98,7 +96,7 @@ impl Rows {
         framed
     }
 
-    /// Adds single rows, in the frame. They come after all others.
+    /// Adds single rows, in the frame, after all others.
     pub(super) fn add_singles(&mut self, rows: &[DVector<f64>]) -> Singles {
         let mut singles = Singles { local: Vec::new(), wide: Vec::new() };
         for (index, row) in rows.iter().enumerate() {
@@ -119,13 +117,12 @@ impl Rows {
         singles
     }
 
-    /// First variable and number of those in one frame with this one.
     fn group_of(&self, variable: usize) -> (usize, usize) {
         let holds = |first: usize| first <= variable && variable < first + 10;
         self.frames.iter().find(|(first, _)| holds(*first)).map_or((variable, 1), |(first, _)| (*first, 10))
     }
 
-    /// `C J` for columns that begin at `first` and end with that body or variable.
+    /// `C J` for columns from `first` to the end of that body or variable.
     pub(super) fn framed_part(&self, first: usize, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let frame = self.frames.iter().find(|(at, _)| *at == first && matrix.ncols() == 10);
         frame.map_or_else(|| matrix.clone(), |(_, frame)| matrix * DMatrix::from_column_slice(10, 10, frame.as_slice()))
@@ -158,12 +155,11 @@ impl Rows {
     }
 }
 
-/// A pivot smaller than this share of its column counts as lost.
-const LEAST_PIVOT: f64 = 1.0e-15;
+const MIN_PIVOT_SHARE: f64 = 1.0e-15;
 
 impl StackedSystem {
-    /// Reduces the rows over `size` variables. Where rounding leaves a variable without any row of its own, the least
-    /// row that helps is added. None when that is not enough, or an entry is not finite.
+    /// Reduces the rows over `size` variables. If rounding cancels the rows of a variable, the smallest sufficient row
+    /// is added. `None` if that fails or an entry is not finite.
     pub(super) fn new(size: usize, rows: Rows) -> Option<Self> {
         let mut squares = vec![0.0; size];
         for part in &rows.local {
@@ -182,7 +178,7 @@ impl StackedSystem {
         let mut added = 0.0;
         loop {
             let triangle = reduced(size, &rows, &squares, added);
-            let usable = (0..size).all(|k| triangle[row_start(size, k)] > LEAST_PIVOT * squares[k].sqrt());
+            let usable = (0..size).all(|k| triangle[row_start(size, k)] > MIN_PIVOT_SHARE * squares[k].sqrt());
             if usable {
                 return Some(Self { rows, triangle });
             }
@@ -193,19 +189,18 @@ impl StackedSystem {
         }
     }
 
-    /// The rows that it was made from.
     pub(super) fn rows(&self) -> &Rows {
         &self.rows
     }
 
-    /// u with `GᵀG u = Gᵀh + direct`, refined as long as that helps.
+    /// u with `GᵀG u = Gᵀh + direct`, refined as long as this reduces the error.
     pub(super) fn solve(&self, right: &RightSide) -> DVector<f64> {
         let mut u = self.solve_once(self.rows.transposed(right));
         let mut size = f64::INFINITY;
         for _ in 0..4 {
             let rest = self.rows.transposed(&self.rows.rest(right, &u));
             let half = self.solve_lower(rest);
-            // The error in the system's own metric.
+            // Error in the system's metric.
             let norm = half.norm();
             if norm.is_nan() || norm >= 0.3 * size {
                 break;
@@ -231,10 +226,9 @@ impl StackedSystem {
     }
 }
 
-/// The packed triangle of all rows and of `added √squares` on the diagonal.
+/// Packed triangle of all rows and of `added √squares` on the diagonal.
 fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     let mut triangle = vec![0.0; row_start(size, size)];
-    // Those of one body.
     let mut small = [0.0; row_start(10, 10)];
     let (mut own, mut filled) = (Vec::new(), Vec::new());
     let mut at = 0;
@@ -278,17 +272,16 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     triangle
 }
 
-/// Rows on the way into a triangle.
+/// Rows to be reduced into a triangle.
 struct Panel<'a> {
     size: usize,
     chunks: usize,
     values: &'a mut [Chunk],
-    /// Rows so far.
     rows: usize,
 }
 
 impl<'a> Panel<'a> {
-    /// Room for rows over `size` columns, in memory that is used again.
+    /// Memory for rows over `size` columns; `memory` is reused.
     fn new(size: usize, chunks: usize, memory: &'a mut Vec<Chunk>) -> Self {
         memory.clear();
         memory.resize(size * chunks, Chunk::ZERO);
@@ -302,7 +295,7 @@ impl<'a> Panel<'a> {
         }
         for (k, column) in part.as_slice().chunks_exact(part.nrows()).enumerate() {
             let mut chunks = self.values[(first + k) * self.chunks..(first + k + 1) * self.chunks].iter_mut();
-            // The chunk that the rows before have begun, then whole ones.
+            // First the partly filled chunk, then whole ones.
             let begun = self.rows % CHUNK_ROWS;
             let (head, rest) = column.split_at((CHUNK_ROWS - begun).min(column.len()));
             let mut chunks = chunks.by_ref().skip(self.rows / CHUNK_ROWS);
@@ -316,7 +309,7 @@ impl<'a> Panel<'a> {
         self.rows += part.nrows();
     }
 
-    /// Reflects all rows into a packed triangle; `filled` is memory that is used again.
+    /// Reflects all rows into a packed triangle; `filled` is reused memory.
     fn absorbed(self, triangle: &mut [f64], filled: &mut Vec<usize>) {
         let Self { size, chunks, values: panel, .. } = self;
         heights(panel, chunks, filled);
@@ -329,14 +322,14 @@ mod tests {
     use super::*;
 
     fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
-        // Of full rank: the phase is no sum of a row's and a column's.
+        // Full rank: the phase is not a sum of a row and a column term.
         DMatrix::from_fn(rows, columns, |i, j| ((i * i * 5 + j * 3 + i * j * j * 2) as f64 * 0.37 + seed).sin())
     }
 
     #[test]
     fn solves_rows_that_normal_equations_would_lose() {
-        // Data rows 1e9 times the unit rows, and of half the rank: the weak directions are the unit rows' alone, and
-        // 1e-16 · 1e18 is more than they have.
+        // Data rows of half the rank and 1e9 times the unit rows: the weak directions come from the unit rows only,
+        // which are below 1e-16 · 1e18.
         let (size, scale) = (14, 1.0e9);
         let frame = Matrix10::identity();
         let wide = matrix(6, size, 0.4) * scale;
@@ -348,7 +341,7 @@ mod tests {
             wide: vec![wide.clone()],
         };
         let system = StackedSystem::new(size, rows).unwrap();
-        // With h = (A v, v) the answer is v.
+        // With h = (A v, v) the solution is v.
         let v = DVector::from_fn(size, |i, _| (i as f64).cos());
         let right = RightSide {
             local: std::iter::once(v.rows(0, 10).into_owned())
@@ -357,12 +350,12 @@ mod tests {
             wide: vec![&wide * &v],
             direct: DVector::zeros(size),
         };
-        // Condition 1e10 times rounding.
+        // Condition number 1e10 times rounding.
         assert!((system.solve(&right) - v).amax() < 1e-5);
     }
 
     #[test]
-    fn frames_and_the_direct_part_are_the_normal_equations() {
+    fn frames_and_direct_part_equal_the_normal_equations() {
         let size = 12;
         let frame = Matrix10::from_fn(|i, j| f64::from(i == j) + 0.1 * ((i * 3 + j) as f64).sin());
         let mut rows = Rows { frames: vec![(1, frame)], ..Rows::default() };
@@ -384,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variable_without_rows_or_a_broken_one_is_none() {
+    fn variables_without_rows_or_with_nan_give_none() {
         let rows = |value: f64| Rows { wide: vec![DMatrix::from_row_slice(1, 2, &[1.0, value])], ..Rows::default() };
         assert!(StackedSystem::new(2, rows(0.0)).is_none());
         assert!(StackedSystem::new(2, rows(f64::NAN)).is_none());

@@ -1,19 +1,18 @@
-//! Cross-validation between models that share most of their columns, from factors alone: which of many columns should
-//! one joint have?
+//! Cross-validation of models that share most of their columns, from factors alone.
 //!
-//! The log's time segments are dealt out to K blocks in turn, so that every block holds a part of all that was moved:
-//! what a fit says of a block is then not made of what the other blocks never showed. With block k left out, all other
-//! rows of all joints are reduced to one triangle whose last columns are the candidates':
-//!
+//! The time segments are distributed over K blocks in turn, so that every block covers all parts of the motion. For
+//! each left-out block k, all other rows of all joints are reduced to one triangle whose last columns are the
+//! candidates:
 //! ```text
-//!     [ R_cc  R_cv  r_c ]   c: columns that every candidate model has, v: candidate columns
+//! ```text
 //!     [  0    R_vv  r_v ]
 //! ```
 //!
-//! A candidate model takes some of v: its coefficients follow from `R_vv` and `r_v` alone (a problem of a few
-//! unknowns), the others by substitution, and the error on block k from that block's own triangle. So the rows are
-//! reduced once per block, whatever the number of candidates (variable projection: Golub and Pereyra, SIAM J. Numer.
-//! Anal. 10 (1973) 413).
+//! The coefficients of a candidate model with some of the columns v follow from `R_vv` and `r_v` alone (a few
+//! unknowns), the others by substitution, and the error on block k from that block's own triangle. The rows are
+//! reduced
+//! once per block for any number of candidates (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
+//! 413).
 
 use super::nonnegative::nonnegative_least_squares;
 use crate::error::{EstimationError, require};
@@ -22,8 +21,8 @@ use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// A column of which earlier ones leave a smaller share than this has no value of its own.
-const DEPENDENT: f64 = 1.0e-8;
+/// A column is dependent if earlier columns leave a smaller share of it.
+const DEPENDENCE_TOLERANCE: f64 = 1.0e-8;
 
 /// The rows of a problem, cut into blocks of time.
 #[derive(Debug)]
@@ -33,50 +32,45 @@ pub struct CrossValidation<'a> {
     folds: usize,
 }
 
-/// The rows of equations that are [alike](LinearProblem::alike).
+/// The rows of [same-column equations](LinearProblem::same_column_groups).
 #[derive(Debug)]
 struct Part {
-    /// The first of these equations.
     first: usize,
-    /// What each block holds.
     own: Vec<TriangularFactor>,
-    /// What all others hold, and (last) what all hold.
+    /// Rows of all other blocks, for each block, and (last) all rows.
     others: Vec<TriangularFactor>,
 }
 
-/// One joint's candidates with one block left out at a time.
+/// One joint's candidates for all left-out blocks.
 #[derive(Debug)]
 pub struct JointFolds {
     common: Vec<usize>,
     variable: Vec<usize>,
-    /// Per block and, last, with no block left out.
+    /// One per left-out block; the last one without a left-out block.
     folds: Vec<Fold>,
 }
 
-/// What all candidates share when one block is left out; columns in the order common, variable.
+/// Data shared by all candidates for one left-out block; columns in the order common, variable.
 #[derive(Debug)]
 struct Fold {
-    /// All rows that are fitted to.
     triangle: TriangularFactor,
-    /// The joint's rows of the block (of all blocks).
+    /// The joint's rows in the left-out block (in all blocks for the last fold).
     rows: TriangularFactor,
     /// `R_vvᵀ R_vv` and `R_vvᵀ r_v`.
     gram: DMatrix<f64>,
     right: DVector<f64>,
-    /// Whether a common column is separated from earlier ones.
+    /// Whether a common column is independent of earlier ones.
     independent: Vec<bool>,
 }
 
-/// Candidates that are computed side by side.
-const SIDE_BY_SIDE: usize = 8;
+const CANDIDATES_PER_BLOCK: usize = 8;
 
-/// A number for each candidate at work.
-type Side = [f64; SIDE_BY_SIDE];
+type CandidateValues = [f64; CANDIDATES_PER_BLOCK];
 
-/// What a candidate model leaves of the joint's torque.
+/// Prediction errors of a candidate model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoldErrors {
-    /// Sum of squared residuals on each block by the fit to the others, (Nm)².
+    /// Sum of squared residuals on each block by the fit to the other blocks, (Nm)².
     pub squares: Vec<f64>,
     /// Rows of the joint in each block.
     pub rows: Vec<usize>,
@@ -90,8 +84,8 @@ impl FoldErrors {
         (self.squares.iter().sum::<f64>() / self.rows.iter().sum::<usize>().max(1) as f64).sqrt()
     }
 
-    /// Mean square error minus that of `other`, and the standard error of this difference as it varies from block to
-    /// block: `s/√K`, with blocks weighted by their rows.
+    /// Mean square error minus that of `other`, and the standard error of this difference from its variation between
+    /// blocks: `s/√K`, with blocks weighted by their rows.
     pub fn excess_over(&self, other: &Self) -> [f64; 2] {
         let count = self.rows.len() as f64;
         let mean_rows = self.rows.iter().sum::<usize>() as f64 / count;
@@ -103,13 +97,13 @@ impl FoldErrors {
 }
 
 impl<'a> CrossValidation<'a> {
-    /// Deals the problem's segments out to `folds` blocks in turn, over all logs in their order.
+    /// Distributes the problem's segments over `folds` blocks in turn, over all logs in their order.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer
-    /// segments than blocks; [`EstimationError::Empty`].
+    /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] for fewer segments
+    /// than blocks; [`EstimationError::Empty`].
     pub fn new(problem: &'a LinearProblem, folds: usize) -> Result<Self, EstimationError> {
-        require(folds >= 2, "folds", folds as f64, "give at least 2 blocks")?;
+        require(folds >= 2, "folds", folds as f64, "use at least 2 blocks")?;
         if problem.equations().is_empty() {
             return Err(EstimationError::Empty);
         }
@@ -119,20 +113,20 @@ impl<'a> CrossValidation<'a> {
             before.push(segments[equation.joint]);
             segments[equation.joint] += equation.factor.segment_rows().len();
         }
-        // Logs whose rows see the same columns are one stack of rows from here on.
-        let part = |alike: Vec<usize>| {
-            let columns = problem.equations()[alike[0]].factor.columns();
+        // Logs with the same columns are combined.
+        let part = |group: Vec<usize>| {
+            let columns = problem.equations()[group[0]].factor.columns();
             let mut own = vec![TriangularFactor::new(columns); folds];
             let mut workspace = FactorWorkspace::default();
-            for &equation in &alike {
+            for &equation in &group {
                 for (number, segment) in problem.equations()[equation].factor.segment_factors().iter().enumerate() {
                     own[(before[equation] + number) % folds].absorb_factor(&mut workspace, segment);
                 }
             }
             let others = all_but_one(&own, columns);
-            Part { first: alike[0], own, others }
+            Part { first: group[0], own, others }
         };
-        let parts = problem.alike().into_par_iter().map(part).collect();
+        let parts = problem.same_column_groups().into_par_iter().map(part).collect();
         let fewest = segments.into_iter().filter(|&count| count > 0).min().unwrap_or(0);
         if fewest < folds {
             return Err(EstimationError::TooFewSegments { clusters: fewest });
@@ -140,13 +134,13 @@ impl<'a> CrossValidation<'a> {
         Ok(Self { problem, parts, folds })
     }
 
-    /// Prepares the choice of joint `joint` among the columns `variable`, which no other joint sees. All joints see
-    /// those of the columns `common` that are theirs; rows of joint j count with `weights[j]`.
+    /// Prepares the selection for joint `joint` among the columns `variable`, which must not occur in other joints.
+    /// The columns `common` are always included; rows of joint j have the weight `weights[j]`.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] for numbers out of range or another number of weights;
-    /// [`EstimationError::Setting`] for an impossible weight; [`EstimationError::TooFewRows`] when a block leaves fewer
-    /// rows of the joint, or all blocks but one of all joints, than could distinguish the columns.
+    /// [`EstimationError::Mismatch`] for numbers out of range or a wrong number of weights;
+    /// [`EstimationError::Setting`] for an invalid weight; [`EstimationError::TooFewRows`] if the rows without a block
+    /// cannot distinguish the columns.
     pub fn joint(
         &self,
         joint: usize,
@@ -160,7 +154,7 @@ impl<'a> CrossValidation<'a> {
             return Err(mismatch("weights of joints", joints.len(), weights.len()));
         }
         if joint >= joints.len() {
-            return Err(mismatch("a joint number below the number of joints", joints.len(), joint));
+            return Err(mismatch("joint number, below the number of joints", joints.len(), joint));
         }
         let size = self.problem.columns().len();
         crate::factor::check_columns(common, size)?;
@@ -184,7 +178,7 @@ impl<'a> CrossValidation<'a> {
                 };
                 let weight = weights[equation.joint];
                 crate::factor::check_weight(weight)?;
-                // Later rows have nothing but torque, and what the triangle cannot explain does not count.
+                // Later rows contain torque only and do not affect the fit.
                 let seen = order.iter().filter_map(|&global| place[global]).max().map_or(0, |local| local + 1);
                 absorb(&mut triangle, &others[fold], weight, seen);
                 if equation.joint == joint {
@@ -206,7 +200,7 @@ impl<'a> CrossValidation<'a> {
     }
 }
 
-/// What all blocks but one hold, for each block, and (last) what all hold: from both ends towards the middle.
+/// For each block the rows of all other blocks, and (last) all rows, from prefix and suffix sums.
 fn all_but_one(own: &[TriangularFactor], columns: usize) -> Vec<TriangularFactor> {
     let mut workspace = FactorWorkspace::default();
     let mut after = vec![TriangularFactor::new(columns)];
@@ -234,10 +228,10 @@ impl JointFolds {
         &self.variable
     }
 
-    /// Variance inflation of a combination `a` of candidate columns, given as (place in [`variable`](Self::variable),
-    /// factor): the factor by which the common columns and the combinations `others` increase the variance of its
-    /// coefficient. It is `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that a combination of those columns
-    /// explains over all rows: 1 where they explain nothing, infinite where they explain all of it.
+    /// Variance inflation factor of a combination `a` of candidate columns, given as (place in
+    /// [`variable`](Self::variable), factor): `1 / (1 - R²)`, where R² is the share of `‖W a‖²` that the common
+    /// columns and the combinations `others` explain over all rows. It is 1 if they explain nothing and infinite if
+    /// they explain everything.
     ///
     /// Source: Belsley, Kuh and Welsch, *Regression Diagnostics*, 1980, section 3.1; not centred.
     ///
@@ -255,7 +249,7 @@ impl JointFolds {
         };
         let own = dense(combination);
         let whole = fold.square_of(self.common.len(), combination);
-        // The Gram matrix is that of the parts which the common columns do not explain.
+        // The Gram matrix is that of the parts that the common columns do not explain.
         let mut basis: Vec<DVector<f64>> = Vec::with_capacity(others.len());
         let without = |mut vector: DVector<f64>, basis: &[DVector<f64>]| {
             for one in basis {
@@ -267,7 +261,7 @@ impl JointFolds {
         for other in others {
             let rest = without(dense(other), &basis);
             let square = rest.dot(&(&fold.gram * &rest));
-            if square > DEPENDENT * fold.square_of(self.common.len(), other) {
+            if square > DEPENDENCE_TOLERANCE * fold.square_of(self.common.len(), other) {
                 basis.push(rest / square.sqrt());
             }
         }
@@ -276,25 +270,25 @@ impl JointFolds {
         if whole > 0.0 && left > 0.0 { whole / left } else { f64::INFINITY }
     }
 
-    /// The error of the model that has the candidate columns `chosen` (places in [`variable`](Self::variable)) beside
-    /// the common ones; those with `nonnegative` set are constrained to coefficients of zero or more.
+    /// Errors of the model with the candidate columns `chosen` (places in [`variable`](Self::variable)) and the common
+    /// ones; coefficients with `nonnegative` set are constrained to zero or more.
     ///
     /// # Panics
     /// If the slices' lengths differ or a place is out of range.
     pub fn errors(&self, chosen: &[usize], nonnegative: &[bool]) -> FoldErrors {
-        self.side_by_side(Level::detect(), &[(chosen, nonnegative)]).swap_remove(0)
+        self.block_errors(Level::detect(), &[(chosen, nonnegative)]).swap_remove(0)
     }
 
-    /// [`errors`](Self::errors) of many models, each given as (chosen, nonnegative), in their order.
+    /// [`errors`](Self::errors) of several models, each given as (chosen, nonnegative).
     ///
     /// # Panics
     /// As [`errors`](Self::errors).
     pub fn errors_of_all(&self, models: &[(&[usize], &[bool])]) -> Vec<FoldErrors> {
         let level = Level::detect();
-        models.chunks(SIDE_BY_SIDE).flat_map(|some| self.side_by_side(level, some)).collect()
+        models.chunks(CANDIDATES_PER_BLOCK).flat_map(|some| self.block_errors(level, some)).collect()
     }
 
-    fn side_by_side(&self, level: Level, models: &[(&[usize], &[bool])]) -> Vec<FoldErrors> {
+    fn block_errors(&self, level: Level, models: &[(&[usize], &[bool])]) -> Vec<FoldErrors> {
         let last = self.folds.len() - 1;
         let mut places: Vec<usize> = models.iter().flat_map(|(chosen, _)| *chosen).copied().collect();
         places.sort_unstable();
@@ -302,7 +296,7 @@ impl JointFolds {
         let none =
             FoldErrors { squares: Vec::with_capacity(last), rows: Vec::with_capacity(last), coefficients: vec![] };
         let mut errors = vec![none; models.len()];
-        let mut theta = vec![[0.0; SIDE_BY_SIDE]; self.common.len() + self.variable.len()];
+        let mut theta = vec![[0.0; CANDIDATES_PER_BLOCK]; self.common.len() + self.variable.len()];
         for (number, fold) in self.folds.iter().enumerate() {
             for (k, (chosen, nonnegative)) in models.iter().enumerate() {
                 let coefficients = fold.coefficients(chosen, nonnegative);
@@ -333,7 +327,7 @@ impl Fold {
         let columns = DMatrix::from_fn(end - start, end - start, |row, k| triangle.entry(start + row, start + k));
         let torque = DVector::from_fn(end - start, |row, _| triangle.entry(start + row, end));
         let norms = triangle.column_norms();
-        let independent = (0..start).map(|row| triangle.entry(row, row) > DEPENDENT * norms[row]).collect();
+        let independent = (0..start).map(|row| triangle.entry(row, row) > DEPENDENCE_TOLERANCE * norms[row]).collect();
         Self { gram: columns.tr_mul(&columns), right: columns.tr_mul(&torque), independent, triangle, rows }
     }
 
@@ -353,40 +347,39 @@ impl Fold {
     }
 }
 
-/// What the candidates at work leave of the block's torque, a column each.
 struct Residuals<'a> {
     fold: &'a Fold,
-    /// Places of the columns that any of them has; all others are zero in `theta`.
+    /// Places of the columns of any candidate; all others are zero in `theta`.
     places: &'a [usize],
-    /// Coefficients of the candidates' columns; those of the common ones come from here.
-    theta: &'a mut [Side],
+    /// Coefficients of the candidates' columns; the kernel adds those of the common columns.
+    theta: &'a mut [CandidateValues],
 }
 
 impl Kernel for Residuals<'_> {
     type Output = DMatrix<f64>;
 
-    /// The loops over candidates become vector instructions; each candidate's own sums keep their order.
+    /// The loops over candidates vectorise; the sums of each candidate keep their order.
     #[inline(always)]
     fn run<T: Lane>(self) -> Self::Output {
         let Self { fold, places, theta } = self;
         let (start, end) = (fold.independent.len(), theta.len());
-        // All parameters: a common column that the rows do not separate from earlier ones is zero.
+        // A dependent common column is zero.
         for row in (0..start).rev() {
             let entries = fold.triangle.row(row);
-            let mut value = [0.0; SIDE_BY_SIDE];
+            let mut value = [0.0; CANDIDATES_PER_BLOCK];
             if fold.independent[row] {
                 let sum = products(entries, row, row + 1..start, places, theta);
-                for k in 0..SIDE_BY_SIDE {
+                for k in 0..CANDIDATES_PER_BLOCK {
                     value[k] = (entries[end - row] - sum[k]) / entries[0];
                 }
             }
             theta[row] = value;
         }
-        let mut residuals = DMatrix::zeros(end, SIDE_BY_SIDE);
+        let mut residuals = DMatrix::zeros(end, CANDIDATES_PER_BLOCK);
         for row in 0..end {
             let entries = fold.rows.row(row);
             let sum = products(entries, row, row.min(start)..start, places, theta);
-            for k in 0..SIDE_BY_SIDE {
+            for k in 0..CANDIDATES_PER_BLOCK {
                 residuals[(row, k)] = entries[end - row] - sum[k];
             }
         }
@@ -394,21 +387,27 @@ impl Kernel for Residuals<'_> {
     }
 }
 
-/// The sums of products of a triangle's row, whose entries begin at column `row`, with the parameters of the common
-/// columns `range` and of those at `places`.
+/// Products of a triangle's row, whose entries begin at column `row`, with the parameters of the common columns
+/// `range` and of those at `places`.
 #[inline(always)]
-fn products(entries: &[f64], row: usize, range: core::ops::Range<usize>, places: &[usize], theta: &[Side]) -> Side {
-    let mut sum = [0.0; SIDE_BY_SIDE];
+fn products(
+    entries: &[f64],
+    row: usize,
+    range: core::ops::Range<usize>,
+    places: &[usize],
+    theta: &[CandidateValues],
+) -> CandidateValues {
+    let mut sum = [0.0; CANDIDATES_PER_BLOCK];
     let common = range.end;
     for (entry, theta) in entries[range.start - row.min(range.start)..].iter().zip(&theta[range]) {
-        for k in 0..SIDE_BY_SIDE {
+        for k in 0..CANDIDATES_PER_BLOCK {
             sum[k] += entry * theta[k];
         }
     }
     for place in places {
         let column = common + place;
         if column >= row {
-            for k in 0..SIDE_BY_SIDE {
+            for k in 0..CANDIDATES_PER_BLOCK {
                 sum[k] += entries[column - row] * theta[column][k];
             }
         }

@@ -1,21 +1,20 @@
-//! Essential parameters: which base parameters do the data really determine, and what does the fit lose without the
-//! others?
+//! Essential parameters: the base parameters that the data determine, found by backward elimination.
 
 use crate::error::{EstimationError, require};
 use crate::uncertainty::{Estimate, f_tail, student_half_width};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// When parameters are dropped.
+/// Criteria for dropping parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EssentialSettings {
-    /// Dropping ends when the largest relative standard deviation is below so many times the smallest. Default 30, as
-    /// in published fits of the TX40; 10 is strict.
+    /// Dropping ends when the largest relative standard deviation is below this multiple of the smallest. Default 30,
+    /// as in published fits of the TX40; 10 is strict.
     pub ratio: f64,
-    /// Dropping ends before the residual grows by more than noise explains: the F-test's probability of such growth
-    /// falls below this. Default 0.05.
+    /// Dropping ends when the F-test rejects: its probability falls below this level, so that noise does not explain
+    /// the growth of the residual. Default 0.05.
     pub significance: f64,
 }
 
@@ -31,25 +30,25 @@ impl EssentialSettings {
     /// # Errors
     /// [`EstimationError::Setting`] for a ratio below 1 or a significance that is not between 0 and 1.
     pub fn validate(&self) -> Result<(), EstimationError> {
-        require(self.ratio >= 1.0 && self.ratio.is_finite(), "ratio", self.ratio, "give 1 or more")?;
-        let fix = "give a probability above 0 and below 1";
+        require(self.ratio >= 1.0 && self.ratio.is_finite(), "ratio", self.ratio, "use 1 or more")?;
+        let fix = "use a probability above 0 and below 1";
         require(self.significance > 0.0 && self.significance < 1.0, "significance", self.significance, fix)
     }
 }
 
-/// A parameter that was dropped, that is held at zero.
+/// A dropped parameter, held at zero.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DroppedParameter {
     /// Its name.
     pub name: String,
-    /// What it was before.
+    /// Value before it was dropped.
     pub value: f64,
-    /// Its relative standard deviation then, percent: the largest of all.
+    /// Relative standard deviation before it was dropped, percent: the largest of all.
     pub relative_std_percent: f64,
-    /// How often the smallest relative standard deviation went into it.
+    /// Ratio to the smallest relative standard deviation.
     pub times_smallest: f64,
-    /// F of the residual's growth, with all dropped so far.
+    /// F of the growth of the residual, with all parameters dropped so far.
     pub f: f64,
     /// Probability of a larger F if all dropped parameters were zero.
     pub p_value: f64,
@@ -62,13 +61,13 @@ pub struct DroppedParameter {
 pub enum EssentialEnd {
     /// All relative standard deviations are below the ratio.
     RatioReached,
-    /// The next parameter cannot be dropped: the residual would grow by more than noise explains.
+    /// Dropping the next parameter would increase the residual by more than noise explains.
     ResidualGrows,
     /// One parameter is left.
     OneLeft,
 }
 
-/// What was dropped and why no more.
+/// Dropped parameters and the reason for stopping.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct EssentialReport {
@@ -78,24 +77,23 @@ pub struct EssentialReport {
     pub dropped: Vec<DroppedParameter>,
     /// Why dropping ended.
     pub end: EssentialEnd,
-    /// The parameter at which it ended; none when the ratio was reached.
+    /// The parameter that could not be dropped; `None` if the ratio was reached.
     pub refused: Option<DroppedParameter>,
 }
 
-/// The estimate with all but the essential parameters held at zero (Pham and Gautier, "Essential parameters of robots",
-/// CDC 1991).
+/// Holds all but the essential parameters at zero (Pham and Gautier, "Essential parameters of robots", CDC 1991).
 ///
-/// Again and again the parameter with the largest relative standard deviation is held at zero, until that is below
-/// `ratio` times the smallest, or until the F-test speaks against it:
+/// Drops the parameter with the largest relative standard deviation until that is below `ratio` times the smallest, or
+/// until the F-test rejects:
 ///
 /// ```text
 ///     θ_e' = θ_e − V_ed V_dd⁻¹ θ_d,   F = θ_dᵀ V_dd⁻¹ θ_d / d  ~  F(d, N − p)
 /// ```
 ///
-/// with V the covariance under white noise, d the number dropped. Both are what a new fit with the same weights and
-/// fewer columns gives. With coloured residuals F is too large, and fewer parameters are dropped than could be. The
-/// covariance of the rest is the chosen one, carried through the same map; it does not know that the choice was made on
-/// the same data.
+/// V is the covariance under white noise, d the number of dropped parameters. Both results equal those of a new fit
+/// with the same weights and fewer columns. With coloured residuals F is too large and fewer parameters are dropped
+/// than possible. The covariance of the rest is the chosen one, transformed by the same map; it does not include the
+/// effect of selecting on the same data.
 ///
 /// # Errors
 /// [`EstimationError::Setting`].
@@ -152,7 +150,7 @@ pub fn essential(
     }
 }
 
-/// F of holding columns at zero, and the estimate that remains.
+/// F of holding columns at zero, and the remaining estimate.
 fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
     let all = estimate.values.len();
     let white = &estimate.covariance_white;
@@ -176,7 +174,7 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
     reduced.covariance = &map * &estimate.covariance * map.transpose();
     reduced.covariance_white = &map * white * map.transpose();
     reduced.std = reduced.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
-    // The residuals have the share of every bar that they had.
+    // Residuals keep their share of every error bar.
     let share = |(noise, std): (&f64, &f64)| if *std > 0.0 { noise / std } else { 0.0 };
     let shares = estimate.noise_std.iter().zip(&estimate.std).map(share);
     reduced.noise_std = reduced.std.iter().zip(shares).map(|(std, share)| std * share).collect();
@@ -193,7 +191,7 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
 pub struct CorrelatedPair {
     /// The two names.
     pub parameters: [String; 2],
-    /// Their correlation, −1 to 1: near ±1 the data determine a sum of the two, not each.
+    /// Their correlation, −1 to 1: near ±1 the data determine only a combination of the two.
     pub correlation: f64,
 }
 

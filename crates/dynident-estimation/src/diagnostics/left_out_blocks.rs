@@ -1,4 +1,4 @@
-//! How well blocks of time are predicted by the fit to all others, beside what the fit itself promises.
+//! Prediction error on left-out blocks of time relative to the error that the fit predicts.
 
 use crate::error::{EstimationError, expect};
 use crate::factor::{FactorWorkspace, LinearProblem, TriangularFactor};
@@ -6,16 +6,14 @@ use crate::uncertainty::Estimate;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// One joint's rows in one block of time.
 struct Block {
     joint: usize,
-    /// For every column of the factor its number among the problem's columns.
     columns: Vec<usize>,
     factor: TriangularFactor,
 }
 
-/// For every joint the factor by which what the fit to all other blocks leaves of a block is larger than its covariance
-/// and the joint's noise let expect, never below 1:
+/// Ratio, for every joint, of the prediction error on left-out blocks to the error expected from the covariance and
+/// the joint's noise, at least 1:
 ///
 /// ```text
 /// κ_j² = Σ_k n_jk / n_j · ‖τ_jk − W_jk θ₋ₖ‖² / (tr(W_jk V₋ₖ W_jkᵀ) + n_jk σ_j²)
@@ -23,16 +21,16 @@ struct Block {
 /// ```
 ///
 /// with the estimate θ, its covariance V and the joints' noise σ_j (Nm, N), n_jk rows of joint j in block k. A is the
-/// information of all rows and of the problem's prior, A₋ₖ that without block k; columns that were not estimated stay
-/// as they are. Every log is cut into so many blocks of equal length that there are at least `blocks` of them; with as
-/// many logs, each is one. A block without which the others do not determine the parameters says nothing.
+/// information of all rows and of the prior, A₋ₖ that without block k; columns that were not estimated are not
+/// changed. Every log is divided into equally many blocks of equal length, at least `blocks` in all. A block is
+/// ignored if the others do not determine the parameters.
 ///
-/// A model that is right has κ about 1. One that drifts with the temperature, or that lacks a term, predicts what lies
-/// ahead worse than its residuals say, for these are what it was fitted to. One-step deletion is exact for weighted
-/// least squares with these weights (Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 3.6).
+/// For a correct model κ is about 1. A model that drifts with temperature or lacks a term predicts new data worse than
+/// its residuals suggest. One-step deletion is exact for weighted least squares with these weights (Cook and Weisberg,
+/// *Residuals and Influence in Regression*, 1982, section 3.6).
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] when the estimate has other columns or joints than the problem.
+/// [`EstimationError::Mismatch`] if columns or joints of estimate and problem differ.
 pub fn left_out_ratios(
     problem: &LinearProblem,
     estimate: &Estimate,
@@ -47,7 +45,7 @@ pub fn left_out_ratios(
         return Ok(vec![1.0; joints]);
     }
 
-    // What every block says of the columns that were estimated.
+    // Information and score of every block over the estimated columns.
     let of_time = cut(problem, blocks.div_ceil(problem.logs().len().max(1)).max(1));
     let mut informations = Vec::with_capacity(of_time.len());
     let mut scores = Vec::with_capacity(of_time.len());
@@ -73,7 +71,7 @@ pub fn left_out_ratios(
     }
     let covariance = estimate.covariance.select_rows(&free).select_columns(&free);
 
-    // Each block by the fit to the others.
+    // Prediction of each block by the fit to the others.
     let (mut excess, mut counted) = (vec![0.0; joints], vec![0.0; joints]);
     for ((block, information), score) in of_time.values().zip(&informations).zip(&scores) {
         let Some(rest) = Cholesky::new(&all - information) else { continue };
@@ -102,7 +100,7 @@ pub fn left_out_ratios(
     Ok(excess.into_iter().zip(counted).map(ratio).collect())
 }
 
-/// The rows by log and block of time, `each` blocks a log.
+/// The rows by log and block of time, `each` blocks per log.
 fn cut(problem: &LinearProblem, each: usize) -> BTreeMap<(usize, usize), Vec<Block>> {
     let mut of_time: BTreeMap<(usize, usize), Vec<Block>> = BTreeMap::new();
     let mut workspace = FactorWorkspace::default();
@@ -131,7 +129,7 @@ impl Block {
         triangle.transpose() * triangle
     }
 
-    /// The part of a parameter vector that these rows see.
+    /// The parameters of the columns of these rows.
     fn local(&self, theta: &[f64]) -> Vec<f64> {
         self.columns.iter().map(|&column| theta[column]).collect()
     }

@@ -1,10 +1,10 @@
-//! **Is the model good, and is all of it needed?** Errors on data that were not used, and a look at the residuals.
+//! **Model validation**: errors on held-out data and residual diagnostics.
 //!
-//! [`Validation`] sums up the errors of predicted torque; [`CrossValidation`] leaves out one part of the logs after the
-//! other to compare sets of columns; [`left_out_ratios`] says how much worse such parts are predicted than the fit
-//! promises. [`essential`] drops parameters that the data do not support, one by one.
-//! [`Whiteness`], [`Normality`] and [`SpeedRanges`] are fed sample after sample and say whether residuals are white,
-//! normal, or larger at reversals; their memory does not grow.
+//! [`Validation`] accumulates the errors of predicted torque; [`CrossValidation`] compares sets of columns on left-out
+//! parts of the logs; [`left_out_ratios`] compares the prediction error on such parts with the one that the fit
+//! predicts. [`essential`] drops parameters that the data do not determine. [`Whiteness`], [`Normality`] and
+//! [`SpeedRanges`] take residuals sample by sample, in constant memory, and test whether they are white, normal or
+//! larger at reversals.
 
 mod cross_validation;
 mod essential;

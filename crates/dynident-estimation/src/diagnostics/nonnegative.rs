@@ -1,22 +1,22 @@
-//! Least squares with some unknowns that cannot be negative, for a handful of unknowns.
+//! Least squares with nonnegativity constraints, for a few unknowns.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A column of which others leave a share with a smaller square has no value of its own.
-const LEAST_SHARE: f64 = 1.0e-12;
+/// A column is dependent if the others leave a share with a smaller square.
+const MIN_REMAINING_SQUARE: f64 = 1.0e-12;
 
 /// `argmin ‖A x − b‖²` with `x_k ≥ 0` where `nonnegative[k]`, from `gram = AᵀA` and `right = Aᵀb`.
 ///
-/// The active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23, with the free unknowns
-/// never active. A column that others explain up to 1e-6 of its norm is left out (zero). Always ends: after `4 n + 10`
-/// changes of the set the last feasible point is returned. `gram` is n × n, `right` and `nonnegative` have n entries,
-/// in whatever units A and b have.
+/// Active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23; unconstrained unknowns are
+/// never active. A column that others explain up to 1e-6 of its norm is excluded (zero). After at most `4 n + 10`
+/// changes of the set the last feasible point is returned. `gram` is n × n, `right` and `nonnegative` have n entries;
+/// any units.
 ///
 /// # Panics
-/// Where sizes differ.
+/// If sizes differ.
 pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonnegative: &[bool]) -> DVector<f64> {
     let n = right.len();
-    // Unit diagonal, so that one tolerance fits all.
+    // Unit diagonal, so that one tolerance suits all columns.
     let scale: Vec<f64> = (0..n).map(|k| if gram[(k, k)] > 0.0 { gram[(k, k)].sqrt() } else { 0.0 }).collect();
     let usable = |k: usize| scale[k] > 0.0;
     let scaled = |i: usize, j: usize| if usable(i) && usable(j) { gram[(i, j)] / (scale[i] * scale[j]) } else { 0.0 };
@@ -25,7 +25,7 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
     let mut passive = PassiveSet::new((&matrix, &right));
     for k in 0..n {
         if usable(k) && !nonnegative[k] {
-            passive.push(k, LEAST_SHARE);
+            passive.push(k, MIN_REMAINING_SQUARE);
         }
     }
     let mut x = vec![0.0; n];
@@ -35,7 +35,7 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
     let size = right.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
     let mut refused = vec![false; n];
     for _ in 0..4 * n + 10 {
-        // The unknown that lowers the misfit fastest; the first of equals.
+        // The unknown with the largest gradient; the first one if equal.
         let gradient = |k: usize| right[k] - matrix[k * n..(k + 1) * n].iter().zip(&x).map(|(a, x)| a * x).sum::<f64>();
         let enters = (0..n)
             .filter(|k| nonnegative[*k] && usable(*k) && !refused[*k] && !passive.places.contains(k))
@@ -43,12 +43,12 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
             .filter(|(_, gradient)| *gradient > 1.0e-12 * size)
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
         let Some((enters, _)) = enters else { break };
-        if !passive.push(enters, LEAST_SHARE) {
-            // Dependent on those that are in already.
+        if !passive.push(enters, MIN_REMAINING_SQUARE) {
+            // Depends on the unknowns in the set.
             refused[enters] = true;
             continue;
         }
-        // Back from the unconstrained point until all are feasible again.
+        // Moves back from the unconstrained point until all unknowns are feasible.
         loop {
             passive.solve(&mut target);
             let own = || passive.places.iter().copied().zip(target.iter().copied());
@@ -76,8 +76,7 @@ pub fn nonnegative_least_squares(gram: &DMatrix<f64>, right: &DVector<f64>, nonn
     DVector::from_fn(n, |k, _| if usable(k) { x[k] / scale[k] } else { 0.0 })
 }
 
-/// The unknowns that are not held at zero, and Cholesky's factor of their part of the matrix: one that enters is one
-/// more row.
+/// Unknowns that are not held at zero, and the Cholesky factor of their part of the matrix; a new unknown adds a row.
 struct PassiveSet<'a> {
     /// The matrix by rows, and the right side.
     problem: (&'a [f64], &'a [f64]),
@@ -95,7 +94,8 @@ impl<'a> PassiveSet<'a> {
         Self { problem, places, factor: Vec::with_capacity(n * (n + 1) / 2), forward }
     }
 
-    /// Lets unknown `k` in, if those in leave it a share whose square is `least`; says whether they do.
+    /// Adds unknown `k` if it is independent of the others (remaining square above `least`); returns whether it was
+    /// added.
     fn push(&mut self, k: usize, least: f64) -> bool {
         let (matrix, right) = self.problem;
         let (n, start) = (right.len(), self.factor.len());
@@ -120,19 +120,18 @@ impl<'a> PassiveSet<'a> {
         true
     }
 
-    /// Takes unknowns out.
     fn remove(&mut self, leaving: &[usize]) {
         let Some(first) = self.places.iter().position(|k| leaving.contains(k)) else { return };
         let behind = self.places.split_off(first);
         self.factor.truncate(first * (first + 1) / 2);
         self.forward.truncate(first);
         behind.into_iter().filter(|k| !leaving.contains(k)).for_each(|k| {
-            // Independent of more than these: of these, too.
+            // Independent of the larger set, so also of the remaining one.
             self.push(k, f64::MIN_POSITIVE);
         });
     }
 
-    /// The unconstrained solution on these unknowns, in their order.
+    /// Unconstrained solution for these unknowns, in their order.
     fn solve(&self, solution: &mut Vec<f64>) {
         solution.clear();
         solution.extend_from_slice(&self.forward);
@@ -149,8 +148,7 @@ impl<'a> PassiveSet<'a> {
 mod tests {
     use super::*;
 
-    /// The conditions of Karush, Kuhn and Tucker are necessary and sufficient here: an oracle that knows nothing of
-    /// active sets.
+    /// The Karush-Kuhn-Tucker conditions are necessary and sufficient here, and independent of the active-set method.
     #[test]
     fn random_problems_meet_the_optimality_conditions() {
         let mut state = 1_u64;
@@ -178,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_columns_and_columns_of_zeros_give_numbers() {
+    fn equal_and_zero_columns_give_finite_results() {
         let a = DMatrix::from_row_slice(3, 3, &[1., 1., 0., 2., 2., 0., 3., 3., 0.]);
         let b = DVector::from_vec(vec![2., 4., 6.]);
         for nonnegative in [[true; 3], [false; 3]] {

@@ -1,4 +1,4 @@
-//! Are residuals normally distributed? Jarque and Bera's test.
+//! Jarque-Bera test for normally distributed residuals.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 ///     JB = N/6 (S² + (K − 3)²/4) ~ χ²(2),   S = m₃ / m₂^(3/2),   K = m₄ / m₂²
 /// ```
 ///
-/// Heavy tails (K far above 3) are the usual finding on robots: friction at reversals, contacts, lost samples. The test
-/// assumes independent residuals; with coloured ones it rejects too often.
+/// Heavy tails (K far above 3) are usual on robots: friction at reversals, contacts, lost samples. The test assumes
+/// independent residuals; with coloured ones it rejects too often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[doc(alias("jarque-bera"))]
 pub struct Normality {
@@ -20,7 +20,7 @@ pub struct Normality {
     fourth: f64,
 }
 
-/// What the test says.
+/// Result of the test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NormalityReport {
@@ -37,8 +37,7 @@ pub struct NormalityReport {
 }
 
 impl Normality {
-    /// The next residual. Central moments are updated one by one, without cancellation: Pébay, Sandia report
-    /// SAND2008-6212 (2008).
+    /// Adds a residual. Central moments are updated without cancellation: Pébay, Sandia report SAND2008-6212 (2008).
     pub fn add(&mut self, residual: f64) {
         let before = self.count;
         self.count += 1.0;
@@ -53,7 +52,7 @@ impl Normality {
         self.second += term;
     }
 
-    /// The test; none for fewer than eight residuals, or if all are the same.
+    /// Result of the test; `None` for fewer than eight or all equal residuals.
     pub fn report(&self) -> Option<NormalityReport> {
         let (n, variance) = (self.count, self.second / self.count);
         if n < 8.0 || variance.is_nan() || variance <= 0.0 || !self.fourth.is_finite() {
@@ -77,7 +76,7 @@ impl Normality {
 mod tests {
     use super::*;
 
-    /// Moments of the whole numbers 0..n: symmetric, kurtosis 3/5 (3n² − 7)/(n² − 1), a closed form.
+    /// Moments of the whole numbers 0..n: symmetric, kurtosis 3/5 (3n² − 7)/(n² − 1).
     #[test]
     fn moments_of_a_uniform_grid() {
         let n = 1000.0;

@@ -1,43 +1,43 @@
-//! How large residuals are at reversals, at rest and in fast motion.
+//! RMS residuals at rest, at reversals and in fast motion.
 
 use serde::{Deserialize, Serialize};
 
-/// Sums of squared residuals by the joint's own velocity: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
-/// rad/s on), of an arm of usual length; speeds of other machines are given in their own units.
+/// Sums of squared residuals by the joint's velocity: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
+/// rad/s on), for an arm of usual length. Scale the velocities of other machines to their size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedRanges {
     sums: [(usize, f64); 3],
 }
 
-/// Residuals of one regime.
+/// Residuals of one range.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangeFigures {
     /// Samples.
     pub samples: usize,
-    /// Their root mean square residual, Nm (N); none without samples.
+    /// RMS residual, Nm (N); `None` without samples.
     pub rmse_nm: Option<f64>,
 }
 
-/// Residuals by regime.
+/// Residuals by range.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangesReport {
-    /// |q̇| below 0.005 rad/s (m/s) of an arm of 1.2 m, as much in its own units of another machine.
+    /// |q̇| below 0.005 rad/s (m/s) for an arm of 1.2 m, scaled for other machines.
     pub at_rest: SpeedRangeFigures,
-    /// |q̇| from there to 0.1 rad/s (m/s), likewise.
+    /// |q̇| from 0.005 to 0.1 rad/s (m/s), scaled likewise.
     pub reversal: SpeedRangeFigures,
-    /// |q̇| from 0.1 rad/s (m/s) on, likewise.
+    /// |q̇| from 0.1 rad/s (m/s) on, scaled likewise.
     pub fast: SpeedRangeFigures,
 }
 
 impl SpeedRanges {
-    /// Below this velocity a joint counts as at rest, rad/s (m/s) of a usual arm.
+    /// Below this velocity a joint is at rest, rad/s (m/s) of a usual arm.
     pub const REST_BELOW: f64 = 0.005;
-    /// Below this velocity it counts as reversing, rad/s (m/s) of a usual arm: friction's regime.
+    /// Below this velocity a joint is reversing (friction dominates), rad/s (m/s) of a usual arm.
     pub const REVERSAL_BELOW: f64 = 0.1;
 
-    /// A residual at a velocity, rad/s (m/s) as it would be of a usual arm.
+    /// Adds a residual at a velocity, rad/s (m/s) scaled to a usual arm.
     pub fn add(&mut self, speed: f64, residual: f64) {
         let speed = speed.abs();
         let place = usize::from(speed >= Self::REST_BELOW) + usize::from(speed >= Self::REVERSAL_BELOW);
@@ -45,7 +45,7 @@ impl SpeedRanges {
         self.sums[place].1 += residual * residual;
     }
 
-    /// The figures so far.
+    /// The results so far.
     pub fn report(&self) -> SpeedRangesReport {
         let [at_rest, reversal, fast] = self.sums.map(|(samples, square)| SpeedRangeFigures {
             samples,

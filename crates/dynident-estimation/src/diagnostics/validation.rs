@@ -1,6 +1,7 @@
-//! How well a model predicts torque: streaming figures per joint and over all joints.
+//! Errors of predicted torque per joint and over all joints, computed sample by sample.
 
 use crate::error::EstimationError;
+use crate::factor::MAX_MAGNITUDE;
 use serde::{Deserialize, Serialize};
 
 /// Running sums over samples of measured and predicted torque.
@@ -15,7 +16,7 @@ struct Sums {
     max_error: f64,
 }
 
-/// Compares predicted with measured torque, sample after sample; memory does not grow.
+/// Compares predicted with measured torque sample by sample, in constant memory.
 ///
 /// ```
 /// use dynident_estimation::Validation;
@@ -32,7 +33,7 @@ pub struct Validation {
     sums: Vec<Sums>,
 }
 
-/// Figures of one joint. Torque in N m (force in N for a prismatic joint).
+/// Errors of one joint. Torque in N m (force in N for a prismatic joint).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointValidation {
@@ -42,19 +43,19 @@ pub struct JointValidation {
     pub samples: usize,
     /// `√(Σ(τ − τ̂)² / samples)`.
     pub rmse_nm: f64,
-    /// `100 ‖τ − τ̂‖ / ‖τ‖`; none when the measured torque is zero throughout.
+    /// `100 ‖τ − τ̂‖ / ‖τ‖`; `None` if the measured torque is zero.
     pub relative_error_percent: Option<f64>,
     /// `max |τ − τ̂|`.
     pub max_error_nm: f64,
-    /// `1 − Σ(τ − τ̂)² / Σ(τ − mean τ)²`; none when the measured torque is constant.
+    /// `1 − Σ(τ − τ̂)² / Σ(τ − mean τ)²`; `None` if the measured torque is constant.
     pub r_squared: Option<f64>,
 }
 
-/// Figures of all joints stacked into one vector (its own mean in R²), and of every joint.
+/// Errors of all joints stacked into one vector (with its own mean in R²), and of every joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ValidationReport {
-    /// Samples of the joint that has most.
+    /// Largest number of samples of any joint.
     pub samples: usize,
     /// As [`JointValidation::rmse_nm`], over all joints stacked.
     pub rmse_nm: f64,
@@ -69,17 +70,17 @@ pub struct ValidationReport {
 }
 
 impl Validation {
-    /// Nothing compared yet.
+    /// Creates an empty comparison.
     pub fn new(joints: Vec<String>) -> Self {
         let sums = vec![Sums::default(); joints.len()];
         Self { names: joints, sums }
     }
 
-    /// One sample: measured and predicted torque of every joint.
+    /// Adds one sample: measured and predicted torque of every joint.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless both have one value per joint; [`EstimationError::Unusable`] for NaN or
-    /// infinity (the column is the joint). Nothing is counted then.
+    /// [`EstimationError::Mismatch`] for a wrong number of values; [`EstimationError::Unusable`] for NaN or infinity
+    /// (the column is the joint). On error nothing is added.
     pub fn add(&mut self, measured: &[f64], predicted: &[f64]) -> Result<(), EstimationError> {
         for (what, values) in [("measured torques", measured), ("predicted torques", predicted)] {
             if values.len() != self.sums.len() {
@@ -94,7 +95,7 @@ impl Validation {
         Ok(())
     }
 
-    /// Consecutive samples of joint number `joint`.
+    /// Adds consecutive samples of joint number `joint`.
     ///
     /// # Errors
     /// As [`add`](Self::add), and [`EstimationError::Mismatch`] for a joint out of range.
@@ -105,7 +106,7 @@ impl Validation {
             return Err(EstimationError::Mismatch { what: "predicted torques".into(), expected, found });
         }
         let Some(sums) = self.sums.get_mut(joint) else {
-            let what = "a joint number below the number of joints".into();
+            let what = "joint number, below the number of joints".into();
             return Err(EstimationError::Mismatch { what, expected: joints, found: joint });
         };
         check(measured, |row| (row, joint))?;
@@ -116,7 +117,7 @@ impl Validation {
         Ok(())
     }
 
-    /// The figures so far. Without samples all errors are zero and the ratios none.
+    /// The results so far. Without samples all errors are zero and the ratios `None`.
     pub fn report(&self) -> ValidationReport {
         let joints: Vec<JointValidation> =
             self.names.iter().zip(&self.sums).map(|(name, sums)| sums.figures(name.clone())).collect();
@@ -144,7 +145,7 @@ impl Sums {
         self.max_error = self.max_error.max(error.abs());
     }
 
-    /// Both stacked (Chan, Golub and LeVeque, The American Statistician 37 (1983) 242).
+    /// Merges two series (Chan, Golub and LeVeque, The American Statistician 37 (1983) 242).
     fn merged(&self, other: &Self) -> Self {
         let samples = self.samples + other.samples;
         let difference = other.mean - self.mean;
@@ -172,14 +173,11 @@ impl Sums {
     }
 }
 
-/// The largest torque whose square can be summed.
-const LARGEST: f64 = 1.0e140;
-
 fn check(values: &[f64], place: impl Fn(usize) -> (usize, usize)) -> Result<(), EstimationError> {
-    match values.iter().position(|value| value.is_nan() || value.abs() > LARGEST) {
+    match values.iter().position(|value| value.is_nan() || value.abs() > MAX_MAGNITUDE) {
         Some(index) => {
             let (row, column) = place(index);
-            Err(EstimationError::Unusable { row, column, value: values[index], limit: LARGEST })
+            Err(EstimationError::Unusable { row, column, value: values[index], limit: MAX_MAGNITUDE })
         }
         None => Ok(()),
     }

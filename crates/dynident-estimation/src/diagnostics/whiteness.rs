@@ -1,9 +1,8 @@
-//! Are residuals correlated in time? Ljung and Box's test.
+//! Ljung-Box test for residuals that are correlated in time.
 
 use crate::uncertainty::chi_squared_tail;
 use serde::{Deserialize, Serialize};
 
-/// Lags looked at.
 const LAGS: usize = 10;
 
 /// Streaming autocorrelations up to lag 10, and the test of Ljung and Box, Biometrika 65 (1978) 297:
@@ -12,8 +11,8 @@ const LAGS: usize = 10;
 ///     Q = N (N + 2) Σ_{l=1}^{10} ρ_l² / (N − l),   ρ_l = Σ r_t r_{t−l} / Σ r_t²,   Q ~ χ²(10) for white residuals
 /// ```
 ///
-/// Residuals are taken as they are, not less their mean: an offset that the model does not have is an error as well.
-/// Parameters fitted to other data cost no degree of freedom.
+/// The mean is not subtracted: an offset that the model lacks is also an error. Parameters fitted to other data use no
+/// degree of freedom.
 ///
 /// ```
 /// use dynident_estimation::Whiteness;
@@ -30,7 +29,7 @@ pub struct Whiteness {
     square: f64,
 }
 
-/// What the test says.
+/// Result of the test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WhitenessReport {
@@ -45,7 +44,7 @@ pub struct WhitenessReport {
 }
 
 impl Whiteness {
-    /// The next residual of the same series.
+    /// Adds the next residual of the series.
     pub fn add(&mut self, residual: f64) {
         for lag in 1..=LAGS.min(self.count) {
             self.products[lag - 1] += residual * self.recent[(self.count - lag) % LAGS];
@@ -55,7 +54,7 @@ impl Whiteness {
         self.count += 1;
     }
 
-    /// The test; none for 20 residuals or fewer, or none that differ from zero.
+    /// Result of the test; `None` for 20 residuals or fewer, or if all are zero.
     pub fn report(&self) -> Option<WhitenessReport> {
         let n = self.count as f64;
         if self.count <= 2 * LAGS || self.square <= 0.0 || !self.square.is_finite() {
@@ -74,10 +73,10 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    /// Of 400 white series the test at 5 % rejects 20 ± 4.4; four of these are 18. An AR(1) series of ρ = 0.5 is always
-    /// found out.
+    /// Of 400 white series the test at 5 % rejects 20 ± 4.4; the tolerance is 4 σ. It always rejects an AR(1) series
+    /// with ρ = 0.5.
     #[test]
-    fn rejects_white_residuals_as_often_as_it_says() {
+    fn white_residuals_are_rejected_at_the_nominal_rate() {
         let mut random = Random::new(7);
         let mut rejected = 0;
         for _ in 0..400 {
@@ -96,9 +95,9 @@ mod tests {
         assert!((2..=38).contains(&rejected), "{rejected}");
     }
 
-    /// Q written out on a short series.
+    /// Q computed directly for a short series.
     #[test]
-    fn is_the_formula() {
+    fn ljung_box_equals_the_formula() {
         let r: Vec<f64> = (0..30).map(|k| f64::from((k * 7) % 11) - 5.0).collect();
         let mut whiteness = Whiteness::default();
         for r in &r {

@@ -1,38 +1,36 @@
-//! Which columns say more than the noise of the regressor does.
+//! Detection of columns that the motion does not excite above the noise of the regressor.
 //!
-//! A joint at rest whose encoder has noise has columns that are not zero: noise makes them. Least squares would take
-//! them for information, with parameters of any size. Here directions of the parameters are held against what the
-//! noise alone makes of them.
+//! The columns of a joint at rest are not zero if its encoder has noise. Least squares would treat this noise as
+//! information and estimate parameters of arbitrary size. This module compares directions of the parameters with the
+//! effect of the noise alone.
 
 use super::problem::LinearProblem;
 use super::unexcited::Unexcited;
 use crate::error::{EstimationError, expect};
 
-/// A column counts as excited when what no other excited column explains of it has at least this many times the square
-/// sum that the noise makes there. Noise alone gives one, and less for columns of products of noise; with few rows and
-/// with a noise level that is itself an estimate, up to two or three. At four the part that is motion has three times
-/// the power of the noise.
-const ABOVE_NOISE: f64 = 4.0;
+/// Minimum ratio of a column's square sum, after removal of the other excited columns, to that of the noise. Noise
+/// alone gives 1 (less for products of noise), and up to 3 with few rows and an estimated noise level. At 4 the motion
+/// has three times the power of the noise.
+const MIN_POWER_OVER_NOISE: f64 = 4.0;
 
-/// A column is dependent when at most this share of its norm is its own: the default of
+/// Share of a column's norm below which other columns explain it completely: the default of
 /// [`RankSettings`](super::RankSettings).
-const DEPENDENT: f64 = 1.0e-8;
+const DEPENDENCE_TOLERANCE: f64 = 1.0e-8;
 
-/// The columns that are not excited: nothing but noise and other columns. Columns that depend on others exactly are not
-/// among them: which of those are held is for the rank decision.
+/// Finds the columns that are not excited, i.e. that contain only noise and combinations of other columns. Exactly
+/// dependent columns are excluded: the rank decision selects which of those are held.
 ///
-/// `noise` is a problem of the same columns whose rows are what noise in the motion adds to the rows of `problem`, so
-/// that `NᵀN` is what it adds to `WᵀW`; `weights` are those of the joints, 1/σ. `scales`, where they are known, say how
-/// large an error of each parameter is to be expected.
+/// `noise` is a problem over the same columns: `NᵀN` is the contribution of motion noise to `WᵀW`. `weights` are those
+/// of the joints, 1/σ. `scales`, if known, are the expected errors of the parameters.
 ///
-/// One column after another is taken, and what it explains is taken off all others: from `W_c` what is left is
-/// `r_c = W_c − W_F k`, and noise makes `n_c = N_c − N_F k` of it, with the same k. As long as some column has
-/// `‖r_c‖² ≥ 4 ‖n_c‖²`, the next is the one of them whose error would make the most torque, `scale ‖r_c‖` (without
-/// scales: the one that is clearest above the noise). Units, the order of joints and of columns do not matter.
-/// Golub and Van Loan, Matrix Computations, 5.5.7 (subset selection), with the noise as threshold.
+/// Greedy selection: each selected column is projected out of all others. The remainder of column c is `r_c = W_c −
+/// W_F k`, and that of its noise is `n_c = N_c − N_F k` with the same k. While some column has `‖r_c‖² ≥ 4 ‖n_c‖²`,
+/// the next selected column is the one with the largest torque error, `scale ‖r_c‖` (without scales: the one with the
+/// largest ratio to its noise). The result does not depend on units or on the order of joints and columns. Golub and
+/// Van Loan, Matrix Computations, 5.5.7 (subset selection), with the noise as threshold.
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for another number of columns, joints, weights or scales.
+/// [`EstimationError::Mismatch`] if the numbers of columns, joints, weights or scales disagree.
 pub fn unexcited_columns(
     problem: &LinearProblem,
     noise: &LinearProblem,
@@ -52,19 +50,18 @@ pub fn unexcited_columns(
         made.column_mut(column).unscale_mut(*norm);
     }
     let of_noise: Vec<f64> = made.column_iter().map(|column| column.norm_squared()).collect();
-    // A column without a scale is taken last: where nothing is known of it, others are estimated before it.
     let worth = |column: usize| scales.map_or(f64::INFINITY, |scales| scales[column] * norms[column]);
     let mut left: Vec<usize> = (0..count).filter(|&column| norms[column] > 0.0).collect();
     loop {
         let mut next: Option<(usize, [f64; 2])> = None;
         for (place, &column) in left.iter().enumerate() {
             let own = rows.column(column).norm_squared();
-            let threshold = ABOVE_NOISE * made.column(column).norm_squared();
-            if own <= DEPENDENT * DEPENDENT || own < threshold {
+            let threshold = MIN_POWER_OVER_NOISE * made.column(column).norm_squared();
+            if own <= DEPENDENCE_TOLERANCE * DEPENDENCE_TOLERANCE || own < threshold {
                 continue;
             }
-            // Rounding in place of no noise at all: a column that is exact comes before none that is exact too.
-            let clear = own / threshold.max(DEPENDENT * DEPENDENT);
+            // Rounding replaces zero noise, so that exact columns are also ordered by their remainder.
+            let clear = own / threshold.max(DEPENDENCE_TOLERANCE * DEPENDENCE_TOLERANCE);
             let rank = [own.sqrt() * worth(column), clear];
             if next.as_ref().is_none_or(|(_, best)| rank > *best) {
                 next = Some((place, rank));
@@ -80,10 +77,11 @@ pub fn unexcited_columns(
             made.column_mut(column).axpy(-share, &noise, 1.0);
         }
     }
-    // A column that others explain to the last digit is not the noise's business: rank decides which of them is held.
-    left.retain(|&column| rows.column(column).norm_squared() > DEPENDENT * DEPENDENT);
-    // What the others explain of a column of noise is chance, and no larger than noise either.
-    let is_noise = |column: &usize| 1.0 - rows.column(*column).norm_squared() <= ABOVE_NOISE * of_noise[*column];
+    // Columns explained to rounding are left to the rank decision.
+    left.retain(|&column| rows.column(column).norm_squared() > DEPENDENCE_TOLERANCE * DEPENDENCE_TOLERANCE);
+    // The part of a noise column that other columns explain is a chance correlation, not larger than the noise.
+    let is_noise =
+        |column: &usize| 1.0 - rows.column(*column).norm_squared() <= MIN_POWER_OVER_NOISE * of_noise[*column];
     let mut silent: Vec<usize> = left.iter().copied().filter(is_noise).collect();
     let empty = (0..count).filter(|&column| norms[column] <= 0.0);
     silent.extend(empty.clone());

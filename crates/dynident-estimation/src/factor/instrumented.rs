@@ -1,5 +1,4 @@
-//! Rows that carry instruments: `[Z | W | τ]`, where Z are the same columns from a motion that is free of the noise in
-//! W.
+//! Rows with instruments: `[Z | W | τ]`, where Z has the columns of W from a motion without the noise of W.
 
 use super::problem::LinearProblem;
 use super::segmented::SegmentedFactor;
@@ -7,12 +6,13 @@ use super::unexcited::Unexcited;
 use crate::error::EstimationError;
 use nalgebra::DMatrix;
 
-/// `τ_j = W_j θ + noise` with instruments `Z_j`, one column of Z for every column of W, held as factors of `[Z_j | W_j
+/// `τ_j = W_j θ + noise` with instruments `Z_j`, one column of Z for every column of W, stored as factors of `[Z_j |
+/// W_j
 /// | τ_j]`.
 ///
-/// Z is the regressor of another account of the same motion: simulated with the current model, smoothed much more
-/// strongly, averaged over periods or taken from a repeated run. It must be correlated with W and not with the noise of
-/// W and τ.
+/// Z is the regressor of another estimate of the same motion: simulated with the current model, smoothed more
+/// strongly, averaged over periods or taken from a repeated run. It must be correlated with W and uncorrelated with
+/// the noise of W and τ.
 ///
 /// ```
 /// use dynident_estimation::{InstrumentedProblem, SegmentSettings, SegmentedFactor, instrumental_variables};
@@ -38,7 +38,7 @@ pub struct InstrumentedProblem {
 }
 
 impl InstrumentedProblem {
-    /// A problem without data: names of the columns (parameters) and of the joints.
+    /// Creates a problem without data from the names of the columns (parameters) and joints.
     pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
         let both = columns.iter().map(|name| format!("instrument of {name}")).chain(columns.iter().cloned()).collect();
         Self {
@@ -49,8 +49,8 @@ impl InstrumentedProblem {
         }
     }
 
-    /// Adds the rows of joint number `joint` in the log called `log`. The factor has the instruments first, one for
-    /// each of `columns`, then the regressor's columns in the same order, then the torque.
+    /// Adds the rows of joint number `joint` in the log called `log`. Columns of the factor: one instrument for each
+    /// of `columns`, then the regressor in the same order, then the torque.
     ///
     /// # Errors
     /// As [`LinearProblem::add`]; the factor must have twice as many columns as `columns` names.
@@ -70,7 +70,7 @@ impl InstrumentedProblem {
         self.rows.add(log, joint, both, factor)
     }
 
-    /// Values at which columns are fixed that the instruments do not distinguish; zero unless said otherwise.
+    /// Sets the values of columns that the instruments do not distinguish; zero by default.
     ///
     /// # Errors
     /// As [`LinearProblem::with_fallback`].
@@ -82,7 +82,7 @@ impl InstrumentedProblem {
         Ok(self)
     }
 
-    /// Columns that are to stay at their fallback values: see [`LinearProblem::with_unexcited`].
+    /// Sets columns to hold at their fallback values: see [`LinearProblem::with_unexcited`].
     ///
     /// # Errors
     /// As [`LinearProblem::with_unexcited`].
@@ -92,7 +92,7 @@ impl InstrumentedProblem {
         Ok(self)
     }
 
-    /// Columns that are held at their fallback values.
+    /// Columns held at their fallback values.
     pub fn unexcited(&self) -> &Unexcited {
         &self.unexcited
     }
@@ -107,15 +107,15 @@ impl InstrumentedProblem {
         self.rows.joints()
     }
 
-    /// Values for columns that are not estimated.
+    /// Fallback values of columns that are not estimated.
     pub fn fallback(&self) -> &[f64] {
         &self.fallback
     }
 
-    /// The same rows without their instruments: what least squares would be made from.
+    /// The same rows without instruments, for least squares.
     ///
     /// # Errors
-    /// None that the construction has not ruled out.
+    /// None in practice: construction already checks all conditions.
     pub fn regressors(&self) -> Result<LinearProblem, EstimationError> {
         let mut problem = LinearProblem::new(self.names.clone(), self.joints().to_vec())
             .with_fallback(self.fallback.clone())?
@@ -138,8 +138,8 @@ impl InstrumentedProblem {
         both
     }
 
-    /// A problem over other columns, made of the same rows: `combination` gives for an equation's local columns `[Z | W
-    /// | τ]` the new rows' coefficients, shape (local columns + 1, names + 1).
+    /// A problem over other columns of the same rows. `combination` maps an equation's local columns `[Z | W | τ]` to
+    /// the new rows, shape (local columns + 1, names + 1).
     pub(crate) fn combined(
         &self,
         names: Vec<String>,

@@ -1,12 +1,11 @@
-//! **Rows in, triangles out.** What remains of a log of any length, and the problems that are assembled from it.
+//! **Triangular factors**: logs reduced to factors of bounded size, and the problems assembled from them.
 //!
-//! A [`TriangularFactor`] holds all that least squares needs from rows `[W | τ]`: `RᵀR = [W | τ]ᵀ[W | τ]`. Rows of one
-//! joint in one log go into a [`SegmentedFactor`], which keeps at most K factors of consecutive time segments, so that
-//! a covariance can later ask how the segments differ. The factors of all joints and logs over one list of named
-//! columns make a [`LinearProblem`] (an [`InstrumentedProblem`] where instruments stand beside the regressor), with a
-//! [`Prior`] where there is one. [`RankSettings`] say when a column counts as excited, a [`RankReport`] what was
-//! decided; [`unexcited_columns`] holds columns against the noise of the motion. Where samples come one at a time, a
-//! [`RecursiveFactor`] takes them.
+//! A [`TriangularFactor`] is sufficient for least squares on rows `[W | τ]`: `RᵀR = [W | τ]ᵀ[W | τ]`. The rows of one
+//! joint in one log go into a [`SegmentedFactor`], which keeps at most K factors of consecutive time segments for
+//! covariances from segments. The factors of all joints and logs over one list of named columns form a
+//! [`LinearProblem`] (an [`InstrumentedProblem`] with instruments), optionally with a [`Prior`]. [`RankSettings`]
+//! define when a column is excited, a [`RankReport`] lists the decisions; [`unexcited_columns`] compares columns with
+//! the noise of the motion. A [`RecursiveFactor`] takes samples one at a time.
 
 mod excitation;
 mod instrumented;
@@ -32,5 +31,5 @@ pub(crate) use segmented::ReducedRows;
 pub use segmented::{SegmentSettings, SegmentedFactor};
 pub use stored::{FactorShape, SegmentShape};
 pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
-pub(crate) use triangular::{check_columns, check_weight};
+pub(crate) use triangular::{MAX_MAGNITUDE, check_columns, check_weight};
 pub use unexcited::Unexcited;

@@ -1,4 +1,4 @@
-//! The linear problem that all estimators start from: which joint's rows see which columns, and what they hold.
+//! The linear problem of all estimators.
 
 use super::rank::{RankSettings, split};
 use super::segmented::SegmentedFactor;
@@ -15,20 +15,20 @@ pub struct JointRows {
     pub log: usize,
     /// Number of the joint in [`LinearProblem::joints`].
     pub joint: usize,
-    /// For every column of the factor its number among the problem's columns.
+    /// For every column of the factor its number in the problem.
     pub columns: Vec<usize>,
-    /// What the rows hold.
+    /// The reduced rows.
     pub factor: SegmentedFactor,
 }
 
-/// A Gaussian belief about the parameters before the data: `S θ = S m + N(0, 1)`, that is mean m, information SᵀS.
+/// Gaussian prior of the parameters: `S θ = S m + N(0, 1)`, i.e. mean m and information SᵀS.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     mean: Vec<f64>,
     sqrt_information: DMatrix<f64>,
 }
 
-/// `τ_j = W_j θ + noise` for every joint j of every log, held as factors.
+/// `τ_j = W_j θ + noise` for every joint j of every log, stored as factors.
 ///
 /// ```
 /// use dynident_estimation::{LinearProblem, SegmentSettings, SegmentedFactor, ordinary_least_squares};
@@ -53,7 +53,7 @@ pub struct LinearProblem {
 }
 
 impl LinearProblem {
-    /// A problem without data: names of the columns (parameters) and of the joints.
+    /// Creates a problem without data from the names of the columns (parameters) and joints.
     pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
         let fallback = vec![0.0; columns.len()];
         Self {
@@ -68,11 +68,10 @@ impl LinearProblem {
     }
 
     /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor
-    /// its number in the problem. Rows of several joints of one log are added under the same name.
+    /// its number in the problem. Add the joints of one log under the same log name.
     ///
-    /// # Errors
-    /// [`EstimationError::Mismatch`] for a joint out of range or a list of another length than the factor's columns;
-    /// [`EstimationError::Column`] for a column out of range or given twice.
+    /// [`EstimationError::Mismatch`] for a joint out of range or a wrong length of `columns`;
+    /// [`EstimationError::Column`] for a column out of range or duplicate.
     pub fn add(
         &mut self,
         log: &str,
@@ -81,7 +80,7 @@ impl LinearProblem {
         factor: SegmentedFactor,
     ) -> Result<(), EstimationError> {
         if joint >= self.joints.len() {
-            let what = format!("log {log}: a joint number below the number of joints");
+            let what = format!("log {log}: joint number, below the number of joints");
             return Err(EstimationError::Mismatch { what, expected: self.joints.len(), found: joint });
         }
         if columns.len() != factor.columns() {
@@ -107,12 +106,10 @@ impl LinearProblem {
         Ok(())
     }
 
-    /// Values at which columns are fixed that the data do not excite (zero unless said otherwise): the prior model's,
-    /// say.
+    /// Sets the values of columns that the data do not excite, for example nominal values; zero by default.
     ///
-    /// # Errors
-    /// [`EstimationError::Mismatch`] for another number of values than columns, [`EstimationError::Setting`] for one
-    /// that is not finite.
+    /// [`EstimationError::Mismatch`] for a wrong number of values, [`EstimationError::Setting`] for a value that is
+    /// not finite.
     pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
         expect("fallback values", self.columns.len(), values.len())?;
         finite("fallback value", &values)?;
@@ -120,8 +117,8 @@ impl LinearProblem {
         Ok(self)
     }
 
-    /// Columns that are to stay at their fallback values although they are not zero: noise of the motion makes them, as
-    /// [`unexcited_columns`](super::unexcited_columns) finds. Every estimator holds them.
+    /// Sets columns to hold at their fallback values because they contain only noise, as found by
+    /// [`unexcited_columns`](super::unexcited_columns). Every estimator holds them.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a column out of range.
@@ -149,9 +146,8 @@ impl LinearProblem {
         Ok(self)
     }
 
-    /// The same with the rows of every joint of every log multiplied by a weight: `weight(log, joint)` with the log's
-    /// and the joint's number. Logs with noise of their own count as much as they tell; residuals are in the unit of a
-    /// log with weight 1.
+    /// Multiplies the rows of every joint of every log by `weight(log, joint)` (numbers of log and joint), for logs
+    /// with different noise. Residuals are then in the unit of a log with weight 1.
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
@@ -187,22 +183,22 @@ impl LinearProblem {
         &self.equations
     }
 
-    /// Values for columns that the data do not excite.
+    /// Fallback values of columns that are not estimated.
     pub fn fallback(&self) -> &[f64] {
         &self.fallback
     }
 
-    /// Columns that are held at their fallback values.
+    /// Columns held at their fallback values.
     pub fn unexcited(&self) -> &Unexcited {
         &self.unexcited
     }
 
-    /// The prior, if there is one.
+    /// The prior, if set.
     pub fn prior(&self) -> Option<&Prior> {
         self.prior.as_ref()
     }
 
-    /// Rows of every joint over all logs, N_j.
+    /// N_j: rows of every joint over all logs.
     pub fn joint_rows(&self) -> Vec<usize> {
         let mut rows = vec![0; self.joints.len()];
         for equation in &self.equations {
@@ -222,22 +218,21 @@ impl LinearProblem {
         squares.into_iter().map(f64::sqrt).collect()
     }
 
-    /// One factor of all rows over all columns, those of joint j multiplied by `weights[j]` (1/σ_j for weighted least
-    /// squares), and the rows of the prior if there is one (with weight 1).
+    /// One factor of all rows over all columns. The rows of joint j are multiplied by `weights[j]` (1/σ_j for weighted
+    /// least squares); the prior's rows, if any, have weight 1.
     ///
-    /// # Errors
-    /// [`EstimationError::Mismatch`] unless there is one weight per joint; [`EstimationError::Setting`] for one that is
+    /// [`EstimationError::Mismatch`] for a wrong number of weights; [`EstimationError::Setting`] for a weight that is
     /// negative, NaN or infinite.
     pub fn combined(&self, weights: &[f64]) -> Result<TriangularFactor, EstimationError> {
         self.stacked().combined(weights)
     }
 
-    /// As [`combined`](Self::combined), where of each [unexcited](Self::with_unexcited) column only what the other
-    /// columns explain is left, `W_H` becomes `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and nothing of a silent one. So the rows say
-    /// what they know of the sums that the held parameters stand in, and nothing that only noise says of them.
+    /// As [`combined`](Self::combined), with each [unexcited](Self::with_unexcited) column replaced by the part that
+    /// the other columns explain, `W_H` by `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and a silent column by zero. The factor keeps the
+    /// information about identifiable combinations that include held parameters, and drops the information from noise.
     ///
     /// # Errors
-    /// As [`combined`](Self::combined); [`EstimationError::Overflow`] when the other columns are not independent.
+    /// As [`combined`](Self::combined); [`EstimationError::Overflow`] if the other columns are dependent.
     pub fn combined_without_noise(
         &self,
         weights: &[f64],
@@ -265,22 +260,21 @@ impl LinearProblem {
         Ok(without)
     }
 
-    /// The totals of all equations, ready to be weighted again and again.
+    /// The total factors of all equations, for repeated weighting.
     pub(crate) fn stacked(&self) -> StackedProblem<'_> {
         let totals: Vec<&TriangularFactor> = self.equations.par_iter().map(|e| e.factor.total()).collect();
-        let stack = |alike: Vec<usize>| {
-            let mut total = totals[alike[0]].clone();
+        let stack = |group: Vec<usize>| {
+            let mut total = totals[group[0]].clone();
             let mut workspace = FactorWorkspace::default();
-            alike[1..].iter().for_each(|&equation| total.absorb_factor(&mut workspace, totals[equation]));
-            (alike[0], total)
+            group[1..].iter().for_each(|&equation| total.absorb_factor(&mut workspace, totals[equation]));
+            (group[0], total)
         };
-        let stacks = self.alike().into_par_iter().map(stack).collect();
+        let stacks = self.same_column_groups().into_par_iter().map(stack).collect();
         StackedProblem { problem: self, totals, stacks }
     }
 
-    /// The equations of each joint that see the same columns, in their order: rows of several logs that always count
-    /// alike.
-    pub(crate) fn alike(&self) -> Vec<Vec<usize>> {
+    /// Groups of equations of one joint with the same columns, which always have the same weight.
+    pub(crate) fn same_column_groups(&self) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
         for (number, equation) in self.equations.iter().enumerate() {
             let same = |group: &&mut Vec<usize>| {
@@ -296,13 +290,11 @@ impl LinearProblem {
     }
 }
 
-/// A problem with the total factor of every equation at hand.
 pub(crate) struct StackedProblem<'a> {
     pub(crate) problem: &'a LinearProblem,
-    /// One per equation.
     pub(crate) totals: Vec<&'a TriangularFactor>,
-    /// Of equations that are [alike](LinearProblem::alike) the number of the first one and all of their rows: with many
-    /// logs far fewer triangles over all columns.
+    /// For each group of [same-column equations](LinearProblem::same_column_groups) the number of its first equation
+    /// and the factor of all its rows; with many logs this saves most of the work.
     stacks: Vec<(usize, TriangularFactor)>,
 }
 
@@ -361,7 +353,7 @@ impl StackedProblem<'_> {
 }
 
 impl JointRows {
-    /// The part of a parameter vector that these rows see.
+    /// The parameters of the columns of these rows.
     pub(crate) fn local(&self, theta: &[f64]) -> Vec<f64> {
         self.columns.iter().map(|&column| theta[column]).collect()
     }
@@ -381,7 +373,7 @@ impl Prior {
 
 fn finite(setting: &'static str, values: &[f64]) -> Result<(), EstimationError> {
     match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(EstimationError::Setting { setting, value, fix: "give finite numbers" }),
+        Some(&value) => Err(EstimationError::Setting { setting, value, fix: "use finite numbers" }),
         None => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! Which columns the data excite, decided on scaled columns with a stated tolerance; and the solution on those.
+//! Rank decision on scaled columns with an explicit tolerance, and the solution for the excited columns.
 
 use super::triangular::{FactorWorkspace, TriangularFactor};
 use super::unexcited::{Unexcited, answer_of_free};
@@ -8,17 +8,17 @@ use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// When a column counts as excited.
+/// Criteria for an excited column.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RankSettings {
-    /// A column is dependent when the part of it that no earlier column explains is at most this share of its norm.
-    /// Default 1e-8: far above rounding (1e-13 or so after scaling) and far below what any real motion that excites a
-    /// parameter leaves.
+    /// A column is dependent if the part that no earlier column explains is at most this share of its norm. Default
+    /// 1e-8: far above rounding (about 1e-13 after scaling) and far below the share of a parameter that the motion
+    /// excites.
     pub tolerance: f64,
-    /// A column whose norm is at most this share of the largest column norm is taken for zero. Default 1e-12: only
-    /// rounding noise is that small, units of different parameters never differ so much.
+    /// A column is treated as zero if its norm is at most this share of the largest column norm. Default 1e-12: only
+    /// rounding noise is that small; units of parameters never differ that much.
     pub negligible_column: f64,
 }
 
@@ -36,13 +36,13 @@ impl RankSettings {
     pub fn validate(&self) -> Result<(), EstimationError> {
         for (setting, value) in [("rank.tolerance", self.tolerance), ("rank.negligible_column", self.negligible_column)]
         {
-            within(setting, value, 1.0e-14..1.0, "give a share from 1e-14 to below 1")?;
+            within(setting, value, 1.0e-14..1.0, "use a share from 1e-14 to below 1")?;
         }
         Ok(())
     }
 }
 
-/// A column that the data do not distinguish from earlier ones.
+/// A column that the data do not distinguish from earlier columns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FixedColumn {
     /// Its number.
@@ -51,64 +51,62 @@ pub struct FixedColumn {
     pub name: String,
     /// The value at which it was fixed.
     pub value: f64,
-    /// Whether it differs from a sum of other columns by no more than noise of the motion; otherwise it is such a sum,
-    /// or zero.
+    /// True if the column differs from a combination of other columns only by noise of the motion; false if it is
+    /// exactly such a combination or zero.
     pub noise: bool,
-    /// How the value of every column changes with that of this one, `∂θ/∂value`: the estimate of a column that is
-    /// measured only together with this one is right if this value is. Zero for columns that do not care.
+    /// Sensitivity of the value of every column to that of this column, `∂θ/∂value`: an estimate with a nonzero
+    /// sensitivity is correct only if this value is. Zero for columns that do not depend on it.
     #[serde(skip)]
     pub answers: Vec<f64>,
 }
 
-/// What was decided about the rank, and on which numbers.
+/// Rank decisions and the numbers behind them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankReport {
-    /// Columns estimated.
+    /// Number of estimated columns.
     pub rank: usize,
-    /// All columns.
+    /// Number of all columns.
     pub columns: usize,
-    /// Columns that are not excited by these data, and the values at which they were fixed.
+    /// Columns that these data do not excite, and the values at which they were fixed.
     pub fixed: Vec<FixedColumn>,
-    /// Singular values of all columns after each was divided by its norm (a negligible column by the largest norm),
+    /// Singular values of all columns after division by their norms (a negligible column by the largest norm),
     /// descending.
     pub singular_values: Vec<f64>,
-    /// How many of them exceed `tolerance` times the largest: a cross-check of `rank` by another criterion.
+    /// Number of singular values above `tolerance` times the largest: a cross-check of `rank`.
     pub numerical_rank: usize,
     /// The settings' tolerance.
     pub tolerance: f64,
-    /// The smallest share of a column that was still called independent.
+    /// Smallest independent share of a column that was accepted as independent.
     pub weakest_independent: f64,
-    /// The largest share of a column that was called dependent (0 when none was).
+    /// Largest independent share of a column that was called dependent (0 without dependent columns).
     pub strongest_dependent: f64,
-    /// Largest over smallest singular value of the estimated columns as they are; depends on units.
+    /// Largest over smallest singular value of the estimated columns, unscaled; depends on units.
     pub condition_number_raw: f64,
-    /// The same after each column was divided by its norm.
+    /// Condition number after each column was divided by its norm.
     pub condition_number_scaled: f64,
 }
 
-/// Which columns are estimated; the rest stay at their fallback values.
 #[derive(Clone, Debug)]
 pub(crate) struct Split {
     pub(crate) free: Vec<usize>,
     fixed: Vec<usize>,
-    /// Those of the fixed ones that stand out from the others by no more than noise.
+    /// Fixed columns that differ from the others only by noise.
     noise: Vec<usize>,
-    /// Those that are nothing but noise: nothing answers to them.
+    /// Fixed columns that contain only noise: no other column depends on them.
     silent: Vec<usize>,
     weakest_independent: f64,
     strongest_dependent: f64,
 }
 
-/// The least-squares solution on the free columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Solution {
-    /// One value per column, fixed ones included.
+    /// One value per column, including fixed ones.
     pub(crate) values: Vec<f64>,
     /// `R⁻¹` of the free columns: the inverse information is `R⁻¹ R⁻ᵀ`. Upper triangular, (free, free).
     pub(crate) inverse: DMatrix<f64>,
 }
 
-/// Column norms with negligible ones replaced by the largest, so that dividing by them leaves those negligible.
+/// Column norms; a negligible norm is replaced by the largest, so that the scaled column stays negligible.
 fn scales(triangle: &TriangularFactor, settings: &RankSettings) -> Vec<f64> {
     let norms = triangle.column_norms();
     let largest = norms.iter().copied().fold(0.0, f64::max);
@@ -121,7 +119,7 @@ fn scaled_triangle(triangle: &TriangularFactor, scales: &[f64]) -> DMatrix<f64> 
     DMatrix::from_fn(scales.len(), scales.len(), |row, column| triangle.entry(row, column) / scales[column])
 }
 
-/// Decides which columns of the stacked rows are excited; those `unexcited` are not whatever the rows say.
+/// Decides which columns of the stacked rows are excited; `unexcited` columns are always fixed.
 pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings, unexcited: &Unexcited) -> Split {
     let scales = scales(triangle, settings);
     let mut scaled = scaled_triangle(triangle, &scales);
@@ -139,13 +137,10 @@ pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings, unexci
     }
 }
 
-/// The values of all columns, and what is left to do for their uncertainty.
 pub(crate) struct SolvedValues {
-    /// One value per column, fixed ones included.
+    /// One value per column, including fixed ones.
     pub(crate) values: Vec<f64>,
-    /// The free columns, each divided by its scale.
     reduced: TriangularFactor,
-    /// Scales of the free columns.
     scales: Vec<f64>,
 }
 
@@ -164,7 +159,6 @@ impl SolvedValues {
         whitened
     }
 
-    /// The values with their inverse triangle.
     pub(crate) fn with_inverse(self) -> Solution {
         let mut inverse = dispatch(Level::detect(), Inverse { triangle: &self.reduced });
         for (k, scale) in self.scales.iter().enumerate() {
@@ -179,7 +173,7 @@ pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankS
     solved_values(triangle, split, settings, fallback).with_inverse()
 }
 
-/// [`solve`] for the values alone.
+/// [`solve`] without the inverse.
 pub(crate) fn solved_values(
     triangle: &TriangularFactor,
     split: &Split,
@@ -201,7 +195,7 @@ pub(crate) fn solved_values(
     let reduced = if split.fixed.is_empty() {
         TriangularFactor::from_entries(free, 0, scaled)
     } else {
-        // Triangular again after columns were left out.
+        // The triangular form is restored after columns were removed.
         let mut reduced = TriangularFactor::new(free);
         reduced.absorb_entries(&mut FactorWorkspace::default(), size, scaled);
         reduced
@@ -219,31 +213,30 @@ pub(crate) fn solved_values(
     SolvedValues { values, reduced, scales: split.free.iter().map(|&column| scales[column]).collect() }
 }
 
-/// The inverse of a factor's `R_W`, by back-substitution.
+/// Inverse of a factor's `R_W` by back-substitution.
 struct Inverse<'a> {
     triangle: &'a TriangularFactor,
 }
 
-/// Columns of the inverse that are computed side by side.
-const SIDE_BY_SIDE: usize = 8;
+const COLUMNS_PER_BLOCK: usize = 8;
 
 impl Kernel for Inverse<'_> {
     type Output = DMatrix<f64>;
 
-    /// The loops over columns become vector instructions; each column's own sums keep their order.
+    /// The loops over columns vectorise; the sums of each column keep their order.
     #[inline(always)]
     fn run<T: Lane>(self) -> Self::Output {
         let size = self.triangle.columns();
         let mut inverse = DMatrix::zeros(size, size);
-        let mut x = vec![[0.0; SIDE_BY_SIDE]; size];
-        for first in (0..size).step_by(SIDE_BY_SIDE) {
-            let end = size.min(first + SIDE_BY_SIDE);
-            x[..end].fill([0.0; SIDE_BY_SIDE]);
+        let mut x = vec![[0.0; COLUMNS_PER_BLOCK]; size];
+        for first in (0..size).step_by(COLUMNS_PER_BLOCK) {
+            let end = size.min(first + COLUMNS_PER_BLOCK);
+            x[..end].fill([0.0; COLUMNS_PER_BLOCK]);
             for row in (0..end).rev() {
                 let entries = self.triangle.row(row);
-                let mut sum = [0.0; SIDE_BY_SIDE];
+                let mut sum = [0.0; COLUMNS_PER_BLOCK];
                 for (entry, below) in entries[1..].iter().zip(&x[row + 1..end]) {
-                    for k in 0..SIDE_BY_SIDE {
+                    for k in 0..COLUMNS_PER_BLOCK {
                         sum[k] += entry * below[k];
                     }
                 }
@@ -258,7 +251,6 @@ impl Kernel for Inverse<'_> {
     }
 }
 
-/// Singular values and conditions of the stacked rows beside the decision taken.
 pub(crate) fn report(
     triangle: &TriangularFactor,
     split: &Split,
@@ -311,7 +303,7 @@ pub(crate) fn report(
     }
 }
 
-/// Largest over smallest singular value; 1 for no columns.
+/// Largest over smallest singular value; 1 without columns.
 fn condition(matrix: &DMatrix<f64>) -> f64 {
     if matrix.ncols() == 0 {
         return 1.0;

@@ -1,36 +1,29 @@
-//! A triangle that takes the few rows of a sample at a time: what a recursive estimate stands on.
+//! A triangular factor that is updated with the few rows of one sample, for recursive estimation.
 //!
-//! A block of hundreds of rows is reflected down its columns (`reflect.rs`). A sample gives one row for each joint, and
-//! registers along seven rows are half empty: here they lie along the columns. Reflector k takes
-//! `v = (ν, a)`, `a` the entries of the rows in column k, to all columns from k on at once,
+//! `reflect.rs` reduces a block of hundreds of rows with registers along the rows. A sample has one row per joint, so
+//! here the registers lie along the columns. Reflector k, `v = (ν, a)` with the entries `a` of the rows in column k,
+//! is applied to all columns from k on at once,
 //!
 //! ```text
 //!     t_j = β (ν R_kj + Σ_m a_m A_mj),   R_kj −= ν t_j,   A_mj −= a_m t_j,
 //! ```
 //!
-//! and rows that have not begun yet, because their joint moves none of the bodies so far, are left out.
+//! and rows whose first nonzero column comes later are skipped.
 
-use super::reflect::{CHUNK_ROWS, Chunk};
-use super::triangular::TriangularFactor;
+use super::reflect::{CHUNK_ROWS, Chunk, NEGLIGIBLE_SQUARE};
+use super::triangular::{MAX_MAGNITUDE, TriangularFactor};
 use crate::error::{EstimationError, require};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 
-/// Rows reflected together: what registers hold.
-const MOST_ROWS: usize = 8;
+/// Rows reflected together, limited by the registers.
+const GROUP_ROWS: usize = 8;
 
-/// Reflectors applied together.
 const REFLECTORS: usize = 2;
 
-/// As in `reflect.rs`: a column of rows whose squares sum to less counts as zero.
-const NEGLIGIBLE_SQUARE: f64 = 1.0e-290;
-
-/// The largest magnitude that can be squared and summed without overflow.
-const LARGEST: f64 = 1.0e140;
-
-/// The upper triangular R of all rows `[W | τ]` so far, of which every sample brings as many as there are joints.
+/// The upper triangular R of all rows `[W | τ]` so far; each sample adds one row per joint.
 ///
-/// The same factor as a [`TriangularFactor`] to rounding, in a form for which a sample is cheap: 2·rows·(columns + 1)²
-/// operations less what rows that begin late leave out, and no allocation.
+/// Equal to a [`TriangularFactor`] up to rounding, but cheap to update with a sample: at most 2·rows·(columns + 1)²
+/// operations, less for rows that begin late, and no allocation.
 ///
 /// ```
 /// use dynident_estimation::RecursiveFactor;
@@ -56,22 +49,20 @@ pub struct RecursiveFactor {
     level: Level,
     columns: usize,
     samples: usize,
-    /// Row k from the line that holds its diagonal on. What stands before the diagonal means nothing.
+    /// Row k starts at the line that contains its diagonal. Entries before the diagonal are undefined.
     triangle: Vec<Chunk>,
-    /// Rows of the sample at hand, in groups of those that are reflected together: the lines of a group one after
-    /// another, in each its rows, those first that begin first.
+    /// Rows of the current sample in groups that are reflected together. Lines of a group are consecutive; within a
+    /// line, rows are sorted by their first column.
     lines: Vec<Line>,
-    /// Where each row of a sample stands among all, and the column at which each of them begins, in that order.
+    /// Sorted position of each row of a sample, and the first column of each row in sorted order.
     places: Vec<usize>,
     begins: Vec<usize>,
 }
 
-/// Eight columns of the rows that are reflected together.
-type Line = [Chunk; MOST_ROWS];
+type Line = [Chunk; GROUP_ROWS];
 
 impl RecursiveFactor {
-    /// The factor of no rows. Every sample has as many rows as `begins` has entries; row m has zeros in the columns
-    /// before `begins[m]`.
+    /// The factor without rows. Every sample has `begins.len()` rows; row m is zero in the columns before `begins[m]`.
     pub fn new(columns: usize, begins: &[usize]) -> Self {
         Self::with_level(columns, begins, Level::detect())
     }
@@ -90,9 +81,9 @@ impl RecursiveFactor {
             level,
             columns,
             samples: 0,
-            // Whole steps of reflectors: a row of zeros may be the last.
+            // Rounded up to whole reflector steps: the last row may be zero.
             triangle: vec![Chunk::ZERO; row_line((columns + 1).next_multiple_of(REFLECTORS), count)],
-            lines: vec![[Chunk::ZERO; MOST_ROWS]; begins.len().div_ceil(MOST_ROWS) * count],
+            lines: vec![[Chunk::ZERO; GROUP_ROWS]; begins.len().div_ceil(GROUP_ROWS) * count],
             places,
             begins,
         }
@@ -108,36 +99,36 @@ impl RecursiveFactor {
         self.samples
     }
 
-    /// Sets an entry of row `row` of the sample at hand; column [`columns()`](Self::columns) is the torque's. Entries
-    /// that are not set are zero. One before the row's beginning is not seen.
+    /// Sets an entry of row `row` of the current sample; column [`columns()`](Self::columns) is the torque. Unset
+    /// entries are zero; entries before the first column of the row are ignored.
     ///
     /// # Panics
-    /// If there is no such row in a sample, or no such column.
+    /// If the row or column is out of range.
     #[inline]
     pub fn set(&mut self, row: usize, column: usize, value: f64) {
         assert!(column <= self.columns, "column {column} of {}", self.columns);
         let place = self.places[row];
-        let line = place / MOST_ROWS * line_count(self.columns) + column / CHUNK_ROWS;
-        self.lines[line][place % MOST_ROWS].0[column % CHUNK_ROWS] = value;
+        let line = place / GROUP_ROWS * line_count(self.columns) + column / CHUNK_ROWS;
+        self.lines[line][place % GROUP_ROWS].0[column % CHUNK_ROWS] = value;
     }
 
-    /// Takes the rows of the sample at hand into the triangle, without allocation.
+    /// Absorbs the current sample into the triangle, without allocation.
     ///
     /// # Errors
-    /// [`EstimationError::Unusable`] for a NaN, an infinity or a magnitude above 1e140: nothing of the sample is taken.
+    /// [`EstimationError::Unusable`] for a NaN, an infinity or a magnitude above 1e140; the whole sample is dropped.
     pub fn absorb(&mut self) -> Result<(), EstimationError> {
         let count = line_count(self.columns);
         if let Some(bad) = dispatch(self.level, FindUnusable(&self.lines)) {
-            let (group, line) = (bad / MOST_ROWS / count, bad / MOST_ROWS % count);
-            let place = group * MOST_ROWS + bad % MOST_ROWS;
+            let (group, line) = (bad / GROUP_ROWS / count, bad / GROUP_ROWS % count);
+            let place = group * GROUP_ROWS + bad % GROUP_ROWS;
             let row = self.places.iter().position(|&at| at == place).unwrap_or(0);
-            let chunk = self.lines[bad / MOST_ROWS][bad % MOST_ROWS].0;
-            let within = chunk.iter().position(|value| value.is_nan() || value.abs() > LARGEST).unwrap_or(0);
-            self.lines.fill([Chunk::ZERO; MOST_ROWS]);
+            let chunk = self.lines[bad / GROUP_ROWS][bad % GROUP_ROWS].0;
+            let within = chunk.iter().position(|value| value.is_nan() || value.abs() > MAX_MAGNITUDE).unwrap_or(0);
+            self.lines.fill([Chunk::ZERO; GROUP_ROWS]);
             let column = line * CHUNK_ROWS + within;
-            return Err(EstimationError::Unusable { row, column, value: chunk[within], limit: LARGEST });
+            return Err(EstimationError::Unusable { row, column, value: chunk[within], limit: MAX_MAGNITUDE });
         }
-        for (lines, begins) in self.lines.chunks_mut(count).zip(self.begins.chunks(MOST_ROWS)) {
+        for (lines, begins) in self.lines.chunks_mut(count).zip(self.begins.chunks(GROUP_ROWS)) {
             dispatch(
                 self.level,
                 TriangleOnRows { triangle: &mut self.triangle, size: self.columns + 1, lines, begins },
@@ -147,7 +138,7 @@ impl RecursiveFactor {
         Ok(())
     }
 
-    /// Entry (`row`, `column`) of R; column [`columns()`](Self::columns) is the torque's. Zero below the diagonal.
+    /// Entry (`row`, `column`) of R; column [`columns()`](Self::columns) is the torque. Zero below the diagonal.
     ///
     /// # Panics
     /// If either number is above [`columns()`](Self::columns).
@@ -161,23 +152,23 @@ impl RecursiveFactor {
         self.triangle[line].0[column % CHUNK_ROWS]
     }
 
-    /// All rows so far times `weight`: `weight · R`, in place.
+    /// Multiplies all rows so far by `weight`: `weight · R`, in place.
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
     pub fn scale(&mut self, weight: f64) -> Result<(), EstimationError> {
-        require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")?;
+        require(weight.is_finite() && weight >= 0.0, "weight", weight, "use a finite, nonnegative weight")?;
         for value in self.triangle.iter_mut().flat_map(|chunk| &mut chunk.0) {
             *value *= weight;
         }
         Ok(())
     }
 
-    /// The θ of `R_W θ = r`, in `out`; false where a diagonal of R is below 1e-12 of the largest, and rows do not
-    /// determine θ. Allocates nothing.
+    /// Writes the solution θ of `R_W θ = r` to `out`; returns false if a diagonal of R is below 1e-12 of the largest,
+    /// i.e. the rows do not determine θ. Does not allocate.
     ///
     /// # Panics
-    /// If `out` has not one entry for each column.
+    /// If `out` does not have one entry per column.
     pub fn solve(&self, out: &mut [f64]) -> bool {
         assert_eq!(out.len(), self.columns, "one entry for each column");
         let count = line_count(self.columns);
@@ -200,17 +191,17 @@ impl RecursiveFactor {
         true
     }
 
-    /// The same factor as a [`TriangularFactor`], which estimators and fits take. Allocates.
+    /// Converts to a [`TriangularFactor`]. Allocates.
     pub fn to_triangular(&self) -> TriangularFactor {
         TriangularFactor::from_entries(self.columns, self.samples * self.begins.len(), |row, column| {
             self.entry(row, column)
         })
     }
 
-    /// Starts from a factor of rows before the first sample.
+    /// Replaces the content by the factor of rows before the first sample.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] when the numbers of columns differ.
+    /// [`EstimationError::Mismatch`] if the numbers of columns differ.
     pub fn start_from(&mut self, factor: &TriangularFactor) -> Result<(), EstimationError> {
         crate::error::expect("columns of the start", self.columns, factor.columns())?;
         self.samples = 0;
@@ -224,18 +215,17 @@ impl RecursiveFactor {
     }
 }
 
-/// Lines of eight columns, the torque's among them.
 const fn line_count(columns: usize) -> usize {
     (columns + 1).div_ceil(CHUNK_ROWS)
 }
 
-/// The line with which row `row` begins: eight rows have all `count` lines, the next eight one less.
+/// First line of row `row`: eight rows have all `count` lines, the next eight one less.
 const fn row_line(row: usize, count: usize) -> usize {
     let (whole, rest) = (row / CHUNK_ROWS, row % CHUNK_ROWS);
     CHUNK_ROWS * whole * count - CHUNK_ROWS / 2 * whole * whole.saturating_sub(1) + rest * (count - whole)
 }
 
-/// The first chunk, counted through all lines, with a number that cannot be squared.
+/// Index over all lines of the first chunk with a value that cannot be squared.
 struct FindUnusable<'a>(&'a [Line]);
 
 impl Kernel for FindUnusable<'_> {
@@ -243,20 +233,20 @@ impl Kernel for FindUnusable<'_> {
 
     #[inline(always)]
     fn run<T: Lane>(self) -> Option<usize> {
-        // False for NaN; without an early exit it vectorises.
+        // The comparison is false for NaN; without an early exit the loop vectorises.
         let mut usable = true;
         for value in self.0.as_flattened().iter().flat_map(|chunk| &chunk.0) {
-            usable &= value.abs() <= LARGEST;
+            usable &= value.abs() <= MAX_MAGNITUDE;
         }
         if usable {
             return None;
         }
-        let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
+        let bad = |value: &f64| value.is_nan() || value.abs() > MAX_MAGNITUDE;
         self.0.as_flattened().iter().position(|chunk| chunk.0.iter().any(bad))
     }
 }
 
-/// Reflects up to eight rows into the triangle, and leaves zeros for the next sample.
+/// Reflects up to eight rows into the triangle and clears them for the next sample.
 struct TriangleOnRows<'a> {
     triangle: &'a mut [Chunk],
     size: usize,
@@ -291,13 +281,13 @@ impl Kernel for TriangleOnRows<'_> {
                 _ => reflect::<T, 8>(above, rest, within),
             }
         }
-        lines.fill([Chunk::ZERO; MOST_ROWS]);
+        lines.fill([Chunk::ZERO; GROUP_ROWS]);
     }
 }
 
-/// Two reflectors of two rows of the triangle and `M` rows: made of their own columns, number by number, then applied
-/// to eight columns after eight, which stay in registers for both. Columns before their own in the first line hold
-/// rounding of earlier reflectors: it is reflected too, which bounds it, and never read.
+/// Applies two reflectors to two rows of the triangle and `M` rows: made from their own columns as scalars, then
+/// applied to eight columns at a time, which stay in registers for both. Columns before the pivot in the first line
+/// contain rounding of earlier reflectors. They are reflected too, which keeps them bounded, and never read.
 #[inline(always)]
 fn reflect<T: Lane, const M: usize>(triangle: &mut [Chunk], lines: &mut [Line], within: usize) {
     let count = lines.len();
@@ -337,7 +327,7 @@ fn reflect<T: Lane, const M: usize>(triangle: &mut [Chunk], lines: &mut [Line], 
     lower[0].0[j] = other.norm;
 }
 
-/// `I - β v vᵀ` with `v = (ν, a)`, which makes of `(old, a)` `(norm, 0)`.
+/// `I - β v vᵀ` with `v = (ν, a)`, which maps `(old, a)` to `(norm, 0)`.
 struct Reflector {
     nu: f64,
     beta: f64,
@@ -351,7 +341,7 @@ impl Reflector {
         if square < NEGLIGIBLE_SQUARE {
             return Self { nu: 0.0, beta: 0.0, norm: old };
         }
-        // Beside the root, which takes as long.
+        // Runs in parallel with the root, which takes as long.
         let inverse = 1.0 / square;
         let norm = (old * old + square).sqrt();
         let sum = old + norm;
@@ -365,7 +355,7 @@ impl Reflector {
 fn apply<T: Lane, const M: usize>(reflector: [T; 2], a: &[T; M], above: &mut [f64], x: &mut [T; M]) {
     let [nu, beta] = reflector;
     let r = T::load(above);
-    // Two sums, which do not wait for each other.
+    // Two independent sums avoid a dependency chain.
     let mut sums = [r * nu, T::ZERO];
     for m in 0..M {
         sums[m % 2] = x[m].mul_add(a[m], sums[m % 2]);
@@ -386,7 +376,7 @@ fn wide<T: Lane, const M: usize>(values: &[f64; M]) -> [T; M] {
     wide
 }
 
-/// `aᵀ b` in sums that do not wait for each other.
+/// `aᵀ b` in four independent sums.
 #[inline(always)]
 fn product<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     let mut sums = [0.0; 4];

@@ -1,13 +1,13 @@
 //! Householder reflections of a triangle stacked on a panel of rows: the hot loop of every fit.
 //!
-//! `[R; A] = Q·[R'; 0]` with R upper triangular (d×d) and A dense (m×d). Reflector k has the form `v = (ν e_k, a)` with
-//! `a` the k-th column of the panel as it then stands, so it touches one row of R and the panel, nothing else: 2·m·d²
-//! operations. Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci.
-//! Stat. Comput. 10 (1989) 53), two target columns at a time, so that each loaded number feeds several multiplications.
+//! `[R; A] = Q·[R'; 0]` with R upper triangular (d×d) and A dense (m×d). Reflector k has the form `v = (ν e_k, a)`
+//! with the current k-th column `a` of the panel, so it changes one row of R and the panel only: 2·m·d² operations in
+//! all. Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci. Stat.
+//! Comput. 10 (1989) 53), two target columns at a time, so that each loaded number is used in several multiplications.
 
 use dynident_lanes::{Kernel, Lane};
 
-/// Eight rows of one column. The type's alignment keeps every load within one cache line.
+/// Eight rows of one column. The alignment keeps every load within one cache line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Chunk(pub(crate) [f64; CHUNK_ROWS]);
@@ -19,39 +19,33 @@ impl Chunk {
 /// Rows in a [`Chunk`].
 pub(crate) const CHUNK_ROWS: usize = 8;
 
-/// How many reflectors are applied together.
 const REFLECTORS: usize = 4;
 
-/// A column whose squared norm is below this counts as zero: its reciprocal would overflow. It is a column of numbers
-/// around 1e-145, far below any rounding error of a measured quantity.
-const NEGLIGIBLE_SQUARE: f64 = 1.0e-290;
+/// A column with a smaller squared norm is treated as zero, because its reciprocal would overflow. Its entries are
+/// around 1e-145, far below any rounding error of a measurement.
+pub(super) const NEGLIGIBLE_SQUARE: f64 = 1.0e-290;
 
-/// Where row `row` of a packed upper triangle of size `size` begins; entry (row, column) follows `column - row` places
-/// on.
+/// Index of row `row` in a packed upper triangle of size `size`; entry (row, column) follows at `column - row`.
 pub(crate) const fn row_start(size: usize, row: usize) -> usize {
-    // Row r holds size - r entries: the sum over the rows before it.
     row * (2 * size + 1 - row) / 2
 }
 
-/// Absorbs a panel into a triangle. The panel's content is spent.
+/// Absorbs a panel into a triangle. The panel is overwritten.
 pub(crate) struct TriangleOnPanel<'a> {
-    /// Packed upper triangle, row by row; its diagonal is not negative, before and after.
+    /// Packed upper triangle by rows, with a nonnegative diagonal.
     pub(crate) triangle: &'a mut [f64],
-    /// Rows and columns of the triangle.
     pub(crate) size: usize,
-    /// Columns of the panel one after another, each `chunks` long, filled up with rows of zeros.
+    /// Columns of the panel one after another, each `chunks` long, padded with zero rows.
     pub(crate) panel: &'a mut [Chunk],
-    /// Chunks per column.
     pub(crate) chunks: usize,
-    /// Chunks of each column up to its last number that is not zero: see [`heights`].
+    /// Chunks of each column up to its last nonzero number: see [`heights`].
     pub(crate) heights: &'a mut [usize],
 }
 
-/// For each column of a panel how many of its chunks there are up to the last one with a number that is not zero. A
-/// triangle below a triangle, or rows that see few of the columns, take a fraction of the work of full ones; the sums
-/// come out to the last bit as over all rows, for what is left out are products with zero.
+/// Number of chunks of each column up to the last nonzero number. Triangular panels and rows with few columns need a
+/// fraction of the work of full ones; the sums are bit-identical, because only products with zero are skipped.
 pub(crate) fn heights(panel: &[Chunk], chunks: usize, out: &mut Vec<usize>) {
-    // A zero with the other sign would not be the same to the last bit.
+    // Compared by bits: a negative zero would change the result.
     let filled = |chunk: &Chunk| chunk.0.iter().any(|value| value.to_bits() != 0);
     out.clear();
     out.extend(panel.chunks_exact(chunks).map(|column| column.iter().rposition(filled).map_or(0, |last| last + 1)));
@@ -72,7 +66,7 @@ impl Kernel for TriangleOnPanel<'_> {
             for own in &own[first..] {
                 height = height.max(*own);
             }
-            // Nothing below these columns of the triangle: their reflectors are the identity.
+            // The panel is zero in these columns, so their reflectors are the identity.
             if height > 0 {
                 let block = Block { columns: &mut head[first * chunks..], chunks, height };
                 match width {
@@ -87,26 +81,26 @@ impl Kernel for TriangleOnPanel<'_> {
     }
 }
 
-/// Columns that reflectors are made of.
+/// Columns from which reflectors are made.
 struct Block<'a> {
     columns: &'a mut [Chunk],
     /// Chunks from one column to the next.
     chunks: usize,
-    /// Chunks of them that are not all zeros.
+    /// Leading chunks that are not all zero.
     height: usize,
 }
 
-/// `V` reflectors `I - β v vᵀ` in the making. Their parts `ν` lie in different rows of the triangle, so the inner
-/// product of two reflectors is that of their panel columns.
+/// `V` reflectors `I - β v vᵀ` under construction. Their parts `ν` lie in different rows of the triangle, so the
+/// inner product of two reflectors is that of their panel columns.
 struct Reflectors<const V: usize> {
-    /// The part ν of each reflector in its row of the triangle.
+    /// Part ν of each reflector in its row of the triangle.
     nu: [f64; V],
-    /// The upper triangle of `I - V T Vᵀ`, `t[l][i]` for l ≤ i, with β on the diagonal.
+    /// Upper triangle T of `I - V T Vᵀ`, `t[l][i]` for l ≤ i, with β on the diagonal.
     t: [[f64; V]; V],
 }
 
 impl<const V: usize> Reflectors<V> {
-    /// How much of each of the first `count` reflectors is to be subtracted from a target with these inner products.
+    /// Amounts of the first `count` reflectors to subtract from a target with these inner products.
     #[inline(always)]
     fn amounts(&self, count: usize, products: [f64; V]) -> [f64; V] {
         let mut amounts = [0.0; V];
@@ -176,10 +170,9 @@ fn is_zero<const V: usize>(triangle: &[f64], size: usize, first: usize, column: 
     bits == 0
 }
 
-/// The first `height` chunks of the first `N` columns of a block.
 #[inline(always)]
 fn columns<const N: usize>(block: &[Chunk], chunks: usize, height: usize) -> [&[Chunk]; N] {
-    // No `array::from_fn`: its closure would not be inlined into the processor level's function.
+    // No `array::from_fn`: its closure is not inlined into the function of the processor level.
     let mut columns: [&[Chunk]; N] = [&[]; N];
     for (i, column) in columns.iter_mut().enumerate() {
         *column = &block[i * chunks..i * chunks + height];
@@ -187,7 +180,7 @@ fn columns<const N: usize>(block: &[Chunk], chunks: usize, height: usize) -> [&[
     columns
 }
 
-/// Applies the `P` reflectors made so far to the block's next column, then makes that column's own reflector.
+/// Applies the `P` previous reflectors to the block's next column, then makes the reflector of that column.
 #[inline(always)]
 fn reflect_column<T: Lane, const V: usize, const P: usize>(
     triangle: &mut [f64],
@@ -216,7 +209,7 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     }
     let [[square]] = inner_products::<T, 1, 1>(&[&*column], &[&*column]);
     if square < NEGLIGIBLE_SQUARE {
-        // The identity: ν and its column of T stay zero.
+        // Identity reflector: ν and its column of T stay zero.
         return;
     }
     let [products] = inner_products::<T, P, 1>(&done, &[&*column]);
@@ -224,8 +217,8 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     let old = *diagonal;
     let norm = (old * old + square).sqrt();
     *diagonal = norm;
-    // old - norm without cancellation (old is not negative): Parlett, SIAM Review 13 (1971) 197. It keeps the diagonal
-    // positive.
+    // old - norm without cancellation (old is not negative), which keeps the diagonal positive: Parlett, SIAM Review
+    // 13 (1971) 197.
     reflectors.nu[P] = -square / (old + norm);
     // At most 2/square, which is finite; norm · square may underflow.
     let beta = (old + norm) / norm / square;
@@ -241,7 +234,7 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     reflectors.t[P][P] = beta;
 }
 
-/// Applies the reflectors to target columns `index ..`.
+/// Applies the reflectors to the target columns from `index` on.
 #[inline(always)]
 fn apply<T: Lane, const V: usize, const X: usize>(
     triangle: &mut [f64],
@@ -294,8 +287,8 @@ fn inner_products<T: Lane, const V: usize, const X: usize>(
             }
         }
     }
-    // Through memory: seeing the loop and the sums over lanes together, the compiler picks a layout that suits the few
-    // sums and shuffles in every turn of the loop (half the speed).
+    // black_box: if the compiler sees the loop and the lane sums together, it chooses a layout with shuffles in every
+    // iteration (half the speed).
     let sums = core::hint::black_box(sums);
     let mut products = [[0.0; V]; X];
     for x in 0..X {
@@ -358,13 +351,13 @@ mod tests {
     use super::*;
     use dynident_lanes::{Level, dispatch};
 
-    /// A triangle and a panel of which column `c` ends after `ends(c)` rows.
+    /// A triangle and a panel whose column `c` ends after `ends(c)` rows.
     fn stack(size: usize, chunks: usize, ends: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<Chunk>) {
         let number = |k: usize| (1.7 * k as f64 * k as f64 + 0.3).sin();
         let mut triangle: Vec<f64> = (0..row_start(size, size)).map(number).collect();
         for row in 0..size {
             triangle[row_start(size, row)] = triangle[row_start(size, row)].abs();
-            // The last but one column is not seen by the first half.
+            // The second last column is zero in the first half of the rows.
             if row + 2 < size && row < size / 2 {
                 triangle[row_start(size, row) + size - 2 - row] = 0.0;
             }
@@ -379,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_that_are_left_out_change_no_bit() {
+    fn skipped_zeros_change_no_bit() {
         let (size, chunks) = (23, 4);
         let triangular = |column: usize| column + 1;
         let few = |column: usize| if column.is_multiple_of(3) || column == size - 2 { 0 } else { 13 };

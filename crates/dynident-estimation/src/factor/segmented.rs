@@ -1,4 +1,4 @@
-//! A factor that remembers when: the rows of one joint in one log as at most K factors of consecutive time segments.
+//! The rows of one joint in one log as at most K factors of consecutive time segments.
 
 use super::sparse_map::SparseMap;
 use super::triangular::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
@@ -8,16 +8,16 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
-/// How a log is cut into segments.
+/// Division of a log into segments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SegmentSettings {
-    /// Segments kept at most; memory is bounded by this many factors. Default 64: enough for a covariance from
-    /// segments, and segments of any log worth fitting then last longer than its residuals are correlated.
+    /// Maximum number of segments; it bounds the memory. Default 64: enough for a covariance from segments, and in
+    /// any usable log the segments are longer than the correlation time of the residuals.
     pub max_segments: usize,
-    /// Rows of a segment at first; doubled whenever the log outgrows `max_segments`. Default 16. A multiple of
-    /// [`BLOCK_ROWS`](crate::factor::BLOCK_ROWS) is faster for logs known to be long.
+    /// Initial length of a segment, in rows; doubled whenever the log exceeds `max_segments`. Default 16. A multiple
+    /// of [`BLOCK_ROWS`](crate::factor::BLOCK_ROWS) is faster for long logs.
     pub first_length_rows: usize,
 }
 
@@ -28,8 +28,7 @@ impl Default for SegmentSettings {
 }
 
 impl SegmentSettings {
-    /// The default number of segments, with a first length that a log of `rows` rows never outgrows: no merging, the
-    /// fastest.
+    /// Default number of segments with an initial length that fits a log of `rows` rows: no merging, fastest.
     pub fn for_rows(rows: usize) -> Self {
         let settings = Self::default();
         let mut first_length_rows = settings.first_length_rows;
@@ -44,13 +43,13 @@ impl SegmentSettings {
     /// # Errors
     /// [`EstimationError::Setting`] for fewer than two segments or a length of zero.
     pub fn validate(&self) -> Result<(), EstimationError> {
-        require(self.max_segments >= 2, "max_segments", self.max_segments as f64, "give at least 2")?;
-        require(self.first_length_rows > 0, "first_length_rows", 0.0, "give at least 1")
+        require(self.max_segments >= 2, "max_segments", self.max_segments as f64, "use at least 2")?;
+        require(self.first_length_rows > 0, "first_length_rows", 0.0, "use at least 1")
     }
 }
 
-/// Rows that a segment keeps as they are: they wait for neighbours, since one large block is reduced faster than small
-/// ones and their triangles. Six times the memory of the factor.
+/// Maximum number of unreduced rows of a segment. One large block is reduced faster than several small ones. Needs
+/// six times the memory of the factor.
 const fn most_rows(columns: usize) -> usize {
     3 * (columns + 1)
 }
@@ -58,17 +57,16 @@ const fn most_rows(columns: usize) -> usize {
 /// One segment: its rows while they are few, then their factor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Segment {
-    /// Row by row, columns + 1 numbers each.
+    /// By rows, columns + 1 numbers each.
     Rows(Vec<f64>),
     Factor(TriangularFactor),
 }
 
 /// A [`TriangularFactor`] kept as consecutive time segments of equal length (the last may be shorter).
 ///
-/// When the log outgrows the allowed number of segments, neighbours are merged and the length doubles: memory stays
-/// bounded for a log of any length, and all that resampling of a time series needs (segments as clusters, jackknife,
-/// block bootstrap, leaving segments out) comes from these factors, without a second pass over the data. The result
-/// depends only on the rows and the settings, by rounding on how they are cut into calls.
+/// When a log exceeds the maximum number of segments, neighbours are merged and the length doubles, so memory is
+/// bounded for a log of any length. Clusters, jackknife and block bootstrap use these factors without a second pass
+/// over the data. The result depends only on the rows and settings, and by rounding on how rows are split into calls.
 ///
 /// ```
 /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -88,13 +86,13 @@ pub struct SegmentedFactor {
     length_rows: usize,
     rows: usize,
     segments: Vec<Segment>,
-    /// The factor of all rows, once somebody asked for it: estimators ask again and again.
+    /// The factor of all rows, computed on first use.
     total: OnceLock<TriangularFactor>,
     workspace: FactorWorkspace,
 }
 
 impl SegmentedFactor {
-    /// No rows yet, for `columns` regressor columns and the torque.
+    /// Creates a factor without rows for `columns` regressor columns and the torque.
     ///
     /// # Errors
     /// As [`SegmentSettings::validate`].
@@ -111,7 +109,7 @@ impl SegmentedFactor {
         })
     }
 
-    /// The rows of a factor as one segment: all that values need, and little work for those who make many.
+    /// One segment from a factor: fast, and sufficient for values without a covariance.
     pub fn of_factor(factor: TriangularFactor) -> Self {
         let (columns, rows) = (factor.columns(), factor.rows());
         let (total, workspace) = (OnceLock::from(factor.clone()), FactorWorkspace::default());
@@ -119,7 +117,6 @@ impl SegmentedFactor {
         Self { columns, max_segments: 2, length_rows: rows.max(1), rows, segments, total, workspace }
     }
 
-    /// The factor of these segments.
     pub(super) fn of_segments(
         columns: usize,
         rows: usize,
@@ -158,11 +155,10 @@ impl SegmentedFactor {
         self.segments.iter().map(|segment| segment.rows(self.columns)).collect()
     }
 
-    /// Absorbs the next `rows` rows of the log, column by column as in [`TriangularFactor::absorb`]; their order is
-    /// time.
+    /// Absorbs the next `rows` rows of the log in order of time, column by column as in [`TriangularFactor::absorb`].
     ///
     /// # Errors
-    /// As [`TriangularFactor::absorb`]; nothing is absorbed then.
+    /// As [`TriangularFactor::absorb`]; on error nothing is absorbed.
     pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
         check_panel(self.columns, panel, rows)?;
         self.total = OnceLock::new();
@@ -187,7 +183,7 @@ impl SegmentedFactor {
         Ok(())
     }
 
-    /// Merges neighbours and doubles the length.
+    /// Merges neighbouring segments and doubles the length.
     pub(super) fn halve(&mut self) {
         let mut merged = Vec::with_capacity(self.max_segments);
         let mut old = std::mem::take(&mut self.segments).into_iter();
@@ -201,8 +197,8 @@ impl SegmentedFactor {
         self.length_rows *= 2;
     }
 
-    /// The same rows and segments with only the given columns, in the order given: a smaller model from the factors of
-    /// a larger one, without a second pass over the log.
+    /// The same rows and segments with only the given columns, in the given order: a smaller model without a second
+    /// pass over the log.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a column out of range.
@@ -227,15 +223,15 @@ impl SegmentedFactor {
         self.segments.iter().map(|segment| segment.factor(self.columns, &mut workspace)).collect()
     }
 
-    /// Of every segment, in order of time, rows that say of the parameters what its own say: these while they are no
-    /// more than there are columns, else those of its factor that are not zero.
+    /// Equivalent rows of every segment, in order of time: the rows themselves if there are at most as many as
+    /// columns, else the nonzero rows of their factor.
     pub(crate) fn reduced_segments(&self) -> Vec<ReducedRows> {
         let mut workspace = FactorWorkspace::default();
         self.segments.iter().map(|segment| segment.reduced(self.columns, &mut workspace)).collect()
     }
 
-    /// The factor of all rows; made once and kept, and of a [selection](Self::selected) or a [map](Self::mapped) made
-    /// of this one.
+    /// The factor of all rows, computed once. A [selection](Self::selected) or a [map](Self::mapped) derives its total
+    /// from this one.
     pub fn total(&self) -> &TriangularFactor {
         self.total.get_or_init(|| {
             let mut workspace = FactorWorkspace::default();
@@ -247,9 +243,9 @@ impl SegmentedFactor {
         })
     }
 
-    /// The rows `[W | τ] C` in the same segments: other columns, and another torque, made of these. C has shape
-    /// (columns + 1, new columns + 1), its last column makes the torque. A load whose columns are sums of others, a
-    /// torque less a known part, or a unit of one joint need no second pass over the log.
+    /// The rows `[W | τ] C` in the same segments. C has shape (columns + 1, new columns + 1); its last column gives
+    /// the torque. Use this for a load with combined columns, a torque minus a known part or another unit of a joint,
+    /// without a second pass over the log.
     ///
     /// ```
     /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -263,8 +259,8 @@ impl SegmentedFactor {
     /// ```
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless C has one row for each column and one for the torque, and at least one
-    /// column; [`EstimationError::Setting`] for an entry that is not finite.
+    /// [`EstimationError::Mismatch`] unless C has one row per column plus the torque and at least one column;
+    /// [`EstimationError::Setting`] for an entry that is not finite.
     pub fn mapped(&self, map: &DMatrix<f64>) -> Result<Self, EstimationError> {
         expect("rows of a map of columns", self.columns + 1, map.nrows())?;
         if map.ncols() == 0 {
@@ -275,7 +271,7 @@ impl SegmentedFactor {
             });
         }
         if let Some(&value) = map.iter().find(|value| !value.is_finite()) {
-            return Err(EstimationError::Setting { setting: "map of columns", value, fix: "give finite numbers" });
+            return Err(EstimationError::Setting { setting: "map of columns", value, fix: "use finite numbers" });
         }
         let (columns, map) = (map.ncols() - 1, SparseMap::new(map));
         let mut workspace = FactorWorkspace::default();
@@ -284,21 +280,20 @@ impl SegmentedFactor {
         Ok(Self { columns, segments, total, workspace, ..*self })
     }
 
-    /// The same rows as one segment: all that values need, and little work for those who solve again and again.
+    /// The same rows as one segment: sufficient for values without a covariance, and fast for repeated solutions.
     #[must_use]
     pub fn as_one_segment(&self) -> Self {
         Self { max_segments: self.max_segments, ..Self::of_factor(self.total().clone()) }
     }
 
-    /// The same columns and segments without their rows, for another pass over the same log.
+    /// The same columns and settings without rows, for another pass over the same log.
     pub(crate) fn emptied(&self) -> Self {
         let (total, workspace) = (OnceLock::new(), FactorWorkspace::default());
         Self { rows: 0, segments: Vec::new(), total, workspace, ..*self }
     }
 
-    /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1),
-    /// the rows `[W | τ] C`, all blocks stacked. Segments stay what they were in time; their numbers of rows are
-    /// multiplied by the number of blocks.
+    /// The factor of the rows `[W | τ] C` for every matrix C of `blocks`, shape (columns + 1, new columns + 1), all
+    /// blocks stacked. Segments stay the same in time; their numbers of rows are multiplied by the number of blocks.
     pub(crate) fn transformed(&self, blocks: &[DMatrix<f64>]) -> Self {
         let size = self.columns + 1;
         let columns = blocks.first().map_or(0, |block| block.ncols().saturating_sub(1));
@@ -326,13 +321,13 @@ impl SegmentedFactor {
         }
     }
 
-    /// `Wᵀ(τ − Wθ)` of every segment, in order of time: the sums that a covariance with correlated errors is made of.
+    /// `Wᵀ(τ − Wθ)` of every segment, in order of time, for covariances with correlated errors.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
+    /// [`EstimationError::Mismatch`] for a wrong number of parameters.
     pub fn scores(&self, theta: &[f64]) -> Result<Vec<DVector<f64>>, EstimationError> {
         if theta.len() != self.columns {
-            let what = "parameters for a factor's columns".into();
+            let what = "parameters of a factor".into();
             return Err(EstimationError::Mismatch { what, expected: self.columns, found: theta.len() });
         }
         let score = |segment: &Segment| match segment {
@@ -353,11 +348,10 @@ impl SegmentedFactor {
     }
 }
 
-/// Few rows `[W | τ]` that stand for those of a segment.
+/// A few rows `[W | τ]` that are equivalent to those of a segment.
 pub(crate) struct ReducedRows {
     /// W, shape (rows, columns).
     pub(crate) regressor: DMatrix<f64>,
-    /// τ, one for each row.
     pub(crate) torque: DVector<f64>,
 }
 
@@ -412,7 +406,6 @@ impl Segment {
         }
     }
 
-    /// From rows to their factor.
     fn condense(&mut self, columns: usize, workspace: &mut FactorWorkspace) {
         if let Self::Rows(_) = self {
             *self = Self::Factor(self.factor(columns, workspace));
@@ -442,7 +435,7 @@ impl Segment {
             }
             Self::Rows(_) => Self::Factor(self.factor(columns, workspace)).reduced(columns, workspace),
             Self::Factor(factor) => {
-                // The last row holds what no parameter explains.
+                // The last row has no regressor.
                 let rows = factor.filled_rows().min(columns);
                 let regressor = DMatrix::from_fn(rows, columns, |row, column| factor.entry(row, column));
                 ReducedRows { regressor, torque: DVector::from_fn(rows, |row, _| factor.entry(row, columns)) }

@@ -1,17 +1,17 @@
-//! A matrix C that makes columns of others, `[W | τ] C`, by the few entries that it has.
+//! Sparse matrix C that combines columns, `[W | τ] C`.
 
 use nalgebra::DMatrix;
 
-/// The entries of C that are not zero, column by column. Maps of columns select, add and scale: most of C is zero.
+/// Nonzero entries of C by column. C selects, adds and scales columns, so most entries are zero.
 pub(super) struct SparseMap {
     /// Rows of C: old columns and the torque.
     size: usize,
-    /// For every new column the old ones with their weights; the torque last.
+    /// For every new column the old columns with their weights; the torque last.
     of_columns: Vec<Vec<(usize, f64)>>,
 }
 
 impl SparseMap {
-    /// The entries of `map`, shape (old columns + 1, new columns + 1).
+    /// The nonzero entries of `map`, shape (old columns + 1, new columns + 1).
     pub(super) fn new(map: &DMatrix<f64>) -> Self {
         let entries = |column: usize| {
             let values = map.column(column);
@@ -21,22 +21,19 @@ impl SparseMap {
         Self { size: map.nrows(), of_columns: (0..map.ncols()).map(entries).collect() }
     }
 
-    /// Old columns and the torque.
+    /// Number of old columns plus the torque.
     pub(super) fn size(&self) -> usize {
         self.size
     }
 
-    /// New columns, without the torque.
     pub(super) fn columns(&self) -> usize {
         self.of_columns.len() - 1
     }
 
-    /// For every new column the old ones with their weights; the torque last.
     pub(super) fn of_columns(&self) -> &[Vec<(usize, f64)>] {
         &self.of_columns
     }
 
-    /// One row `[w | τ] C`.
     pub(super) fn of_row<'r>(&'r self, row: &'r [f64]) -> impl Iterator<Item = f64> + 'r {
         self.of_columns.iter().map(|entries| entries.iter().map(|&(from, weight)| weight * row[from]).sum())
     }

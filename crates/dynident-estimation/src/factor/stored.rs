@@ -1,18 +1,18 @@
-//! A segmented factor as plain numbers: for files, and for sending what one machine has read to another.
+//! A segmented factor as plain numbers, for files and for transfer between computers.
 
 use super::segmented::{Segment, SegmentedFactor};
-use super::triangular::{LARGEST, TriangularFactor};
+use super::triangular::{MAX_MAGNITUDE, TriangularFactor};
 use super::{SegmentSettings, row_start};
 use crate::error::{EstimationError, expect, require};
 use serde::{Deserialize, Serialize};
 
-/// What the numbers of a [`SegmentedFactor`] are: see [`SegmentedFactor::numbers`].
+/// Layout of the numbers of a [`SegmentedFactor`]: see [`SegmentedFactor::numbers`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FactorShape {
     /// Regressor columns (without the torque).
     pub columns: usize,
-    /// Segments kept at most.
+    /// Maximum number of segments.
     pub max_segments: usize,
     /// Rows of a full segment.
     pub segment_length_rows: usize,
@@ -20,18 +20,18 @@ pub struct FactorShape {
     pub segments: Vec<SegmentShape>,
 }
 
-/// What the numbers of one segment are.
+/// Layout of the numbers of one segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentShape {
-    /// Rows of `[W | τ]` that it holds.
+    /// Number of rows `[W | τ]` in the segment.
     pub rows: usize,
-    /// Whether they are a triangle, packed by rows, or themselves, one row after another.
+    /// True for a triangle packed by rows; false for the unreduced rows, one after another.
     pub is_triangle: bool,
 }
 
 impl FactorShape {
-    /// Numbers of all segments; none if there are more than can be counted.
+    /// Count of numbers of all segments; `None` on overflow.
     pub fn count(&self) -> Option<usize> {
         let size = self.columns.checked_add(1)?;
         self.segments.iter().try_fold(0_usize, |sum, segment| sum.checked_add(segment.count(size)?))
@@ -39,7 +39,7 @@ impl FactorShape {
 }
 
 impl SegmentShape {
-    /// Its numbers, with `size` columns and the torque among them.
+    /// Count of its numbers with `size` columns including the torque.
     fn count(self, size: usize) -> Option<usize> {
         if self.is_triangle {
             size.checked_mul(size.checked_add(1)?).map(|twice| twice / 2)
@@ -50,7 +50,7 @@ impl SegmentShape {
 }
 
 impl SegmentedFactor {
-    /// What [`numbers`](Self::numbers) are.
+    /// Layout of [`numbers`](Self::numbers).
     pub fn shape(&self) -> FactorShape {
         let columns = self.columns();
         let segment = |segment: &Segment| SegmentShape {
@@ -65,8 +65,8 @@ impl SegmentedFactor {
         }
     }
 
-    /// All that the factor remembers: of every segment in order of time the packed triangle of `[W | τ]`, or its rows
-    /// while they are few.
+    /// Complete content: for every segment in order of time the packed triangle of `[W | τ]`, or its rows while they
+    /// are few.
     ///
     /// ```
     /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -84,23 +84,21 @@ impl SegmentedFactor {
         self.segments().iter().flat_map(of).collect()
     }
 
-    /// The factor whose [`shape`](Self::shape) and [`numbers`](Self::numbers) these are, to the last bit.
+    /// Restores the factor from its [`shape`](Self::shape) and [`numbers`](Self::numbers), bit by bit.
     ///
-    /// # Errors
-    /// [`EstimationError::Mismatch`] for another count of numbers, or segments that no factor has;
-    /// [`EstimationError::Unusable`] for a number that no factor holds; [`EstimationError::Setting`] as
-    /// [`SegmentSettings::validate`].
+    /// [`EstimationError::Mismatch`] for a wrong count of numbers or segments; [`EstimationError::Unusable`] for an
+    /// invalid value; [`EstimationError::Setting`] as [`SegmentSettings::validate`].
     pub fn from_numbers(shape: &FactorShape, numbers: &[f64]) -> Result<Self, EstimationError> {
         let FactorShape { columns, max_segments, segment_length_rows, ref segments } = *shape;
         SegmentSettings { max_segments, first_length_rows: segment_length_rows }.validate()?;
-        expect("numbers of a stored factor", shape.count().unwrap_or(usize::MAX), numbers.len())?;
+        expect("number of values of a stored factor", shape.count().unwrap_or(usize::MAX), numbers.len())?;
         let size = columns + 1;
-        if let Some(place) = numbers.iter().position(|value| value.is_nan() || value.abs() > LARGEST) {
+        if let Some(place) = numbers.iter().position(|value| value.is_nan() || value.abs() > MAX_MAGNITUDE) {
             return Err(EstimationError::Unusable {
                 row: place / size,
                 column: place % size,
                 value: numbers[place],
-                limit: LARGEST,
+                limit: MAX_MAGNITUDE,
             });
         }
         if segments.len() > max_segments {
@@ -110,7 +108,7 @@ impl SegmentedFactor {
         let mut rest = numbers;
         let mut restored = Vec::with_capacity(segments.len());
         for segment in segments {
-            // Counted before, for all of them together.
+            // The total count was checked above.
             let (own, later) = rest.split_at(segment.count(size).unwrap_or(rest.len()).min(rest.len()));
             rest = later;
             restored.push(if segment.is_triangle {
@@ -123,13 +121,13 @@ impl SegmentedFactor {
         Ok(Self::of_segments(columns, rows, max_segments, segment_length_rows, restored))
     }
 
-    /// The same rows in at most `most` segments: neighbours are merged, two by two, until there are no more. Values
-    /// stay, by rounding; an error bar has fewer segments to be made of.
+    /// The same rows in at most `most` segments: neighbours are merged pairwise. Values change by rounding only;
+    /// error bars have fewer segments.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for no segment at all.
+    /// [`EstimationError::Setting`] if `most` is zero.
     pub fn with_at_most(&self, most: usize) -> Result<Self, EstimationError> {
-        require(most > 0, "segments", most as f64, "give at least 1")?;
+        require(most > 0, "segments", most as f64, "use at least 1")?;
         let mut fewer = self.clone();
         while fewer.segments().len() > most {
             fewer.halve();
@@ -138,13 +136,13 @@ impl SegmentedFactor {
     }
 }
 
-/// The factor of `rows` rows whose packed triangle this is.
+/// The factor of `rows` rows with this packed triangle.
 fn triangular(columns: usize, rows: usize, packed: &[f64]) -> Result<TriangularFactor, EstimationError> {
     let size = columns + 1;
     for row in 0..size {
         let diagonal = packed[row_start(size, row)];
-        // A factor's diagonal is never negative: one that is was not written by a factor.
-        require(diagonal >= 0.0, "diagonal of a stored factor", diagonal, "read an unharmed file")?;
+        // The diagonal of a factor is never negative, so a negative entry means a corrupt file.
+        require(diagonal >= 0.0, "diagonal of a stored factor", diagonal, "the file is corrupt: use an intact one")?;
     }
     Ok(TriangularFactor::of_triangle(columns, rows, packed.to_vec()))
 }

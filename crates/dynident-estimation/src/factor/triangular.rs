@@ -1,4 +1,4 @@
-//! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
+//! Triangular factor of rows `[W | τ]`, sufficient for linear estimation.
 
 use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 use super::sparse_map::SparseMap;
@@ -6,13 +6,13 @@ use crate::error::{EstimationError, expect, require};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
-/// Rows absorbed at once. A block of 256 rows and 44 columns (a seven-joint arm) is 90 kB, which a second-level cache
-/// holds while the few columns at work are in the first; measured 15 % faster than 128 rows, because reflectors are
-/// made half as often.
+/// Rows absorbed at once. A block of 256 rows and 44 columns (a seven-joint arm) is 90 kB: it fits into the
+/// second-level cache, and the few active columns into the first. Measured 15 % faster than 128 rows, because half as
+/// many reflectors are made.
 pub const BLOCK_ROWS: usize = 256;
 
 /// The largest magnitude that can be squared and summed without overflow.
-pub(super) const LARGEST: f64 = 1.0e140;
+pub(crate) const MAX_MAGNITUDE: f64 = 1.0e140;
 
 /// The upper triangular R of `[W | τ] = Q·R` (a square-root information array): `RᵀR = [W | τ]ᵀ[W | τ]`.
 ///
@@ -21,10 +21,10 @@ pub(super) const LARGEST: f64 = 1.0e140;
 ///         [  0   ρ ]    ‖τ − Wθ‖² = ‖r − R_W θ‖² + ρ²  for every θ
 /// ```
 ///
-/// Rows come in blocks and are forgotten; factors of blocks, logs and robots [`merge`](Self::merge). The diagonal is
-/// never negative, so the factor of given rows is unique (up to rounding) where their columns are independent. With
-/// fewer rows than columns, or dependent columns, the identities above still hold and nothing becomes NaN; rank
-/// decisions are made later, with scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
+/// Rows come in blocks and are not stored; factors of blocks, logs and robots can be [merged](Self::merge). The
+/// diagonal is nonnegative, so the factor is unique (up to rounding) if the columns are independent. With fewer rows
+/// than columns or dependent columns the identities above still apply and no entry is NaN; the rank decision comes
+/// later, on scaled columns with an explicit tolerance (`rank.rs`), never from this diagonal.
 ///
 /// Golub and Van Loan, Matrix Computations, 4th ed., 5.2 and 6.5; Bierman, Factorization Methods for Discrete
 /// Sequential Estimation (1977), ch. IV and V.
@@ -48,7 +48,7 @@ pub struct TriangularFactor {
     triangle: Vec<f64>,
 }
 
-/// Memory for a block of rows; keep one per thread and hand it to [`TriangularFactor::absorb_with`].
+/// Memory for a block of rows; keep one per thread for [`TriangularFactor::absorb_with`].
 #[derive(Clone, Debug)]
 pub struct FactorWorkspace {
     level: Level,
@@ -63,12 +63,12 @@ impl Default for FactorWorkspace {
 }
 
 impl FactorWorkspace {
-    /// A workspace whose work runs at the given processor level; [`Default`] takes the best one.
+    /// Creates a workspace for the given processor level; [`Default`] uses the best one.
     pub fn new(level: Level) -> Self {
         Self { level, panel: Vec::new(), heights: Vec::new() }
     }
 
-    /// Room for a block; what it holds is left over from earlier work.
+    /// Memory for a block, with undefined content.
     fn block(&mut self, rows: usize, columns: usize) -> &mut [Chunk] {
         let length = rows.div_ceil(CHUNK_ROWS) * columns;
         if self.panel.len() < length {
@@ -79,7 +79,7 @@ impl FactorWorkspace {
 }
 
 impl TriangularFactor {
-    /// The factor of no rows, for `columns` regressor columns and the torque.
+    /// Creates a factor without rows for `columns` regressor columns and the torque.
     pub fn new(columns: usize) -> Self {
         Self { columns, rows: 0, triangle: vec![0.0; row_start(columns + 1, columns + 1)] }
     }
@@ -94,7 +94,6 @@ impl TriangularFactor {
         Ok(factor)
     }
 
-    /// The factor with this triangle, packed by rows.
     pub(super) fn of_triangle(columns: usize, rows: usize, triangle: Vec<f64>) -> Self {
         Self { columns, rows, triangle }
     }
@@ -103,7 +102,6 @@ impl TriangularFactor {
         &self.triangle
     }
 
-    /// The factor with these entries on and above the diagonal.
     pub(crate) fn from_entries(columns: usize, rows: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let triangle = (0..=columns).flat_map(|row| (row..=columns).map(move |column| (row, column)));
         Self { columns, rows, triangle: triangle.map(|(row, column)| entry(row, column)).collect() }
@@ -119,7 +117,7 @@ impl TriangularFactor {
         self.rows
     }
 
-    /// Entry (`row`, `column`) of R; column [`columns()`](Self::columns) is the torque's. Zero below the diagonal.
+    /// Entry (`row`, `column`) of R; column [`columns()`](Self::columns) is the torque. Zero below the diagonal.
     ///
     /// # Panics
     /// If either number is above [`columns()`](Self::columns).
@@ -129,7 +127,7 @@ impl TriangularFactor {
         if column < row { 0.0 } else { self.triangle[row_start(size, row) + column - row] }
     }
 
-    /// The entries of row `row` of R from its diagonal to the torque's column.
+    /// Entries of row `row` of R from its diagonal to the torque.
     pub(crate) fn row(&self, row: usize) -> &[f64] {
         let size = self.columns + 1;
         &self.triangle[row_start(size, row)..row_start(size, row + 1)]
@@ -138,17 +136,16 @@ impl TriangularFactor {
     /// Absorbs `rows` rows of `[W | τ]` given column by column: `panel[c * rows + i]` is column c of row i, torque
     /// last.
     ///
-    /// Takes about 2·rows·(columns + 1)² operations, in blocks of [`BLOCK_ROWS`]. How rows are cut into calls, and
-    /// their order, changes the result by rounding only.
+    /// Takes about 2·rows·(columns + 1)² operations, in blocks of [`BLOCK_ROWS`]. The order of rows and their division
+    /// into calls change the result by rounding only.
     ///
-    /// # Errors
-    /// [`EstimationError::Shape`] when the panel has another length; [`EstimationError::Unusable`] for a NaN, an
+    /// [`EstimationError::Shape`] for a panel of the wrong length; [`EstimationError::Unusable`] for a NaN, an
     /// infinity or a magnitude above 1e140. The factor is then unchanged.
     pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
         self.absorb_with(&mut FactorWorkspace::default(), panel, rows)
     }
 
-    /// [`absorb`](Self::absorb) without allocation once the workspace has its size.
+    /// [`absorb`](Self::absorb) without allocation once the workspace is large enough.
     ///
     /// # Errors
     /// As [`absorb`](Self::absorb).
@@ -163,7 +160,7 @@ impl TriangularFactor {
         Ok(())
     }
 
-    /// Absorbs some of a panel's rows; the panel has passed [`check_panel`].
+    /// Absorbs a range of rows of a panel that has passed [`check_panel`].
     pub(crate) fn absorb_range(
         &mut self,
         workspace: &mut FactorWorkspace,
@@ -193,7 +190,7 @@ impl TriangularFactor {
         self.rows += range.len();
     }
 
-    /// Absorbs one block given by its entries, (row, column) to value. The caller counts the rows.
+    /// Absorbs one block given by its entries at (row, column). The caller updates the number of rows.
     pub(crate) fn absorb_entries(
         &mut self,
         workspace: &mut FactorWorkspace,
@@ -211,8 +208,8 @@ impl TriangularFactor {
         self.reflect(workspace, rows);
     }
 
-    /// Absorbs the first `rows` rows of `other` times `weight`: column `place(column)` of its triangle where this one
-    /// has column `column`, zeros for `None`. The caller counts the rows.
+    /// Absorbs the first `rows` rows of `other` times `weight`: column `column` here is column `place(column)` of
+    /// `other`, zero for `None`. The caller updates the number of rows.
     pub(crate) fn absorb_columns(
         &mut self,
         workspace: &mut FactorWorkspace,
@@ -226,7 +223,7 @@ impl TriangularFactor {
         block.fill(Chunk::ZERO);
         for (column, out) in block.chunks_exact_mut(chunks.max(1)).enumerate() {
             let Some(local) = place(column) else { continue };
-            // From a row to the next of a packed triangle.
+            // Offset to the next row of a packed triangle.
             let mut at = local;
             for row in 0..rows.min(local + 1) {
                 out[row / CHUNK_ROWS].0[row % CHUNK_ROWS] = weight * other.triangle[at];
@@ -236,7 +233,6 @@ impl TriangularFactor {
         self.reflect(workspace, rows);
     }
 
-    /// Counts rows whose entries were absorbed in another form.
     pub(crate) fn count(&mut self, rows: usize) {
         self.rows += rows;
     }
@@ -252,15 +248,15 @@ impl TriangularFactor {
         dispatch(*level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks, heights: own });
     }
 
-    /// Adds what `other` has seen: afterwards this is the factor of both stacks of rows.
+    /// Adds the rows of `other`.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] when the numbers of columns differ.
+    /// [`EstimationError::Mismatch`] if the numbers of columns differ.
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimationError> {
         self.merge_with(&mut FactorWorkspace::default(), other)
     }
 
-    /// [`merge`](Self::merge) without allocation once the workspace has its size.
+    /// [`merge`](Self::merge) without allocation once the workspace is large enough.
     ///
     /// # Errors
     /// As [`merge`](Self::merge).
@@ -270,7 +266,7 @@ impl TriangularFactor {
         Ok(())
     }
 
-    /// [`merge`](Self::merge) of a factor with as many columns.
+    /// [`merge`](Self::merge) without the check of columns.
     pub(crate) fn absorb_factor(&mut self, workspace: &mut FactorWorkspace, other: &Self) {
         if self.rows == 0 {
             self.clone_from(other);
@@ -299,7 +295,7 @@ impl TriangularFactor {
         self.rows += rows;
     }
 
-    /// The factor of the same rows multiplied by `weight` (finite, not negative): `weight · R`.
+    /// The factor of the same rows multiplied by `weight`: `weight · R`.
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
@@ -312,8 +308,8 @@ impl TriangularFactor {
         Ok(scaled)
     }
 
-    /// The factor of the same rows with the first `columns` columns and, as torque, the sum of those behind them, each
-    /// times its weight: many torques of one motion from one pass over its rows.
+    /// The factor of the same rows with the first `columns` columns and, as torque, the weighted sum of the remaining
+    /// ones: several torques of one motion from one pass over its rows.
     ///
     /// ```
     /// use dynident_estimation::TriangularFactor;
@@ -325,20 +321,20 @@ impl TriangularFactor {
     /// ```
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless there is one weight for each column behind the first ones, and at least
-    /// one; [`EstimationError::Setting`] for one that is not finite.
+    /// [`EstimationError::Mismatch`] unless there is one weight per remaining column, and at least one;
+    /// [`EstimationError::Setting`] for a weight that is not finite.
     pub fn with_torque(&self, columns: usize, weights: &[f64]) -> Result<Self, EstimationError> {
         let given = columns.saturating_add(weights.len());
-        expect("columns and weights of those behind them", self.columns + 1, given)?;
-        expect("columns before the torques, at most", self.columns.min(columns), columns)?;
+        expect("kept columns plus weights of the remaining ones", self.columns + 1, given)?;
+        expect("kept columns, at most", self.columns.min(columns), columns)?;
         for &weight in weights {
-            require(weight.is_finite(), "weight of a torque", weight, "give a finite number")?;
+            require(weight.is_finite(), "weight of a torque", weight, "use a finite number")?;
         }
         let torque = |row: usize| {
             let behind = self.row(row).iter().rev().zip(weights.iter().rev());
             behind.map(|(entry, weight)| entry * weight).sum::<f64>()
         };
-        // Below the columns that are kept the torque is all there is.
+        // The rows below the kept columns contribute to the torque only.
         let below = (columns..=self.columns).map(|row| torque(row).powi(2)).sum::<f64>().sqrt();
         let mut triangle = Vec::with_capacity(row_start(columns + 1, columns + 1));
         for row in 0..columns {
@@ -352,9 +348,9 @@ impl TriangularFactor {
     /// `‖τ − Wθ‖²` over all rows absorbed.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
+    /// [`EstimationError::Mismatch`] for a wrong number of parameters.
     pub fn residual_sum_of_squares(&self, theta: &[f64]) -> Result<f64, EstimationError> {
-        expect("parameters for a factor's columns", self.columns, theta.len())?;
+        expect("parameters of a factor", self.columns, theta.len())?;
         let rho = self.entry(self.columns, self.columns);
         Ok(self.residual(theta).norm_squared() + rho * rho)
     }
@@ -381,7 +377,7 @@ impl TriangularFactor {
         score
     }
 
-    /// The factor of the same rows with only the given columns, in the order given.
+    /// The factor of the same rows with only the given columns, in the given order.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a column out of range.
@@ -394,7 +390,6 @@ impl TriangularFactor {
         Ok(selected)
     }
 
-    /// The factor of the rows `[W | τ] C`.
     pub(super) fn mapped(&self, workspace: &mut FactorWorkspace, map: &SparseMap) -> Self {
         let (rows, size) = (self.filled_rows(), self.columns + 1);
         let mut mapped = Self::new(map.columns());
@@ -403,7 +398,7 @@ impl TriangularFactor {
         block.fill(Chunk::ZERO);
         for (out, entries) in block.chunks_exact_mut(chunks.max(1)).zip(map.of_columns()) {
             for &(from, weight) in entries {
-                // From a row to the next of a packed triangle.
+                // Offset to the next row of a packed triangle.
                 let mut at = from;
                 for row in 0..rows.min(from + 1) {
                     out[row / CHUNK_ROWS].0[row % CHUNK_ROWS] += weight * self.triangle[at];
@@ -436,7 +431,7 @@ impl TriangularFactor {
         DVector::from_fn(self.columns, |r, _| self.entry(r, self.columns))
     }
 
-    /// Rows of the triangle that can hold something: later ones are still zero when few rows were absorbed.
+    /// Number of leading rows that are not zero; less than the size if few rows were absorbed.
     pub(super) fn filled_rows(&self) -> usize {
         let size = self.columns + 1;
         (0..size)
@@ -446,16 +441,14 @@ impl TriangularFactor {
     }
 }
 
-/// That a weight of rows is possible.
 pub(crate) fn check_weight(weight: f64) -> Result<(), EstimationError> {
-    require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")
+    require(weight.is_finite() && weight >= 0.0, "weight", weight, "use a finite, nonnegative weight")
 }
 
-/// That all column numbers of a selection are below `size`.
 pub(crate) fn check_columns(columns: &[usize], size: usize) -> Result<(), EstimationError> {
     match columns.iter().find(|&&column| column >= size) {
         Some(&found) => Err(EstimationError::Mismatch {
-            what: "a selected column below the number of columns".into(),
+            what: "selected column, below the number of columns".into(),
             expected: size,
             found,
         }),
@@ -463,17 +456,22 @@ pub(crate) fn check_columns(columns: &[usize], size: usize) -> Result<(), Estima
     }
 }
 
-/// Checks the shape and the numbers of a panel with `columns` + 1 columns of `rows` rows.
+/// Checks the length and values of a panel with `columns` + 1 columns of `rows` rows.
 pub(crate) fn check_panel(columns: usize, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
     let expected = rows.saturating_mul(columns + 1);
     if panel.len() != expected {
         return Err(EstimationError::Shape { what: "a panel of rows", expected, found: panel.len() });
     }
-    // Comparison is false for NaN; the loop without an early exit vectorises.
-    let usable = panel.iter().fold(true, |usable, value| usable & (value.abs() <= LARGEST));
+    // The comparison is false for NaN; without an early exit the loop vectorises.
+    let usable = panel.iter().fold(true, |usable, value| usable & (value.abs() <= MAX_MAGNITUDE));
     if usable {
         return Ok(());
     }
-    let place = panel.iter().position(|value| value.is_nan() || value.abs() > LARGEST).unwrap_or(0);
-    Err(EstimationError::Unusable { row: place % rows, column: place / rows, value: panel[place], limit: LARGEST })
+    let place = panel.iter().position(|value| value.is_nan() || value.abs() > MAX_MAGNITUDE).unwrap_or(0);
+    Err(EstimationError::Unusable {
+        row: place % rows,
+        column: place / rows,
+        value: panel[place],
+        limit: MAX_MAGNITUDE,
+    })
 }

@@ -1,4 +1,4 @@
-//! Columns that the data do not excite, and the effect of the values at which they are held.
+//! Columns that the data do not excite, and the effect of their held values.
 
 use crate::error::EstimationError;
 use nalgebra::DMatrix;
@@ -6,24 +6,21 @@ use nalgebra::DMatrix;
 /// Columns that the data do not excite.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unexcited {
-    /// All of them, ascending: nothing but noise and other columns.
+    /// All of them, ascending: only noise and combinations of other columns.
     pub columns: Vec<usize>,
-    /// Those among them that are nothing but noise: not even a sum of other columns stands out. Ascending.
+    /// The subset without any combination of other columns above the noise (only noise). Ascending.
     pub silent: Vec<usize>,
 }
 
 impl Unexcited {
-    /// The same columns under other numbers, without those that have none.
+    /// The same columns with new numbers; columns without a new number are dropped.
     pub fn renumbered(&self, number: impl Fn(usize) -> Option<usize>) -> Self {
         let of = |columns: &[usize]| columns.iter().filter_map(|&column| number(column)).collect();
         Self { columns: of(&self.columns), silent: of(&self.silent) }
     }
 }
 
-/// How the estimated columns answer to those that are held: `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹ W_FᵀW_H`, shape (free, held).
-///
-/// # Errors
-/// [`EstimationError::Overflow`] when the free columns are not independent.
+/// Sensitivity of the estimated columns to the held ones: `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹ W_FᵀW_H`, shape (free, held).
 pub(crate) fn answer_of_free(
     triangle: &DMatrix<f64>,
     free: &[usize],

@@ -1,46 +1,47 @@
-//! Which parameters of one robot wander: friction that grows, a belt that slackens.
+//! Drift of the parameters of one robot over time, for example growing friction or a slackening belt.
 //!
 //! ```text
 //!     y_k = a + b t_k + e_k,   e_k ~ N(0, c v_k),   c = max(1, χ²/(n − 2))
 //! ```
 //!
-//! Estimates of several weeks that scatter about their line by more than their bars (another load, another temperature)
-//! make the slope's bar wider by √c; b over its bar is Student's with n − 2 degrees of freedom.
+//! If the estimates scatter about the line by more than their error bars (other load or temperature), the slope's
+//! error bar grows by √c. The slope over its error bar has a Student distribution with n − 2 degrees of freedom.
 
 use super::member::{Member, checked};
 use crate::error::{EstimationError, expect, require};
 use crate::uncertainty::{f_tail, student_half_width};
 use serde::Serialize;
 
-/// Estimates that a line with a bar can be laid through.
-const FEWEST: usize = 3;
+/// Minimum number of estimates for a line with an error bar.
+const MIN_ESTIMATES: usize = 3;
 
-/// One parameter over time.
+/// Drift of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ParameterDrift {
     /// Change of the parameter for each unit of time, b.
     pub slope: f64,
     /// Its standard deviation.
     pub slope_std: f64,
-    /// Half of its 95 % interval.
+    /// Half-width of its 95 % interval.
     pub half_width_95: f64,
-    /// Times the variance of their bars that estimates scatter about the line, c.
+    /// Variance of the estimates about the line relative to their error bars, c.
     pub scatter: f64,
-    /// How likely a parameter that stays where it is looks as if it wandered as much.
+    /// Probability of at least this slope for a constant parameter.
     pub tail: f64,
-    /// Whether it wanders: `tail` below the false-alarm rate over all parameters.
+    /// Whether the parameter drifts: `tail` is below the false-alarm rate, corrected for the number of parameters.
     pub drifts: bool,
 }
 
-/// One robot over time.
+/// Drift of one robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Drift {
-    /// One for each parameter; none where too few estimates have it, or all at one time.
+    /// One per parameter; `None` if too few estimates contain it, or all at the same time.
     pub parameters: Vec<Option<ParameterDrift>>,
 }
 
-/// Lays a line through the estimates of one robot at the `times` given (days, say). `false_alarm` is the chance that
-/// any parameter of a robot that does not change is said to wander (Bonferroni's inequality over parameters).
+/// Fits a line to the estimates of one robot at the given `times` (for example in days). `false_alarm` is the
+/// probability that any parameter of an unchanged robot is reported as drifting (Bonferroni's inequality over
+/// parameters).
 ///
 /// ```
 /// use dynident_estimation::fleet::{Member, drift};
@@ -54,13 +55,13 @@ pub struct Drift {
 /// ```
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for fewer than three estimates, estimates of other parameters or another number of
-/// times; [`EstimationError::Setting`] for numbers without a meaning.
+/// [`EstimationError::Mismatch`] for fewer than three estimates, different parameters or a wrong number of times;
+/// [`EstimationError::Setting`] for values that are not finite or an invalid false-alarm rate.
 pub fn drift(members: &[Member], times: &[f64], false_alarm: f64) -> Result<Drift, EstimationError> {
-    let parameters = checked(members, FEWEST, false_alarm)?;
+    let parameters = checked(members, MIN_ESTIMATES, false_alarm)?;
     expect("times of the estimates", members.len(), times.len())?;
     for &time in times {
-        require(time.is_finite(), "time of an estimate", time, "give a finite number")?;
+        require(time.is_finite(), "time of an estimate", time, "use a finite number")?;
     }
     let of_parameter = |parameter: usize| {
         let known =
@@ -70,9 +71,9 @@ pub fn drift(members: &[Member], times: &[f64], false_alarm: f64) -> Result<Drif
     Ok(Drift { parameters: (0..parameters).map(of_parameter).collect() })
 }
 
-/// The line through `(time, (value, variance))`.
+/// Fits a line to points `(time, (value, variance))`.
 fn line(points: &[(f64, (f64, f64))], false_alarm: f64) -> Option<ParameterDrift> {
-    if points.len() < FEWEST {
+    if points.len() < MIN_ESTIMATES {
         return None;
     }
     let unit = points.iter().map(|(_, (_, variance))| *variance).fold(f64::INFINITY, f64::min);
@@ -83,7 +84,7 @@ fn line(points: &[(f64, (f64, f64))], false_alarm: f64) -> Option<ParameterDrift
     let (time, value) = (sum(&|time, _| time) / weights, sum(&|_, value| value) / weights);
     let spread = sum(&|t, _| (t - time).powi(2));
     let longest = points.iter().map(|(t, _)| (t - time).abs()).fold(0.0, f64::max);
-    // All at one time, by rounding.
+    // All times are equal up to rounding.
     if spread <= weights * (f64::EPSILON * (longest + time.abs())).powi(2) {
         return None;
     }

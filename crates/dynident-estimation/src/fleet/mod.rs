@@ -1,7 +1,7 @@
-//! **Many robots of one kind.** One estimate for each robot, or for each week of one robot: which parameters differ by
-//! more than their error bars, which robot is not like the others, which parameter wanders.
+//! **Several robots of one type.** Compares one estimate per robot, or per week of one robot.
 //!
-//! An estimate is a [`Member`]: values and covariance. [`spread`] compares robots, [`drift`] follows one over time.
+//! An estimate is a [`Member`]: values and standard deviations. [`spread`] finds parameters that differ between robots
+//! by more than their error bars and robots that differ from the others; [`drift`] follows one robot over time.
 
 mod drift;
 mod member;

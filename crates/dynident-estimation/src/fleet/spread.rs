@@ -1,67 +1,67 @@
-//! Which parameters differ from robot to robot, and which robot is not like the others.
+//! Differences between robots: parameters that vary over the fleet, and robots that differ from the others.
 //!
 //! ```text
 //!     y_i = μ + u_i + e_i,   u_i ~ N(0, τ²) between robots,   e_i ~ N(0, v_i) of the estimate
 //!     Q = Σ w_i (y_i − ȳ)²,  w_i = 1/v_i;   τ² = max(0, (Q − (k − 1)) / (Σw − Σw²/Σw))
 //! ```
 //!
-//! Q has k − 1 degrees of freedom where robots do not differ. A robot is held against the others alone:
-//! `t_i = (y_i − μ₋ᵢ) / √(v_i + τ₋ᵢ² + Var μ₋ᵢ)`, Student's with k − 2 degrees of freedom. The one furthest off is set
-//! aside and the rest are looked at again, so that one ill robot does not hide behind the spread that it makes itself.
-//! DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177; Viechtbauer and Cheung, Research Synthesis Methods 1
-//! (2010) 112, for the deleted residuals.
+//! Q has k − 1 degrees of freedom if the robots do not differ. Each robot is compared with the others only: `t_i =
+//! (y_i − μ₋ᵢ) / √(v_i + τ₋ᵢ² + Var μ₋ᵢ)`, Student's with k − 2 degrees of freedom. The most deviating robot is
+//! excluded and the test repeated, so that a faulty robot is not hidden by the variance that it causes. DerSimonian
+//! and Laird, Controlled Clinical Trials 7 (1986) 177; Viechtbauer and Cheung, Research Synthesis Methods 1 (2010)
+//! 112, for the deleted residuals.
 
 use super::member::{Member, checked};
 use crate::error::EstimationError;
 use crate::uncertainty::{chi_squared_tail, f_tail};
 use serde::Serialize;
 
-/// Robots that a spread can be made of, and that must be left when some are set aside.
-const FEWEST: usize = 3;
+const MIN_ROBOTS: usize = 3;
 
-/// One parameter over the fleet, without the robots that were set aside.
+/// One parameter over the fleet, without the excluded robots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ParameterSpread {
-    /// The fleet's mean μ.
+    /// Mean μ of the fleet.
     pub mean: f64,
     /// Standard deviation of that mean.
     pub mean_std: f64,
-    /// Standard deviation τ from robot to robot, beyond what their bars explain.
+    /// Standard deviation τ between robots, in addition to the error bars.
     pub between_std: f64,
-    /// How likely robots that do not differ look as different as these.
+    /// Probability of at least this spread for equal robots.
     pub tail: f64,
-    /// Whether robots differ: `tail` below the false-alarm rate over all parameters.
+    /// Whether robots differ: `tail` is below the false-alarm rate, corrected for the number of parameters.
     pub differs: bool,
-    /// Robots that it was estimated for.
+    /// Number of robots with an estimate of the parameter.
     pub robots: usize,
 }
 
-/// One robot beside the others.
+/// Comparison of one robot with the others.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MemberDeviation {
-    /// What it is called.
+    /// Name of the member.
     pub name: String,
-    /// `t` of every parameter; none where the parameter was not estimated, or by too few others.
+    /// `t` of every parameter; `None` if it was not estimated for this robot or for too few others.
     pub deviation: Vec<Option<f64>>,
-    /// The parameter furthest off; none where there is nothing to compare.
+    /// Most deviating parameter; `None` without a comparison.
     pub worst: Option<usize>,
-    /// How likely any parameter of a robot like the others is as far off as that one.
+    /// Probability that any parameter of an equal robot deviates at least as much.
     pub tail: f64,
-    /// Whether it is not like the others: `tail` below the false-alarm rate over all robots.
+    /// Whether the robot differs from the others: `tail` is below the false-alarm rate, corrected for the number of
+    /// robots.
     pub is_unlike: bool,
 }
 
-/// A fleet.
+/// Result for a fleet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// One for each parameter; none where too few robots have it.
+    /// One per parameter; `None` if too few robots have it.
     pub parameters: Vec<Option<ParameterSpread>>,
     /// One for each robot, in the order given.
     pub members: Vec<MemberDeviation>,
 }
 
-/// Compares the estimates of several robots. `false_alarm` is the chance that any robot of a fleet of equals, or any
-/// parameter of it, is called different (Bonferroni's inequality over robots and parameters).
+/// Compares the estimates of several robots. `false_alarm` is the probability that any robot of a fleet of equal
+/// robots, or any of its parameters, is reported as different (Bonferroni's inequality over robots and parameters).
 ///
 /// ```
 /// use dynident_estimation::fleet::{Member, spread};
@@ -75,25 +75,25 @@ pub struct Spread {
 /// ```
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for fewer than three estimates or estimates of other parameters,
-/// [`EstimationError::Setting`] for numbers without a meaning.
+/// [`EstimationError::Mismatch`] for fewer than three estimates or different parameters, [`EstimationError::Setting`]
+/// for values that are not finite or an invalid false-alarm rate.
 pub fn spread(members: &[Member], false_alarm: f64) -> Result<Spread, EstimationError> {
-    let parameters = checked(members, FEWEST, false_alarm)?;
-    let mut is_aside = vec![false; members.len()];
+    let parameters = checked(members, MIN_ROBOTS, false_alarm)?;
+    let mut is_excluded = vec![false; members.len()];
     let deviations = loop {
         let found: Vec<MemberDeviation> =
-            (0..members.len()).map(|index| deviation(members, &is_aside, index, false_alarm)).collect();
-        let candidates = (0..members.len()).filter(|&index| !is_aside[index] && found[index].is_unlike);
+            (0..members.len()).map(|index| deviation(members, &is_excluded, index, false_alarm)).collect();
+        let candidates = (0..members.len()).filter(|&index| !is_excluded[index] && found[index].is_unlike);
         let worst = candidates.min_by(|&a, &b| found[a].tail.total_cmp(&found[b].tail));
-        // More than half of a fleet cannot be unlike the fleet.
-        let aside = is_aside.iter().filter(|aside| **aside).count();
+        // At most half of the fleet can be excluded.
+        let excluded = is_excluded.iter().filter(|excluded| **excluded).count();
         match worst {
-            Some(index) if 2 * (aside + 1) < members.len() => is_aside[index] = true,
+            Some(index) if 2 * (excluded + 1) < members.len() => is_excluded[index] = true,
             _ => break found,
         }
     };
     let of_parameter = |parameter: usize| {
-        let known = known(members, parameter, |index| !is_aside[index]);
+        let known = known(members, parameter, |index| !is_excluded[index]);
         let fleet = Fleet::new(&known)?;
         let tail = chi_squared_tail(fleet.q, (known.len() - 1) as f64);
         Some(ParameterSpread {
@@ -108,13 +108,13 @@ pub fn spread(members: &[Member], false_alarm: f64) -> Result<Spread, Estimation
     Ok(Spread { parameters: (0..parameters).map(of_parameter).collect(), members: deviations })
 }
 
-/// Value and variance of a parameter of the members that count.
-fn known(members: &[Member], parameter: usize, counts: impl Fn(usize) -> bool) -> Vec<(f64, f64)> {
-    (0..members.len()).filter(|&index| counts(index)).filter_map(|index| members[index].known(parameter)).collect()
+/// Value and variance of a parameter of the `included` members.
+fn known(members: &[Member], parameter: usize, included: impl Fn(usize) -> bool) -> Vec<(f64, f64)> {
+    (0..members.len()).filter(|&index| included(index)).filter_map(|index| members[index].known(parameter)).collect()
 }
 
-/// Member number `index` against those that are not set aside.
-fn deviation(members: &[Member], is_aside: &[bool], index: usize, false_alarm: f64) -> MemberDeviation {
+/// Compares member `index` with the members that are not excluded.
+fn deviation(members: &[Member], is_excluded: &[bool], index: usize, false_alarm: f64) -> MemberDeviation {
     let own = &members[index];
     let mut found = MemberDeviation {
         name: own.name.clone(),
@@ -125,7 +125,7 @@ fn deviation(members: &[Member], is_aside: &[bool], index: usize, false_alarm: f
     };
     let mut compared = 0;
     for parameter in 0..own.values.len() {
-        let others = known(members, parameter, |other| other != index && !is_aside[other]);
+        let others = known(members, parameter, |other| other != index && !is_excluded[other]);
         let (Some((value, variance)), Some(fleet)) = (own.known(parameter), Fleet::new(&others)) else { continue };
         let t = (value - fleet.mean) / (variance + fleet.between + fleet.mean_variance).sqrt();
         let tail = f_tail(t * t, 1.0, (others.len() - 1) as f64);
@@ -140,7 +140,7 @@ fn deviation(members: &[Member], is_aside: &[bool], index: usize, false_alarm: f
     found
 }
 
-/// Mean and variance between robots of one parameter.
+/// Mean of a parameter and its variance between robots.
 struct Fleet {
     mean: f64,
     mean_variance: f64,
@@ -149,12 +149,12 @@ struct Fleet {
 }
 
 impl Fleet {
-    /// None for fewer than two robots.
+    /// `None` for fewer than two robots.
     fn new(known: &[(f64, f64)]) -> Option<Self> {
         if known.len() < 2 {
             return None;
         }
-        // In units of the smallest variance: weights near one, whatever the parameter's unit.
+        // Scaled by the smallest variance, to be independent of units.
         let unit = known.iter().map(|(_, variance)| *variance).fold(f64::INFINITY, f64::min);
         let mean = |between: f64| {
             let weights = || known.iter().map(move |(_, variance)| unit / (variance + between));

@@ -1,4 +1,4 @@
-//! Is the fast part of a measured motion motion, or noise? Torque follows the one and not the other.
+//! Separates motion from noise in the fast part of a measured motion: torque follows only motion.
 
 use super::instrumental::InstrumentalEstimate;
 use super::projection::Projection;
@@ -9,29 +9,28 @@ use crate::uncertainty::CovarianceMethod;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// How far torque follows what the instruments do not hold of the regressor.
+/// Response of the torque to the part of the regressor that the instruments do not explain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FastMotion {
-    /// κ: 1 where all of it is motion, 0 where all of it is noise.
+    /// κ: 1 if this part is motion, 0 if it is noise.
     pub followed: f64,
-    /// Half the width of its 95 % interval, from time segments.
+    /// Half-width of its 95 % interval, from time segments.
     pub half_width_95: f64,
-    /// Root mean square of the torque that this part would need, over that of the whole motion, joints in units of
-    /// their noise.
+    /// RMS of the torque that this part needs relative to that of the whole motion, joints in units of their noise.
     pub share_of_torque: f64,
 }
 
 /// `κ = argmin Σ_j ‖τ_j - W̃_j θ - κ V_j θ‖² / σ_j²`, with `W = W̃ + V`, `W̃ = Z(ZᵀZ)⁻¹ZᵀW` and θ the instrumental
 /// estimate.
 ///
-/// One number for all that instruments of a lower band leave over: fast motion moves the robot and needs its torque (κ
-/// = 1), noise of the positions needs none (κ = 0), and between the two κ is the share of motion. Where a model merely
-/// fails in fast motion, torque still follows most of it; that is how noise is told from a wrong model, which the test
-/// of Durbin, Wu and Hausman cannot ([`hausman_test`](crate::hausman_test)): it rejects for either. As one number κ
-/// also needs no more time segments than two, however many parameters there are.
+/// κ is one number for the whole remainder of instruments with a lower bandwidth. Fast motion needs torque (κ = 1),
+/// position noise does not (κ = 0); in between κ is the share of motion. If only the model is wrong in fast motion,
+/// the torque still follows most of it. So κ distinguishes noise from a wrong model, which the Durbin-Wu-Hausman test
+/// ([`hausman_test`](crate::hausman_test)) cannot: it rejects for either. κ needs two time segments only, for any
+/// number of parameters.
 ///
-/// None where the instruments leave nothing over or the rows do not carry it.
+/// `None` if the instruments explain the whole regressor or if the rows do not determine κ.
 ///
 /// # Errors
 /// [`EstimationError::Setting`] and [`EstimationError::Mismatch`] for an estimate of another problem.

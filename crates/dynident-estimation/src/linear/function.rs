@@ -1,4 +1,4 @@
-//! A caller's own estimator: any rule that makes values of the rows `[W | τ]`.
+//! Custom estimators: a caller's rule that computes values from the rows `[W | τ]`.
 
 use super::ordinary::OrdinarySettings;
 use super::weighted::{WeightedSettings, weighted_values};
@@ -7,11 +7,10 @@ use crate::factor::{LinearProblem, Solution, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom, student_half_width};
 use nalgebra::{DMatrix, DVector};
 
-/// What an estimator of a caller gets: the rows of every joint, reduced to as many as there are columns and one more.
+/// Input of a custom estimator: the rows of every joint, reduced to the number of columns plus one.
 ///
-/// They are the triangular factors of the rows: for each joint and every θ, `‖τ - W θ‖²` and `Wᵀ(τ - W θ)` over them
-/// are those over all samples. Columns that the data do not excite are not among them; what they give at their fallback
-/// values is taken from τ.
+/// The rows are the triangular factors: for each joint and every θ, `‖τ - W θ‖²` and `Wᵀ(τ - W θ)` are equal to those
+/// over all samples. Unexcited columns are excluded; their torque at the fallback values is subtracted from τ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatorRows {
     /// Names of the columns.
@@ -22,28 +21,29 @@ pub struct EstimatorRows {
     pub regressor: DMatrix<f64>,
     /// Torque, Nm (N).
     pub torque: DVector<f64>,
-    /// Of each row the number of its joint.
+    /// Joint number of each row.
     pub joint_of_row: Vec<usize>,
-    /// Samples of each joint that the rows stand for.
+    /// Number of samples per joint before the reduction.
     pub samples: Vec<usize>,
     /// Noise of each joint by weighted least squares, Nm (N): `1/σ_j` whitens its rows.
     pub joint_sigma: Vec<f64>,
 }
 
-/// What it gives.
+/// Output of a custom estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnEstimate {
     /// One value for each column of the rows.
     pub values: Vec<f64>,
-    /// Their covariance; without one, error bars are those of ordinary least squares at the residuals of `values`.
+    /// Covariance of the values; if `None`, error bars are those of ordinary least squares with the residuals of
+    /// `values`.
     pub covariance: Option<DMatrix<f64>>,
 }
 
-/// The estimate that `rule` makes of a problem's rows; `name` is what messages call it.
+/// Estimates a problem with the custom `rule`; `name` appears in error messages.
 ///
 /// # Errors
-/// As [`ordinary_least_squares`](super::ordinary_least_squares); [`EstimationError::Own`] for values or a covariance of
-/// another size, that are not finite, and for a negative variance.
+/// As [`ordinary_least_squares`](super::ordinary_least_squares); [`EstimationError::Own`] for values or a covariance
+/// of the wrong size or not finite, and for a negative variance.
 pub fn estimate_by(
     problem: &LinearProblem,
     settings: &OrdinarySettings,
@@ -91,7 +91,7 @@ pub fn estimate_by(
     Ok(estimate)
 }
 
-/// The rows of the free columns, joint by joint, less what the held columns explain.
+/// Rows of the free columns by joint, minus the contribution of the held columns.
 fn estimator_rows(
     problem: &LinearProblem,
     settings: &OrdinarySettings,
@@ -109,7 +109,7 @@ fn estimator_rows(
         let mut alone = vec![0.0; joints];
         alone[joint] = 1.0;
         let own = stacked.combined(&alone)?;
-        // What no θ explains: the last row, whose regressor is zero.
+        // The last row has no regressor.
         torque[joint * each + each - 1] = own.entry(each - 1, each - 1);
         for (row, value) in own.residual(&known).iter().enumerate() {
             torque[joint * each + row] = *value;
@@ -130,28 +130,27 @@ fn estimator_rows(
     })
 }
 
-/// That values and covariance are numbers, and as many as there are columns.
 fn check(name: &str, own: &OwnEstimate, columns: usize) -> Result<(), EstimationError> {
     let wrong = |problem: String| EstimationError::Own { name: name.to_owned(), problem };
     expect("values of a caller's own estimator", columns, own.values.len())?;
     if let Some(place) = own.values.iter().position(|value| !value.is_finite()) {
-        return Err(wrong(format!("value {place} is {}: give finite numbers", own.values[place])));
+        return Err(wrong(format!("value {place} is {}: use finite numbers", own.values[place])));
     }
     let Some(covariance) = &own.covariance else { return Ok(()) };
     if covariance.shape() != (columns, columns) {
         let (rows, found) = covariance.shape();
-        return Err(wrong(format!("a covariance of shape ({rows}, {found}): give ({columns}, {columns})")));
+        return Err(wrong(format!("a covariance of shape ({rows}, {found}): use ({columns}, {columns})")));
     }
     if covariance.iter().any(|value| !value.is_finite()) {
-        return Err(wrong("the covariance holds numbers that are not finite".to_owned()));
+        return Err(wrong("the covariance contains values that are not finite: use finite numbers".to_owned()));
     }
     if let Some(place) = (0..columns).find(|&k| covariance[(k, k)] < 0.0) {
-        return Err(wrong(format!("variance {place} of the covariance is negative")));
+        return Err(wrong(format!("variance {place} of the covariance is negative: use nonnegative variances")));
     }
     Ok(())
 }
 
-/// Bars by a covariance that the caller gave, as normally distributed errors.
+/// Error bars from the caller's covariance, for normally distributed errors.
 fn with_covariance(estimate: &mut Estimate, free: &[usize], covariance: &DMatrix<f64>) {
     let normal = student_half_width(0.95, f64::INFINITY);
     estimate.clusters = 0;

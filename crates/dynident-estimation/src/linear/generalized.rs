@@ -1,4 +1,4 @@
-//! Generalised least squares: the joints' errors at one instant belong together.
+//! Generalised least squares for errors that are correlated between joints.
 
 use super::weighted::{WeightedSettings, noise_of_joints};
 use crate::error::{EstimationError, expect};
@@ -6,12 +6,12 @@ use crate::factor::{LinearProblem, SegmentedFactor, Unexcited, solve, split};
 use crate::uncertainty::{Estimate, PointEstimate};
 use nalgebra::{DMatrix, DVector};
 
-/// Rows of all joints side by side: one row of `[W_1 τ_1 | W_2 τ_2 | … | W_n τ_n]` for every instant of a log, held as
+/// Rows of all joints in one table: one row `[W_1 τ_1 | W_2 τ_2 | … | W_n τ_n]` per instant of a log, stored as
 /// factors.
 ///
-/// The triangle of such rows knows all products `W_iᵀW_j`, so that any covariance across joints can be tried without
-/// passing the rows again. It is as wide as all joints together: for a seven-joint arm absorbing costs about seven
-/// times what the joints' own factors cost.
+/// The triangle of such rows contains all products `W_iᵀW_j`, so any covariance across joints can be applied without
+/// another pass over the rows. Its width is that of all joints together: for a seven-joint arm absorbing rows costs
+/// about seven times as much as with separate factors.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -40,24 +40,24 @@ pub struct CrossProblem {
     logs: Vec<(String, SegmentedFactor)>,
 }
 
-/// What [`generalized_least_squares`] found.
+/// Result of [`generalized_least_squares`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneralizedEstimate {
-    /// Values with covariance. Its clusters are segments of all joints; score inflation, effective and segment
-    /// correlation are of all joints together.
+    /// Values with covariance. Clusters are segments of all joints; score inflation, effective and segment correlation
+    /// are for all joints together.
     pub estimate: Estimate,
-    /// Ω, the covariance of the joints' errors at one instant, (joints, joints), squared torque.
+    /// Ω, covariance of the joints' errors at one instant, (joints, joints), squared torque.
     pub noise_covariance: DMatrix<f64>,
-    /// The same as correlations.
+    /// Correlation matrix of Ω.
     pub noise_correlation: DMatrix<f64>,
 }
 
 impl CrossProblem {
-    /// A problem without data: names of columns and joints, and the columns that each joint sees.
+    /// Creates a problem without data from the names of columns and joints and the columns of each joint.
     ///
     /// # Errors
-    /// [`EstimationError::Empty`] without joints; [`EstimationError::Mismatch`] unless there is one list for each
-    /// joint; [`EstimationError::Column`] for a column out of range or given twice.
+    /// [`EstimationError::Empty`] without joints; [`EstimationError::Mismatch`] for a wrong number of lists;
+    /// [`EstimationError::Column`] for a column out of range or duplicate.
     pub fn new(
         columns: Vec<String>,
         joints: Vec<String>,
@@ -86,24 +86,23 @@ impl CrossProblem {
         })
     }
 
-    /// Columns of a log's factor beside its last one (the last joint's torque): those of all joints, and the torques of
-    /// all but the last.
+    /// Columns of a log's factor: those of all joints and the torques of all joints but the last.
     pub fn width(&self) -> usize {
         self.joint_columns.iter().map(|list| list.len() + 1).sum::<usize>().saturating_sub(1)
     }
 
-    /// Adds a log: rows `[W_1 τ_1 | … | W_n τ_n]`, columns of each joint in the order of its list, absorbed in the
-    /// order of time.
+    /// Adds a log: rows `[W_1 τ_1 | … | W_n τ_n]` in order of time, the columns of each joint in the order of its
+    /// list.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] when the factor has another [`width`](Self::width).
+    /// [`EstimationError::Mismatch`] if the factor has another [`width`](Self::width).
     pub fn add(&mut self, log: &str, rows: SegmentedFactor) -> Result<(), EstimationError> {
-        expect("columns of all joints side by side", self.width(), rows.columns())?;
+        expect("columns of all joints together", self.width(), rows.columns())?;
         self.logs.push((log.into(), rows));
         Ok(())
     }
 
-    /// Values at which columns are fixed that the data do not excite; zero unless said otherwise.
+    /// Sets the values of columns that the data do not excite; zero by default.
     ///
     /// # Errors
     /// As [`LinearProblem::with_fallback`].
@@ -113,7 +112,7 @@ impl CrossProblem {
         Ok(self)
     }
 
-    /// Columns that are to stay at their fallback values: see [`LinearProblem::with_unexcited`].
+    /// Sets columns to hold at their fallback values: see [`LinearProblem::with_unexcited`].
     ///
     /// # Errors
     /// As [`LinearProblem::with_unexcited`].
@@ -187,21 +186,20 @@ impl CrossProblem {
     }
 }
 
-/// Two joints' errors never count as more correlated than this: the whitener would divide by the rounding of their
-/// difference.
-const HIGHEST_CORRELATION: f64 = 1.0 - 1.0e-9;
+/// Limit of the correlation of two joints' errors. Above it the whitener divides by the rounding of their difference.
+const MAX_CORRELATION: f64 = 1.0 - 1.0e-9;
 
 /// `θ = argmin Σ_t e_tᵀ Ω⁻¹ e_t`, `e_t = τ_t − W_t θ` over all joints at instant t, `Ω = Σ_t e_t e_tᵀ / (N − p/n)`
-/// iterated from the unit matrix until it settles; p estimated columns, n joints, N instants.
+/// iterated from the unit matrix to convergence; p estimated columns, n joints, N instants.
 ///
-/// With `Ω = L Lᵀ` the rows are multiplied by L⁻¹, which the side-by-side triangle allows without another pass. The
-/// white covariance is `(Σ W_tᵀΩ⁻¹W_t)⁻¹`; that from segments takes a segment of all joints as a cluster. Zellner, J.
-/// Am. Stat. Assoc. 57 (1962) 348 (seemingly unrelated regressions, iterated).
+/// With `Ω = L Lᵀ` the rows are multiplied by L⁻¹, without another pass over the log. The white covariance is `(Σ
+/// W_tᵀΩ⁻¹W_t)⁻¹`; for the covariance from segments a cluster is a segment of all joints. Zellner, J. Am. Stat. Assoc.
+/// 57 (1962) 348 (seemingly unrelated regressions, iterated).
 ///
 /// # Errors
-/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`] (instants must outnumber the columns' share and the
-/// joints), [`EstimationError::Setting`], and those of the covariance. Joints whose errors are the same but for a
-/// factor are whitened as if correlated by 1 − 1e-9.
+/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`] (there must be more instants than the columns' share
+/// plus the joints), [`EstimationError::Setting`], and those of the covariance. Proportional errors of two joints are
+/// whitened with a correlation of 1 − 1e-9.
 #[doc(alias("gls", "sur", "zellner"))]
 pub fn generalized_least_squares(
     problem: &CrossProblem,
@@ -213,7 +211,7 @@ pub fn generalized_least_squares(
     if rows == 0 {
         return Err(EstimationError::Empty);
     }
-    // The first solution takes joints as independent and equally noisy.
+    // Start: independent joints with equal noise.
     let mut whitener = DMatrix::identity(joints, joints);
     let mut whitened = problem.whitened(&whitener)?;
     let mut triangle = whitened.stacked().combined(&[1.0])?;
@@ -228,7 +226,7 @@ pub fn generalized_least_squares(
     let mut omega: DMatrix<f64>;
     let mut previous: Option<DMatrix<f64>> = None;
     let (mut iterations, mut converged) = (1, false);
-    // Covariance from residuals, and solution from covariance, in turn.
+    // Alternates between the covariance from residuals and the solution from the covariance.
     loop {
         let (products, torque) = problem.residual_products(&solution.values);
         let squares: Vec<f64> = products.diagonal().iter().copied().collect();
@@ -249,7 +247,7 @@ pub fn generalized_least_squares(
         previous = Some(omega);
         iterations += 1;
     }
-    // All joints are one whitened problem, whose figures each of them shares.
+    // All joints form one whitened problem and share its diagnostics.
     let sigma: Vec<f64> = omega.diagonal().iter().map(|variance| variance.sqrt()).collect();
     let fitted = PointEstimate {
         triangle,
@@ -271,20 +269,20 @@ pub fn generalized_least_squares(
     Ok(GeneralizedEstimate { estimate, noise_covariance: omega, noise_correlation })
 }
 
-/// Covariance of the joints' noise with the standard deviations `sigma`; correlations are bounded.
+/// Covariance of the joints' noise with the standard deviations `sigma` and bounded correlations.
 fn noise_covariance(products: &DMatrix<f64>, sigma: &[f64], degrees_of_freedom: f64) -> DMatrix<f64> {
     DMatrix::from_fn(sigma.len(), sigma.len(), |i, j| {
         if i == j {
             sigma[i] * sigma[i]
         } else {
-            let bound = HIGHEST_CORRELATION * sigma[i] * sigma[j];
+            let bound = MAX_CORRELATION * sigma[i] * sigma[j];
             (products[(i, j)] / degrees_of_freedom).clamp(-bound, bound)
         }
     })
 }
 
-/// L⁻¹ with L Lᵀ = Ω. A covariance that clamped correlations have made indefinite is drawn towards its diagonal until
-/// it is not.
+/// L⁻¹ with L Lᵀ = Ω. If clamped correlations made Ω indefinite, it is shrunk towards its diagonal until it is
+/// positive definite.
 fn inverse_root(omega: &DMatrix<f64>, sigma: &[f64]) -> DMatrix<f64> {
     let joints = sigma.len();
     let diagonal = DMatrix::from_diagonal(&DVector::from_iterator(joints, sigma.iter().map(|s| s * s)));

@@ -1,4 +1,5 @@
-//! Was filtering enough? The augmented Durbin-Wu-Hausman test of least squares against instrumental variables.
+//! Augmented Durbin-Wu-Hausman test of least squares against instrumental variables: does filtering remove enough
+//! noise?
 
 use super::instrumental::{InstrumentalEstimate, noisy_columns};
 use super::projection::Projection;
@@ -13,13 +14,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HausmanSettings {
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// The covariance behind the test; from time segments by default. `white` is the textbook's test, which coloured
-    /// residuals make reject far too often.
+    /// Covariance of the test; from time segments by default. With `white`, the textbook form, coloured residuals
+    /// cause far too many rejections.
     pub covariance: CovarianceMethod,
-    /// Probability of rejecting least squares where it is right. Default 0.01: with that many samples small doubts are
-    /// easily raised.
+    /// Probability of rejecting least squares when it is correct. Default 0.01: with large samples even small
+    /// deviations are significant.
     pub level: f64,
 }
 
@@ -40,34 +41,34 @@ impl HausmanSettings {
     }
 }
 
-/// What the test says.
+/// Verdict of the test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum HausmanVerdict {
-    /// Noise in the regressor does not show: filtering was enough, least squares may be used.
+    /// No significant noise in the regressor: filtering was sufficient, least squares is valid.
     FilteringWasEnough,
-    /// Noise in the regressor (or feedback) biases least squares: it is rejected, use the instrumental estimate.
+    /// Noise in the regressor (or feedback) biases least squares: use the instrumental estimate.
     RejectLeastSquares,
-    /// Too few time segments for so many columns, or instruments that explain everything: nothing can be said.
+    /// Too few time segments for the columns, or instruments that explain the whole regressor.
     Undecided,
 }
 
-/// The test with its numbers.
+/// Verdict and statistics of the test.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct HausmanTest {
-    /// What follows.
+    /// The verdict.
     pub verdict: HausmanVerdict,
-    /// The statistic; none when undecided.
+    /// F statistic; `None` if undecided.
     pub f: Option<f64>,
-    /// Degrees of freedom: tested columns; time segments (or rows, with white residuals) less those.
+    /// Degrees of freedom: tested columns; time segments (rows for white residuals) minus tested columns.
     pub degrees_of_freedom: [f64; 2],
-    /// Probability of such an F where least squares is right.
+    /// Probability of a larger F if least squares is correct.
     pub p_value: Option<f64>,
-    /// Columns tested, each with its own `t = γ/std(γ)`: where the noise is.
+    /// Tested columns with `t = γ/std(γ)`; large values show where the noise is.
     pub columns: Vec<HausmanColumn>,
-    /// Why nothing can be said, when undecided.
+    /// Why the test is undecided.
     pub reason: Option<String>,
 }
 
@@ -77,28 +78,28 @@ pub struct HausmanTest {
 pub struct HausmanColumn {
     /// Its name.
     pub name: String,
-    /// γ: by how much the column's noise would be weighted differently from its motion.
+    /// γ: difference between the coefficients of the column's noise and of its motion.
     pub contrast: f64,
     /// γ over its standard deviation.
     pub t: f64,
 }
 
-/// Regresses `τ` on `[W | V]`, where `V = W − Z(ZᵀZ)⁻¹ZᵀW` is what the instruments do not explain of the regressor, and
-/// tests whether V's coefficients γ are zero:
+/// Regresses `τ` on `[W | V]`, where `V = W − Z(ZᵀZ)⁻¹ZᵀW` is the part of the regressor that the instruments do not
+/// explain, and tests whether the coefficients γ of V are zero:
 ///
 /// ```text
 ///     τ = W θ + V γ + noise,    T² = γᵀ Cov(γ)⁻¹ γ,    F = T² (G − q)/(q (G − 1))  against F(q, G − q)
 /// ```
 ///
-/// If W is free of noise that matters, V carries no other torque than W does and γ = 0; under noise in W (or noise fed
-/// back into the motion) the coefficients differ. Cov is that of G time segments, so that residuals correlated in time
-/// do not reject by themselves; F is Hotelling's form for a covariance that was estimated from G pieces. Rows are
-/// weighted by the joints' noise in `estimate`. Janot, Vandanjon and Gautier, Control Engineering Practice 48 (2016)
-/// 52; Hausman, Econometrica 46 (1978) 1251.
+/// Without significant noise in W, V has the same coefficients as W and γ = 0; noise in W (or noise fed back into the
+/// motion) makes them differ. Cov comes from G time segments, so that correlated residuals alone do not cause a
+/// rejection; F is Hotelling's form for a covariance estimated from G segments. Rows are weighted by the joints' noise
+/// in `estimate`. Janot, Vandanjon and Gautier, Control Engineering Practice 48 (2016) 52; Hausman, Econometrica 46
+/// (1978) 1251.
 ///
 /// # Errors
-/// [`EstimationError::Setting`] and the errors of the covariance. A test that cannot be made is a verdict, not an
-/// error.
+/// [`EstimationError::Setting`] and the errors of the covariance. If the test is not possible, the verdict is
+/// [`HausmanVerdict::Undecided`].
 #[doc(alias("durbin-wu-hausman", "dwh"))]
 pub fn hausman_test(
     problem: &InstrumentedProblem,
@@ -116,7 +117,8 @@ pub fn hausman_test(
     let noisy = noisy_columns(&projection, &free);
     if noisy.is_empty() {
         return Ok(undecided(
-            "the instruments explain the regressor wholly: they hold the same noise".into(),
+            "the instruments explain the regressor completely, so they contain the same noise: use other instruments"
+                .into(),
             [0.0; 2],
         ));
     }
@@ -126,7 +128,7 @@ pub fn hausman_test(
     let choice = split(&triangle, &settings.rank, &Unexcited::default());
     let tested: Vec<usize> = choice.free.iter().copied().filter(|&column| column >= free.len()).collect();
     if tested.is_empty() {
-        return Ok(undecided("nothing of the regressor's noise is independent of the regressor".into(), [0.0; 2]));
+        return Ok(undecided("no noise column is independent of the regressor".into(), [0.0; 2]));
     }
     let degrees_of_freedom = match joint_degrees_of_freedom(&stacked, choice.free.len()) {
         Ok(degrees_of_freedom) => degrees_of_freedom,
@@ -152,14 +154,14 @@ pub fn hausman_test(
     Ok(judged(&fit, &Tested { columns: tested, names }, degrees, settings.level))
 }
 
-/// The columns of `[W | V]` whose coefficients are tested.
+/// Columns of `[W | V]` whose coefficients are tested.
 struct Tested {
     columns: Vec<usize>,
-    /// Names of the columns of W whose noise they are.
+    /// Names of the corresponding columns of W.
     names: Vec<String>,
 }
 
-/// The test of a fit of `[W | V]` with that many degrees of freedom.
+/// The test on a fit of `[W | V]` with `degrees` degrees of freedom.
 fn judged(fit: &Estimate, tested: &Tested, degrees: usize, level: f64) -> HausmanTest {
     let Tested { columns: tested, names } = tested;
     let q = tested.len();
@@ -176,10 +178,11 @@ fn judged(fit: &Estimate, tested: &Tested, degrees: usize, level: f64) -> Hausma
         })
         .collect();
     if pieces <= q {
-        let reason = format!("{pieces} time segments for {q} tested columns: use shorter segments or longer logs");
+        let reason =
+            format!("too few time segments ({pieces}) for {q} tested columns: use shorter segments or longer logs");
         return HausmanTest { columns, ..undecided(reason, degrees_of_freedom) };
     }
-    // On the scale of the standard deviations, where units do not matter.
+    // Scaled by the standard deviations, to be independent of units.
     let std: Vec<f64> = tested.iter().map(|&column| fit.std[column]).collect();
     let correlation = DMatrix::from_fn(q, q, |i, j| fit.covariance[(tested[i], tested[j])] / (std[i] * std[j]));
     let t = DVector::from_fn(q, |i, _| fit.values[tested[i]] / std[i]);
@@ -195,7 +198,7 @@ fn judged(fit: &Estimate, tested: &Tested, degrees: usize, level: f64) -> Hausma
     HausmanTest { verdict, f: Some(f), degrees_of_freedom, p_value: Some(p_value), columns, reason: None }
 }
 
-/// The regression of τ on the `free` columns of W and the `noisy` ones of V; the other columns of W keep their values.
+/// Regression of τ on the `free` columns of W and the `noisy` ones of V; the other columns of W keep their values.
 fn augmented(
     problem: &InstrumentedProblem,
     projection: &Projection,

@@ -1,4 +1,4 @@
-//! Instrumental variables: estimates that noise in the regressor does not pull towards zero.
+//! Instrumental variables: estimates that are not biased towards zero by noise in the regressor.
 
 use super::projection::Projection;
 use super::weighted::{WeightedSettings, noise_change, noise_of_joints};
@@ -12,16 +12,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentalSettings {
-    /// When a column counts as excited; applied to the part of the regressor that the instruments explain.
+    /// Criteria for an excited column, for the part of the regressor that the instruments explain.
     pub rank: RankSettings,
-    /// The covariance to report; from time segments by default.
+    /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// Largest relative change of any joint's σ at which the iteration of the weights ends. Default 1e-6.
+    /// The iteration of the weights ends when no joint's σ changes by more than this share. Default 1e-6.
     pub tolerance: f64,
-    /// Most solutions made. Default 50.
+    /// Maximum number of solutions. Default 50.
     pub max_iterations: usize,
-    /// First-stage F below which the instruments are called weak. Default 10, the rule of thumb of Staiger and Stock,
-    /// Econometrica 65 (1997) 557.
+    /// The instruments are weak if the first-stage F is below this value. Default 10, the rule of thumb of Staiger
+    /// and Stock, Econometrica 65 (1997) 557.
     pub weak_below: f64,
 }
 
@@ -41,65 +41,64 @@ impl InstrumentalSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, a limit of F that is not
+    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, zero iterations, a limit of F that is not
     /// positive, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         let (rank, covariance) = (self.rank, self.covariance);
         let (tolerance, max_iterations) = (self.tolerance, self.max_iterations);
         WeightedSettings { rank, covariance, tolerance, max_iterations }.validate()?;
-        let fix = "give a positive limit for the first-stage F, 10 by default";
+        let fix = "use a positive limit for the first-stage F (default 10)";
         require(self.weak_below.is_finite() && self.weak_below > 0.0, "weak_below", self.weak_below, fix)
     }
 }
 
-/// How well the instruments explain the regressor.
+/// Strength of the instruments.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct InstrumentReport {
-    /// Independent instruments.
+    /// Number of independent instruments.
     pub instruments: usize,
-    /// Columns that hold noise which the instruments do not share. The others are explained wholly and are their own
-    /// instruments.
+    /// Columns with noise that the instruments do not share. The other columns are explained completely and are their
+    /// own instruments.
     pub noisy_columns: Vec<String>,
-    /// Smallest F of the first stage over all directions in the noisy columns (Cragg-Donald): `λ_min(Σ_V⁻¹ W̃ᵀW̃) / k`
-    /// with `Σ_V = VᵀV/(N − k)`, other columns taken out. None when no column is noisy.
+    /// Smallest first-stage F over all directions in the noisy columns (Cragg-Donald): `λ_min(Σ_V⁻¹ W̃ᵀW̃) / k` with
+    /// `Σ_V = VᵀV/(N − k)`, other columns projected out. `None` without noisy columns.
     pub weakest_f: Option<f64>,
-    /// The noisy column with the largest part in that direction, each column measured by its own noise.
+    /// The noisy column with the largest component in that direction, in units of its noise.
     pub weakest_column: Option<String>,
-    /// Whether the smallest F is below the settings' limit: the estimate is then biased towards least squares, and its
-    /// error bars are too small.
+    /// Whether the smallest F is below the limit: the estimate is then biased towards least squares and its error bars
+    /// are too small.
     pub weak: bool,
 }
 
-/// What [`instrumental_variables`] found.
+/// Result of [`instrumental_variables`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InstrumentalEstimate {
-    /// Values with covariance; `joint_sigma` is that of `τ − W θ`, noise of W included.
+    /// Values with covariance; `joint_sigma` is that of `τ − W θ`, including noise of W.
     pub estimate: Estimate,
     /// The first stage.
     pub instruments: InstrumentReport,
 }
 
-/// A part of a column that the instruments leave over counts as noise above this share of the column: rounding stays
-/// far below.
-pub(crate) const NOISY: f64 = 1.0e-7;
+/// A column is noisy if the share that the instruments do not explain exceeds this value; rounding is far smaller.
+pub(crate) const MIN_NOISE_SHARE: f64 = 1.0e-7;
 
 /// `θ = (Σ_j Z_jᵀW_j/σ_j²)⁻¹ Σ_j Z_jᵀτ_j/σ_j²`, with `σ_j² = ‖τ_j − W_j θ‖²/(N_j − p/n)` iterated from one as in
 /// weighted least squares.
 ///
-/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`, which is the same as long
-/// as there are as many independent instruments as estimated columns, and two-stage least squares where there are more.
-/// Consistent when Z is uncorrelated with the noise of W and τ, where least squares is biased towards zero. The
+/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`. This is the same for
+/// equally many independent instruments and estimated columns, and two-stage least squares for more instruments.
+/// Consistent if Z is uncorrelated with the noise of W and τ, where least squares is biased towards zero. The
 /// covariance is the sandwich `A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹` with `A = W̃ᵀW̃`, `s_g = W̃_gᵀ(τ_g − W_g θ)`, `W̃ =
-/// Z(ZᵀZ)⁻¹ZᵀW`, or its leave-one-segment-out form.
+/// Z(ZᵀZ)⁻¹ZᵀW`, or its delete-one-segment form.
 ///
-/// For instruments that are simulated with the current model (IDIM-IV) call this again with new Z until θ settles.
-/// Janot, Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014) 132; weak instruments: Cragg and Donald,
+/// For instruments simulated with the current model (IDIM-IV) repeat the call with new Z until θ converges. Janot,
+/// Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014) 132; weak instruments: Cragg and Donald,
 /// Econometric Theory 9 (1993) 222.
 ///
 /// # Errors
 /// As [`weighted_least_squares`](crate::weighted_least_squares). Columns that the instruments do not distinguish are
-/// fixed and named in the estimate's rank report; weak instruments are reported: neither is an error.
+/// fixed and listed in the rank report; weak instruments are reported. Neither is an error.
 #[doc(alias("iv", "idim-iv", "2sls", "tsls"))]
 pub fn instrumental_variables(
     problem: &InstrumentedProblem,
@@ -131,7 +130,7 @@ pub fn instrumental_variables(
         iterations += 1;
     }
     let instruments = report(problem, &projection, &choice, settings);
-    // Least squares of τ − V θ on W̃ has the same solution, the residual τ − W θ, and so the sandwich of the
+    // Least squares of τ − V θ on W̃ has the same solution and the residual τ − W θ, and so the sandwich of the
     // instruments.
     let theta = DVector::from_column_slice(&solution.values);
     let second = problem.combined(problem.columns().to_vec(), problem.fallback().to_vec(), |local| {
@@ -159,16 +158,19 @@ pub fn instrumental_variables(
 }
 
 impl InstrumentalEstimate {
-    /// Whether all columns were estimated with instruments that are strong enough.
+    /// Whether all columns were estimated with strong instruments.
     pub fn sound(&self) -> bool {
         self.estimate.status == EstimateStatus::Complete && !self.instruments.weak
     }
 }
 
-/// Free columns that the instruments do not explain wholly.
+/// Free columns that the instruments do not explain completely.
 pub(crate) fn noisy_columns(projection: &Projection, free: &[usize]) -> Vec<usize> {
     let (explained, left) = (projection.explained.column_norms(), projection.left.column_norms());
-    free.iter().copied().filter(|&column| left[column] > NOISY * explained[column].hypot(left[column])).collect()
+    free.iter()
+        .copied()
+        .filter(|&column| left[column] > MIN_NOISE_SHARE * explained[column].hypot(left[column]))
+        .collect()
 }
 
 fn report(
@@ -191,7 +193,7 @@ fn report(
     if noisy.is_empty() || rows <= k {
         return report;
     }
-    // The explained part of the noisy columns with all others taken out: the last rows of a triangle with the others
+    // Explained part of the noisy columns with all others projected out: the last rows of a triangle with the others
     // first.
     let others: Vec<usize> = choice.free.iter().copied().filter(|column| !noisy.contains(column)).collect();
     let order: Vec<usize> = others.iter().chain(&noisy).copied().collect();
@@ -209,7 +211,7 @@ fn report(
     let scaled =
         |matrix: DMatrix<f64>| DMatrix::from_fn(count, count, |row, column| matrix[(row, column)] / scales[column]);
     let (explained, left) = (scaled(explained), scaled(left));
-    // Smallest σ of E V⁻¹ is the reciprocal of the largest of V E⁻¹; E is regular, for its columns were found
+    // The smallest σ of E V⁻¹ is the reciprocal of the largest of V E⁻¹; E is regular, because its columns are
     // independent.
     let Some(inverse) = explained.clone().try_inverse() else { return report };
     let decomposition = (left * &inverse).svd(false, true);

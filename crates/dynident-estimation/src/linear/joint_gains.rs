@@ -1,5 +1,4 @@
-//! Torque in a unit that nobody knows: one gain for each joint beside the parameters, determined by a load that is
-//! known.
+//! Joint gains for torque in an unknown unit, estimated together with the parameters from a known load.
 
 use super::ordinary::{OrdinarySettings, ordinary_least_squares};
 use super::weighted::{WeightedSettings, weighted_least_squares};
@@ -10,23 +9,22 @@ use dynident_dynamics::independent_columns;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-/// Steps that are made at most; three to six are usual.
-const MOST_STEPS: usize = 50;
-/// The steps end when none moves a value by more than this share of its standard deviation under white noise.
-const SETTLED: f64 = 1.0e-4;
-/// A step is halved at most so often before the fit counts as settled.
-const MOST_HALVINGS: usize = 12;
+/// Maximum number of Gauss-Newton steps; three to six are usual.
+const MAX_STEPS: usize = 50;
+/// The iteration ends when no value moves by more than this share of its standard deviation under white noise.
+const STEP_TOLERANCE: f64 = 1.0e-4;
+/// Maximum number of halvings of a step before the iteration ends.
+const MAX_HALVINGS: usize = 12;
 /// Share of a gain's column, by its own norm, that must be in a dependence for the gain to be part of it.
-const IN_DEPENDENCE: f64 = 1.0e-6;
+const MIN_DEPENDENCE_SHARE: f64 = 1.0e-6;
 
-/// `u_j = (1/g_j) W_j (θ + c) + noise`: what joint j reports in its own unit, for parameters θ and a known load c that
-/// some logs carry.
+/// `u_j = (1/g_j) W_j (θ + c) + noise`: signal of joint j in its own unit, for parameters θ and a known load c in some
+/// of the logs.
 #[derive(Clone, Debug)]
 pub struct GainProblem<'a> {
-    /// Rows `[W | u]`; the columns are θ.
+    /// Rows `[W | u]` over the columns θ.
     pub rows: &'a LinearProblem,
-    /// For every log of the rows the known part of the parameters, one value per column: a load's in loaded logs, zero
-    /// in others.
+    /// Known part of the parameters for every log, one value per column: the load in loaded logs, zero in others.
     pub known: Vec<Vec<f64>>,
 }
 
@@ -35,17 +33,17 @@ pub struct GainProblem<'a> {
 pub struct JointGain {
     /// The joint.
     pub joint: String,
-    /// Torque per unit of what is logged, Nm (N). Where it is not identified, what it was held at.
+    /// Torque per unit of the logged signal, Nm (N); the held value if not identified.
     pub gain: f64,
     /// Its standard deviation.
     pub std: f64,
-    /// Half the width of its 95 % interval.
+    /// Half-width of its 95 % interval.
     pub half_width_95: f64,
-    /// False where any other gain of this joint fits as well, with other parameters: no known load is felt.
+    /// False if any other gain of this joint fits equally well with other parameters: no known load acts on the joint.
     pub identified: bool,
 }
 
-/// What [`joint_gains`] found.
+/// Result of [`joint_gains`].
 #[derive(Clone, Debug)]
 pub struct GainEstimate {
     /// θ, then `1/g_j` of every joint; `joint_sigma` is in the joints' own units.
@@ -54,22 +52,22 @@ pub struct GainEstimate {
     pub gains: Vec<JointGain>,
 }
 
-/// Parameters and gains together, `min Σ_j ‖u_j − k_j W_j (θ + c)‖² / σ_j²` over θ and `k_j = 1/g_j`, by Gauss-Newton
-/// steps on the factors.
+/// Estimates parameters and gains together, `min Σ_j ‖u_j − k_j W_j (θ + c)‖² / σ_j²` over θ and `k_j = 1/g_j`, by
+/// Gauss-Newton steps on the factors.
 ///
-/// The noise is in what is logged, so it stands alone on its side: with gains in front of u (`g_j u_j = W_j (θ + c)`)
-/// plain least squares draws the gains to zero, and total least squares is the cure that is usual (Gautier and Briot,
-/// ICRA 2012 and ASME J. Dyn. Sys. Meas. Control 136 (2014) 051025). Start: the same linear equations with u replaced
-/// by its fit on its own log's columns, which noise does not bias. Every step is a weighted fit of the columns `k_j
-/// W_j` and `W_j (θ + c)`; the last one's covariance is that of the solution.
+/// The noisy signal u is the left side. With gains in front of u (`g_j u_j = W_j (θ + c)`) least squares biases the
+/// gains to zero; the usual remedy is total least squares (Gautier and Briot, ICRA 2012 and ASME J. Dyn. Sys. Meas.
+/// Control 136 (2014) 051025). Start: these linear equations with u replaced by its fit on its own log's columns,
+/// which noise does not bias. Every step is a weighted fit of the columns `k_j W_j` and `W_j (θ + c)`; the covariance
+/// is that of the last step.
 ///
-/// A load must be known and felt: without it all of one joint's (or of all joints that share parameters) gains and
-/// parameters can be multiplied by the same number. Gains in such a dependence are not `identified`; they are held
-/// where they began.
+/// A known load must act on the joint. Otherwise all gains and parameters of the joint (or of all joints that share
+/// parameters) can be multiplied by the same number. Such gains are not `identified` and are held at their start
+/// values.
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for shapes that do not fit or a problem with a prior, [`EstimationError::Setting`] for
-/// a load that is not finite or zero in all logs, and those of [`weighted_least_squares`].
+/// [`EstimationError::Mismatch`] for wrong shapes or a problem with a prior, [`EstimationError::Setting`] for a load
+/// that is not finite or zero in all logs, and those of [`weighted_least_squares`].
 #[doc(alias("torque constant", "drive gain"))]
 pub fn joint_gains(problem: &GainProblem<'_>, settings: &WeightedSettings) -> Result<GainEstimate, EstimationError> {
     check(problem)?;
@@ -82,12 +80,12 @@ pub fn joint_gains(problem: &GainProblem<'_>, settings: &WeightedSettings) -> Re
     let mut misfit = misfit(problem, &x)?;
     let mut settled = false;
     let mut steps = 0;
-    while !settled && steps < MOST_STEPS {
+    while !settled && steps < MAX_STEPS {
         steps += 1;
         let step = weighted_least_squares(&linearised(problem, Some(&merged), &x)?, &quick)?;
         let mut share = 1.0;
         let mut better = None;
-        for _ in 0..=MOST_HALVINGS {
+        for _ in 0..=MAX_HALVINGS {
             let tried: Vec<f64> = x.iter().zip(&step.values).map(|(from, to)| from + share * (to - from)).collect();
             let usable = tried[count..].iter().zip(&x[count..]).all(|(k, old)| k * old > 0.0);
             if usable {
@@ -99,15 +97,15 @@ pub fn joint_gains(problem: &GainProblem<'_>, settings: &WeightedSettings) -> Re
             }
             share *= 0.5;
         }
-        // No smaller misfit along the step: rounding is all that is left of it.
+        // No smaller misfit along the step: converged to rounding.
         let Some((next, found)) = better else { break };
-        settled = next.iter().zip(&x).zip(&step.std).all(|((a, b), std)| (a - b).abs() <= SETTLED * std);
+        settled = next.iter().zip(&x).zip(&step.std).all(|((a, b), std)| (a - b).abs() <= STEP_TOLERANCE * std);
         (x, misfit) = (next, found);
     }
     let last = linearised(problem, None, &x)?;
     let mut estimate = weighted_least_squares(&last, settings)?;
     estimate.iterations = steps + 1;
-    if steps == MOST_STEPS && !settled {
+    if steps == MAX_STEPS && !settled {
         estimate.status = EstimateStatus::IterationLimit;
     }
     let held = not_identified(&last, &estimate, count, settings)?;
@@ -133,7 +131,7 @@ fn check(problem: &GainProblem<'_>) -> Result<(), EstimationError> {
     for known in &problem.known {
         expect("values of a known load", rows.columns().len(), known.len())?;
         if let Some(&value) = known.iter().find(|value| !value.is_finite()) {
-            return Err(EstimationError::Setting { setting: "known load", value, fix: "give finite numbers" });
+            return Err(EstimationError::Setting { setting: "known load", value, fix: "use finite numbers" });
         }
     }
     if rows.prior().is_some() {
@@ -141,19 +139,19 @@ fn check(problem: &GainProblem<'_>) -> Result<(), EstimationError> {
         return Err(EstimationError::Mismatch { what, expected: 0, found: 1 });
     }
     if problem.known.iter().flatten().all(|&value| value == 0.0) {
-        let fix = "let at least one log carry a load that is known";
+        let fix = "use at least one log with a known load";
         return Err(EstimationError::Setting { setting: "known load", value: 0.0, fix });
     }
     Ok(())
 }
 
-/// `θ + c` as the rows of an equation see it.
+/// `θ + c` for the columns of an equation.
 fn loaded(problem: &GainProblem<'_>, equation: &JointRows, x: &[f64]) -> Vec<f64> {
     let known = &problem.known[equation.log];
     equation.columns.iter().map(|&column| x[column] + known[column]).collect()
 }
 
-/// `Σ_j N_j ln ‖u_j − k_j W_j (θ + c)‖²`: what weights by each joint's own noise make smallest.
+/// Objective of the weighted fit, `Σ_j N_j ln ‖u_j − k_j W_j (θ + c)‖²`.
 fn misfit(problem: &GainProblem<'_>, x: &[f64]) -> Result<f64, EstimationError> {
     let rows = problem.rows;
     let count = rows.columns().len();
@@ -165,14 +163,13 @@ fn misfit(problem: &GainProblem<'_>, x: &[f64]) -> Result<f64, EstimationError> 
         squares[equation.joint] += total.residual_sum_of_squares(&theta)?;
         torque[equation.joint] += total.torque_norm().powi(2);
     }
-    // Rounding of the torque: below it there is nothing to gain.
+    // Rounding error of the torque.
     let floor = |torque: f64| (1.0e-24 * torque).max(f64::MIN_POSITIVE);
     let terms = squares.iter().zip(&torque).zip(rows.joint_rows());
     Ok(terms.map(|((square, &torque), n)| n as f64 * square.max(floor(torque)).ln()).sum())
 }
 
-/// The columns `k W` for θ and `W (θ + c)` for k about x; the target in absolute terms, so that the solution is the
-/// next x.
+/// Columns `k W` for θ and `W (θ + c)` for k at x. The target is absolute, so that the solution is the next x.
 fn linearised(
     problem: &GainProblem<'_>,
     merged: Option<&[SegmentedFactor]>,
@@ -210,7 +207,7 @@ fn start(
     let rows = problem.rows;
     let (count, joints) = (rows.columns().len(), rows.joints().len());
     let names = rows.columns().iter().chain(rows.joints()).cloned().collect();
-    // Parameters that are not determined are zero, gains one.
+    // Undetermined parameters are zero, undetermined gains one.
     let mut fallback: Vec<f64> = (0..count + joints).map(|column| f64::from(u8::from(column >= count))).collect();
     for &column in &rows.unexcited().columns {
         fallback[column] = rows.fallback()[column];
@@ -234,20 +231,20 @@ fn start(
         let columns = equation.columns.iter().copied().chain([count + equation.joint]).collect();
         linear.add(&rows.logs()[equation.log], equation.joint, columns, factor.mapped(&map)?)?;
     }
-    // Without noise the residual is rounding, which ordinary weights stand better.
+    // Ordinary weights: for noise-free data the residuals are rounding and unusable as weights.
     let ordinary = OrdinarySettings { rank: settings.rank, covariance: CovarianceMethod::White };
     let mut x = ordinary_least_squares(&linear, &ordinary)?.values;
     for (joint, gain) in x[count..].iter_mut().enumerate() {
         let scale = rows.equations().iter().filter(|equation| equation.joint == joint);
         let largest = scale.map(|equation| equation.factor.total().torque_norm()).fold(0.0, f64::max);
-        // A gain of nothing would make its reciprocal run away; the sign is what counts.
+        // A gain near zero would give an unbounded reciprocal.
         let least = if largest > 0.0 { 1.0e-9 / largest } else { 1.0 };
         *gain = 1.0 / if gain.abs() > least { *gain } else { 1.0 };
     }
     Ok(x)
 }
 
-/// Which gains stand in a dependence of columns.
+/// Which gains are part of a dependence between columns.
 fn not_identified(
     last: &LinearProblem,
     estimate: &Estimate,
@@ -272,7 +269,7 @@ fn not_identified(
         }
         held[column - count] = true;
         for (row, &other) in split.independent.iter().enumerate() {
-            if other >= count && split.regrouping[(row, place)].abs() > IN_DEPENDENCE {
+            if other >= count && split.regrouping[(row, place)].abs() > MIN_DEPENDENCE_SHARE {
                 held[other - count] = true;
             }
         }

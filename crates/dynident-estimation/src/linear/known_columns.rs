@@ -1,4 +1,4 @@
-//! Weighted least squares where some parameters are known from other data, with the error bars that they have.
+//! Weighted least squares with some parameters known from other data, including their error bars.
 
 use super::weighted::{WeightedSettings, weighted_least_squares};
 use crate::error::{EstimationError, expect};
@@ -6,35 +6,35 @@ use crate::factor::LinearProblem;
 use crate::uncertainty::{Estimate, student_half_width};
 use nalgebra::{DMatrix, DVector};
 
-/// What other data say of some columns.
+/// Known values of some columns, from other data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownColumns {
     /// Their numbers among the problem's columns.
     pub columns: Vec<usize>,
     /// Their values.
     pub values: Vec<f64>,
-    /// Covariance of the values, same order; zero for what is known exactly.
+    /// Covariance of the values in the same order; zero for exact values.
     pub covariance: DMatrix<f64>,
 }
 
-/// Estimates the columns that are not known: `θ_u = argmin Σ_j ‖τ_j − W_k θ_k − W_u θ_u‖² / σ_j²`.
+/// Estimates the unknown columns: `θ_u = argmin Σ_j ‖τ_j − W_k θ_k − W_u θ_u‖² / σ_j²`.
 ///
-/// The known values are not changed by these data; their errors go into the others' error bars:
+/// The data do not change the known values; their errors are included in the error bars of the other columns:
 ///
 /// ```text
 ///     V_u = V_own + G V_k Gᵀ,   cov(θ_u, θ_k) = G V_k,
 ///     G = ∂θ_u/∂θ_k = −(W_uᵀ Ω W_u)⁻¹ W_uᵀ Ω W_k,   Ω = diag(1/σ_j²)
 /// ```
 ///
-/// with `V_own` of these data by the chosen method. Right where the known values come from other data. The residual
-/// holds `W_k` times their error as well, so that `V_own` counts some of it again: the bars are cautious. The estimate
-/// has all columns of the problem; `rank` speaks of those that were not known. Murphy and Topel, J. Business and
-/// Economic Statistics 3 (1985) 370 (two-step estimation, independent steps).
+/// `V_own` is the covariance from these data by the chosen method. Valid if the known values come from other data. The
+/// residual also contains `W_k` times their error, so `V_own` includes part of it twice: the error bars are
+/// conservative. The estimate has all columns of the problem; `rank` covers the unknown ones. Murphy and Topel, J.
+/// Business and Economic Statistics 3 (1985) 370 (two-step estimation, independent steps).
 ///
 /// ```
 /// use dynident_estimation::*;
 /// use nalgebra::DMatrix;
-/// // τ = 2 x + 3 ± 0.1, the slope known as 2 ± 0.5: as the mean of x is 1.5, so uncertain is the offset, 1.5 · 0.5.
+/// // τ = 2 x + 3 ± 0.1 with known slope 2 ± 0.5. The mean of x is 1.5: offset uncertainty 1.5 · 0.5.
 /// let mut rows = SegmentedFactor::new(2, SegmentSettings { max_segments: 8, first_length_rows: 1 })?;
 /// rows.absorb(&[0., 1., 2., 3., 1., 1., 1., 1., 3.1, 4.9, 7.1, 8.9], 4)?;
 /// let mut problem = LinearProblem::new(vec!["slope".into(), "offset".into()], vec!["joint1".into()]);
@@ -46,9 +46,8 @@ pub struct KnownColumns {
 /// ```
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for numbers that do not fit, columns named twice, nothing left to estimate, or a
-/// problem with a prior; [`EstimationError::Setting`] for values that are not finite; and as
-/// [`weighted_least_squares`].
+/// [`EstimationError::Mismatch`] for wrong sizes, duplicate columns, no unknown column, or a problem with a prior;
+/// [`EstimationError::Setting`] for values that are not finite; and as [`weighted_least_squares`].
 #[doc(alias("payload"))]
 pub fn weighted_least_squares_with_known(
     problem: &LinearProblem,
@@ -93,13 +92,13 @@ fn check(problem: &LinearProblem, known: &KnownColumns) -> Result<(), Estimation
     expect("rows of the known columns' covariance", known.columns.len(), known.covariance.nrows())?;
     expect("columns of the known columns' covariance", known.columns.len(), known.covariance.ncols())?;
     if problem.prior().is_some() {
-        let what = "priors beside known columns (state what is known once)".into();
+        let what = "priors in addition to known columns (use one of them)".into();
         return Err(EstimationError::Mismatch { what, expected: 0, found: 1 });
     }
     let mut seen = vec![false; count];
     for &column in &known.columns {
         if column >= count || std::mem::replace(&mut seen[column], true) {
-            let what = "a known column below the number of columns, named once".into();
+            let what = "known column, below the number of columns and not duplicate".into();
             return Err(EstimationError::Mismatch { what, expected: count, found: column });
         }
     }
@@ -109,13 +108,13 @@ fn check(problem: &LinearProblem, known: &KnownColumns) -> Result<(), Estimation
     }
     match known.values.iter().chain(known.covariance.iter()).find(|value| !value.is_finite()) {
         Some(&value) => {
-            Err(EstimationError::Setting { setting: "known columns", value, fix: "give finite values and covariance" })
+            Err(EstimationError::Setting { setting: "known columns", value, fix: "use finite values and covariance" })
         }
         None => Ok(()),
     }
 }
 
-/// G, shape (free columns, known columns); zero rows for columns that the data do not excite.
+/// G, shape (free columns, known columns); zero rows for unexcited columns.
 fn sensitivity(
     problem: &LinearProblem,
     known: &KnownColumns,
@@ -135,7 +134,7 @@ fn sensitivity(
     let factor = own_rows.qr();
     let (q, r) = (factor.q(), factor.r());
     let mut solved = q.tr_mul(&triangle.select_columns(&known.columns));
-    // The columns are independent, so the triangle has no zero on its diagonal.
+    // The columns are independent, so the diagonal of the triangle has no zero.
     if !r.solve_upper_triangular_mut(&mut solved) {
         return Err(EstimationError::Overflow { name: problem.columns()[free[0]].clone() });
     }
@@ -146,7 +145,6 @@ fn sensitivity(
     Ok(sensitivity)
 }
 
-/// All columns together.
 fn joined(
     problem: &LinearProblem,
     known: &KnownColumns,

@@ -1,19 +1,19 @@
-//! **Estimators of `τ = W θ + noise`**: each takes a problem and its settings and returns an
-//! [`Estimate`](crate::Estimate), those with findings of their own in a struct beside it.
+//! **Estimators of `τ = W θ + noise`.** Each takes a problem and settings and returns an
+//! [`Estimate`](crate::Estimate), if needed in a struct with further results.
 //!
-//! | what the noise is like | function |
+//! | noise | function |
 //! | --- | --- |
 //! | equal in all joints | [`ordinary_least_squares`] |
-//! | a level for each joint | [`weighted_least_squares`] |
-//! | the same, some columns known | [`weighted_least_squares_with_known`] |
+//! | one level per joint | [`weighted_least_squares`] |
+//! | one level per joint, some columns known | [`weighted_least_squares_with_known`] |
 //! | correlated between joints | [`generalized_least_squares`] |
 //! | a level that depends on the velocity | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
-//! | what a caller says of it | [`estimate_by`] |
-//! | in the columns too | [`instrumental_variables`]; [`hausman_test`] and [`fast_motion`] say whether it matters |
+//! | custom | [`estimate_by`] |
+//! | also in the columns | [`instrumental_variables`]; tests: [`hausman_test`] and [`fast_motion`] |
 //!
-//! A function takes a problem, its settings and, where rows are needed again, a source of rows at last: a pass over the
-//! log as often as it is called. [`joint_gains`] estimates the torque constants of the drives from the same rows.
+//! Arguments are the problem, its settings and, for iterative reweighting of rows, a function that passes over the
+//! rows of the log. [`joint_gains`] estimates the torque constants of the drives from the same rows.
 
 mod fast_motion;
 mod function;

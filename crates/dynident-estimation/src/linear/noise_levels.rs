@@ -1,4 +1,4 @@
-//! Reweighting by the noise itself: every row counts by the noise around it, for each joint and instant.
+//! Weighted least squares with a noise level for each joint and instant, estimated from nearby residuals.
 
 use super::robust::{RowBlock, RowVisitor, scale_floors, with_factors};
 use super::weighted::{WeightedSettings, weighted_least_squares};
@@ -11,20 +11,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseLevelSettings {
-    /// Rows of one joint and log, centred on a row, whose residuals say how large the noise is there. Default 51: the
-    /// level is then known to about 10 %, and follows what lasts longer than some fifty rows (slow and fast motion,
-    /// reversals of a slow motion, a brake that is let go).
+    /// Window length in rows of one joint and log, centred on a row, for the local noise level. Default 51: the level
+    /// has an uncertainty of about 10 % and follows changes that last longer than about fifty rows (slow and fast
+    /// motion, slow reversals, brake release).
     pub window_rows: usize,
-    /// Share of the joint's mean square residual in every level's square, 0 to 1. Default 1e-3: no row is taken for
-    /// more than thirty times as quiet as the mean. One gives weighted least squares.
+    /// Share of the joint's mean square residual in the square of every level, 0 to 1. Default 1e-3: limits the level
+    /// to at least 1/30 of the mean. One gives weighted least squares.
     pub pooled_share: f64,
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// The covariance to report; from time segments by default.
+    /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// Largest change of a value, in its error bars, at which the iteration ends. Default 1e-2.
+    /// The iteration ends when no value changes by more than this share of its error bar. Default 1e-2.
     pub tolerance: f64,
-    /// Most passes over the rows. Default 30.
+    /// Maximum number of passes over the rows. Default 30.
     pub max_passes: usize,
 }
 
@@ -49,42 +49,40 @@ impl NoiseLevelSettings {
     /// outside 1e-9 to 1, fewer than two passes, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let fix = "give at least 5: fewer rows are no measure of noise";
+        let fix = "use at least 5 rows to estimate the noise";
         require(self.window_rows >= 5, "window_rows", self.window_rows as f64, fix)?;
-        within("pooled_share", self.pooled_share, 1.0e-6..=1.0, "give a share from 1e-6 to 1")?;
-        within("tolerance", self.tolerance, 1.0e-9..=1.0, "give a change in error bars from 1e-9 to 1")?;
-        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "give at least 2")
+        within("pooled_share", self.pooled_share, 1.0e-6..=1.0, "use a share from 1e-6 to 1")?;
+        within("tolerance", self.tolerance, 1.0e-9..=1.0, "use a change in error bars from 1e-9 to 1")?;
+        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "use at least 2")
     }
 }
 
-/// What [`noise_weighted_least_squares`] found.
+/// Result of [`noise_weighted_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NoiseWeightedEstimate {
-    /// Values with covariance. `joint_sigma` is the noise of rows at their joint's mean level.
+    /// Values with covariance. `joint_sigma` is the noise of rows at the mean level of their joint.
     pub estimate: Estimate,
-    /// For every joint the smallest and the largest noise level of its rows, over the root mean square of all its
-    /// residuals. Both near one: weighted least squares would have done.
+    /// Smallest and largest noise level of each joint's rows, relative to the RMS of its residuals. If both are near
+    /// one, weighted least squares is sufficient.
     pub level_range: Vec<[f64; 2]>,
 }
 
-/// `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²`, `σ_jk² = s σ_j² + (1 − s) · mean of r² over the window around row k`,
-/// iterated: rows of joint j at instant k count by the reciprocal of the noise level there, which the residuals of the
-/// solution before determine.
+/// `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²`, `σ_jk² = s σ_j² + (1 − s) · mean of r² over the window around row
+/// k`, iterated with the residuals of the previous solution.
 ///
-/// Feng's reading of iteratively reweighted least squares, where weights are the reciprocal noise: torque noise of a
-/// drive is larger at velocity, friction is modelled worse at reversals, and one σ for the whole joint lets the worst
-/// part decide. Unlike Huber's and Tukey's weights a row is not judged by its own residual but by its neighbourhood's,
-/// so that normal noise loses nothing but what the level's own uncertainty costs. After Han et al., "An iterative
-/// approach for accurate dynamic model identification", IEEE Trans. Ind. Electron. (2020); for estimated weights in
-/// general Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3 and 3.
+/// Torque noise of a drive is larger at velocity and friction models are worse at reversals, so with one σ per joint
+/// the worst part dominates. Unlike Huber's and Tukey's weights, the weight depends on the residuals of the
+/// neighbourhood instead of the row's own, so for normal noise the efficiency loss is only that of the estimated
+/// level. After Han et al., "An iterative approach for accurate dynamic model identification", IEEE Trans. Ind.
+/// Electron. (2020); for estimated weights Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3
+/// and 3.
 ///
-/// `pass` hands every row that `problem` was made of to its visitor, as often as it is called; residuals are kept, one
-/// number for each row, regressors are not. The covariance is that of [`weighted_least_squares`] on the reweighted
-/// rows, weights taken for given.
+/// `pass` must give all rows of `problem` to its visitor at each call. Residuals are stored, one number per row;
+/// regressors are not. The covariance is that of [`weighted_least_squares`] on the reweighted rows, for given weights.
 ///
 /// # Errors
-/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds;
-/// and whatever `pass` itself returns. Reaching `max_passes` is a status, not an error.
+/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] if the rows of a pass differ from those of the
+/// problem; and the errors of `pass`. Reaching `max_passes` is a status, not an error.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -134,11 +132,11 @@ pub fn noise_weighted_least_squares<E: From<EstimationError>>(
         }
         levels = Some(next);
     }
-    // At least two passes are made, and the last one returns.
+    // Unreachable: at least two passes are made, and the last one returns.
     Err(EstimationError::Empty.into())
 }
 
-/// Noise levels over the joint's own, by equation and row.
+/// Noise levels relative to that of the joint, by equation and row.
 struct Levels {
     relative: Vec<Vec<f64>>,
     ranges: Vec<[f64; 2]>,
@@ -179,8 +177,8 @@ impl Levels {
     }
 }
 
-/// Mean square over a centred window of `width` numbers, cut at the ends. Sums are made afresh, not by subtraction, so
-/// that a large residual leaves no rounding behind.
+/// Mean square over a centred window of `width` numbers, truncated at the ends. Every sum is computed anew, because
+/// running sums would keep the rounding of large residuals.
 fn window_means(residuals: &[f64], width: usize) -> Vec<f64> {
     let half = width / 2;
     let mean = |row: usize| {
@@ -190,7 +188,7 @@ fn window_means(residuals: &[f64], width: usize) -> Vec<f64> {
     (0..residuals.len()).map(mean).collect()
 }
 
-/// One pass: residuals of θ by equation, and the factors of the rows over their levels.
+/// One pass: residuals of θ by equation, and factors of the rows divided by their levels.
 fn gathered<E: From<EstimationError>>(
     problem: &LinearProblem,
     theta: &[f64],
@@ -205,7 +203,7 @@ fn gathered<E: From<EstimationError>>(
     let mismatch = |at: usize, found: usize| {
         let equation = &equations[at];
         let (log, joint) = (&problem.logs()[equation.log], &problem.joints()[equation.joint]);
-        let what = format!("log {log}, joint {joint}: rows of another pass over the same log");
+        let what = format!("log {log}, joint {joint}: rows of another pass over the log");
         EstimationError::Mismatch { what, expected: equation.factor.rows(), found }
     };
     let mut visit = |block: &RowBlock<'_>| -> Result<(), EstimationError> {

@@ -1,4 +1,4 @@
-//! Ordinary least squares: every row counts the same.
+//! Ordinary least squares with equal weights.
 
 use crate::error::EstimationError;
 use crate::factor::{LinearProblem, RankSettings, solve, split};
@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OrdinarySettings {
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// The covariance to report; from time segments by default.
+    /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
 }
 
@@ -25,14 +25,13 @@ impl OrdinarySettings {
     }
 }
 
-/// `θ = argmin Σ_j ‖τ_j − W_j θ‖²` by orthogonal reduction, never by normal equations.
+/// `θ = argmin Σ_j ‖τ_j − W_j θ‖²` by orthogonal reduction, without normal equations.
 ///
 /// The white-noise covariance is `s² (WᵀW)⁻¹` with `s² = RSS/(N − p)`. Golub and Van Loan, Matrix Computations, 5.3.
 ///
 /// # Errors
-/// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
-/// [`EstimationError::PriorWithoutNoiseLevel`] when the problem has a prior, [`EstimationError::Setting`], and the
-/// errors of the chosen covariance.
+/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`], [`EstimationError::PriorWithoutNoiseLevel`] for a
+/// problem with a prior, [`EstimationError::Setting`], and the errors of the chosen covariance.
 #[doc(alias("ols", "least squares", "lstsq"))]
 pub fn ordinary_least_squares(
     problem: &LinearProblem,

@@ -1,4 +1,4 @@
-//! The first stage of two: what the instruments explain of the regressor.
+//! First stage of two-stage least squares: projection of the regressor on the instruments.
 
 use crate::error::EstimationError;
 use crate::factor::{
@@ -14,16 +14,15 @@ use nalgebra::DMatrix;
 ///                     [  0   0    ρ ]
 /// ```
 ///
-/// No product ZᵀW is formed, so the condition of the instruments is not squared. Instruments that depend on earlier
-/// ones are left out.
+/// No product ZᵀW is formed, so the condition number of the instruments is not squared. Instruments that depend on
+/// earlier ones are excluded.
 pub(crate) struct Projection {
     /// `[M | m]` as a factor: that of the rows `[W̃ | P_Z τ]`.
     pub(crate) explained: TriangularFactor,
-    /// `[R_V | v]`: what is left of regressor and torque.
+    /// `[R_V | v]`: unexplained part of regressor and torque.
     pub(crate) left: TriangularFactor,
-    /// Π, (columns, columns); zero rows for instruments that were left out.
+    /// Π, (columns, columns); zero rows for excluded instruments.
     pub(crate) coefficients: DMatrix<f64>,
-    /// Independent instruments.
     pub(crate) instruments: usize,
 }
 
@@ -47,7 +46,7 @@ impl Projection {
         let kept = split(&alone, rank, &Unexcited::default()).free;
         let k = kept.len();
         let norms = alone.column_norms();
-        // Triangular again without the dependent ones.
+        // The triangular form is restored without the dependent instruments.
         let mut reduced = TriangularFactor::new(k + count);
         reduced.absorb_entries(&mut workspace, 2 * count + 1, |row, column| {
             if column < k {
@@ -75,8 +74,7 @@ impl Projection {
         Ok(Self { explained, left, coefficients, instruments: k })
     }
 
-    /// For an equation that sees the columns `local`: coefficients of its `[Z | W | τ]` in `[Z Π | W − Z Π]` over all
-    /// columns.
+    /// Coefficients of an equation's `[Z | W | τ]`, with columns `local`, in `[Z Π | W − Z Π]` over all columns.
     pub(crate) fn parts(&self, local: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
         let count = self.coefficients.ncols();
         let mut fitted = DMatrix::zeros(2 * local.len() + 1, count);

@@ -1,4 +1,4 @@
-//! Iteratively reweighted least squares: rows that no noise explains lose their say.
+//! Robust least squares: iteratively reweighted rows, with low weights for outliers.
 
 use super::weighted::{WeightedSettings, weighted_values};
 use crate::error::{EstimationError, require, within};
@@ -7,20 +7,21 @@ use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degree
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// How a row's weight falls with its residual, measured by the joint's noise.
+/// Weight of a row as a function of its residual u in units of the joint's noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RowWeight {
-    /// `w = min(1, k/|u|)`: large residuals count as if they were k. One minimum. Huber, Ann. Math. Stat. 35 (1964) 73.
+    /// `w = min(1, k/|u|)`: limits the influence of large residuals to that of k. Has one minimum. Huber, Ann. Math.
+    /// Stat. 35 (1964) 73.
     Huber {
-        /// k; 1.345 by default, which costs 5 % efficiency where noise is normal.
+        /// k; default 1.345, which costs 5 % efficiency for normal noise.
         #[serde(default = "huber_k")]
         k: f64,
     },
-    /// `w = (1 − (u/c)²)²` for `|u| < c`, else nothing: gross errors are left out. Starts from Huber's solution, for it
-    /// has several minima. Beaton and Tukey, Technometrics 16 (1974) 147.
+    /// `w = (1 − (u/c)²)²` for `|u| < c`, else zero: gross errors are excluded. Has several minima, so it starts from
+    /// Huber's solution. Beaton and Tukey, Technometrics 16 (1974) 147.
     Tukey {
-        /// c; 4.685 by default, which costs 5 % efficiency where noise is normal.
+        /// c; default 4.685, which costs 5 % efficiency for normal noise.
         #[serde(default = "tukey_c")]
         c: f64,
     },
@@ -65,7 +66,7 @@ impl RowWeight {
         }
     }
 
-    /// ψ'(u), the slope of ψ(u) = u w(u).
+    /// ψ'(u), the derivative of ψ(u) = u w(u).
     fn slope(&self, u: f64) -> f64 {
         match *self {
             Self::Huber { k } => f64::from(u.abs() <= k),
@@ -81,15 +82,15 @@ impl RowWeight {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RobustSettings {
-    /// How weights fall; Huber's by default.
+    /// Weight function; Huber's by default.
     pub weight: RowWeight,
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// The covariance to report; from time segments by default.
+    /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// Change, relative to the noise, at which the iteration ends. Default 1e-4: a ten-thousandth of an error bar.
+    /// The iteration ends at this change relative to the error bars. Default 1e-4.
     pub tolerance: f64,
-    /// Most passes over the rows. Default 50.
+    /// Maximum number of passes over the rows. Default 50.
     pub max_passes: usize,
 }
 
@@ -117,13 +118,13 @@ impl RobustSettings {
             RowWeight::Huber { k } => ("weight.k", k),
             RowWeight::Tukey { c } => ("weight.c", c),
         };
-        within(setting, value, 0.1..=100.0, "give a number of deviations from 0.1 to 100")?;
-        within("tolerance", self.tolerance, 1.0e-13..=1.0, "give a relative change from 1e-13 to 1")?;
-        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "give at least 2")
+        within(setting, value, 0.1..=100.0, "use a number of standard deviations from 0.1 to 100")?;
+        within("tolerance", self.tolerance, 1.0e-13..=1.0, "use a relative change from 1e-13 to 1")?;
+        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "use at least 2")
     }
 }
 
-/// Some rows of one joint in one log, as they were absorbed into the problem: same rows, same order.
+/// Some rows of one joint in one log, in the order in which they were absorbed into the problem.
 #[derive(Clone, Copy, Debug)]
 pub struct RowBlock<'a> {
     /// Number of the log in [`LinearProblem::logs`].
@@ -137,10 +138,10 @@ pub struct RowBlock<'a> {
 }
 
 impl RowBlock<'_> {
-    /// Place of the block's equation, whose columns the panel must have.
+    /// Index of the block's equation; checks the size of the panel.
     pub(super) fn equation(&self, equations: &[JointRows]) -> Result<usize, EstimationError> {
         let Some(at) = equations.iter().position(|e| e.log == self.log && e.joint == self.joint) else {
-            let what = "a block's log and joint in the problem".to_owned();
+            let what = "log and joint of a block, part of the problem".to_owned();
             return Err(EstimationError::Mismatch { what, expected: equations.len(), found: self.log });
         };
         let expected = (equations[at].columns.len() + 1) * self.rows;
@@ -150,7 +151,7 @@ impl RowBlock<'_> {
         Ok(at)
     }
 
-    /// `τ − w θ` of one row, θ of the equation's columns.
+    /// `τ − w θ` of one row, with θ of the equation's columns.
     pub(super) fn residual(&self, row: usize, theta: &[f64]) -> f64 {
         let at_column = |column: usize| self.panel[column * self.rows + row];
         let predicted: f64 = theta.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
@@ -158,66 +159,62 @@ impl RowBlock<'_> {
     }
 }
 
-/// What a pass hands every block of rows to.
+/// Receives the blocks of rows of a pass.
 pub type RowVisitor<'a> = dyn FnMut(&RowBlock<'_>) -> Result<(), EstimationError> + 'a;
 
-/// What [`robust_least_squares`] found.
+/// Result of [`robust_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobustEstimate {
     /// Values with covariance; `joint_sigma` is the MAD scale.
     pub estimate: Estimate,
-    /// For every joint the share of rows whose weight is below one half.
+    /// Share of rows with a weight below one half, for every joint.
     pub outlier_share: Vec<f64>,
-    /// For every joint the mean weight of its rows.
+    /// Mean weight of the rows, for every joint.
     pub mean_weight: Vec<f64>,
 }
 
-/// What one pass over the rows gathered.
 struct PassSums {
     factors: Vec<SegmentedFactor>,
     residuals: Vec<Vec<f64>>,
     tally: Vec<Tally>,
 }
 
-/// Sums over a joint's rows.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     rows: usize,
     weight: f64,
     slope: f64,
-    /// ψ².
+    /// Sum of ψ².
     square: f64,
     outliers: usize,
 }
 
-/// Normal noise has its median magnitude at this share of its standard deviation: Φ⁻¹(3/4).
-const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
+/// Median magnitude of normal noise relative to its standard deviation: Φ⁻¹(3/4).
+const NORMAL_MEDIAN_ABS_DEVIATION: f64 = 0.674_489_750_196_081_7;
 
-/// Part of the passes after which the scales stay as they are. With few rows for each parameter the scale and the rows
-/// that count chase each other without end; at a fixed scale reweighting settles, as in MM-estimates (Yohai, Ann. Stat.
+/// The scales are updated in the first 1/SCALE_UPDATE_PART of the passes only. With few rows per parameter the scale
+/// and the weights otherwise oscillate; at a fixed scale reweighting converges, as in MM-estimates (Yohai, Ann. Stat.
 /// 15 (1987) 642).
-const SCALING_PART: usize = 4;
+const SCALE_UPDATE_PART: usize = 4;
 
-/// The scale never falls below this share of the torque's root mean square (most rows fitted exactly, as in a
-/// simulation).
-const SMALLEST_SCALE: f64 = 1.0e-9;
+/// Lower limit of the scale relative to the RMS torque, for data that most rows fit exactly (simulation).
+const MIN_SCALE_SHARE: f64 = 1.0e-9;
 
 /// `θ` with `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0`, `u_i = (τ_i − W_i θ)/s_j`, `s_j = median |τ_i − W_i θ| / 0.6745`
 /// over joint j's rows.
 ///
-/// Starts from [`weighted_values`] of `problem`'s factors; then every pass over the rows gives residuals, scales
-/// and the factors of the reweighted rows, from which the next θ follows. The scale of a pass is that of the θ before,
-/// which has the same limit and needs one pass each, not two; after a quarter of the passes scales stay. Regressors are
-/// never stored; residuals are, one number per row, for their median. `pass` hands every row that `problem` was made of
-/// to its visitor, as often as it is called.
+/// Starts from [`weighted_values`] of `problem`'s factors. Every pass over the rows gives residuals, scales and the
+/// factors of the reweighted rows for the next θ. The scale of a pass is that of the previous θ, which has the same
+/// limit and saves a second pass; after a quarter of the passes the scales are fixed. Residuals are stored, one number
+/// per row, for their median; regressors are not. `pass` must give all rows of `problem` to its visitor at each call.
 ///
-/// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, for an outlier's weight falls when the fit bends
-/// towards it (Huber, Robust Statistics (1981), 7.6). Rows are judged one by one: behind a filter that smears an
-/// outlier over its length, filter less.
+/// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, because the weight of an outlier changes with the
+/// fit (Huber, Robust Statistics (1981), 7.6). Rows are weighted one by one; a filter spreads an outlier over its
+/// length, so use as little filtering as possible.
 ///
 /// # Errors
-/// As [`weighted_values`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds;
-/// and whatever `pass` itself returns. Reaching `max_passes` is a status, not an error.
+/// As [`weighted_values`]; [`EstimationError::Mismatch`] if the rows of a pass differ from those of the problem; and
+/// the errors of `pass`. Reaching `max_passes` is a status, not an error.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -248,14 +245,14 @@ pub fn robust_least_squares<E: From<EstimationError>>(
     let mut theta = weighted_values(problem, &start)?.values;
     let floors = scale_floors(problem);
     let mut scales = vec![f64::INFINITY; floors.len()];
-    // Tukey's weights have several solutions: Huber's, which has one, comes first.
+    // Tukey's weights have several solutions; Huber's unique solution is the start.
     let mut weight = RowWeight::huber();
     let mut choice: Option<Split> = None;
     let mut passes = 0;
     loop {
         let gathered = gather(problem, &theta, &scales, &weight, &mut pass)?;
         passes += 1;
-        let new_scales: Vec<f64> = if passes > settings.max_passes / SCALING_PART {
+        let new_scales: Vec<f64> = if passes > settings.max_passes / SCALE_UPDATE_PART {
             scales.clone()
         } else {
             gathered.residuals.into_iter().zip(&floors).map(|(r, floor)| median_scale(r).max(*floor)).collect()
@@ -272,13 +269,13 @@ pub fn robust_least_squares<E: From<EstimationError>>(
         joint_degrees_of_freedom(&stacked, choice.free.len())?;
         let solution = solve(&triangle, choice, &settings.rank, problem.fallback());
         let scale_change = new_scales.iter().zip(&scales).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
-        // Rows have unit noise: the norm is the change in error bars, over all directions.
+        // Rows have unit noise, so the norm is the change in units of error bars over all directions.
         let step: Vec<f64> = solution.values.iter().zip(&theta).map(|(new, old)| new - old).collect();
         let change = (triangle.regressor_triangle() * nalgebra::DVector::from_vec(step)).norm()
             / (choice.free.len().max(1) as f64).sqrt();
         let largest = scale_change.max(change);
         let preliminary = weight != settings.weight;
-        // A tenth of an error bar is near enough to start from.
+        // A tenth of an error bar is sufficient for the start.
         let settled = largest <= if preliminary { settings.tolerance.max(0.1) } else { settings.tolerance };
         let last = passes >= settings.max_passes;
         if (settled && !preliminary) || last {
@@ -344,7 +341,7 @@ fn gather<E: From<EstimationError>>(
     for (equation, factor) in equations.iter().zip(&factors) {
         if factor.rows() != equation.factor.rows() {
             let (log, joint) = (&problem.logs()[equation.log], &problem.joints()[equation.joint]);
-            let what = format!("log {log}, joint {joint}: rows of another pass over the same log");
+            let what = format!("log {log}, joint {joint}: rows of another pass over the log");
             return Err(
                 EstimationError::Mismatch { what, expected: equation.factor.rows(), found: factor.rows() }.into()
             );
@@ -353,7 +350,7 @@ fn gather<E: From<EstimationError>>(
     Ok(PassSums { factors, residuals, tally })
 }
 
-/// The same problem over other factors; a prior stays.
+/// The same problem with other factors; keeps the prior.
 pub(crate) fn with_factors(
     problem: &LinearProblem,
     factors: Vec<SegmentedFactor>,
@@ -370,7 +367,7 @@ pub(crate) fn with_factors(
     Ok(new)
 }
 
-/// `median |r| / 0.6745`; zero for no rows.
+/// `median |r| / 0.6745`; zero without rows.
 fn median_scale(mut residuals: Vec<f64>) -> f64 {
     let count = residuals.len();
     if count == 0 {
@@ -381,7 +378,7 @@ fn median_scale(mut residuals: Vec<f64>) -> f64 {
     }
     let (below, middle, _) = residuals.select_nth_unstable_by(count / 2, f64::total_cmp);
     let median = if count % 2 == 1 { *middle } else { 0.5 * (*middle + below.iter().copied().fold(0.0, f64::max)) };
-    median / MEDIAN_OF_NORMAL
+    median / NORMAL_MEDIAN_ABS_DEVIATION
 }
 
 pub(crate) fn scale_floors(problem: &LinearProblem) -> Vec<f64> {
@@ -396,12 +393,12 @@ pub(crate) fn scale_floors(problem: &LinearProblem) -> Vec<f64> {
         if *value <= 0.0 {
             *value = if largest > 0.0 { largest } else { 1.0 };
         }
-        *value *= SMALLEST_SCALE;
+        *value *= MIN_SCALE_SHARE;
     }
     rms
 }
 
-/// Variance of the reweighted rows under white noise that makes `A⁻¹` the covariance before the correction of
+/// Variance of the reweighted rows under white noise for which `A⁻¹` is the covariance before the correction in
 /// [`finished`]: `E ψ² / E w`.
 fn variance_factor(tally: &[Tally]) -> f64 {
     let (square, weight) = tally.iter().fold((0.0, 0.0), |(s, w), t| (s + t.square, w + t.weight));
@@ -410,8 +407,8 @@ fn variance_factor(tally: &[Tally]) -> f64 {
 
 fn finished(mut estimate: Estimate, tally: &[Tally], method: CovarianceMethod) -> RobustEstimate {
     let (weight, slope) = tally.iter().fold((0.0, 0.0), |(w, s), t| (w + t.weight, s + t.slope));
-    // The slopes' sum falls below a tenth of the weights' only where most rows are outliers; no covariance means much
-    // then.
+    // The sum of the slopes is below a tenth of that of the weights only if most rows are outliers; the covariance is
+    // meaningless then.
     let correction = (weight / slope.max(0.1 * weight)).powi(2);
     if correction.is_finite() {
         let scale = |matrix: &mut DMatrix<f64>| *matrix *= correction;

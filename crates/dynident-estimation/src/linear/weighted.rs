@@ -1,4 +1,4 @@
-//! Weighted least squares: the rows of each joint count by that joint's own noise.
+//! Weighted least squares with the noise level of each joint.
 
 use super::noise_step::newton_weights;
 use crate::error::{EstimationError, require, within};
@@ -10,14 +10,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WeightedSettings {
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// The covariance to report; from time segments by default.
+    /// Method of the reported covariance; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// Largest relative change of any joint's σ at which the iteration ends. Default 1e-6: far below the accuracy of
+    /// The iteration ends when no joint's σ changes by more than this share. Default 1e-6: far below the accuracy of
     /// any σ.
     pub tolerance: f64,
-    /// Most solutions made. Default 50; four to six are usual.
+    /// Maximum number of solutions. Default 50; four to six are usual.
     pub max_iterations: usize,
 }
 
@@ -36,47 +36,47 @@ impl WeightedSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, or rank settings out of range.
+    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, zero iterations, or rank settings out of
+    /// range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        within("tolerance", self.tolerance, 1.0e-12..=1.0, "give a relative change from 1e-12 to 1")?;
-        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
+        within("tolerance", self.tolerance, 1.0e-12..=1.0, "use a relative change from 1e-12 to 1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "use at least 1")
     }
 }
 
-/// A joint's σ never falls below this share of its torque's root mean square: with noise-free (simulated) torque the
-/// residual is rounding error, and weights made of it would wander for ever.
-const SMALLEST_SIGMA: f64 = 1.0e-9;
+/// Lower limit of a joint's σ relative to its RMS torque. For noise-free (simulated) torque the residual is rounding
+/// error, and weights from it would not converge.
+const MIN_SIGMA_SHARE: f64 = 1.0e-9;
 
-/// What weighted least squares finds before anything is said of its accuracy.
+/// Values and noise levels without a covariance for correlated errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightedValues {
-    /// One value per column; a column that is not excited has its fallback value.
+    /// One value per column; the fallback value for an unexcited column.
     pub values: Vec<f64>,
     /// For every joint the standard deviation of its residual, as in [`Estimate::joint_sigma`].
     pub joint_sigma: Vec<f64>,
-    /// Standard deviation of every value if errors are independent from sample to sample, the root of the diagonal of
-    /// [`Estimate::covariance_white`]; zero for a column that is not excited.
+    /// Standard deviation of every value for errors that are independent from sample to sample, the root of the
+    /// diagonal of [`Estimate::covariance_white`]; zero for an unexcited column.
     pub white_std: Vec<f64>,
-    /// Solutions made.
+    /// Number of solutions.
     pub iterations: usize,
-    /// Whether the noise of the joints settled within the iterations allowed.
+    /// Whether the noise levels converged within the iteration limit.
     pub converged: bool,
 }
 
 /// `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1 until the
-/// σ_j settle; N_j are the joint's rows, p the estimated columns, n the joints. A [prior](LinearProblem::with_prior)
-/// adds `‖S(θ − m)‖²`.
+/// σ_j converge; N_j rows of the joint, p estimated columns, n joints. A [prior](LinearProblem::with_prior) adds `‖S(θ
+/// − m)‖²`.
 ///
-/// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. Which columns are excited is decided once, on the
-/// first solution. Behind the second solution the σ_j move by Newton's step as long as it brings them nearer. Gautier,
+/// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. The excited columns are selected once, on the first
+/// solution. After the second solution Newton's step updates the σ_j as long as it improves convergence. Gautier,
 /// "Dynamic identification of robots with power model", ICRA 1997; Swevers, Verdonck and De Schutter, IEEE Control
 /// Systems Magazine 27 (2007) 58.
 ///
 /// # Errors
-/// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
-/// [`EstimationError::Setting`], and the errors of the chosen covariance. Reaching `max_iterations` is a status, not an
-/// error.
+/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`], [`EstimationError::Setting`], and the errors of the
+/// chosen covariance. Reaching `max_iterations` is a status, not an error.
 #[doc(alias("wls", "idim-ls", "idim", "iteratively reweighted"))]
 pub fn weighted_least_squares(
     problem: &LinearProblem,
@@ -86,8 +86,8 @@ pub fn weighted_least_squares(
     iterated(&stacked, settings)?.into_estimate(&stacked, &settings.rank, settings.covariance)
 }
 
-/// The values and the noise of [`weighted_least_squares`], without bars that hold correlated errors and without a
-/// report of the rank: half of its time or less.
+/// The values and noise levels of [`weighted_least_squares`] without its covariance and rank report, in at most half
+/// the time.
 ///
 /// # Errors
 /// As [`weighted_least_squares`]; [`EstimationError::Overflow`] for a value that is not finite.
@@ -108,7 +108,6 @@ pub fn weighted_values(
     }
 }
 
-/// Solutions with the noise of the one before, until it has settled.
 fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result<PointEstimate, EstimationError> {
     settings.validate()?;
     let problem = stacked.problem;
@@ -122,13 +121,13 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
     let (joint_sigma, converged) = loop {
         let (squares, torque) = stacked.joint_squares(&solution.values)?;
         let joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
-        // The weights of the first solution stand for no noise.
+        // The first weights are no noise estimate.
         let change = if iterations > 1 { noise_change(&joint_sigma, &weights) } else { f64::INFINITY };
         let has_settled = change <= settings.tolerance;
         if has_settled || iterations == settings.max_iterations {
             break (joint_sigma, has_settled);
         }
-        // Newton's step from weights that are not those of the start; one that does not lead nearer is the last.
+        // Newton's step is skipped in the first iteration and disabled once it does not improve convergence.
         newton_helps &= !is_newton || change <= 0.5 * last_change;
         let newton = || newton_weights(stacked, &split, &solution, &weights, &joint_sigma, &degrees_of_freedom);
         let next = if iterations > 1 && newton_helps { newton() } else { None };
@@ -138,23 +137,22 @@ fn iterated(stacked: &StackedProblem<'_>, settings: &WeightedSettings) -> Result
         solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
         iterations += 1;
     };
-    // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
-    // came first.
+    // The rows are scaled by the last weights; on convergence their remaining noise is one up to the tolerance.
     let (solution, weighted_variance) = (solution.with_inverse(), 1.0);
     Ok(PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance, iterations, converged })
 }
 
-/// Largest relative change from the noise that the weights stand for to the noise that was found with them.
+/// Largest relative change of the noise between the weights and the residuals of their solution.
 pub(crate) fn noise_change(joint_sigma: &[f64], weights: &[f64]) -> f64 {
     joint_sigma.iter().zip(weights).map(|(s, w)| (s * w - 1.0).abs()).fold(0.0, f64::max)
 }
 
-/// Noise of every joint, never below the rounding of its torque.
+/// Noise of every joint, at least the rounding of its torque.
 pub(crate) fn noise_of_joints(squares: &[f64], torque: &[f64], degrees_of_freedom: &[f64]) -> Vec<f64> {
     let largest = torque.iter().zip(degrees_of_freedom).map(|(t, f)| t / f).fold(0.0, f64::max);
     let of_joint = |joint: usize| {
         let rms = (if torque[joint] > 0.0 { torque[joint] / degrees_of_freedom[joint] } else { largest }).sqrt();
-        let floor = SMALLEST_SIGMA * if rms > 0.0 { rms } else { 1.0 };
+        let floor = MIN_SIGMA_SHARE * if rms > 0.0 { rms } else { 1.0 };
         (squares[joint] / degrees_of_freedom[joint]).sqrt().max(floor)
     };
     (0..squares.len()).map(of_joint).collect()

@@ -1,12 +1,12 @@
-//! The colour of a residual: an autoregression, and the filter that takes it away.
+//! Autoregressive models of residuals, and the whitening filter.
 
 use nalgebra::{DMatrix, DVector};
 
-/// `a` of `e_t = a_1 e_{t−1} + … + a_k e_{t−k} + white noise`, k at most `most`; empty for white noise.
+/// Coefficients `a` of `e_t = a_1 e_{t−1} + … + a_k e_{t−k} + white noise`, k at most `most`; empty for white noise.
 ///
-/// Levinson and Durbin's recursion on the sample autocovariances `Σ e_t e_{t−l} / N`, which always gives a stable
-/// autoregression; k by Schwarz's criterion `N ln v_k + k ln N`, v_k being the variance that order k leaves. Brockwell
-/// and Davis, Time Series: Theory and Methods, 2nd ed., 5.2 and 9.3.
+/// Levinson-Durbin recursion on the sample autocovariances `Σ e_t e_{t−l} / N`, which always gives a stable model; k
+/// minimises Schwarz's criterion (BIC) `N ln v_k + k ln N` with the innovation variance v_k of order k. Brockwell and
+/// Davis, Time Series: Theory and Methods, 2nd ed., 5.2 and 9.3.
 pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
     let count = e.len();
     let covariance = |lag: usize| -> f64 { e[lag..].iter().zip(e).map(|(late, early)| late * early).sum() };
@@ -14,8 +14,8 @@ pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
     from_covariances(&covariances, count).0
 }
 
-/// The same from the autocovariances themselves, of lag 0 on, that `count` numbers have shown; with the variance of
-/// what is new, in units of theirs.
+/// As [`autoregression`] from the autocovariances of `count` samples, from lag 0; also returns the innovation
+/// variance.
 pub(crate) fn from_covariances(covariances: &[f64], count: usize) -> (Vec<f64>, f64) {
     let mut left = covariances.first().copied().unwrap_or_default();
     if left <= 0.0 || !left.is_finite() {
@@ -45,8 +45,8 @@ pub(crate) fn from_covariances(covariances: &[f64], count: usize) -> (Vec<f64>, 
     (best.1, best.2)
 }
 
-/// The same autoregression with all that lasts shortened, so that none of its modes keeps more than the share `most`
-/// from one number to the next: `a_k cᵏ`; with the variance that it leaves of noise of these autocovariances.
+/// Shortens the memory of an autoregression, `a_k cᵏ`, so that no mode decays slower than the factor `most` per
+/// sample; also returns the innovation variance for these autocovariances.
 pub(crate) fn shortened(a: Vec<f64>, variance: f64, covariances: &[f64], most: f64) -> (Vec<f64>, f64) {
     let order = a.len();
     let companion =
@@ -73,7 +73,7 @@ pub(crate) fn shortened(a: Vec<f64>, variance: f64, covariances: &[f64], most: f
     (a, left)
 }
 
-/// `y_t − a_1 y_{t−1} − … − a_k y_{t−k}` for `t ≥ k`, the first k values being spent.
+/// `y_t − a_1 y_{t−1} − … − a_k y_{t−k}` for `t ≥ k`; the first k values are lost.
 pub(crate) fn whitened(y: &[f64], a: &[f64]) -> DVector<f64> {
     let order = a.len();
     DVector::from_iterator(
@@ -82,7 +82,7 @@ pub(crate) fn whitened(y: &[f64], a: &[f64]) -> DVector<f64> {
     )
 }
 
-/// The same for every column.
+/// [`whitened`] for every column.
 pub(crate) fn whitened_columns(columns: &DMatrix<f64>, a: &[f64]) -> DMatrix<f64> {
     if a.is_empty() {
         return columns.clone();
@@ -103,9 +103,9 @@ mod tests {
     use dynident_model::sample::Random;
 
     /// e_t = 1.2 e_{t−1} − 0.5 e_{t−2} + w_t: coefficients of 4000 samples have errors of about √((1 − a_2²)/N) =
-    /// 0.014; four of these. What the filter leaves is w.
+    /// 0.014; tolerance 4 σ. The filtered residual is w.
     #[test]
-    fn an_autoregression_is_found_and_taken_away() {
+    fn autoregression_is_estimated_and_removed() {
         let mut random = Random::new(5);
         let w: Vec<f64> = (0..4000).map(|_| random.normal()).collect();
         let mut e = vec![0.0; w.len()];
@@ -121,8 +121,7 @@ mod tests {
         }
     }
 
-    /// One mode of 0.9 shortened to 0.5: the filter is 1 − 0.5 z⁻¹, and of unit variance leaves 1 − 2 · 0.5 · 0.9 +
-    /// 0.25.
+    /// One mode of 0.9 shortened to 0.5: the filter is 1 − 0.5 z⁻¹, with innovation variance 1 − 2 · 0.5 · 0.9 + 0.25.
     #[test]
     fn long_modes_are_shortened() {
         let (a, left) = shortened(vec![0.9], 0.19, &[1.0, 0.9], 0.5);

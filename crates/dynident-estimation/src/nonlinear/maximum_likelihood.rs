@@ -1,5 +1,4 @@
-//! Maximum likelihood with errors in the motion as well as in the torque, both of known covariance: what averaged
-//! periods of a repeated motion allow.
+//! Maximum likelihood with errors of known covariance in motion and torque, for averaged periods of a repeated motion.
 
 use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, Unexcited, report, solve, split};
@@ -14,38 +13,38 @@ pub struct InstantRows<'a> {
     pub regressor: &'a DMatrix<f64>,
     /// τ, one entry per joint.
     pub torque: &'a DVector<f64>,
-    /// `∂W/∂x_i` for every measured variable x_i of the motion at this instant (positions; or positions, velocities and
-    /// accelerations), each of W's shape.
+    /// `∂W/∂x_i` for every measured variable x_i of the motion at this instant (positions; or positions, velocities
+    /// and accelerations), each of W's shape.
     pub regressor_by_motion: &'a [DMatrix<f64>],
 }
 
-/// What a pass hands every instant to.
+/// Receives the instants of a pass.
 pub type InstantVisitor<'a> = dyn FnMut(&InstantRows<'_>) -> Result<(), EstimationError> + 'a;
 
 /// Settings of [`maximum_likelihood`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaximumLikelihoodSettings {
-    /// Σ_q: covariance of the errors of the motion's variables at one instant, as they enter (of P averaged periods, a
-    /// P-th of a single one's). Symmetric, not indefinite.
+    /// Σ_q: covariance of the errors of the motion's variables at one instant, after averaging (for P periods, 1/P of
+    /// that of one period). Symmetric, positive semidefinite.
     pub motion_covariance: DMatrix<f64>,
     /// Σ_τ: covariance of the torque's errors, (joints, joints), positive definite.
     pub torque_covariance: DMatrix<f64>,
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// Length of a step, in error bars over all directions, at which the iteration ends; 1e-6 is usual.
+    /// The iteration ends at this step length, in error bars over all directions; 1e-6 is usual.
     pub tolerance: f64,
-    /// Most steps; 50 is plenty.
+    /// Maximum number of steps; 50 is sufficient.
     pub max_iterations: usize,
 }
 
-/// What [`maximum_likelihood`] found.
+/// Result of [`maximum_likelihood`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MaximumLikelihoodEstimate {
     /// Names of the columns.
     pub names: Vec<String>,
-    /// One value per column; zero for a column that the data do not excite.
+    /// One value per column; zero for an unexcited column.
     pub values: Vec<f64>,
-    /// `(Σ_k W̃_kᵀ S_k⁻¹ W̃_k)⁻¹`: the Cramér-Rao bound for the covariances given; zero rows and columns for fixed
+    /// `(Σ_k W̃_kᵀ S_k⁻¹ W̃_k)⁻¹`: the Cramér-Rao bound for the given covariances; zero rows and columns for fixed
     /// columns.
     #[serde(skip)]
     pub covariance: DMatrix<f64>,
@@ -53,18 +52,18 @@ pub struct MaximumLikelihoodEstimate {
     pub std: Vec<f64>,
     /// The cost at the values.
     pub cost: f64,
-    /// Residuals less estimated columns. The cost is about as large when model and covariances are right (χ²), and
-    /// larger when the model leaves something out.
+    /// Residuals minus estimated columns. The cost is about this large for a correct model and correct covariances
+    /// (χ²), and larger for an incomplete model.
     pub degrees_of_freedom: usize,
-    /// Steps made.
+    /// Number of steps.
     pub iterations: usize,
-    /// How it ended.
+    /// Status of the estimator.
     pub status: EstimateStatus,
     /// Rank decisions.
     pub rank: RankReport,
 }
 
-/// What one pass gathers at θ.
+/// Results of one pass at θ.
 struct PassSums {
     triangle: TriangularFactor,
     cost: f64,
@@ -77,21 +76,21 @@ struct PassSums {
 ///     S_k = D_k Σ_q D_kᵀ + Σ_τ,   D_k = ∂r_k/∂q = −Σ_j θ_j ∂W_kj/∂q
 /// ```
 ///
-/// which is the likelihood's exponent once the best motion near the measured one has been taken for every instant.
-/// Olsen, Swevers and Verdonck, Int. J. Robotics Research 21 (2002) 895: for periodic excitation Σ_q and Σ_τ are known
-/// from how the periods differ. Where W holds noise, least squares draws parameters towards zero; this does not, to
-/// first order in the motion's errors.
+/// which is the exponent of the likelihood with the best motion near the measured one for every instant. Olsen,
+/// Swevers and Verdonck, Int. J. Robotics Research 21 (2002) 895: for periodic excitation Σ_q and Σ_τ are known from
+/// the differences between periods. Noise in W biases least squares towards zero, but not this estimate, to first
+/// order in the motion's errors.
 ///
-/// Gauss and Newton's steps with the regressor at the corrected motion, `W̃ = W + Σ_i (Σ_q Dᵀ S⁻¹ r)_i (−∂W/∂q_i)`,
-/// whose gradient is exact: `∂J/∂θ = −2 Σ W̃ᵀ S⁻¹ r` (Britt and Luecke, Technometrics 15 (1973) 233). A step that does
-/// not lower J is halved. The first one, from θ = 0, is generalised least squares.
+/// Gauss-Newton steps use the regressor at the corrected motion, `W̃ = W + Σ_i (Σ_q Dᵀ S⁻¹ r)_i (−∂W/∂q_i)`, with the
+/// exact gradient `∂J/∂θ = −2 Σ W̃ᵀ S⁻¹ r` (Britt and Luecke, Technometrics 15 (1973) 233). A step that does not lower
+/// J is halved. The first step, from θ = 0, is generalised least squares.
 ///
-/// `pass` hands every instant to its visitor, the same ones as often as it is called.
+/// `pass` must give the same instants to its visitor at each call.
 ///
 /// # Errors
-/// [`EstimationError::Setting`] for covariances that are none or numbers out of range, [`EstimationError::Mismatch`]
-/// for other shapes, [`EstimationError::Empty`], [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and
-/// whatever `pass` returns.
+/// [`EstimationError::Setting`] for invalid covariances or settings, [`EstimationError::Mismatch`] for wrong shapes,
+/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and the errors of
+/// `pass`.
 #[doc(alias("ml", "mle"))]
 pub fn maximum_likelihood<E: From<EstimationError>>(
     names: &[String],
@@ -160,8 +159,8 @@ impl MaximumLikelihoodSettings {
         self.rank.validate()?;
         covariance("motion_covariance", &self.motion_covariance, false)?;
         covariance("torque_covariance", &self.torque_covariance, true)?;
-        within("tolerance", self.tolerance, 1.0e-12..=1.0, "give a length in error bars from 1e-12 to 1")?;
-        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
+        within("tolerance", self.tolerance, 1.0e-12..=1.0, "use a length in error bars from 1e-12 to 1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "use at least 1")
     }
 }
 
@@ -175,7 +174,7 @@ fn covariance(setting: &'static str, matrix: &DMatrix<f64>, definite: bool) -> R
     if finite && symmetric && enough {
         return Ok(());
     }
-    let fix = "give a covariance: finite, symmetric, and for the torque positive definite";
+    let fix = "use a finite, symmetric, positive semidefinite matrix (positive definite for the torque)";
     Err(EstimationError::Setting { setting, value: least, fix })
 }
 
@@ -209,7 +208,7 @@ fn gathered<E: From<EstimationError>>(
             return Err(EstimationError::Setting {
                 setting: "torque_covariance",
                 value: settings.torque_covariance.diagonal().min(),
-                fix: "its size and the motion's differ by too many powers of ten: check units",
+                fix: "the covariances of torque and motion differ by too many powers of ten: check units",
             });
         };
         let error = spread.tr_mul(&factor.solve(&residual));

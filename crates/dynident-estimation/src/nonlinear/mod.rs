@@ -1,10 +1,10 @@
-//! **Estimators that iterate on the model**: the rows themselves depend on what is sought.
+//! **Nonlinear estimators**: the rows depend on the unknowns.
 //!
-//! [`maximum_likelihood`] accounts for errors of known size in every position of a periodic motion,
-//! [`simulated_least_squares`] compares a simulated motion with the measured one (or its torque),
-//! [`simultaneous_least_squares`] estimates the motion together with the parameters from encoder and torque channels
-//! whose noise is coloured; [`simultaneous_bound`] is the Cramér-Rao bound of that problem;
-//! [`spline_motion_least_squares`] does the same for any log, the motion a smoothing spline.
+//! [`maximum_likelihood`] includes errors of known covariance in every position of a periodic motion.
+//! [`simulated_least_squares`] fits the simulated to the measured motion (or torque). [`simultaneous_least_squares`]
+//! estimates motion and parameters together from encoder and torque channels with coloured noise;
+//! [`simultaneous_bound`] is its Cramér-Rao bound. [`spline_motion_least_squares`] does the same for any log, with a
+//! smoothing spline as motion.
 
 mod autoregression;
 mod maximum_likelihood;

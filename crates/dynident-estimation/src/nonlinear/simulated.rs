@@ -1,4 +1,4 @@
-//! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE, behind one seam.
+//! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE.
 
 use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{
@@ -8,41 +8,38 @@ use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// What a simulation of the experiment gives, at the record's own instants: rows of all channels and instants in one
-/// order, which is the record's as well.
+/// Simulated outputs at the instants of the record, in the row order of the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedRows {
-    /// What is compared with the record: torque for DIDIM and CLIE, position for CLOE.
+    /// Output to compare with the record: torque for DIDIM and CLIE, position for CLOE.
     pub output: DVector<f64>,
-    /// W of the simulated motion, shape (rows, columns); DIDIM's rows only, and empty (no rows) for a simulation that
-    /// does not give them.
+    /// W of the simulated motion, shape (rows, columns); only for DIDIM, else empty (no rows).
     pub regressor: DMatrix<f64>,
 }
 
-/// The experiment over again with other parameters: the same robot model, controller, reference and filters.
-/// `estimation` does not know how.
+/// Repeats the experiment in simulation with other parameters: same robot model, controller, reference and filters.
 pub trait SimulatedMotion {
-    /// What can go wrong in a simulation.
+    /// Error of a simulation.
     type Error: From<EstimationError>;
 
-    /// Simulates with parameters θ. None when the simulation does not get through (an unstable loop, a mass matrix that
-    /// is none): the step is then halved.
+    /// Simulates with parameters θ. Returns `None` if the simulation fails (unstable loop, mass matrix not positive
+    /// definite); the step is then halved.
     ///
     /// # Errors
-    /// Whatever no other parameters would fix.
+    /// Failures that do not depend on the parameters.
     fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, Self::Error>;
 }
 
-/// Which distance between simulation and record is made small.
+/// Criterion to minimise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulatedCriterion {
-    /// `‖τ − W(q_s, q̇_s, q̈_s) θ‖`, the simulated motion taken for given in every step: direct and inverse dynamic
-    /// identification. The measured position is not needed. A few simulations in all.
+    /// `‖τ − W(q_s, q̇_s, q̈_s) θ‖` with the simulated motion held fixed in every step: direct and inverse dynamic
+    /// identification (DIDIM). Needs no measured position and only a few simulations.
     #[default]
     Didim,
-    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by differences: closed-loop input error (y the torque) or
-    /// output error (y the position), by what the simulation puts out. One simulation for every parameter and step.
+    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by differences: closed-loop input error (y is the torque) or
+    /// output error (y is the position). Needs one simulation per parameter and step.
     Output,
 }
 
@@ -50,15 +47,15 @@ pub enum SimulatedCriterion {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedSettings {
-    /// What is compared.
+    /// Criterion to minimise.
     pub criterion: SimulatedCriterion,
-    /// When a column counts as excited.
+    /// Criteria for an excited column.
     pub rank: RankSettings,
-    /// Length of a step, in error bars over all directions, at which the iteration ends. Default 1e-3.
+    /// The iteration ends at this step length, in error bars over all directions. Default 1e-3.
     pub tolerance: f64,
-    /// Most steps. Default 30.
+    /// Maximum number of steps. Default 30.
     pub max_iterations: usize,
-    /// Step of the differences, relative to each parameter's `scale`. Default 1e-4.
+    /// Step of the finite differences, relative to each parameter's `scale`. Default 1e-4.
     pub difference: f64,
 }
 
@@ -81,77 +78,75 @@ impl SimulatedSettings {
     /// [`EstimationError::Setting`].
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        within("tolerance", self.tolerance, 1.0e-10..=1.0, "give a length in error bars from 1e-10 to 1")?;
-        within("difference", self.difference, 1.0e-9..=0.1, "give a relative step from 1e-9 to 0.1")?;
-        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
+        within("tolerance", self.tolerance, 1.0e-10..=1.0, "use a length in error bars from 1e-10 to 1")?;
+        within("difference", self.difference, 1.0e-9..=0.1, "use a relative step from 1e-9 to 0.1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "use at least 1")
     }
 }
 
-/// The record and where to begin.
+/// The record and the start of the iteration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedProblem {
     /// Names of the parameters.
     pub names: Vec<String>,
-    /// Where the iteration begins: a description's values, or a least-squares estimate.
+    /// Start values: nominal values or a least-squares estimate.
     pub start: Vec<f64>,
-    /// The ordinary size of each parameter, greater than zero: the unit of its differences.
+    /// Typical size of each parameter, greater than zero: the unit of its differences.
     pub scale: Vec<f64>,
-    /// What was measured, rows as the simulation's.
+    /// Measured outputs, in the rows of the simulation.
     pub measured: DVector<f64>,
     /// Standard deviation of each row's noise.
     pub noise_std: DVector<f64>,
 }
 
-/// What [`simulated_least_squares`] found.
+/// Result of [`simulated_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimulatedEstimate {
     /// Names of the parameters.
     pub names: Vec<String>,
-    /// One value per parameter; that of a parameter which the data do not excite is its start.
+    /// One value per parameter; the start value for an unexcited parameter.
     pub values: Vec<f64>,
-    /// `s² (JᵀJ)⁻¹` of the rows over their noise, s² the mean square of what is left: for noise that is white over the
-    /// rows.
+    /// `s² (JᵀJ)⁻¹` of the rows over their noise, s² the mean square residual; valid for white noise.
     #[serde(skip)]
     pub covariance: DMatrix<f64>,
     /// Square roots of its diagonal.
     pub std: Vec<f64>,
     /// Sum of squares of the rows' residuals over their noise.
     pub cost: f64,
-    /// Steps made.
+    /// Number of steps.
     pub iterations: usize,
-    /// Simulations made.
+    /// Number of simulations.
     pub simulations: usize,
-    /// How it ended. [`EstimateStatus::IterationLimit`] also when no shorter step lowers the cost any more although the
-    /// step is not small.
+    /// Status of the estimator. [`EstimateStatus::IterationLimit`] also if a step is not small but no shorter step
+    /// lowers the cost.
     pub status: EstimateStatus,
     /// Rank decisions at the last point.
     pub rank: RankReport,
-    /// What the outputs do with the parameters at the last point, shape (rows, parameters): W of the simulated motion
-    /// for DIDIM, J for CLIE and CLOE.
+    /// Derivatives of the outputs by the parameters at the last point, shape (rows, parameters): W of the simulated
+    /// motion for DIDIM, J for CLIE and CLOE.
     #[serde(skip)]
     pub jacobian: DMatrix<f64>,
-    /// What was measured there less `W θ` (DIDIM) or less the simulation's output, so that `jacobian · (θ' - values) ≈
-    /// residual` is the problem of the next step: what error bars for coloured residuals can be made from.
+    /// Measured output minus `W θ` (DIDIM) or minus the simulated output, so that `jacobian · (θ' - values) ≈
+    /// residual` is the problem of the next step. Use it for error bars with coloured residuals.
     #[serde(skip)]
     pub residual: DVector<f64>,
 }
 
-/// Parameters with which the simulated experiment looks like the recorded one, by the method of Gauss and Newton:
+/// Fits the simulated to the recorded experiment by Gauss-Newton steps:
 ///
 /// ```text
 ///     DIDIM:       θ_{k+1} = argmin ‖Σ^{-1/2} (τ − W(q_s(θ_k)) θ)‖        (the motion hardly depends on θ: ∂y_s/∂θ ≈ W)
 ///     CLIE, CLOE:  θ_{k+1} = θ_k + argmin ‖Σ^{-1/2} (y − y_s(θ_k) − J Δ)‖,  J = ∂y_s/∂θ by central differences
 /// ```
-///
-/// A step that does not lower `‖Σ^{-1/2} (y − y_s(θ))‖` is halved (for DIDIM, one that raises its square by more than 5
-/// %). No noise of a measured position enters the regressor; instead the controller and its reference must be known.
+/// A step that does not lower `‖Σ^{-1/2} (y − y_s(θ))‖` is halved (for DIDIM, one that raises its square by more than
+/// 5 %). Noise of the measured position does not enter the regressor; instead controller and reference must be known.
 /// Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013) 428 (DIDIM); Walter and Pronzato,
 /// Identification of Parametric Models from Experimental Data (1997), for output errors.
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for lists and rows of other lengths, [`EstimationError::Setting`],
-/// [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and whatever the simulation returns;
-/// [`EstimationError::NoSimulation`] when the start itself cannot be simulated.
+/// [`EstimationError::Mismatch`] for wrong sizes, [`EstimationError::Setting`], [`EstimationError::TooFewRows`],
+/// [`EstimationError::Unusable`], and the errors of the simulation; [`EstimationError::NoSimulation`] if the start
+/// cannot be simulated.
 #[doc(alias("didim", "clie", "cloe", "cle", "output error"))]
 pub fn simulated_least_squares<S: SimulatedMotion>(
     problem: &SimulatedProblem,
@@ -177,10 +172,10 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         let noise = (now.cost / (rows - choice.free.len()) as f64).sqrt().max(f64::MIN_POSITIVE);
         let length = (triangle.regressor_triangle() * &step).norm() / (choice.free.len().max(1) as f64).sqrt();
         converged = length <= settings.tolerance * noise;
-        // Within the tolerance costs differ by what the simulation's own accuracy leaves; and DIDIM's fixed point is
-        // not quite where the cost is least.
+        // Within the tolerance costs differ by the accuracy of the simulation; the fixed point of DIDIM is not exactly
+        // at the minimum cost.
         let most = match settings.criterion {
-            SimulatedCriterion::Didim => now.cost * DIDIM_RISE,
+            SimulatedCriterion::Didim => now.cost * MAX_DIDIM_COST_RATIO,
             SimulatedCriterion::Output if converged => now.cost * (1.0 + settings.tolerance),
             SimulatedCriterion::Output => now.cost,
         };
@@ -225,16 +220,16 @@ impl SimulatedProblem {
             let bad = values.iter().find(|value| !value.is_finite() || positive && **value <= 0.0);
             bad.map_or(Ok(()), |&value| Err(EstimationError::Setting { setting, value, fix }))
         };
-        usable("start", &self.start, false, "give finite values")?;
-        usable("scale", &self.scale, true, "give each parameter's ordinary size, greater than zero")?;
-        usable("noise_std", self.noise_std.as_slice(), true, "give deviations greater than zero")?;
-        usable("measured", self.measured.as_slice(), false, "leave out rows that were not measured")
+        usable("start", &self.start, false, "use finite values")?;
+        usable("scale", &self.scale, true, "use the typical size of each parameter, greater than zero")?;
+        usable("noise_std", self.noise_std.as_slice(), true, "use standard deviations greater than zero")?;
+        usable("measured", self.measured.as_slice(), false, "remove rows without a measurement")
     }
 }
 
-/// How much a step of DIDIM may raise the cost: with noise in the torque its fixed point lies beside the least cost by
-/// a part of an error bar.
-const DIDIM_RISE: f64 = 1.05;
+/// Maximum increase of the cost by a step of DIDIM, as a factor: with torque noise its fixed point differs from the
+/// minimum by part of an error bar.
+const MAX_DIDIM_COST_RATIO: f64 = 1.05;
 
 struct Run<'a, S> {
     problem: &'a SimulatedProblem,
@@ -248,17 +243,15 @@ struct SimulationPoint {
     cost: f64,
 }
 
-/// The linear problem of one step.
 struct Linearised {
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
-    /// Of the rows over their noise.
     triangle: TriangularFactor,
     choice: Split,
 }
 
 impl<S: SimulatedMotion> Run<'_, S> {
-    /// The linear problem about a simulation with parameters `theta`.
+    /// The linear problem at a simulation with parameters `theta`.
     fn linearised(&mut self, theta: &DVector<f64>, now: &SimulationPoint) -> Result<Linearised, S::Error> {
         let (problem, settings) = (self.problem, self.settings);
         let (columns, rows) = (problem.names.len(), problem.measured.len());
@@ -270,7 +263,7 @@ impl<S: SimulatedMotion> Run<'_, S> {
             }
             SimulatedCriterion::Output => self.jacobian(theta, now, settings.difference)?,
         };
-        // DIDIM compares with W θ, which is the simulated torque but for friction at rest and filters.
+        // DIDIM compares with W θ, the simulated torque except for static friction and filters.
         let residual = match settings.criterion {
             SimulatedCriterion::Didim => &problem.measured - &jacobian * theta,
             SimulatedCriterion::Output => &problem.measured - &now.rows.output,
@@ -299,7 +292,7 @@ impl<S: SimulatedMotion> Run<'_, S> {
         Ok(cost.is_finite().then_some(SimulationPoint { rows, cost }))
     }
 
-    /// Central differences; one-sided where one side cannot be simulated, zero where neither can.
+    /// Central differences; one-sided if one side cannot be simulated, zero if neither can.
     fn jacobian(
         &mut self,
         theta: &DVector<f64>,

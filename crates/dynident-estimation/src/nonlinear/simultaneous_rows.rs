@@ -1,35 +1,34 @@
-//! The linear algebra behind [`simultaneous_least_squares`](crate::simultaneous_least_squares()): whitened rows, their
-//! normal matrices, and the motion's elimination.
+//! Linear algebra of [`simultaneous_least_squares`](crate::simultaneous_least_squares()): whitened rows, normal
+//! matrices and elimination of the motion.
 
 use super::autoregression::{whitened, whitened_columns};
 use crate::error::{EstimationError, expect};
 use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// A pivot of the information, scaled to a unit diagonal, that counts as zero: the square of a share of a column that
-/// is far below what any real motion leaves, and above rounding.
-const SINGULAR: f64 = 1.0e-13;
-/// A channel's σ never falls below this share of what its unknowns make of it: noise-free data leave rounding errors
-/// only.
-const SMALLEST_SIGMA: f64 = 1.0e-9;
-/// Columns that are multiplied at a time: the normal matrices are symmetric, and half of them need not be made.
-const STRIP: usize = 64;
+/// Pivot of the information, scaled to a unit diagonal, that is treated as zero: far below the value of an excited
+/// column and above rounding.
+const MIN_PIVOT: f64 = 1.0e-13;
+/// Lower limit of a channel's σ relative to the size of its prediction, for noise-free data.
+const MIN_SIGMA_SHARE: f64 = 1.0e-9;
+/// Columns multiplied at a time: only half of the symmetric normal matrix is computed.
+const STRIP_COLUMNS: usize = 64;
 
-/// One channel's rows about given unknowns: a joint's positions, or a joint's torques, of one uninterrupted piece of
-/// one log, in the order of time.
+/// One channel's rows at given unknowns: positions or torques of a joint in one uninterrupted piece of one log, in
+/// order of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelRows {
     /// `y − f(motion, parameters)`, one number for each row.
     pub residual: Vec<f64>,
-    /// Number of the motion's unknown that the first column of `by_motion` belongs to; the others follow it.
+    /// Number of the motion's unknown of the first column of `by_motion`; the others follow.
     pub first_motion: usize,
-    /// `∂f/∂motion`, shape (rows, any): the unknowns before and after do not act on this channel.
+    /// `∂f/∂motion`, shape (rows, any): other unknowns do not act on this channel.
     pub by_motion: DMatrix<f64>,
     /// `∂f/∂parameters`, shape (rows, parameters), or (rows, 0) if they do not act on this channel.
     pub by_parameters: DMatrix<f64>,
 }
 
-/// Rows after the whitening filter of their channel, and their normal matrices, which hold for any σ.
+/// Whitened rows of all channels and their normal matrices, independent of σ.
 pub(crate) struct WhiteRows {
     motion: usize,
     parameters: usize,
@@ -38,9 +37,9 @@ pub(crate) struct WhiteRows {
 }
 
 struct WhiteChannel {
-    /// For every column its number among all unknowns.
+    /// Number of every column among all unknowns.
     places: Vec<usize>,
-    /// How many of the columns belong to the motion.
+    /// Number of columns that belong to the motion.
     motion: usize,
     /// Derivatives by those unknowns.
     columns: DMatrix<f64>,
@@ -48,7 +47,7 @@ struct WhiteChannel {
     normal: DMatrix<f64>,
 }
 
-/// The normal equations of all channels, columns scaled to unit norm.
+/// Normal equations of all channels, with columns scaled to unit norm.
 pub(crate) struct System {
     scale: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
@@ -69,7 +68,6 @@ impl System {
     }
 }
 
-/// `Σ ‖r_c‖²/σ_c²`.
 pub(crate) fn cost(residuals: &[DVector<f64>], sigma: &[f64]) -> f64 {
     residuals.iter().zip(sigma).map(|(r, sigma)| r.norm_squared() / (sigma * sigma)).sum()
 }
@@ -92,12 +90,10 @@ impl WhiteRows {
         self.motion + self.parameters
     }
 
-    /// The unknowns of the motion and the parameters.
     pub(crate) fn parts<'a>(&self, unknowns: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
         unknowns.as_slice().split_at(self.motion)
     }
 
-    /// Residuals through the channels' filters.
     pub(crate) fn filtered(&self, residuals: &[Vec<f64>]) -> Result<Vec<DVector<f64>>, EstimationError> {
         expect("channels of residuals", self.channels.len(), residuals.len())?;
         let one = |((residual, colour), channel): ((&Vec<f64>, &Vec<f64>), &WhiteChannel)| {
@@ -108,7 +104,6 @@ impl WhiteRows {
         residuals.iter().zip(&self.colours).zip(&self.channels).map(one).collect()
     }
 
-    /// `Σ X_cᵀ r_c/σ_c²`.
     pub(crate) fn gradient(&self, residuals: &[DVector<f64>], sigma: &[f64]) -> DVector<f64> {
         let mut gradient = DVector::zeros(self.unknowns());
         for ((channel, r), sigma) in self.channels.iter().zip(residuals).zip(sigma) {
@@ -143,15 +138,15 @@ impl WhiteRows {
         sum
     }
 
-    /// The factored information; none if it is singular.
+    /// The factored information; `None` if it is singular.
     pub(crate) fn system(&self, sigma: &[f64]) -> Option<System> {
         let (scaled, scale) = scaled(self.information(sigma))?;
         let factor = scaled.cholesky()?;
         let least = factor.l_dirty().diagonal().iter().map(|pivot| pivot * pivot).fold(1.0, f64::min);
-        (least > SINGULAR).then_some(System { scale, factor })
+        (least > MIN_PIVOT).then_some(System { scale, factor })
     }
 
-    /// The first unknown whose own part of the information is gone.
+    /// The first unknown that the rows do not separate from the previous ones.
     pub(crate) fn undetermined(&self, sigma: &[f64], names: &[String]) -> EstimationError {
         let information = self.information(sigma);
         let size = information.nrows();
@@ -162,7 +157,7 @@ impl WhiteRows {
         });
         let mut place = size - 1;
         for k in 0..size {
-            if left[(k, k)].is_nan() || left[(k, k)] <= SINGULAR {
+            if left[(k, k)].is_nan() || left[(k, k)] <= MIN_PIVOT {
                 place = k;
                 break;
             }
@@ -179,7 +174,7 @@ impl WhiteRows {
         EstimationError::Undetermined { name }
     }
 
-    /// `tr(G_c H⁻¹)/σ_c²`: how many unknowns each channel pays for.
+    /// `tr(G_c H⁻¹)/σ_c²`: effective number of unknowns determined by each channel.
     pub(crate) fn leverage(&self, system: &System, sigma: &[f64]) -> Vec<f64> {
         let inverse = system.inverse();
         let of = |(channel, sigma): (&WhiteChannel, &f64)| {
@@ -215,14 +210,14 @@ impl WhiteRows {
             }
             let places = channel.places.iter().enumerate();
             let moved: f64 = places.map(|(k, &place)| channel.normal[(k, k)] * unknowns[place].powi(2)).sum();
-            let floor = SMALLEST_SIGMA * (moved / rows as f64).sqrt();
+            let floor = MIN_SIGMA_SHARE * (moved / rows as f64).sqrt();
             let found = (r.norm_squared() / degrees_of_freedom).sqrt().max(floor);
             sigma.push(if found > 0.0 { found } else { 1.0 });
         }
         Ok(sigma)
     }
 
-    /// The linear problem of the parameters alone: rows `[X_p − X_m B | r + (X_p − X_m B) θ]`, `B = H_mm⁻¹ H_mp`, whose
+    /// Linear problem of the parameters alone: rows `[X_p − X_m B | r + (X_p − X_m B) θ]`, `B = H_mm⁻¹ H_mp`, whose
     /// normal matrix is the Schur complement of the motion's block.
     pub(crate) fn eliminated(
         &self,
@@ -300,12 +295,11 @@ fn channel(
     Ok(WhiteChannel { places, motion: own, normal: normal(&columns), columns })
 }
 
-/// `XᵀX`.
 fn normal(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let count = columns.ncols();
     let mut normal = DMatrix::zeros(count, count);
-    for first in (0..count).step_by(STRIP) {
-        let width = STRIP.min(count - first);
+    for first in (0..count).step_by(STRIP_COLUMNS) {
+        let width = STRIP_COLUMNS.min(count - first);
         let strip = columns.columns(first, width).transpose();
         normal.view_mut((first, first), (width, count - first)).gemm(1.0, &strip, &columns.columns_range(first..), 0.0);
     }
@@ -313,7 +307,7 @@ fn normal(columns: &DMatrix<f64>) -> DMatrix<f64> {
     normal
 }
 
-/// A matrix scaled to a unit diagonal, and by what; none if an entry of its diagonal is not positive.
+/// A matrix scaled to a unit diagonal, and the scale; `None` if a diagonal entry is not positive.
 fn scaled(mut matrix: DMatrix<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let scale = matrix.diagonal().map(|x| 1.0 / x.sqrt());
     if scale.iter().any(|x| !(x.is_finite() && *x > 0.0)) {

@@ -1,30 +1,30 @@
-//! Block bootstrap: what the estimate would have been from other draws of the same time segments.
+//! Block bootstrap: variance of the estimate when the time segments are drawn again with replacement.
 //!
-//! Each replicate draws as many segments of a joint in a log as there are, with replacement, and solves again with the
-//! weights of the fit. In coordinates where the fit's information is the unit matrix a replicate's change is `(Σ_g n_g
-//! H_g)⁻¹ Σ_g n_g s_g`, with H_g the segment's information, s_g its score and n_g how often it was drawn. Künsch,
-//! Annals of Statistics 17 (1989) 1217; Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
+//! Each replicate draws as many segments of a joint in a log as there are and solves again with the weights of the
+//! fit. In whitened coordinates (the information of the fit is the unit matrix) the change of a replicate is `(Σ_g n_g
+//! H_g)⁻¹ Σ_g n_g s_g`: H_g is the information of segment g, s_g its score, n_g how often it was drawn. Künsch, Annals
+//! of Statistics 17 (1989) 1217; Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
 
 use crate::error::EstimationError;
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector};
 
-/// Replicates: the standard deviation then has a sampling error of 4 %.
+/// The standard deviation of 300 replicates has a sampling error of 4 %.
 const REPLICATES: usize = 300;
-/// The seed: the same data always give the same error bars.
+/// Fixed, so that the same data give the same error bars.
 const SEED: u64 = 1;
 
 /// The segments of one joint in one log, whitened: information and score of each.
 pub(super) type Blocks = Vec<(DMatrix<f64>, DVector<f64>)>;
 
-/// The second moment of the replicates' changes about zero, about which they are drawn. `fixed` is the
-/// information that is not drawn (a prior's).
+/// Second moment of the replicates' changes about zero, their expected value. `fixed` is information that is not
+/// drawn (the prior).
 pub(super) fn replicated(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimationError> {
     let size = fixed.nrows();
     let mut random = Random::new(SEED);
     let mut sum = DMatrix::zeros(size, size);
     let mut done = 0;
-    // A draw without some direction has no solution and is repeated; where most have none, the segments are too few.
+    // A singular draw is repeated. If most draws are singular, there are too few segments.
     for _ in 0..4 * REPLICATES {
         let (mut information, mut score) = (fixed.clone(), DVector::zeros(size));
         for series in blocks {
@@ -50,8 +50,8 @@ pub(super) fn replicated(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMat
 mod tests {
     use super::*;
 
-    /// The mean of independent numbers: the bootstrap's variance is Σ (x − mean)² / n². Two hundred draws of 300 know
-    /// it to 8 % (one σ); 25 % is three.
+    /// Mean of independent numbers: the bootstrap variance is Σ (x − mean)² / n². 300 replicates estimate it to 8 %
+    /// (1 σ); the tolerance of 25 % is 3 σ.
     #[test]
     fn the_mean_has_its_textbook_variance() {
         let n = 50;
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_that_no_draw_holds_is_an_error() {
+    fn directions_absent_from_all_draws_are_errors() {
         let blocks = vec![(DMatrix::zeros(1, 1), DVector::zeros(1)); 3];
         assert!(replicated(&[blocks], &DMatrix::zeros(1, 1)).is_err());
     }

@@ -1,19 +1,18 @@
-//! How far an estimate may be off: covariance under white noise, and under noise that is correlated in time.
+//! Covariance of an estimate under white noise and under noise that is correlated in time.
 //!
-//! Residuals of robot torque are strongly coloured (lag-1 correlations of 0.3 to 0.98 at usual rates): unmodelled
-//! friction and elasticity last longer than a sample. The textbook `σ²(WᵀW)⁻¹` counts every sample as new information
-//! and is then too small, by a factor of about √((1+ρ)/(1−ρ)) in the standard deviation. The cluster-robust covariance
+//! Residuals of robot torque are strongly coloured (lag-1 correlations of 0.3 to 0.98 at usual rates), because
+//! unmodelled friction and elasticity last longer than a sample. The textbook `σ²(WᵀW)⁻¹` treats every sample as
+//! independent; its standard deviation is too small by a factor of about √((1+ρ)/(1−ρ)). The cluster-robust covariance
 //!
 //! ```text
 //!     V = c A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹,   A = Σ w_j² W_jᵀW_j,   s_g = w_j² W_gᵀ(τ_g − W_g θ),   c = G/(G−1) · (N−1)/(N−p)
 //! ```
 //!
-//! sums the scores over each time segment g **before** squaring: whatever the correlation (and the changes of variance)
-//! within a segment, its effect is in s_g. It is right as long as segments last much longer than the correlation, so
-//! that their sums are nearly independent, and there are clearly more segments than parameters that each joint's rows
-//! pay for. The first can be checked: [`Estimate::segment_correlation`](crate::Estimate::segment_correlation) is near
-//! zero then. Liang and Zeger, Biometrika 73 (1986) 13; Cameron and Miller, J. Human Resources 50 (2015) 317, who also
-//! give c.
+//! sums the scores over each time segment g **before** squaring, so s_g includes any correlation and any change of
+//! variance within a segment. It is valid if segments are much longer than the correlation, so that their sums are
+//! nearly independent, and if there are clearly more segments than parameters per joint. To check the first condition:
+//! [`Estimate::segment_correlation`](crate::Estimate::segment_correlation) is then near zero. Liang and Zeger,
+//! Biometrika 73 (1986) 13; Cameron and Miller, J. Human Resources 50 (2015) 317, who also give c.
 
 use super::bootstrap::{Blocks, replicated};
 use super::newey_west::{bandwidth, long_run};
@@ -24,54 +23,50 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Which covariance an estimate reports as its own.
+/// The method for the covariance that an estimate reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CovarianceMethod {
-    /// Every time segment of every joint and log is a cluster, errors may be correlated within a segment, and each
-    /// segment is judged by the fit **without it** (delete-one jackknife, CR3). A fit bends towards what it was made
-    /// from, the more the fewer segments there are for each parameter; this does not take that for accuracy. Slightly
-    /// cautious when segments are few.
+    /// Delete-one jackknife (CR3): every time segment of every joint and log is a cluster, and its residuals are those
+    /// of the fit **without** it, so overfitting does not shrink the error bars. Valid for errors correlated within a
+    /// segment. Slightly conservative with few segments.
     #[default]
     Jackknife,
-    /// The same clusters with the residuals of the fit itself and the usual small-sample factor (CR1): too optimistic
+    /// The same clusters with the residuals of the full fit and the usual small-sample factor (CR1). Too optimistic
     /// unless there are many more segments than parameters.
     Segments,
-    /// A time segment of a log is one cluster for all joints: errors may also be correlated across joints. Needs more
-    /// segments, for there are fewer clusters.
+    /// A time segment of a log is one cluster for all joints, so errors may also be correlated across joints. Needs
+    /// more segments, because there are fewer clusters.
     SegmentsAcrossJoints,
-    /// Neighbouring segments may be correlated as well, with Bartlett's weights up to a lag chosen from the scores
-    /// (Newey and West 1994). For segments shorter than the correlation lasts; needs many of them.
+    /// Neighbouring segments may also be correlated: Bartlett weights up to a lag chosen from the scores (Newey and
+    /// West 1994). For segments that are shorter than the correlation; needs many segments.
     NeweyWest,
-    /// Segments drawn with replacement, 300 times, from a fixed seed. As the segments' own method, with the fit's
-    /// changes of information in it.
+    /// Segments drawn with replacement, 300 times, from a fixed seed. Like [`Segments`](Self::Segments), but includes
+    /// the variation of the information matrix.
     Bootstrap,
     /// Errors independent from sample to sample. Too optimistic on real data; for simulations and comparisons.
     White,
 }
 
-/// What the errors look like, from the scores.
 pub(crate) struct Covariances {
-    /// By the chosen method, over all columns (zero for fixed ones).
+    /// By the chosen method, over all columns (zero for fixed columns).
     pub(crate) chosen: DMatrix<f64>,
-    /// Under white noise.
     pub(crate) white: DMatrix<f64>,
     /// Clusters G (0 for the white method).
     pub(crate) clusters: usize,
-    /// Degrees of freedom behind every column's variance (infinite for fixed columns).
+    /// Degrees of freedom of the variance of every column (infinite for fixed columns).
     pub(crate) degrees_of_freedom: Vec<f64>,
-    /// For every joint the mean score variance over what white noise would give.
+    /// For every joint the mean score variance relative to white noise.
     pub(crate) inflation: Vec<f64>,
     /// For every joint the correlation of the scores of neighbouring segments.
     pub(crate) neighbours: Vec<f64>,
 }
 
-/// The second moment of the scores by a method, in whitened coordinates, without the prior's.
+/// Second moment of the scores in whitened coordinates, without the prior.
 struct Moment {
     matrix: DMatrix<f64>,
     clusters: usize,
-    /// Independent squares for each cluster.
     independent: f64,
 }
 
@@ -121,21 +116,21 @@ pub(crate) fn covariances(
     })
 }
 
-/// Each segment by the change that leaving it out makes: `(G − 1)/G Σ_g Δ_g Δ_gᵀ`.
+/// Delete-one jackknife: `(G − 1)/G Σ_g Δ_g Δ_gᵀ` with the change Δ_g when segment g is left out.
 fn jackknife(scores: &Scores<'_>) -> Result<Moment, EstimationError> {
     let changes = scores.joints.par_iter().map(JointScores::changes_without).collect::<Vec<_>>().concat();
     let g = at_least_two(changes.len())? as f64;
     Ok(second_moment(&changes, scores.free, (g - 1.0) / g))
 }
 
-/// Each segment of each joint and log by its score: `c Σ_g s_g s_gᵀ`.
+/// CR1: `c Σ_g s_g s_gᵀ` over the segments of all joints and logs.
 fn segments(scores: &Scores<'_>, rows: usize) -> Result<Moment, EstimationError> {
     let all: Vec<DVector<f64>> = scores.joints.iter().flat_map(|joint| joint.scores.iter().cloned()).collect();
     let factor = small_sample(at_least_two(all.len())?, rows, scores.free);
     Ok(second_moment(&all, scores.free, factor))
 }
 
-/// Each segment of each log by the sum of its joints' scores.
+/// As [`segments`] with the scores summed over the joints of a log.
 fn segments_across_joints(
     scores: &Scores<'_>,
     problem: &LinearProblem,
@@ -164,7 +159,6 @@ fn segments_across_joints(
     Ok(second_moment(&sums, scores.free, factor))
 }
 
-/// Neighbouring segments of a joint in a log with Bartlett's weights.
 fn newey_west(scores: &Scores<'_>, rows: usize) -> Result<Moment, EstimationError> {
     let clusters = at_least_two(scores.clusters())?;
     let (n, p) = (rows as f64, scores.free as f64);
@@ -176,13 +170,12 @@ fn newey_west(scores: &Scores<'_>, rows: usize) -> Result<Moment, EstimationErro
         .fold(DMatrix::zeros(scores.free, scores.free), |sum, (joint, bandwidth)| {
             sum + long_run(&joint.scores, scores.free, *bandwidth)
         });
-    // Bartlett's kernel of bandwidth L makes 3/(2 (L + 1)) independent squares of one score (Priestley, Spectral
-    // Analysis and Time Series, 6.2); never more than one.
+    // Bartlett's kernel of bandwidth L gives 3/(2 (L + 1)) independent squares per score (Priestley, Spectral
+    // Analysis and Time Series, 6.2), at most one.
     let longest = bandwidths.iter().copied().max().unwrap_or(0) as f64;
     Ok(Moment { matrix: sum * (n / (n - p)), clusters, independent: (1.5 / (longest + 1.0)).min(1.0) })
 }
 
-/// Segments of a joint in a log drawn with replacement.
 fn bootstrap(scores: &Scores<'_>, prior: &DMatrix<f64>) -> Result<Moment, EstimationError> {
     let clusters = at_least_two(scores.clusters())?;
     let blocks: Vec<Blocks> =
@@ -194,7 +187,7 @@ fn at_least_two(clusters: usize) -> Result<usize, EstimationError> {
     if clusters < 2 { Err(EstimationError::TooFewSegments { clusters }) } else { Ok(clusters) }
 }
 
-/// c = G/(G−1) · (N−1)/(N−p).
+/// Small-sample factor c = G/(G−1) · (N−1)/(N−p).
 fn small_sample(clusters: usize, rows: usize, free: usize) -> f64 {
     let (g, n, p) = (clusters as f64, rows as f64, free as f64);
     g / (g - 1.0) * (n - 1.0) / (n - p)
@@ -205,8 +198,8 @@ fn second_moment(clusters: &[DVector<f64>], free: usize, factor: f64) -> Moment 
     Moment { matrix: rows.tr_mul(&rows) * factor, clusters: clusters.len(), independent: 1.0 }
 }
 
-/// The correlation matrix of a covariance matrix. A row and column of zero variance (a fixed column) become those of
-/// the unit matrix.
+/// Correlation matrix of a covariance matrix. Rows and columns of zero variance (fixed columns) are those of the unit
+/// matrix.
 ///
 /// ```
 /// use dynident_estimation::correlation;

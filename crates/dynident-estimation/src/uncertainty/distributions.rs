@@ -1,17 +1,16 @@
-//! The distributions that intervals and tests are read from: Student's t, Fisher's F, chi-squared.
+//! Student's t, Fisher's F and chi-squared distributions.
 //!
-//! The incomplete beta and gamma functions are those of `statrs`; its inverse for Student's t loses digits from a
-//! thousand degrees of freedom on (decision 0005), where an expansion about the normal distribution has them
-//! all.
+//! The incomplete beta and gamma functions are those of `statrs`. Its inverse for Student's t loses digits above a
+//! thousand degrees of freedom (decision 0005), so an expansion about the normal distribution is used there.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
 
-/// Half the width of the 95 % interval of a normal variable, in standard deviations.
+/// Half-width of the 95 % interval of a normal variable, in standard deviations.
 pub const HALF_WIDTH_95: f64 = 1.959_963_984_540_054;
 
-/// Probability that a chi-squared variable with `degrees_of_freedom` degrees of freedom exceeds `value`; NaN
-/// for a NaN or for none of them.
+/// Probability that a chi-squared variable with `degrees_of_freedom` degrees of freedom exceeds `value`; NaN for a NaN
+/// or degrees of freedom that are not positive.
 pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
     if value.is_nan() || degrees_of_freedom.is_nan() || degrees_of_freedom <= 0.0 {
         return f64::NAN;
@@ -19,7 +18,7 @@ pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
     if value <= 0.0 {
         return 1.0;
     }
-    // What is far below the smallest number: the function takes no infinity.
+    // The limit keeps an infinite value valid.
     checked_gamma_ur(0.5 * degrees_of_freedom, (0.5 * value).min(1.0e300)).unwrap_or(f64::NAN)
 }
 
@@ -32,9 +31,9 @@ pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     checked_beta_reg(0.5 * denominator, 0.5 * numerator, share).unwrap_or(f64::NAN)
 }
 
-/// The t for which a Student variable with `degrees_of_freedom` degrees of freedom (they need not be whole)
-/// lies between -t and t with probability `level`. Below one degree it is that of one, from a million on that of a
-/// million, 1e-6 from the normal distribution's. NaN unless `level` lies between 0 and 1.
+/// The t for which a Student variable with `degrees_of_freedom` degrees of freedom (not necessarily whole) lies
+/// between -t and t with probability `level`. Degrees of freedom are clamped to 1 to 1e6 (within 1e-6 of the normal
+/// distribution). NaN unless `level` is between 0 and 1.
 ///
 /// ```
 /// let t = dynident_estimation::student_half_width(0.95, 10.0);
@@ -66,8 +65,8 @@ pub fn student_half_width(level: f64, degrees_of_freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Closed forms: chi-squared with 2 degrees is exponential; t with 1 is Cauchy's, with 2 has an algebraic tail;
-    /// F(2, n) has a power tail. Rounding of the series only.
+    /// Chi-squared with 2 degrees is exponential; t with 1 is Cauchy's, with 2 has an algebraic tail; F(2, n) has a
+    /// power tail.
     #[test]
     fn closed_forms() {
         for x in [0.01, 0.7, 3.0, 12.0, 80.0_f64] {
@@ -85,7 +84,6 @@ mod tests {
         assert!((student_half_width(0.95, f64::INFINITY) - 1.959_964).abs() < 1e-5);
     }
 
-    /// Values of printed tables.
     #[test]
     fn tables() {
         for (x, degrees_of_freedom, p) in [(3.841_459, 1.0, 0.05), (124.342_113, 100.0, 0.05), (23.209_251, 10.0, 0.01)]
@@ -97,7 +95,7 @@ mod tests {
         }
     }
 
-    /// SciPy 1.17.1, `t.ppf(0.5 + level / 2, degrees_of_freedom)`, on both sides of where the expansion begins.
+    /// SciPy 1.17.1, `t.ppf(0.5 + level / 2, degrees_of_freedom)`, on both sides of the start of the expansion.
     #[test]
     fn half_widths_of_many_degrees() {
         for (level, degrees_of_freedom, t) in [
@@ -117,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_not_a_number_and_never_hangs() {
+    fn invalid_arguments_give_nan_and_terminate() {
         assert!(chi_squared_tail(1.0, 0.0).is_nan() && f_tail(f64::NAN, 1.0, 1.0).is_nan());
         assert!(student_half_width(1.0, 3.0).is_nan() && student_half_width(0.95, f64::NAN).is_nan());
         assert!(chi_squared_tail(f64::NAN, 1.0).is_nan() && student_half_width(0.95, f64::INFINITY).is_finite());

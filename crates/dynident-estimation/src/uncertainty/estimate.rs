@@ -1,4 +1,4 @@
-//! An estimate is never a bare vector: values with covariance, the noise found, and what was decided about the rank.
+//! The estimate: values, covariance, noise and rank decisions.
 
 use super::covariance::{CovarianceMethod, covariances};
 use super::distributions::student_half_width;
@@ -8,20 +8,19 @@ use crate::factor::{RankReport, RankSettings, Solution, Split, StackedProblem, T
 use nalgebra::{DMatrix, DVector};
 use serde::{Serialize, Serializer, ser::SerializeSeq};
 
-/// How an estimator ended.
+/// Status of an estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimateStatus {
     /// All columns were estimated.
     Complete,
-    /// Some columns are not excited by the data; they were fixed (see [`RankReport::fixed`]) and the others estimated.
+    /// The data do not excite some columns; these were fixed (see [`RankReport::fixed`]) and the others estimated.
     NotAllExcited,
-    /// The iterations stopped at their limit before the weights settled.
+    /// The iteration limit was reached before the weights converged.
     IterationLimit,
 }
 
 impl EstimateStatus {
-    /// From what became of the iteration and of the columns.
     pub(crate) fn of(converged: bool, rank: &RankReport) -> Self {
         if !converged {
             Self::IterationLimit
@@ -34,9 +33,9 @@ impl EstimateStatus {
 }
 
 impl Estimate {
-    /// The same with a `further` error in its covariance, independent of its own and normally distributed: `Σ + F`,
-    /// `std` and the intervals with it, `h' = √(h² + (1.96 σ_F)²)`. `further` is as large as the covariance, or belongs
-    /// to the first columns; columns with a variance of zero there (those that are held) stay as they are.
+    /// Adds an independent, normally distributed error with covariance F: `Σ + F`, also in `std` and the intervals,
+    /// `h' = √(h² + (1.96 σ_F)²)`. `further` has the size of the covariance or covers the first columns only; columns
+    /// with zero variance in F (held columns) do not change.
     #[must_use]
     pub fn with_further_error(&self, further: &DMatrix<f64>) -> Self {
         let mut wider = self.clone();
@@ -62,10 +61,7 @@ impl Estimate {
     }
 }
 
-/// The covariance of all columns from that of the `free` ones, zero for the others, and the roots of its diagonal.
-///
-/// # Errors
-/// [`EstimationError::Overflow`] where a value or its deviation is not a finite number.
+/// Covariance of all columns (zero for the fixed ones) and its standard deviations from that of the `free` columns.
 pub(crate) fn covariance_of_all(
     names: &[String],
     values: &DVector<f64>,
@@ -85,63 +81,61 @@ pub(crate) fn covariance_of_all(
     }
 }
 
-/// What a linear estimator found.
+/// Result of a linear estimator.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// Names of the columns.
     pub names: Vec<String>,
-    /// One value per column; a fixed column has its fallback value.
+    /// One value per column; the fallback value for a fixed column.
     pub values: Vec<f64>,
-    /// Covariance of the values by the chosen method; zero rows and columns for fixed columns, which were not
-    /// estimated.
+    /// Covariance of the values by the chosen method; zero rows and columns for fixed columns.
     #[serde(serialize_with = "rows_of")]
     pub covariance: DMatrix<f64>,
-    /// Covariance if errors were independent from sample to sample.
+    /// Covariance for errors that are independent from sample to sample.
     #[serde(serialize_with = "rows_of")]
     pub covariance_white: DMatrix<f64>,
-    /// The method behind `covariance`.
+    /// Method of `covariance`.
     pub covariance_method: CovarianceMethod,
-    /// Clusters behind `covariance` (0 for the white one).
+    /// Clusters of `covariance` (0 for white noise).
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
-    /// The same by the residuals alone: what [`with_further_error`](Self::with_further_error) adds is not in it.
+    /// `std` from the residuals alone, without the error that [`with_further_error`](Self::with_further_error) adds.
     pub noise_std: Vec<f64>,
-    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of
-    /// freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
+    /// Degrees of freedom of the variance of each value (Satterthwaite; N − p for white errors). With few, the
+    /// interval is wider than 1.96 std.
     pub std_degrees_of_freedom: Vec<f64>,
-    /// Half the width of the 95 % interval: `t₀.₉₇₅(std_degrees_of_freedom) · std`; zero for fixed columns.
+    /// Half-width of the 95 % interval: `t₀.₉₇₅(std_degrees_of_freedom) · std`; zero for fixed columns.
     pub half_width_95: Vec<f64>,
-    /// `100 std / |value|`; none for a fixed column or a value of zero.
+    /// `100 std / |value|`; `None` for a fixed column or a value of zero.
     pub relative_std_percent: Vec<Option<f64>>,
-    /// How the estimator ended.
+    /// Status of the estimator.
     pub status: EstimateStatus,
-    /// Solutions made: 1 for ordinary least squares.
+    /// Number of solutions: 1 for ordinary least squares.
     pub iterations: usize,
-    /// For every joint the standard deviation of its residual, `√(RSS_j / (N_j − p/n))`, in N m (N for a prismatic
-    /// joint).
+    /// Standard deviation of each joint's residual, `√(RSS_j / (N_j − p/n))`, in N m (N for a prismatic joint).
     pub joint_sigma: Vec<f64>,
-    /// For every joint how much larger the squared segment scores are than under white noise: about (1+ρ)/(1−ρ) for
-    /// residuals with lag-1 correlation ρ, against slowly changing columns and in long segments.
+    /// For every joint the squared segment scores relative to white noise: about (1+ρ)/(1−ρ) for residuals with lag-1
+    /// correlation ρ, slowly changing columns and long segments.
     pub score_inflation: Vec<f64>,
-    /// The ρ for which `score_inflation` is (1+ρ)/(1−ρ): an effective lag-1 correlation, between −1 and 1. It is what
-    /// matters for the error bars, and lower than the residual's own where the columns alternate fast.
+    /// Effective lag-1 correlation of every joint, between −1 and 1: the ρ for which `score_inflation` is
+    /// (1+ρ)/(1−ρ). It determines the error bars and is below the residual's own correlation where columns alternate
+    /// fast.
     pub effective_lag1: Vec<f64>,
     /// For every joint the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g.
-    /// Above 0.2 or so the segments are too short for the correlation of the residuals, and error bars still too small:
-    /// use fewer, longer segments.
+    /// Above about 0.2 the segments are too short and the error bars still too small: use fewer, longer segments.
     pub segment_correlation: Vec<f64>,
     /// Rank decisions.
     pub rank: RankReport,
-    /// N − p: all rows less the estimated columns.
+    /// N − p: all rows minus the estimated columns.
     pub degrees_of_freedom: usize,
-    /// Condition of the (weighted) rows in the estimated columns as they are; depends on units.
+    /// Condition number of the (weighted) rows of the estimated columns, unscaled; depends on units.
     pub condition_number_raw: f64,
-    /// The same after each column was divided by its norm.
+    /// Condition number after each column was divided by its norm.
     pub condition_number_scaled: f64,
 }
 
-/// All that an estimator decided, before uncertainty is put on it.
+/// Estimate without its covariance.
 pub(crate) struct PointEstimate {
     pub(crate) triangle: TriangularFactor,
     pub(crate) split: Split,
@@ -216,7 +210,7 @@ impl PointEstimate {
     }
 }
 
-/// Checks that all rows together and each joint's share leave degrees of freedom for the noise, and gives `N_j − p/n`
+/// Checks that all rows together and those of each joint leave degrees of freedom for the noise; returns `N_j − p/n`
 /// for every joint.
 pub(crate) fn joint_degrees_of_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
     let problem = stacked.problem;

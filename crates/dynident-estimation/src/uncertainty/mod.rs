@@ -1,8 +1,8 @@
-//! **How far may it be off?** The [`Estimate`] that every linear estimator returns, and where its error bars come from.
+//! **Uncertainty**: the [`Estimate`] that every linear estimator returns, and its error bars.
 //!
 //! Residuals of robot torque are correlated in time, so the textbook covariance is too small. A [`CovarianceMethod`]
-//! names another: the default leaves out one time segment after the other (delete-one jackknife). Degrees of
-//! freedom by Satterthwaite turn a standard deviation into a half-width of 95 % by [`student_half_width`].
+//! selects another one; the default is the delete-one jackknife over time segments. [`student_half_width`] with
+//! Satterthwaite's degrees of freedom gives the 95 % half-width from a standard deviation.
 
 mod bootstrap;
 mod covariance;

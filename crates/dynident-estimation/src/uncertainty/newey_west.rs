@@ -1,16 +1,17 @@
-//! Newey and West's covariance: scores may be correlated with their neighbours in time, less and less with distance.
+//! Newey-West covariance: scores are correlated with their neighbours in time, with a weight that decreases with the
+//! lag.
 //!
 //! ```text
 //!     S = Σ_g s_g s_gᵀ + Σ_{l=1}^{L} (1 − l/(L+1)) Σ_g (s_g s_{g−l}ᵀ + s_{g−l} s_gᵀ)
 //! ```
 //!
-//! The series is that of the segments of one joint in one log; with segments of one row it is the textbook's. Newey and
-//! West, Econometrica 55 (1987) 703; the bandwidth of Review of Economic Studies 61 (1994) 631, with the trace of the
-//! whitened scores' autocovariances, which does not depend on units, in place of their arbitrary weights.
+//! The series are the segments of one joint in one log; with segments of one row it is the textbook form. Newey and
+//! West, Econometrica 55 (1987) 703; bandwidth of Review of Economic Studies 61 (1994) 631, with the trace of the
+//! whitened scores' autocovariances (independent of units) in place of the arbitrary weights.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Bartlett's kernel up to this lag.
+/// Bandwidth of Bartlett's kernel.
 ///
 /// `L = ⌊1.1447 (s₁/s₀)^(2/3) T^(1/3)⌋`, `s₀ = γ_0 + 2 Σ γ_l`, `s₁ = 2 Σ l γ_l` over l = 1..⌊4 (T/100)^(2/9)⌋, at most
 /// T − 1.
@@ -26,7 +27,7 @@ pub(super) fn bandwidth(series: &[DVector<f64>]) -> usize {
         s0 += 2.0 * value;
         s1 += 2.0 * lag as f64 * value;
     }
-    // A sum that is not positive (alternating scores) says nothing about a time of decay.
+    // A sum that is not positive (alternating scores) gives no decay time.
     if s0 <= 0.0 {
         return 0;
     }
@@ -38,7 +39,7 @@ fn autocovariance(series: &[DVector<f64>], lag: usize) -> f64 {
     series.iter().zip(&series[lag..]).map(|(early, late)| early.dot(late)).sum()
 }
 
-/// S of one series with the given bandwidth; positive semi-definite.
+/// Long-run covariance S of one series with the given bandwidth; positive semi-definite.
 pub(super) fn long_run(series: &[DVector<f64>], size: usize, bandwidth: usize) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(size, size);
     for score in series {
@@ -58,7 +59,7 @@ pub(super) fn long_run(series: &[DVector<f64>], size: usize, bandwidth: usize) -
 mod tests {
     use super::*;
 
-    /// Two scores a and b with L = 1: aa + bb + ½ (ab + ba), by hand.
+    /// Two scores a and b with L = 1: aa + bb + ½ (ab + ba).
     #[test]
     fn by_hand() {
         let series = [DVector::from_vec(vec![1.0, 2.0]), DVector::from_vec(vec![3.0, -1.0])];
@@ -67,8 +68,8 @@ mod tests {
         assert_eq!(long_run(&series, 2, 1), expected);
     }
 
-    /// Scores that keep their sign for many steps ask for a longer kernel than independent ones. (Alternating ones also
-    /// ask for a long one: the rule squares s₁/s₀, for they are correlated as far.)
+    /// Scores that keep their sign for many steps need a longer kernel than independent ones. Alternating scores also
+    /// need a long one, because the rule squares s₁/s₀.
     #[test]
     fn the_bandwidth_follows_the_correlation() {
         let one = |value: f64| DVector::from_vec(vec![value]);

@@ -1,7 +1,7 @@
-//! The scores of a fit in coordinates where its information is the unit matrix.
+//! Scores of a fit in coordinates where its information is the unit matrix.
 //!
-//! With `A = RᵀR` the information of the free columns, `R⁻ᵀ` whitens: what every covariance method looks at is `R⁻ᵀ
-//! s_g` of each time segment g of each joint in each log, and its result `M` spreads to the columns as `R⁻¹ M R⁻ᵀ`.
+//! With the information `A = RᵀR` of the free columns, `R⁻ᵀ` whitens: a covariance method uses `R⁻ᵀ s_g` of each time
+//! segment g of each joint in each log, and its result `M` maps to the columns as `R⁻¹ M R⁻ᵀ`.
 
 use crate::error::EstimationError;
 use crate::factor::{JointRows, ReducedRows, Solution, Split, StackedProblem};
@@ -9,43 +9,39 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// What a covariance needs to know about the fit.
 pub(crate) struct Fit<'a> {
     pub(crate) split: &'a Split,
     pub(crate) solution: &'a Solution,
-    /// w_j: what the rows of joint j were multiplied by.
+    /// w_j: weight of the rows of joint j.
     pub(crate) weights: &'a [f64],
-    /// Noise of joint j, same unit as its torque.
+    /// Noise of joint j, in the unit of its torque.
     pub(crate) joint_sigma: &'a [f64],
     /// Variance of the weighted rows under white noise.
     pub(crate) weighted_variance: f64,
     pub(crate) rows: usize,
 }
 
-/// The scores of all joints in all logs.
 pub(super) struct Scores<'a> {
-    /// One for each equation of the problem, in its order.
+    /// One for each equation of the problem, in the same order.
     pub(super) joints: Vec<JointScores<'a>>,
-    /// Estimated columns.
     pub(super) free: usize,
     /// R⁻¹ of the free columns.
     inverse: &'a DMatrix<f64>,
-    /// Place of every column among the free ones.
+    /// Index of every column among the free ones.
     place: Vec<Option<usize>>,
 }
 
-/// The scores of one joint in one log.
 pub(super) struct JointScores<'a> {
     pub(super) rows: &'a JointRows,
     weight: f64,
-    /// The parameters that these rows see, and their rows of R⁻¹.
+    /// Parameters of the columns of these rows, and the corresponding rows of R⁻¹.
     theta: Vec<f64>,
     local_inverse: DMatrix<f64>,
     /// `R⁻ᵀ w² W_gᵀ(τ_g − W_g θ)` for every segment g.
     pub(super) scores: Vec<DVector<f64>>,
-    /// `‖w W R⁻¹‖²`: what the squared scores sum up to under unit white noise.
+    /// `‖w W R⁻¹‖²`: expected sum of the squared scores under unit white noise.
     information: f64,
-    /// What every segment holds, once a method asks for it.
+    /// Reduced rows of every segment, computed on demand.
     segments: OnceLock<Vec<ReducedRows>>,
 }
 
@@ -74,13 +70,12 @@ impl<'a> Scores<'a> {
         Ok(Self { joints: joints.collect::<Result<_, EstimationError>>()?, free, inverse, place })
     }
 
-    /// Segments of all joints and logs.
     pub(super) fn clusters(&self) -> usize {
         self.joints.iter().map(|joint| joint.scores.len()).sum()
     }
 
-    /// For every joint the squared scores over those of white noise, and the correlation of neighbouring segments'
-    /// scores.
+    /// For every joint the squared scores relative to white noise, and the correlation of the scores of neighbouring
+    /// segments.
     pub(super) fn inflation_and_neighbours(&self, fit: &Fit<'_>) -> (Vec<f64>, Vec<f64>) {
         let count = fit.joint_sigma.len();
         let (mut found, mut expected, mut products) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
@@ -109,10 +104,9 @@ impl<'a> Scores<'a> {
         })
     }
 
-    /// Degrees of freedom of every column's variance, `independent` times those of its clusters under white
-    /// noise; infinite for fixed columns.
+    /// Degrees of freedom of every column's variance: `independent` times those of its clusters under white noise;
+    /// infinite for fixed columns.
     pub(super) fn degrees_of_freedom(&self, independent: f64) -> Vec<f64> {
-        // What share of each estimate's variance comes from each cluster.
         let shares: Vec<Vec<f64>> = self.joints.par_iter().flat_map_iter(|joint| joint.shares(self.inverse)).collect();
         let degrees_of_freedom =
             |place: &Option<usize>| place.map_or(f64::INFINITY, |k| (independent * satterthwaite(&shares, k)).max(1.0));
@@ -121,12 +115,11 @@ impl<'a> Scores<'a> {
 }
 
 impl JointScores<'_> {
-    /// What every segment holds, in order of time.
     fn segments(&self) -> &[ReducedRows] {
         self.segments.get_or_init(|| self.rows.factor.reduced_segments())
     }
 
-    /// The information of every segment in whitened coordinates, `w² R⁻ᵀ W_gᵀ W_g R⁻¹`.
+    /// Information of every segment in whitened coordinates, `w² R⁻ᵀ W_gᵀ W_g R⁻¹`.
     pub(super) fn informations(&self) -> impl Iterator<Item = DMatrix<f64>> {
         self.segments().iter().map(|segment| {
             let whitened = &segment.regressor * &self.local_inverse * self.weight;
@@ -134,21 +127,21 @@ impl JointScores<'_> {
         })
     }
 
-    /// By how much leaving out one segment changes the estimate, for every segment: `R⁻ᵀ w W_gᵀ (I − H_g)⁻¹ w (τ_g −
-    /// W_g θ)`, with the segment's part of the hat matrix `H_g = w² W_g A⁻¹ W_gᵀ`.
+    /// Change of the estimate when one segment is left out, for every segment: `R⁻ᵀ w W_gᵀ (I − H_g)⁻¹ w (τ_g − W_g
+    /// θ)` with the segment's block of the hat matrix `H_g = w² W_g A⁻¹ W_gᵀ`.
     pub(super) fn changes_without(&self) -> Vec<DVector<f64>> {
-        // Where a segment alone fixes a direction its own residual there is zero, and so is the quotient; this keeps it
-        // from being 0/0.
-        const ALONE: f64 = 1.0e-6;
+        // If a segment alone determines a direction, its residual and 1 − leverage are both zero there; the ridge
+        // avoids 0/0.
+        const LEVERAGE_RIDGE: f64 = 1.0e-6;
         let theta = DVector::from_column_slice(&self.theta);
-        // A root of w² A⁻¹ over the columns that these rows see, as wide as it is high: the triangle L of R⁻¹ = L Q.
+        // Square root of w² A⁻¹ over the columns of these rows: the triangle L of R⁻¹ = L Q.
         let root = self.local_inverse.transpose().qr().unpack_r().transpose() * self.weight;
         let change = |segment: &ReducedRows| {
             let ReducedRows { regressor, torque } = segment;
             let rest = (torque - regressor * &theta) * self.weight;
             let half = regressor * &root;
-            let left = DMatrix::identity(rest.len(), rest.len()) * (1.0 + ALONE) - &half * half.transpose();
-            // Positive definite but for rounding: the segment is a part of the total, which is one here.
+            let left = DMatrix::identity(rest.len(), rest.len()) * (1.0 + LEVERAGE_RIDGE) - &half * half.transpose();
+            // Positive definite up to rounding: the segment is part of the total, whose hat matrix is the unit matrix.
             let without = left.cholesky().map_or_else(|| rest.clone(), |factor| factor.solve(&rest));
             regressor.tr_mul(&without)
         };
@@ -156,8 +149,7 @@ impl JointScores<'_> {
         whitened(&self.local_inverse, &changes, self.weight)
     }
 
-    /// For every segment its share in the variance of every free column under white noise, `‖w W_g A⁻¹‖²` column by
-    /// column.
+    /// For every segment its share of the variance of every free column under white noise, `‖w W_g A⁻¹‖²` by column.
     fn shares(&self, inverse: &DMatrix<f64>) -> Vec<Vec<f64>> {
         let local_covariance = &self.local_inverse * inverse.transpose() * self.weight;
         let share = |segment: &ReducedRows| {
@@ -168,18 +160,18 @@ impl JointScores<'_> {
     }
 }
 
-/// `R⁻ᵀ` times vectors over the columns of one joint's rows, times a number: all at once.
+/// `R⁻ᵀ` times vectors over the columns of one joint's rows, times a factor.
 fn whitened(local_inverse: &DMatrix<f64>, vectors: &[DVector<f64>], times: f64) -> Vec<DVector<f64>> {
     let stacked = DMatrix::from_fn(local_inverse.nrows(), vectors.len(), |row, g| vectors[g][row]);
     let product = local_inverse.transpose() * stacked * times;
     product.column_iter().map(nalgebra::Matrix::into_owned).collect()
 }
 
-/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
+/// Degrees of freedom of a sum of independent squares with expectations h_g: `(Σ_g h_g)² / Σ_g h_g² − 1`.
 ///
 /// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169,
-/// here without the correlation that the fit puts between clusters, and less the one degree that the jackknife's factor
-/// (G − 1)/G stands for.
+/// here without the correlation that the fit causes between clusters. One degree is subtracted for the jackknife
+/// factor (G − 1)/G.
 fn satterthwaite(shares: &[Vec<f64>], k: usize) -> f64 {
     let (sum, square) = shares.iter().fold((0.0, 0.0), |(sum, square), h| (sum + h[k], square + h[k] * h[k]));
     if square > 0.0 { (sum * sum / square - 1.0).max(1.0) } else { 1.0 }

@@ -1,4 +1,4 @@
-//! Do 95 % intervals hold the truth 95 % of the time when residuals are correlated in time?
+//! Coverage of 95 % intervals for residuals that are correlated in time.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -11,8 +11,8 @@ const SAMPLES: usize = 6_400;
 const RHO: f64 = 0.9;
 const THETA: [f64; 4] = [2.0, -1.0, 0.5, 0.3];
 
-/// Two joints, noise AR(1) of different size; columns as slow as a robot's motion (periods of some 100 to 400 samples),
-/// the last one the sign of a velocity, as Coulomb friction is.
+/// Two joints with AR(1) noise of different size; columns as slow as a robot's motion (periods of about 100 to 400
+/// samples), the last one the sign of a velocity, as for Coulomb friction.
 fn simulated(random: &mut Random, settings: SegmentSettings) -> LinearProblem {
     let names = (0..THETA.len()).map(|c| format!("theta{c}")).collect();
     let mut problem = LinearProblem::new(names, vec!["joint1".into(), "joint2".into()]);
@@ -37,8 +37,8 @@ fn simulated(random: &mut Random, settings: SegmentSettings) -> LinearProblem {
     problem
 }
 
-/// Share of 95 % intervals, over all parameters and runs, that hold the truth: by segments and under white noise; and
-/// the mean effective lag-1 correlation.
+/// Coverage of 95 % intervals over all parameters and runs, by segments and under white noise; and the mean effective
+/// lag-1 correlation.
 fn coverage(weighted: bool) -> (f64, f64, f64) {
     let mut random = Random::new(20_261_121);
     let (mut segments, mut white, mut lag1) = (0, 0, 0.0);
@@ -61,41 +61,39 @@ fn coverage(weighted: bool) -> (f64, f64, f64) {
     (share(segments), share(white), lag1 / runs as f64)
 }
 
-/// With ρ = 0.9 and slow columns the white standard deviation is too small by up to √(1.9/0.1) = 4.4: its "95 %"
-/// interval holds P(|z| < 1.96/4.4) = 34 %, more for the faster columns; 75 % is far above that and far below 95 %. The
-/// interval from segments is asymptotically right; with some 50 segments a joint, normal instead of t quantiles and
-/// sums of neighbours that still correlate a little at the border it may fall a few percent short: 90 % is the least
-/// that deserves the name. 99 % would mean error bars a third too long. Sampling error of a share: √(0.95·0.05/400) =
-/// 1.1 % from the 400 intervals of every day, 0.6 % from the 1,600 of the long run; 95 % itself lies four of the first
-/// above the lower limit and inside of the upper.
+/// With ρ = 0.9 and slow columns the white standard deviation is too small by up to √(1.9/0.1) = 4.4. The coverage of
+/// its "95 %" interval is then P(|z| < 1.96/4.4) = 34 %, more for the faster columns; the limit is 75 %. The interval
+/// from segments is asymptotically correct; with about 50 segments per joint the coverage may be a few percent lower,
+/// so the limits are 90 % and 99 %. Sampling error of the coverage: √(0.95·0.05/400) = 1.1 % for the 400 intervals of
+/// the daily run, 0.6 % for the 1,600 of the long run.
 fn assert_coverage(weighted: bool) {
     let (segments, white, lag1) = coverage(weighted);
     assert!((0.90..=0.99).contains(&segments), "segments {segments}");
     assert!(white < 0.75, "white {white}");
-    // Below ρ = 0.9 since the columns move, above what would be harmless.
+    // Below ρ = 0.9 because the columns move.
     assert!((0.6..0.95).contains(&lag1), "effective lag-1 {lag1}");
 }
 
 #[test]
-fn ordinary_intervals_hold_the_truth_under_coloured_noise() {
+fn ordinary_intervals_cover_under_coloured_noise() {
     assert_coverage(false);
 }
 
 #[test]
-fn weighted_intervals_hold_the_truth_under_coloured_noise() {
+fn weighted_intervals_cover_under_coloured_noise() {
     assert_coverage(true);
 }
 
 #[test]
-fn segments_too_short_for_the_correlation_show_it() {
+fn too_short_segments_show_correlated_scores() {
     let segment_correlation = |settings| {
         let problem = simulated(&mut Random::new(5), settings);
         let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();
         estimate.segment_correlation.iter().sum::<f64>() / 2.0
     };
-    // Sums of AR(1) noise over neighbouring segments of L samples correlate by ρ(1−ρ^L)² / (L(1−ρ²) − 2ρ(1−ρ^L)),
-    // columns being constant over the segments: 0.05 for L = 100, 0.59 for L = 8. A single log of 64 segments and four
-    // columns scatters by 1/√(64·4) = 0.06: three of these allowed.
+    // Sums of AR(1) noise over neighbouring segments of L samples correlate by ρ(1−ρ^L)² / (L(1−ρ²) − 2ρ(1−ρ^L)) for
+    // columns that are constant over the segments: 0.05 for L = 100, 0.59 for L = 8. One log of 64 segments and four
+    // columns has a sampling error of 1/√(64·4) = 0.06; tolerance 3 σ.
     let long = segment_correlation(SegmentSettings::default());
     let short = segment_correlation(SegmentSettings { max_segments: 1024, first_length_rows: 8 });
     assert!(long.abs() < 0.25, "{long}");

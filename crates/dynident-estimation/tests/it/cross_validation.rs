@@ -1,4 +1,4 @@
-//! Cross-validation from factors against fits made row by row.
+//! Cross-validation from factors compared with fits of the rows.
 use dynident_estimation::{
     CrossValidation, EstimationError, LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor,
     ordinary_least_squares,
@@ -6,7 +6,7 @@ use dynident_estimation::{
 
 const ROWS: usize = 200;
 
-/// Columns a, b and the candidates c, d; torque a + 2 b + 3 c and a little of what none explains.
+/// Columns a, b and the candidates c, d; torque a + 2 b + 3 c and a small unexplained part.
 fn rows() -> Vec<Vec<f64>> {
     let wave = |rate: f64, phase: f64| (0..ROWS).map(|k| (rate * k as f64 + phase).sin()).collect::<Vec<_>>();
     let (a, b, c, d) = (wave(0.31, 0.0), wave(0.77, 1.0), wave(1.3, 2.0), wave(2.1, 0.5));
@@ -35,7 +35,7 @@ fn errors_on_left_out_blocks_equal_those_of_fits_without_them() {
         let found = joint.errors(&chosen, &vec![false; chosen.len()]);
         let columns: Vec<usize> = [0, 1].into_iter().chain(chosen.iter().map(|c| c + 2)).collect();
         for fold in 0..5 {
-            // Segments of ten rows, dealt out in turn.
+            // Segments of ten rows, distributed in turn.
             let (out, kept): (Vec<usize>, Vec<usize>) = (0..ROWS).partition(|k| k / 10 % 5 == fold);
             let kept: Vec<Vec<f64>> = rows.iter().map(|c| kept.iter().map(|&k| c[k]).collect()).collect();
             let fit = ordinary_least_squares(&problem(&columns, &kept, 0..160), &OrdinarySettings::default()).unwrap();
@@ -45,19 +45,19 @@ fn errors_on_left_out_blocks_equal_those_of_fits_without_them() {
                 .map(|e| e * e)
                 .sum();
             assert_eq!(found.rows[fold], 40);
-            // Well-conditioned columns of ones and less: two orders of the same sums.
+            // Well-conditioned columns: the difference is rounding of sums in another order.
             assert!((found.squares[fold] - square).abs() < 1e-10 * (1.0 + square), "{chosen:?} {fold}");
         }
     }
-    // With c the error is that of the unexplained part; the sign of the coefficient can be refused.
+    // With c only the unexplained part remains; a negative coefficient is rejected.
     let (with, without) = (joint.errors(&[0], &[true]), joint.errors(&[], &[]));
     assert!(with.rms() < 0.1 && without.rms() > 1.0 && (with.coefficients[0] - 3.0).abs() < 0.1);
     let [excess, error] = without.excess_over(&with);
     assert!(excess > 2.0 * error && with.excess_over(&with) == [0.0, 0.0]);
 }
 
-/// `c` is `0.9 a` and a little of `d`: the oracle is a fit of `c` to the others, row by row. What the others make whole
-/// is infinite, and a column that is orthogonal to them is not inflated.
+/// `c` is `0.9 a` plus part of `d`: the oracle is a fit of `c` to the others, row by row. A dependent column has
+/// infinite inflation, an orthogonal one none.
 #[test]
 fn variance_inflation_is_that_of_a_fit_of_the_column() {
     let mut rows = rows();
@@ -94,7 +94,6 @@ fn a_selection_of_columns_is_the_factor_of_those_columns() {
         assert_eq!(selected.segment_rows(), some.segment_rows());
         for (a, b) in selected.segment_factors().iter().zip(some.segment_factors()) {
             for (row, column) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
-                // Rounding of one more reduction.
                 assert!((a.entry(row, column) - b.entry(row, column)).abs() < 1e-12);
             }
         }
@@ -103,7 +102,7 @@ fn a_selection_of_columns_is_the_factor_of_those_columns() {
 }
 
 #[test]
-fn too_little_data_is_said() {
+fn too_few_data_are_reported() {
     let rows = rows();
     let short = problem(&[0, 1, 2, 3], &rows, 0..30);
     assert!(matches!(CrossValidation::new(&short, 5), Err(EstimationError::TooFewSegments { clusters: 3 })));

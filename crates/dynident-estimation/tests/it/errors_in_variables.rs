@@ -1,4 +1,4 @@
-//! Noise in the regressor, gross errors and bad input: what the estimators do about it.
+//! Noise in the regressor, gross errors and invalid input.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -19,8 +19,8 @@ fn problem_of(panel: &[f64], rows: usize) -> InstrumentedProblem {
     problem
 }
 
-/// Two columns of normal numbers, measured with noise of standard deviation `noise`; instruments with independent noise
-/// of the same size; coloured torque noise.
+/// Two columns of normal numbers, measured with noise of standard deviation `noise`; instruments with independent
+/// noise of the same size; coloured torque noise.
 fn experiment(random: &mut Random, rows: usize, noise: f64) -> Vec<f64> {
     let mut columns = vec![Vec::new(); 5];
     let mut coloured = 0.0;
@@ -53,16 +53,16 @@ fn bias(rows: usize, noise: f64, runs: u32) -> ([f64; 2], [f64; 2]) {
 }
 
 #[test]
-fn more_data_cure_instruments_and_not_least_squares() {
-    // Noise of 0.5: least squares tends to θ/(1 + 0.25), so a bias of −0.4 and 0.2, whatever the rows.
+fn more_data_remove_the_bias_of_instruments_but_not_of_least_squares() {
+    // Noise of 0.5: least squares converges to θ/(1 + 0.25), a bias of −0.4 and 0.2 for any number of rows.
     for rows in [200, 3200] {
         let (plain, instruments) = bias(rows, 0.5, 40);
         for c in 0..2 {
             let limit = -0.2 * THETA[c];
-            // Standard deviation of a run's estimate is about √(1.2/rows) ≈ 0.08 at 200 rows; of the mean of 40 a sixth
-            // of it. Four of those.
+            // A run's estimate has a standard deviation of about √(1.2/rows) ≈ 0.08 at 200 rows; the mean of 40 runs a
+            // sixth of it. Tolerance 4 σ.
             let chance = 4.0 * (2.0 / rows as f64 / 40.0).sqrt();
-            // Finite-sample bias of IV falls as 1/rows and is a few times that.
+            // The finite-sample bias of IV is a few times 1/rows.
             let small = 6.0 / rows as f64;
             assert!((plain[c] - limit).abs() < chance + small, "{rows} rows, column {c}: {}", plain[c]);
             assert!(instruments[c].abs() < chance + small, "{rows} rows, column {c}: {}", instruments[c]);
@@ -71,12 +71,12 @@ fn more_data_cure_instruments_and_not_least_squares() {
 }
 
 #[test]
-fn the_test_has_its_level_and_its_power() {
+fn hausman_test_has_its_level_and_power() {
     let settings = HausmanSettings { level: 0.05, ..Default::default() };
     let mut random = Random::new(11);
     let (mut false_alarms, mut found) = (0, 0);
     for _ in 0..200 {
-        // No noise in W, noise in Z only: least squares is right although residuals are coloured.
+        // Noise in Z only: least squares is correct although residuals are coloured.
         let rows = 640;
         let mut panel = experiment(&mut random, rows, 0.0);
         panel[..2 * rows].iter_mut().for_each(|z| *z += 0.3 * random.normal());
@@ -87,25 +87,24 @@ fn the_test_has_its_level_and_its_power() {
             *count += i32::from(test.verdict == HausmanVerdict::RejectLeastSquares);
         }
     }
-    // 5 % of 200 is 10 with a standard deviation of 3.1; the jackknife is cautious. Four deviations above, and any
-    // number below.
+    // 5 % of 200 is 10 with a standard deviation of 3.1; the jackknife is conservative. Upper limit 4 σ.
     assert!(false_alarms <= 22, "{false_alarms} of 200");
     // A bias of 8 % of θ is fifteen standard deviations here.
     assert_eq!(found, 200);
 }
 
-/// Torque follows what is motion and not what is noise, whatever part of the regressor the instruments leave over.
+/// κ is 1 for motion and 0 for noise in the part of the regressor that the instruments do not explain.
 #[test]
-fn torque_tells_fast_motion_from_noise() {
+fn torque_separates_fast_motion_from_noise() {
     let mut random = Random::new(5);
     let (rows, runs) = (640, 100);
     let mut inside = [0, 0];
     for _ in 0..runs {
         let clean = experiment(&mut random, rows, 0.0);
-        // Instruments that hold less than the motion: what they leave over is motion.
+        // Noisy instruments: the unexplained part is motion.
         let mut fewer = clean.clone();
         fewer[..2 * rows].iter_mut().for_each(|z| *z += 0.3 * random.normal());
-        // A regressor with noise, instruments without: what they leave over is noise.
+        // Noisy regressor, exact instruments: the unexplained part is noise.
         let mut noisy = clean;
         noisy[2 * rows..4 * rows].iter_mut().for_each(|w| *w += 0.3 * random.normal());
         for (place, (panel, expected)) in [(fewer, 1.0), (noisy, 0.0)].into_iter().enumerate() {
@@ -117,7 +116,7 @@ fn torque_tells_fast_motion_from_noise() {
             assert!((fast.followed - expected).abs() < 0.5 && fast.share_of_torque < 0.5, "{fast:?}");
         }
     }
-    // 95 of 100 with a standard deviation of 2.2, four of them below; θ is taken for exact, which costs a little.
+    // 95 of 100 with a standard deviation of 2.2; lower limit 4 σ and an allowance for the uncertainty of θ.
     assert!(inside.iter().all(|&count| count >= 84), "{inside:?}");
 }
 
@@ -126,14 +125,14 @@ fn weak_and_useless_instruments_are_named() {
     let mut random = Random::new(3);
     let rows = 400;
     let mut panel = experiment(&mut random, rows, 0.1);
-    // The first instrument becomes noise of its own.
+    // The first instrument is independent noise.
     panel[..rows].iter_mut().for_each(|z| *z = random.normal());
     let problem = problem_of(&panel, rows);
     let found = instrumental_variables(&problem, &InstrumentalSettings::default()).unwrap();
     assert!(found.instruments.weak, "{:?}", found.instruments);
     assert_eq!(found.instruments.weakest_column.as_deref(), Some("inertia"));
     assert!(found.estimate.values.iter().chain(&found.estimate.std).all(|v| v.is_finite()));
-    // An instrument that never moves leaves its column at the fallback.
+    // A constant instrument: its column stays at the fallback.
     panel[..rows].fill(0.0);
     let problem = problem_of(&panel, rows).with_fallback(vec![1.5, 0.0]).unwrap();
     let found = instrumental_variables(&problem, &InstrumentalSettings::default()).unwrap();
@@ -142,7 +141,7 @@ fn weak_and_useless_instruments_are_named() {
     assert!(found.estimate.values.iter().chain(&found.estimate.std).all(|v| v.is_finite()));
     let test = hausman_test(&problem, &found, &HausmanSettings::default()).unwrap();
     assert!(test.f.is_none_or(f64::is_finite));
-    // Instruments that are the regressor itself decide nothing.
+    // Instruments equal to the regressor: undecided.
     let regressor = panel[2 * rows..4 * rows].to_vec();
     panel[..2 * rows].copy_from_slice(&regressor);
     let problem = problem_of(&panel, rows);
@@ -154,7 +153,7 @@ fn weak_and_useless_instruments_are_named() {
 }
 
 #[test]
-fn too_few_rows_and_joints_at_rest_are_refused_or_survived() {
+fn too_few_rows_are_refused_and_resting_joints_accepted() {
     let mut random = Random::new(5);
     let few = problem_of(&experiment(&mut random, 2, 0.1), 2);
     let refused = instrumental_variables(&few, &InstrumentalSettings::default());
@@ -162,7 +161,7 @@ fn too_few_rows_and_joints_at_rest_are_refused_or_survived() {
     let empty = InstrumentedProblem::new(vec!["a".into()], vec!["joint1".into()]);
     let refused = instrumental_variables(&empty, &InstrumentalSettings::default());
     assert_eq!(refused, Err(EstimationError::Empty));
-    // Torque and columns all zero: everything stays at the fallback.
+    // Zero torque and columns: all values stay at the fallback.
     let rest = problem_of(&[0.0; 320], 64);
     let found = instrumental_variables(&rest, &InstrumentalSettings::default()).unwrap();
     assert_eq!(found.estimate.rank.fixed.len(), 2);
@@ -175,7 +174,7 @@ fn too_few_rows_and_joints_at_rest_are_refused_or_survived() {
     .unwrap();
     assert_eq!(robust.estimate.values, [0.0, 0.0]);
     assert!(robust.estimate.joint_sigma[0].is_finite());
-    // A pass that gives other rows than the problem holds.
+    // A pass with rows that differ from those of the problem.
     let other = robust_least_squares::<EstimationError>(&plain, &RobustSettings::default(), |visit| {
         visit(&RowBlock { log: 0, joint: 0, rows: 32, panel: &panel[..96] })
     });
@@ -191,13 +190,13 @@ fn too_few_rows_and_joints_at_rest_are_refused_or_survived() {
     factor.absorb(&[x, tau, noise].concat(), 64).unwrap();
     problem.add("run", factor).unwrap();
     let found = generalized_least_squares(&problem, &WeightedSettings::default()).unwrap();
-    // The second joint determines the first one's error, down to the limit on correlation of 1 − 1e-9: √2e-9 of it is
-    // left.
+    // The second joint determines the first one's error up to the correlation limit of 1 − 1e-9: a share of √2e-9
+    // remains.
     assert!((found.estimate.values[0] - 3.0).abs() < 1.0e-4, "{}", found.estimate.values[0]);
     assert!(found.estimate.covariance.iter().all(|v| v.is_finite()));
 }
 
-/// Root mean square error of the parameters over `runs`, measured by the clean error bars' scale.
+/// RMS error of the parameters over `runs`, relative to the error bars without outliers.
 fn robust_error(share: f64, weight: Option<RowWeight>, runs: u32) -> f64 {
     let mut random = Random::new(23);
     let rows = 300;
@@ -207,7 +206,7 @@ fn robust_error(share: f64, weight: Option<RowWeight>, runs: u32) -> f64 {
         for row in 0..rows {
             let (a, b) = (random.normal(), 1.0 + random.uniform());
             let clean = THETA[0] * a + THETA[1] * b + 0.1 * random.normal();
-            // Always drawn, so that all settings see the same noise.
+            // Always drawn, so that all settings have the same noise.
             let (chance, gross) = (random.uniform(), 5.0 * random.normal());
             let tau = clean + if chance < share { gross } else { 0.0 };
             (panel[row], panel[rows + row], panel[2 * rows + row]) = (a, b, tau);
@@ -222,7 +221,7 @@ fn robust_error(share: f64, weight: Option<RowWeight>, runs: u32) -> f64 {
             Some(weight) => {
                 let settings = RobustSettings { weight, ..Default::default() };
                 robust_least_squares::<EstimationError>(&problem, &settings, |visit| {
-                    // In two blocks, as a stream would come.
+                    // In two blocks, as from a stream.
                     let half = rows / 2;
                     for (from, to) in [(0, half), (half, rows)] {
                         let part: Vec<f64> =
@@ -249,7 +248,7 @@ fn gross_errors_cost_reweighting_at_most_a_fifth() {
     assert!(spoilt > 5.0 * clean, "least squares suffers: {spoilt} against {clean}");
     for weight in [RowWeight::huber(), RowWeight::tukey()] {
         let robust = robust_error(0.05, Some(weight), runs);
-        // The project's own goal.
+        // Requirement of the project.
         assert!(robust <= 1.2 * clean, "{weight:?}: {robust} against {clean}");
     }
 }

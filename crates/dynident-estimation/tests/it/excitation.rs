@@ -1,4 +1,4 @@
-//! Columns that noise of the motion makes.
+//! Columns that contain only noise of the motion.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -25,8 +25,8 @@ fn problem(rows: &[DMatrix<f64>], tau: &[DVector<f64>]) -> LinearProblem {
 
 type Rows = Vec<DMatrix<f64>>;
 
-/// Rows, what noise adds to them, torque. Columns: 0 and 1 are motion with a little noise; 2 is noise alone; 3 is
-/// constant, and so is 4 but for noise; 5 is zero.
+/// Rows, their noise, torque. Columns: 0 and 1 are motion with some noise; 2 is noise; 3 is constant; 4 is constant
+/// with noise; 5 is zero.
 fn at_rest() -> (Rows, Rows, Vec<DVector<f64>>) {
     let mut random = Random::new(5);
     let noise = [0.01, 0.02, 0.3, 0.0, 0.05, 0.0];
@@ -55,10 +55,10 @@ fn found(rows: &[DMatrix<f64>], made: &[DMatrix<f64>], scales: Option<&[f64]>) -
 }
 
 #[test]
-fn what_noise_makes_is_held() {
+fn columns_of_noise_are_held() {
     let (rows, made, torques) = at_rest();
     let unexcited = found(&rows, &made, None);
-    // Of the two constant columns the exact one is clearer.
+    // Of the two constant columns the exact one is selected.
     assert_eq!((&unexcited.columns[..], &unexcited.silent[..]), (&[2, 4, 5][..], &[2, 5][..]));
     let nominal = vec![0.0, 0.0, 2.5, 0.0, 0.2, 6.0];
     let problem = problem(&rows, &torques).with_fallback(nominal.clone()).unwrap().with_unexcited(unexcited).unwrap();
@@ -67,12 +67,12 @@ fn what_noise_makes_is_held() {
     for column in [2, 4, 5] {
         assert_eq!((estimate.values[column], estimate.std[column]), (nominal[column], 0.0));
     }
-    // Standard errors of 0.1 over the root of 800 rows and nominal torque of noise 2.5 * 0.3: five of 0.027. Of the
-    // sum p3 + 2 p4 = 1 the estimate is p3 with p4 at nominal.
+    // Standard errors: 0.1 over the root of 800 rows, plus torque from the nominal value 2.5 and noise 0.3: 0.027 in
+    // all; tolerance 5 σ. The data determine p3 + 2 p4 = 1, so the estimate is p3 with p4 at nominal.
     for (column, expected) in [(0, 1.0), (1, -2.0), (3, 1.0 - 2.0 * 0.2)] {
         assert!((estimate.values[column] - expected).abs() < 0.14, "{column}: {}", estimate.values[column]);
     }
-    // It answers to p4 alone; what is noise alone, nothing answers to.
+    // p3 depends on p4; nothing depends on pure noise columns.
     let answers = |column: usize| {
         let fixed = estimate.rank.fixed.iter().find(|fixed| fixed.column == column).unwrap();
         assert!(fixed.noise);
@@ -80,7 +80,7 @@ fn what_noise_makes_is_held() {
     };
     assert!((answers(4)[3] + 2.0).abs() < 0.05 && answers(4)[0].abs() < 0.05, "{:?}", answers(4));
     assert_eq!((answers(2), answers(5)), (vec![0.0; 6], vec![0.0; 6]));
-    // Consistent bodies hear of the sum and not of the noise.
+    // The combination is kept and the noise removed.
     let factor = problem.combined_without_noise(&[1.0; JOINTS], &RankSettings::default()).unwrap();
     let norms = factor.column_norms();
     assert_eq!((norms[2], norms[5]), (0.0, 0.0));
@@ -88,7 +88,7 @@ fn what_noise_makes_is_held() {
 }
 
 #[test]
-fn neither_order_nor_units_matter() {
+fn order_and_units_do_not_matter() {
     let (rows, made, _) = at_rest();
     let plain = found(&rows, &made, None).columns;
     let order = [4, 2, 0, 5, 3, 1];
@@ -103,7 +103,7 @@ fn neither_order_nor_units_matter() {
         all.iter().map(|rows| DMatrix::from_fn(ROWS, 6, |r, c| unit(c) * rows[(r, c)])).collect()
     };
     assert_eq!(found(&scaled(&rows), &scaled(&made), None).columns, plain);
-    // Where it is known how wrong each can be, the one that can be most wrong is estimated: here p4.
+    // With known scales the parameter with the largest torque error is estimated: p4.
     let scales = [1.0, 1.0, 1.0, 0.1, 1.0, 1.0];
     assert_eq!(found(&rows, &made, Some(&scales)).columns, [2, 3, 5]);
     let in_units: Vec<f64> = (0..6).map(|c| scales[c] / unit(c)).collect();
@@ -111,7 +111,7 @@ fn neither_order_nor_units_matter() {
 }
 
 #[test]
-fn without_noise_nothing_but_dependence_is_held() {
+fn without_noise_only_dependent_columns_are_held() {
     let (rows, made, _) = at_rest();
     let none: Vec<DMatrix<f64>> = made.iter().map(|rows| rows * 0.0).collect();
     assert_eq!(found(&rows, &none, None).columns, [5]);

@@ -1,4 +1,4 @@
-//! Triangular and segmented factors: RᵀR = [W | τ]ᵀ[W | τ], whatever the blocking and order.
+//! Triangular and segmented factors: RᵀR = [W | τ]ᵀ[W | τ] for any blocking and order.
 
 use crate::common::Random;
 use dynident_estimation::factor::FactorWorkspace;
@@ -7,8 +7,8 @@ use dynident_lanes::Level;
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
-/// Householder reduction is backward stable: the error of R is a modest multiple of rows · columns · 1.1e-16 of the
-/// matrix norm. 1e-12 leaves room for 400 × 50 and fails for any wrong formula.
+/// Householder reduction is backward stable: the error of R is a small multiple of rows · columns · 1.1e-16 of the
+/// matrix norm. 1e-12 is sufficient for 400 × 50.
 const TOLERANCE: f64 = 1.0e-12;
 
 fn rows(random: &mut Random, rows: usize, columns: usize) -> DMatrix<f64> {
@@ -19,12 +19,11 @@ fn triangle(factor: &TriangularFactor) -> DMatrix<f64> {
     DMatrix::from_fn(factor.columns() + 1, factor.columns() + 1, |r, c| factor.entry(r, c))
 }
 
-/// The larger error; a NaN is the largest.
+/// The larger error; a NaN is treated as infinite.
 fn worse(a: f64, b: f64) -> f64 {
     if b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
-/// Differences of Gram matrices, relative to the column norms.
 fn gram_difference(r: &DMatrix<f64>, w: &DMatrix<f64>) -> f64 {
     let (a, b) = (r.tr_mul(r), w.tr_mul(w));
     let mut worst = 0.0_f64;
@@ -37,7 +36,6 @@ fn gram_difference(r: &DMatrix<f64>, w: &DMatrix<f64>) -> f64 {
     worst
 }
 
-/// Differences of triangles, relative to the norm of each column.
 fn triangle_difference(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     (0..a.ncols()).map(|c| (a.column(c) - b.column(c)).norm() / b.column(c).norm()).fold(0.0, worse)
 }
@@ -46,14 +44,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
     #[test]
-    fn the_gram_matrix_is_kept(seed in 0_u64..1_000_000, count in 0_usize..400, columns in 0_usize..50) {
+    fn gram_matrix_is_preserved(seed in 0_u64..1_000_000, count in 0_usize..400, columns in 0_usize..50) {
         let w = rows(&mut Random::new(seed), count, columns);
         let factor = TriangularFactor::from_rows(columns, w.as_slice(), count).unwrap();
         prop_assert_eq!(factor.rows(), count);
         let r = triangle(&factor);
         prop_assert!(gram_difference(&r, &w) < TOLERANCE);
         prop_assert!((0..=columns).all(|k| r[(k, k)] >= 0.0));
-        // From the condition of these well-excited columns (at most some 1e4 after scaling, when barely square) ample.
+        // Sufficient for these well-excited columns (condition number at most about 1e4 after scaling).
         let theta: Vec<f64> = (0..columns).map(|c| c as f64 - 2.0).collect();
         let residual = w.column(columns) - w.columns(0, columns) * nalgebra::DVector::from_vec(theta.clone());
         let rss = factor.residual_sum_of_squares(&theta).unwrap();
@@ -97,18 +95,17 @@ proptest! {
         for block in blocks.iter().rev() {
             backward.absorb(block.as_slice(), block.nrows()).unwrap();
         }
-        // R is unique with its diagonal positive; its error grows with the condition, here below 1e3 after scaling
-        // (three times as many rows as columns at least): 1e3 times the tolerance of the Gram matrix.
+        // R with positive diagonal is unique; its error grows with the condition number, here below 1e3 after scaling
+        // (at least three times as many rows as columns): 1e3 times the tolerance of the Gram matrix.
         for other in [&forward, &merged, &backward] {
             prop_assert_eq!(other.rows(), count);
             prop_assert!(triangle_difference(&triangle(other), &triangle(&whole)) < 1.0e3 * TOLERANCE);
         }
     }
 
-    /// The total is kept once somebody asked: rows that come later are in it, and what is made of the factor has its
-    /// own.
+    /// The cached total is updated by later rows, and derived factors have their own totals.
     #[test]
-    fn a_kept_total_is_that_of_all_rows(seed in 0_u64..1_000_000, columns in 1_usize..9, counts in prop::array::uniform2(1_usize..90)) {
+    fn cached_total_equals_that_of_all_rows(seed in 0_u64..1_000_000, columns in 1_usize..9, counts in prop::array::uniform2(1_usize..90)) {
         let mut random = Random::new(seed);
         let settings = SegmentSettings { max_segments: 4, first_length_rows: 3 };
         let mut segmented = SegmentedFactor::new(columns, settings).unwrap();
@@ -123,7 +120,7 @@ proptest! {
             prop_assert!(gram_difference(&triangle(segmented.total()), &all) < TOLERANCE);
         }
 
-        // The first column alone; then twice the first, and the torque less the last.
+        // The first column alone; then twice the first, and the torque minus the last.
         let first = segmented.selected(&[0]).unwrap();
         let mut map = DMatrix::zeros(columns + 1, 2);
         (map[(0, 0)], map[(columns, 1)], map[(columns - 1, 1)]) = (2.0, 1.0, -1.0);
@@ -137,7 +134,7 @@ proptest! {
     }
 
     #[test]
-    fn segments_hold_the_same_rows(seed in 0_u64..1_000_000, columns in 0_usize..12, most in 2_usize..9, first in 1_usize..20, calls in prop::collection::vec(0_usize..70, 0..12)) {
+    fn segments_contain_the_same_rows(seed in 0_u64..1_000_000, columns in 0_usize..12, most in 2_usize..9, first in 1_usize..20, calls in prop::collection::vec(0_usize..70, 0..12)) {
         let mut random = Random::new(seed);
         let settings = SegmentSettings { max_segments: most, first_length_rows: first };
         let mut segmented = SegmentedFactor::new(columns, settings).unwrap();
@@ -157,7 +154,7 @@ proptest! {
         if let Some((last, equal)) = lengths.split_last() {
             prop_assert!(equal.iter().all(|l| l == &equal[0] && l % first == 0 && last <= l));
         }
-        // Every segment is exactly its rows: factor and scores.
+        // Factor and scores of every segment match its rows.
         let theta: Vec<f64> = (0..columns).map(|c| 0.5 - c as f64).collect();
         let scores = segmented.scores(&theta).unwrap();
         let mut start = 0;
@@ -195,8 +192,8 @@ fn the_same_input_gives_the_same_bits() {
     assert_eq!(factor(), factor());
 }
 
-/// What is left of a dependent column is rounding error, of the next one rounding error of that, and so on down to
-/// 1e-114, whose cube is zero: once a division by it.
+/// The remainder of a dependent column is rounding error, that of the next one its rounding error, and so on down to
+/// 1e-114, whose cube underflows to zero. A division by this zero must not occur.
 #[test]
 fn a_single_row_of_many_columns_stays_finite() {
     let w = rows(&mut Random::new(0), 1, 26);
@@ -250,7 +247,7 @@ fn a_weight_scales_the_triangle() {
     assert!((factor.residual_sum_of_squares(&[0.0]).unwrap() - 8.0).abs() < 1e-13);
 }
 
-/// Samples of some rows each, of which row m begins at `begins[m]`, into both factors.
+/// Samples of some rows each, in which row m begins at `begins[m]`, absorbed into both factors.
 fn recursive(
     seed: u64,
     columns: usize,
@@ -279,8 +276,8 @@ fn recursive(
 
 #[test]
 fn sample_by_sample_is_the_same_triangle() {
-    // Columns of one line and of several, whole and not; more rows than are reflected together; rows in any order of
-    // their beginnings, and one that has the torque alone.
+    // Columns within one line and over several; more rows than one group; rows in any order of their beginnings, and
+    // one row with torque only.
     let shapes: [(usize, &[usize]); 6] = [
         (1, &[0]),
         (7, &[0, 3]),
@@ -299,7 +296,7 @@ fn sample_by_sample_is_the_same_triangle() {
                 let found = triangle(&found);
                 assert!(found.diagonal().iter().all(|&value| value >= 0.0));
                 assert!(gram_difference(&found, &all) < TOLERANCE, "{columns} columns, {samples}, {}", level.name());
-                // Unique where the rows determine all columns.
+                // R is unique if the rows determine all columns.
                 if samples == 40 && begins[0] == 0 {
                     assert!(triangle_difference(&found, &expected) < 1e-10, "{columns} columns, {}", level.name());
                     let mut values = vec![0.0; columns];
@@ -315,7 +312,7 @@ fn sample_by_sample_is_the_same_triangle() {
 }
 
 #[test]
-fn a_sample_with_a_number_that_is_none_is_refused_whole() {
+fn samples_with_nan_are_refused_whole() {
     let (mut factor, _) = recursive(4, 12, &[5, 0, 2], 9, Level::detect());
     let before = factor.to_triangular();
     for bad in [f64::NAN, f64::INFINITY, -1e150] {
@@ -325,7 +322,7 @@ fn a_sample_with_a_number_that_is_none_is_refused_whole() {
         assert!(matches!(refused, Err(EstimationError::Unusable { row: 0, column: 9, .. })), "{refused:?}");
         assert_eq!(factor.to_triangular(), before);
     }
-    // And nothing of it is left for the next one, of zeros.
+    // Nothing of the rejected sample remains for the next one.
     factor.absorb().unwrap();
     assert_eq!(triangle(&factor.to_triangular()), triangle(&before));
     factor.scale(2.0).unwrap();

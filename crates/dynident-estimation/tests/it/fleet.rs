@@ -1,4 +1,4 @@
-//! Fleets: a published example, false alarms as promised, and the robot that is not like the others.
+//! Fleets: a published example, the false-alarm rate, and a deviating robot.
 
 use crate::common::Random;
 use dynident_estimation::fleet::{Member, drift, spread};
@@ -20,27 +20,27 @@ const TRIALS: [[f64; 4]; 13] = [
     [27., 16886., 29., 17825.],
 ];
 
-/// Figures that every program for meta-analysis gives by DerSimonian and Laird's method for these trials (log risk
-/// ratios): Q = 152.23, τ² = 0.3088, mean -0.7141 ± 0.1787. To the digits printed.
+/// Published results of DerSimonian and Laird's method for these trials (log risk ratios): Q = 152.23, τ² = 0.3088,
+/// mean -0.7141 ± 0.1787, to the printed digits.
 #[test]
-fn the_trials_of_a_vaccine() {
+fn vaccine_trials_give_the_published_result() {
     let trial = |[cases, others, cases_without, others_without]: [f64; 4]| {
         let (all, without) = (cases + others, cases_without + others_without);
         let variance = cases.recip() - all.recip() + cases_without.recip() - without.recip();
         let ratio = ((cases / all) / (cases_without / without)).ln();
         Member { name: "trial".to_owned(), values: vec![ratio], std: vec![variance.sqrt()] }
     };
-    // So small a false-alarm rate sets no trial aside.
+    // This false-alarm rate excludes no trial.
     let found = spread(&TRIALS.map(trial), 1e-12).unwrap();
     let own = found.parameters[0].unwrap();
     assert!(found.members.iter().all(|one| !one.is_unlike));
     assert!((own.between_std.powi(2) - 0.3088).abs() < 5e-5, "{}", own.between_std.powi(2));
     assert!((own.mean + 0.7141).abs() < 5e-5 && (own.mean_std - 0.1787).abs() < 5e-5, "{own:?}");
-    // Of chi-squared with 12 degrees the tail beyond 152.23.
+    // Tail of chi-squared with 12 degrees of freedom beyond 152.23.
     assert!((own.tail / 2.0e-26).ln().abs() < 1.0 && own.differs, "{}", own.tail);
 }
 
-/// A fleet whose robots differ by `between` (in standard deviations of a bar of one to three units).
+/// A fleet whose robots differ by `between` standard deviations; error bars of one to three units.
 fn fleet(random: &mut Random, robots: usize, between: f64) -> Vec<Member> {
     let one = |robot: usize, random: &mut Random| {
         let std: Vec<f64> = (0..10).map(|_| 1.0 + 2.0 * random.uniform()).collect();
@@ -50,10 +50,10 @@ fn fleet(random: &mut Random, robots: usize, between: f64) -> Vec<Member> {
     (0..robots).map(|robot| one(robot, random)).collect()
 }
 
-/// Of 1,000 fleets of equals with a promised rate of 5 %, at most 50 + 3 √50 = 71 name a robot; and no more where
-/// robots differ by nature.
+/// Of 1,000 fleets of equal robots at a false-alarm rate of 5 %, at most 50 + 3 √50 = 71 report a robot; the same for
+/// fleets with a natural spread.
 #[test]
-fn healthy_robots_are_seldom_named() {
+fn false_alarms_of_outliers_have_the_nominal_rate() {
     for between in [0.0, 2.0, 20.0] {
         let mut random = Random::new(11);
         let mut named = 0;
@@ -65,10 +65,10 @@ fn healthy_robots_are_seldom_named() {
     }
 }
 
-/// Two of twenty robots far off in one parameter each: both are named, with the parameter, and the rest are a fleet
-/// without a difference.
+/// Two of twenty robots deviate strongly in one parameter each: both are reported with the parameter, and the rest
+/// does not differ.
 #[test]
-fn robots_that_are_unlike_are_named_with_the_reason() {
+fn outliers_are_named_with_the_reason() {
     for seed in 0..20 {
         let mut members = fleet(&mut Random::new(seed), 20, 0.0);
         members[4].values[3] += 60.0;
@@ -81,10 +81,10 @@ fn robots_that_are_unlike_are_named_with_the_reason() {
     }
 }
 
-/// As for fleets: of 1,000 robots that do not change at most 71 are said to, at a promised 5 %, also where the weeks
-/// scatter by twice their bars; one that does is named.
+/// Of 1,000 unchanged robots at most 71 are reported as drifting at 5 %, also if the weeks scatter by twice their
+/// error bars; a drifting robot is reported.
 #[test]
-fn what_does_not_wander_is_seldom_named() {
+fn false_alarms_of_drift_have_the_nominal_rate() {
     for scatter in [1.0, 2.0] {
         let mut random = Random::new(5);
         let (mut named, mut seen) = (0, 0);
@@ -112,14 +112,14 @@ fn drifts(members: &[Member], weeks: &[f64]) -> Vec<bool> {
 }
 
 #[test]
-fn what_cannot_be_compared_is_said() {
+fn incomparable_members_are_reported() {
     let one = |value: f64, std: f64| Member { name: "one".to_owned(), values: vec![value], std: vec![std] };
     let said = |members: &[Member], rate: f64| spread(members, rate).unwrap_err().to_string();
     assert!(said(&[one(1.0, 1.0), one(1.0, 1.0)], 0.01).contains("at least: expected 3, found 2"));
-    assert!(said(&[one(1.0, 1.0), one(f64::NAN, 1.0), one(1.0, 1.0)], 0.01).contains("leave this estimate out"));
+    assert!(said(&[one(1.0, 1.0), one(f64::NAN, 1.0), one(1.0, 1.0)], 0.01).contains("remove this estimate"));
     assert!(said(&[one(1.0, 1.0), one(1.0, -1.0), one(1.0, 1.0)], 0.01).contains("standard deviation"));
     assert!(said(&[one(1.0, 1.0), one(1.0, 1.0), one(1.0, 1.0)], 0.0).contains("false_alarm"));
-    // What nobody estimated is not compared; estimates of one day have no slope.
+    // A parameter without estimates is not compared; estimates at one time have no slope.
     let held = [one(1.0, 0.0), one(1.0, 0.0), one(1.0, 0.0)];
     assert!(spread(&held, 0.01).unwrap().parameters[0].is_none());
     let same_day = [one(1.0, 1.0), one(1.0, 1.0), one(1.0, 1.0)];

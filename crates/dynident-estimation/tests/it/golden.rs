@@ -1,4 +1,4 @@
-//! Estimators against statsmodels and NumPy (golden/statsmodels_estimators.py).
+//! Estimators compared with statsmodels and NumPy (golden/statsmodels_estimators.py).
 
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimateStatus, LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor,
@@ -7,8 +7,8 @@ use dynident_estimation::{
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-/// Both sides work in double precision on rows with a condition number of 2.7e3 raw (2 scaled). The oracle's products
-/// of XᵀX lose at most its square times 1.1e-16, that is 8e-10.
+/// Double precision on rows with a condition number of 2.7e3 raw (2 scaled). The oracle's XᵀX loses at most its square
+/// times 1.1e-16, i.e. 8e-10.
 const RELATIVE: f64 = 1.0e-9;
 
 fn golden() -> Value {

@@ -1,4 +1,4 @@
-//! Robust, instrumental and generalised least squares against statsmodels (golden/statsmodels_robust.py).
+//! Robust, instrumental and generalised least squares compared with statsmodels (golden/statsmodels_robust.py).
 
 use dynident_estimation::{
     CovarianceMethod, CrossProblem, EstimationError, HausmanSettings, HausmanVerdict, InstrumentalSettings,
@@ -60,15 +60,15 @@ fn robust_estimates_agree_with_statsmodels() {
             visit(&RowBlock { log: 0, joint: 0, rows: tau.len(), panel: &panel })
         })
         .unwrap();
-        // The oracle stops when its coefficients change by 1e-13; its convergence is linear with a factor well below
-        // 0.9, so it is within 1e-12.
+        // The oracle stops when its coefficients change by 1e-13 and converges linearly with a factor well below 0.9,
+        // so it is accurate to 1e-12.
         close_all(name, &found.estimate.values, &numbers(&data[name]["values"]), RELATIVE);
         close_all("scale", &found.estimate.joint_sigma, &[data[name]["scale"].as_f64().unwrap()], RELATIVE);
         let widths = found.estimate.std.iter().zip(&found.estimate.std_degrees_of_freedom);
         let widths: Vec<f64> =
             widths.map(|(std, degrees_of_freedom)| student_half_width(0.95, *degrees_of_freedom) * std).collect();
         close_all("half width", &found.estimate.half_width_95, &widths, RELATIVE);
-        // Twelve of 240 rows are off.
+        // Twelve of 240 rows are outliers.
         assert!((0.03..0.08).contains(&found.outlier_share[0]), "{:?}", found.outlier_share);
     }
 }
@@ -113,7 +113,7 @@ fn instrumental_variables_agree_with_statsmodels() {
     let white = HausmanSettings { covariance: CovarianceMethod::White, ..Default::default() };
     let test = hausman_test(&problem, &found, &white).unwrap();
     close_all("F", &[test.f.unwrap()], &[expected["hausman_f"].as_f64().unwrap()], RELATIVE);
-    // The tail of a large F: its logarithm is about 250, so a relative error of F is multiplied by that.
+    // The logarithm of this tail is about 250, so a relative error of F is multiplied by that.
     close_all("p", &[test.p_value.unwrap()], &[expected["hausman_p"].as_f64().unwrap()], 1.0e-6);
     assert_eq!(test.degrees_of_freedom, [2.0, 295.0]);
     let test = hausman_test(&problem, &found, &HausmanSettings::default()).unwrap();

@@ -1,4 +1,4 @@
-//! Newey and West against statsmodels; essential parameters against a fit with fewer columns.
+//! Newey-West covariance compared with statsmodels; essential parameters compared with a fit of fewer columns.
 
 use dynident_estimation::{
     CovarianceMethod, EssentialEnd, EssentialSettings, Estimate, LinearProblem, OrdinarySettings, SegmentSettings,
@@ -18,10 +18,10 @@ fn fit(columns: &[Vec<f64>], tau: &[f64], segments: SegmentSettings, covariance:
     ordinary_least_squares(&problem, &OrdinarySettings { covariance, ..OrdinarySettings::default() }).unwrap()
 }
 
-/// Segments of one row make it the textbook's. Double precision on both sides, a condition number below 100: its square
-/// times rounding is 1e-12.
+/// With segments of one row it is the textbook form. Double precision, condition number below 100: its square times
+/// rounding is 1e-12.
 #[test]
-fn newey_west_is_that_of_statsmodels() {
+fn newey_west_agrees_with_statsmodels() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../golden/statsmodels_newey_west.json");
     let golden: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let numbers =
@@ -42,10 +42,9 @@ fn columns(random: &mut Random, rows: usize, count: usize) -> Vec<Vec<f64>> {
     (0..count).map(|_| (0..rows).map(|_| random.normal()).collect()).collect()
 }
 
-/// Two of four parameters are zero: they go, the others stay, and what remains is ordinary least squares on the two
-/// columns left.
+/// Two of four parameters are zero and are dropped; the result equals ordinary least squares on the other two.
 #[test]
-fn what_the_data_do_not_tell_is_dropped() {
+fn insignificant_parameters_are_dropped() {
     let mut random = Random::new(3);
     let w = columns(&mut random, 400, 4);
     let tau: Vec<f64> = (0..400).map(|k| 2.0 * w[0][k] - 3.0 * w[2][k] + 0.1 * random.normal()).collect();
@@ -57,20 +56,20 @@ fn what_the_data_do_not_tell_is_dropped() {
     assert_eq!((report.kept, report.end), (2, EssentialEnd::RatioReached));
     let two = fit(&[w[0].clone(), w[2].clone()], &tau, SegmentSettings::default(), CovarianceMethod::White);
     for (column, expected) in [(0, two.values[0]), (2, two.values[1])] {
-        // Both solve the same normal equations, with a condition number near one.
+        // Both solve the same equations with a condition number near one.
         assert!((reduced.values[column] - expected).abs() < 1e-12);
     }
     assert_eq!((reduced.values[1], reduced.std[3]), (0.0, 0.0));
     // F of two fits: ((RSS₂ − RSS₄)/2) / (RSS₄/(N − 4)).
     let square = |estimate: &Estimate| estimate.joint_sigma[0].powi(2) * estimate.degrees_of_freedom as f64;
     let f = (square(&two) - square(&full)) / 2.0 / (square(&full) / 396.0);
-    // The growth is a small difference of two sums of squares: 1e-16 over its share of 1e-3, with a margin.
+    // Small difference of two sums of squares: 1e-16 over its share of 1e-3, with margin.
     assert!((report.dropped[1].f - f).abs() < 1e-9 * f.max(1.0), "{} {f}", report.dropped[1].f);
 }
 
-/// A parameter that is poorly known but plainly not zero stays: the F-test speaks for it.
+/// A poorly determined parameter that is significantly different from zero is kept by the F-test.
 #[test]
-fn what_the_residual_needs_stays() {
+fn parameters_needed_by_the_residual_stay() {
     let mut random = Random::new(4);
     let w = columns(&mut random, 400, 2);
     let tau: Vec<f64> = (0..400).map(|k| 50.0 * w[0][k] + 0.05 * w[1][k] + 0.1 * random.normal()).collect();
@@ -87,9 +86,9 @@ fn reduced_nothing() -> Estimate {
     fit(&w, &w[0].clone(), SegmentSettings::default(), CovarianceMethod::White)
 }
 
-/// Columns a and a + small b: their estimates are correlated with almost −1.
+/// Columns a and a + small b have estimates with a correlation near −1.
 #[test]
-fn near_twins_are_the_strongest_pair() {
+fn similar_columns_are_the_strongest_pair() {
     let mut random = Random::new(6);
     let mut w = columns(&mut random, 300, 3);
     w[2] = w[0].iter().zip(&w[2]).map(|(a, b)| a + 0.1 * b).collect();

@@ -1,4 +1,4 @@
-//! The jackknife covariance: against fits that really leave segments out, and its coverage where segments are few.
+//! The jackknife covariance compared with fits that leave segments out, and its coverage with few segments.
 
 use dynident_estimation::{
     CovarianceMethod, Estimate, LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor,
@@ -37,7 +37,7 @@ fn fit(rows: &[Vec<f64>], length: usize, covariance: CovarianceMethod) -> Estima
 #[test]
 fn equals_fits_that_leave_one_segment_out() {
     let mut random = Random::new(8);
-    // Segments that are factors, that are rows, and rows fewer than columns.
+    // Segments stored as factors, as rows, and with fewer rows than columns.
     for (length, segments) in [(25, 12), (12, 25), (4, 75)] {
         let rows = rows(&mut random, length * segments, 0.8);
         let all = fit(&rows, length, CovarianceMethod::Jackknife);
@@ -49,17 +49,16 @@ fn equals_fits_that_leave_one_segment_out() {
             let change = nalgebra::DVector::from_fn(COLUMNS, |c, _| without.values[c] - all.values[c]);
             expected += &change * change.transpose() * ((segments as f64 - 1.0) / segments as f64);
         }
-        // The guard against segments that stand alone changes eigenvalues by a millionth.
+        // The leverage ridge changes eigenvalues by 1e-6.
         assert!((&all.covariance - &expected).amax() <= 1e-4 * expected.amax());
     }
 }
 
 #[test]
-fn intervals_hold_where_segments_are_few() {
-    // Three segments a parameter. 600 intervals every day, 2,400 in the long run: a coverage of 95 % scatters by
-    // √(0.95·0.05/600) = 0.9 % (0.5 %), three of which lead to 0.92. The t distribution with some ten degrees of
-    // degrees_of_freedom would need wider intervals than 1.96, and the jackknife's caution pays for that. The fit's own
-    // residuals (CR1) must do worse, or the jackknife is not needed.
+fn intervals_cover_with_few_segments() {
+    // Three segments per parameter. 600 intervals in the daily run, 2,400 in the long run: a coverage of 95 % has a
+    // sampling error of √(0.95·0.05/600) = 0.9 % (0.5 %); lower limit 0.92 (3 σ). With about ten degrees of freedom
+    // the interval should be wider than 1.96 std; the conservative jackknife compensates for this. CR1 must be worse.
     let mut random = Random::new(21);
     let (mut inside, mut inside_own, mut count) = (0, 0, 0);
     for _ in 0..dynident_testing::count(100, 400) {
@@ -79,14 +78,13 @@ fn intervals_hold_where_segments_are_few() {
     assert!(share(inside_own) < share(inside), "own residuals {}", share(inside_own));
 }
 
-/// Rows that say nothing, in some segments and in all.
 #[test]
-fn segments_and_columns_without_motion_are_no_trouble() {
+fn segments_and_columns_without_motion_are_accepted() {
     let mut random = Random::new(5);
     let moving = rows(&mut random, 120, 0.5);
     let still = |row: &Vec<f64>| [vec![0.0; COLUMNS], vec![0.1 * row[COLUMNS]]].concat();
     for length in [4, 30] {
-        // The second half stands still.
+        // The second half is at rest.
         let half: Vec<Vec<f64>> =
             moving.iter().enumerate().map(|(t, row)| if t < 60 { row.clone() } else { still(row) }).collect();
         let found = fit(&half, length, CovarianceMethod::Jackknife);

@@ -1,4 +1,4 @@
-//! Gains of joints from logs without and with a known load.
+//! Joint gains from logs without and with a known load.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -7,12 +7,12 @@ use dynident_estimation::{
 };
 
 const SAMPLES: usize = 1200;
-/// The first two parameters are seen by both joints (`shared`) or by one each.
+/// The first two parameters belong to both joints (`shared`) or to one each.
 const THETA: [f64; 4] = [3.0, -2.0, 1.0, 0.7];
 const GAINS: [f64; 2] = [12.0, -0.4];
 
-/// Two joints, each with two parameters: joint 1 sees 0, 1 and joint 2 sees 2, 3, or 1 and 3 if they share one. The
-/// load adds to parameters 0 and, if `felt`, 3.
+/// Two joints with two parameters each: joint 1 has 0 and 1; joint 2 has 2 and 3, or 1 and 3 if they share one. The
+/// load adds to parameter 0 and, if `felt`, to 3.
 fn problem(random: &mut Random, noise: f64, shared: bool, felt: bool) -> (LinearProblem, Vec<Vec<f64>>) {
     let names = (0..4).map(|c| format!("theta{c}")).collect();
     let mut problem = LinearProblem::new(names, vec!["joint1".into(), "joint2".into()]);
@@ -40,12 +40,12 @@ fn problem(random: &mut Random, noise: f64, shared: bool, felt: bool) -> (Linear
 }
 
 #[test]
-fn without_noise_the_truth_comes_back() {
+fn noise_free_data_give_the_true_gains() {
     for (shared, felt) in [(false, true), (true, true), (true, false)] {
         let (rows, known) = problem(&mut Random::new(1), 0.0, shared, felt);
         let found = joint_gains(&GainProblem { rows: &rows, known }, &WeightedSettings::default()).unwrap();
         for (gain, truth) in found.gains.iter().zip(GAINS) {
-            // Rounding of conditioned sums; a joint that shares a parameter needs no load of its own.
+            // Rounding only; a joint that shares a parameter needs no load.
             assert!(gain.identified && (gain.gain / truth - 1.0).abs() < 1e-8, "{gain:?}");
         }
         for (column, truth) in THETA.iter().enumerate().filter(|(c, _)| !shared || *c != 2) {
@@ -55,7 +55,7 @@ fn without_noise_the_truth_comes_back() {
 }
 
 #[test]
-fn intervals_hold_the_truth() {
+fn intervals_cover_the_true_values() {
     let mut random = Random::new(77);
     let (mut inside, mut runs) = (0_usize, 0);
     for _ in 0..150 {
@@ -67,13 +67,13 @@ fn intervals_hold_the_truth() {
             runs += 1;
         }
     }
-    // 300 intervals give 95 % to 1.3 %, somewhat less as two of one run are correlated: 90 to 99 %.
+    // 300 intervals give 95 % to 1.3 %, slightly less for two correlated ones per run: 90 to 99 %.
     let share = inside as f64 / f64::from(runs);
     assert!((0.90..=0.99).contains(&share), "{share}");
 }
 
 #[test]
-fn a_joint_that_feels_no_load_is_named() {
+fn joints_without_load_are_named() {
     let (rows, known) = problem(&mut Random::new(9), 0.3, false, false);
     let found = joint_gains(&GainProblem { rows: &rows, known: known.clone() }, &WeightedSettings::default()).unwrap();
     assert!(found.gains[0].identified && !found.gains[1].identified);

@@ -1,4 +1,4 @@
-//! Two steps: some parameters from one recording, others from another with the first ones' errors carried over.
+//! Two steps: some parameters from one recording, others from another, with propagated errors.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -18,7 +18,7 @@ fn recording(random: &mut Random, with_load: bool) -> LinearProblem {
     let mut noise = random.normal() / (1.0 - RHO * RHO).sqrt();
     for k in 0..SAMPLES {
         let t = k as f64;
-        // Much like the first column, so that what is known of that one counts.
+        // Similar to the first column, so that its known value matters.
         let load = if with_load { 0.3 * (t / 31.0).sin() + 0.8 * (t / 37.0).sin() } else { 0.0 };
         let row = [(t / 37.0).sin(), (t / 61.0).cos() + 0.5, load];
         noise = RHO * noise + random.normal();
@@ -34,7 +34,7 @@ fn recording(random: &mut Random, with_load: bool) -> LinearProblem {
 }
 
 #[test]
-fn intervals_of_the_second_step_hold_the_truth() {
+fn intervals_of_the_second_step_cover() {
     let mut random = Random::new(5);
     let (mut inside, mut without, mut runs) = (0, 0, 0);
     for _ in 0..400 {
@@ -50,31 +50,31 @@ fn intervals_of_the_second_step_hold_the_truth() {
         without += usize::from(error <= of(DMatrix::zeros(2, 2)).half_width_95[2]);
         runs += 1;
     }
-    // 400 runs give 95 % to 1.1 %: three of these below; above, the bars are cautious by what the residual counts
-    // again. Without the first step's errors they are too short.
+    // 400 runs give 95 % to 1.1 %; lower limit 3 σ; above, the error bars are conservative. Without the errors of the
+    // first step they are too short.
     let share = |count: usize| count as f64 / f64::from(runs);
     assert!((0.917..=0.995).contains(&share(inside)), "{}", share(inside));
     assert!(share(without) < share(inside) - 0.02, "{} {}", share(without), share(inside));
 }
 
 #[test]
-fn known_exactly_it_is_the_fit_of_what_is_left() {
+fn exactly_known_columns_leave_the_fit_of_the_others() {
     let problem = recording(&mut Random::new(3), true);
     let known = KnownColumns { columns: vec![1], values: vec![-1.1], covariance: DMatrix::zeros(1, 1) };
     let settings = WeightedSettings { covariance: CovarianceMethod::White, ..WeightedSettings::default() };
     let found = weighted_least_squares_with_known(&problem, &known, &settings).unwrap();
-    // The oracle: a prior that is all but exact.
+    // Oracle: a nearly exact prior.
     let strong = problem.clone().with_prior(vec![0.0, -1.1, 0.0], DMatrix::from_row_slice(1, 3, &[0.0, 1e7, 0.0]));
     let expected = weighted_least_squares(&strong.unwrap(), &settings).unwrap();
     for column in 0..3 {
-        // The prior's own rows change degrees of freedom by one in 1600.
+        // The rows of the prior change the degrees of freedom by one in 1600.
         assert!((found.values[column] - expected.values[column]).abs() < 1e-6, "{column}");
         assert!((found.std[column] - expected.std[column]).abs() < 2e-3 * expected.std[column] + 2e-7, "{column}");
     }
 }
 
 #[test]
-fn what_does_not_fit_is_refused() {
+fn mismatched_columns_are_refused() {
     let problem = recording(&mut Random::new(3), true);
     let of = |columns: Vec<usize>, values: Vec<f64>| {
         let covariance = DMatrix::zeros(columns.len(), columns.len());

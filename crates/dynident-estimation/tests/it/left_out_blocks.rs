@@ -1,5 +1,4 @@
-//! How much worse blocks of time are predicted than a fit promises: the same by refitting rows, about one for a right
-//! model, and what a drift makes of a prediction.
+//! Prediction error on left-out blocks: compared with refitted rows, for a correct model and for a drifting one.
 
 use dynident_estimation::{
     Estimate, LinearProblem, SegmentSettings, SegmentedFactor, WeightedSettings, left_out_ratios,
@@ -42,11 +41,11 @@ fn fitted(joints: &[(DMatrix<f64>, DVector<f64>); 2]) -> (LinearProblem, Estimat
 }
 
 #[test]
-fn the_ratio_is_that_of_refitted_rows() {
+fn ratio_equals_that_of_refitted_rows() {
     let joints = rows(5, 0.4);
     let (problem, estimate) = fitted(&joints);
     let found = left_out_ratios(&problem, &estimate, BLOCKS).unwrap();
-    // Every block by a fit to the rows of all others, with the weights of the whole fit.
+    // Predicts every block by a fit to all other rows, with the weights of the full fit.
     let full = |joint: usize| {
         let (w, tau) = &joints[joint];
         let mut wide = DMatrix::zeros(ROWS, 3);
@@ -75,30 +74,30 @@ fn the_ratio_is_that_of_refitted_rows() {
         }
     }
     for (found, ratio) in found.iter().zip(ratios) {
-        // Sums of some thousand rounded squares.
+        // Rounding of sums of some thousand squares.
         assert!((found * found - ratio.max(1.0)).abs() < 1e-9, "{found} and {ratio}");
     }
     assert!(found[1] > 1.05, "{found:?}");
 }
 
 #[test]
-fn a_right_model_keeps_its_promise_and_a_drifting_one_does_not() {
+fn correct_models_predict_their_error_and_drifting_ones_do_not() {
     for seed in 0..20 {
         let joints = rows(seed, 0.0);
         let (problem, estimate) = fitted(&joints);
         let ratios = left_out_ratios(&problem, &estimate, BLOCKS).unwrap();
-        // The mean of 4,096 squares has a standard deviation of 2.2 %, its root half of that; four of them.
+        // The mean of 4,096 squares has a standard deviation of 2.2 %, its root half of that; tolerance 4 σ.
         assert!(ratios.iter().all(|ratio| (1.0..1.045).contains(ratio)), "{ratios:?}");
     }
     let joints = rows(3, 4.0);
     let (problem, estimate) = fitted(&joints);
     let ratios = left_out_ratios(&problem, &estimate, BLOCKS).unwrap();
-    // The drift is in the second joint's own column; the first shares a column that the second hardly moves.
+    // Only the second joint's own column drifts; the shared column is hardly affected.
     assert!(ratios[0] < 1.1 && ratios[1] > 1.15, "{ratios:?}");
 }
 
 #[test]
-fn one_block_that_alone_tells_a_parameter_says_nothing() {
+fn blocks_that_alone_determine_a_parameter_give_finite_ratios() {
     let mut joints = rows(1, 0.0);
     joints[1].0.view_mut((0, 1), (3 * ROWS / 4, 1)).fill(0.0);
     let (problem, estimate) = fitted(&joints);

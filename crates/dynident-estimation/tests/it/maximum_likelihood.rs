@@ -1,5 +1,5 @@
-//! Maximum likelihood with noise in the motion: against total least squares where the model is a straight line, and
-//! without bias where least squares has one.
+//! Maximum likelihood with noise in the motion: compared with total least squares for a straight line, and unbiased
+//! where least squares is biased.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -25,8 +25,8 @@ fn names(count: usize) -> Vec<String> {
 
 #[test]
 fn a_straight_line_gives_total_least_squares() {
-    // τ = 2 x with errors of 0.5 in x and 1 in τ: the smallest singular vector of [w/0.5 | τ] is the maximum likelihood
-    // solution (Golub and Van Loan).
+    // τ = 2 x with errors of 0.5 in x and 1 in τ: the smallest singular vector of [w/0.5 | τ] is the maximum
+    // likelihood solution (Golub and Van Loan).
     let mut random = Random::new(3);
     let data: Vec<[f64; 2]> = (0..300)
         .map(|k| {
@@ -47,15 +47,15 @@ fn a_straight_line_gives_total_least_squares() {
     let svd = scaled.svd(false, true);
     let v = svd.v_t.unwrap();
     let total = -v[(1, 0)] / v[(1, 1)] / 0.5;
-    // The step's tolerance times the error bar, and rounding.
+    // Step tolerance times the error bar, and rounding.
     assert!((found.values[0] - total).abs() < 1e-8, "{} for {total}", found.values[0]);
-    // The smallest singular value's square is the cost; 299 expected with a deviation of 24.
+    // The cost is the square of the smallest singular value; expected 299 with a standard deviation of 24.
     assert!((found.cost - svd.singular_values[1].powi(2)).abs() < 1e-6);
     assert!((found.cost - 299.0).abs() < 100.0 && found.degrees_of_freedom == 299);
     assert_eq!(found.status, EstimateStatus::Complete);
 }
 
-/// Rows of a pendulum `τ = a sin q + b q̈ + c cos q (two joints that share b)` and their derivatives by (q, q̈).
+/// Rows of `τ = a sin q + b q̈ + c cos q` (two joints that share b) and their derivatives by (q, q̈).
 fn instant(q: f64, ddq: f64) -> (DMatrix<f64>, [DMatrix<f64>; 2]) {
     let regressor = DMatrix::from_row_slice(2, 3, &[q.sin(), ddq, 0.0, 0.0, ddq, q.cos()]);
     let by_q = DMatrix::from_row_slice(2, 3, &[q.cos(), 0.0, 0.0, 0.0, 0.0, -q.sin()]);
@@ -105,21 +105,21 @@ fn noise_in_the_motion_does_not_bias_and_the_error_bars_are_right() {
     }
     let runs = runs as f64;
     for k in 0..3 {
-        // The mean of 200 has a deviation of 0.07, four of them; curvature of the sines within 0.02 rad adds less than
-        // that.
+        // The mean of 200 has a standard deviation of 0.07; tolerance 4 σ. The curvature of the sines within 0.02 rad
+        // adds less.
         assert!((sums[k] / runs).abs() < 0.3, "bias of p{k}: {} error bars", sums[k] / runs);
-        // A variance from 200 squares has a deviation of 10 %; four of them.
+        // A variance from 200 squares has a standard deviation of 10 %; tolerance 4 σ.
         assert!((squares[k] / runs - 1.0).abs() < 0.4, "p{k}: {}", squares[k] / runs);
     }
-    // χ² over 397 degrees of freedom, mean of 200: a deviation of 0.5 %; and the curvature.
+    // χ² with 397 degrees of freedom, mean of 200: a standard deviation of 0.5 %, plus the curvature.
     assert!((cost / runs - 1.0).abs() < 0.03, "{}", cost / runs);
-    // Without the motion's noise it is least squares, drawn towards zero: 0.36 of noise beside 1.9 of signal in q̈
-    // takes about 15 %.
+    // Without the motion's noise it is least squares, which is biased: noise of 0.36 in q̈ with a signal of 1.9
+    // reduces the estimate by about 15 %.
     assert!(plain / runs < 0.92, "{}", plain / runs);
 }
 
 #[test]
-fn what_is_no_covariance_or_has_another_shape_is_named() {
+fn invalid_covariances_and_shapes_are_named() {
     let bad = |change: &dyn Fn(&mut MaximumLikelihoodSettings)| {
         let mut settings = settings(&[0.1], &[1.0]);
         change(&mut settings);

@@ -1,4 +1,4 @@
-//! Weights from the noise around each row: as good as if the levels were known, nothing lost where the noise is even.
+//! Local noise levels: nearly as accurate as known levels, and no loss for constant noise.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -9,7 +9,7 @@ use dynident_estimation::{
 const ROWS: usize = 2000;
 const TRUTH: [f64; 3] = [2.0, -1.0, 0.5];
 
-/// Two joints with three columns; noise of joint 0 in stretches of 250 rows by turns, that of joint 1 even.
+/// Two joints with three columns; noise of joint 0 alternates every 250 rows, that of joint 1 is constant.
 fn panels(random: &mut Random, quiet: f64, loud: f64) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let mut sigmas = Vec::new();
     let panels = (0..2)
@@ -52,8 +52,8 @@ fn error(values: &[f64]) -> f64 {
 
 #[test]
 fn uneven_noise_costs_no_more_than_known_levels_would() {
-    // Mean square errors over 30 draws. Joint 0 alone carries quiet rows of 0.2 among loud ones of 2 (within the
-    // contrast that the default share allows): one σ per joint wastes them.
+    // Mean square errors over 30 draws. Only joint 0 has quiet rows of 0.2 among loud ones of 2 (within the contrast
+    // of the default share): one σ per joint wastes them.
     let settings = NoiseLevelSettings { covariance: CovarianceMethod::White, ..NoiseLevelSettings::default() };
     let white = WeightedSettings { covariance: CovarianceMethod::White, ..WeightedSettings::default() };
     let (mut by_levels, mut known, mut weighted) = (0.0, 0.0, 0.0);
@@ -74,14 +74,13 @@ fn uneven_noise_costs_no_more_than_known_levels_would() {
             .collect();
         known += error(&weighted_least_squares(&problem(&scaled), &white).unwrap().values);
     }
-    // Levels known to 10 % cost a per cent or two; stretches' ends, 50 rows of 250 with a mixed level, at most the
-    // share of rows that they are, a fifth of joint 0's quiet half; the chance of 30 draws of three parameters in a
-    // ratio of paired errors is below 0.1.
+    // Levels known to 10 % cost one or two percent; the ends of the stretches (50 of 250 rows with a mixed level) at
+    // most a fifth of joint 0's quiet half; sampling error of the ratio over 30 draws below 0.1.
     assert!(by_levels <= 1.3 * known, "{} of the known levels' error", by_levels / known);
-    // Joint 0's quiet thousand rows and joint 1's two thousand: a third of the information is lost without levels.
+    // Quiet thousand rows of joint 0, two thousand rows of joint 1: without levels a third of the information is lost.
     assert!(by_levels <= 0.9 * weighted, "{} of the weighted error", by_levels / weighted);
-    // 90 intervals of 95 %: 85.5 expected with a deviation of 2.1; three deviations down, and the levels' own
-    // uncertainty.
+    // 90 intervals of 95 %: expected 85.5 with a standard deviation of 2.1; lower limit 3 σ and an allowance for the
+    // uncertainty of the levels.
     assert!(inside >= 78, "{inside} of 90 inside");
 }
 
@@ -94,11 +93,11 @@ fn even_noise_gives_weighted_least_squares_within_a_fraction_of_an_error_bar() {
     .unwrap();
     let plain = weighted_least_squares(&problem(&panels), &WeightedSettings::default()).unwrap();
     for (k, (value, std)) in plain.values.iter().zip(&plain.std).enumerate() {
-        // Weights with a scatter of 10 % move an estimate by about a tenth of its error bar; three of those.
+        // Weights with a scatter of 10 % move an estimate by about a tenth of its error bar; tolerance three times
+        // that.
         assert!((found.estimate.values[k] - value).abs() < 0.3 * std, "column {k}");
     }
-    // With everything pooled it is weighted least squares itself: weights one to rounding, and the stopping tolerance
-    // of the joints' noise.
+    // Fully pooled it is weighted least squares, up to rounding and the stopping tolerance of the noise.
     let pooled = NoiseLevelSettings { pooled_share: 1.0, ..NoiseLevelSettings::default() };
     let same = noise_weighted_least_squares(&problem(&panels), &pooled, |visit| visited(&panels, visit)).unwrap();
     for (a, b) in same.estimate.values.iter().zip(&plain.values) {

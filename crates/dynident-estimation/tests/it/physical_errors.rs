@@ -1,4 +1,4 @@
-//! The expected error of a physical fit, against the errors of many fits to truths that are drawn as it believes.
+//! Expected error of a physical fit, compared with many fits to truths drawn from the belief.
 
 use super::common::Random;
 use dynident_estimation::TriangularFactor;
@@ -8,7 +8,7 @@ use dynident_estimation::consistent::{
 };
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// Small, so that a fit is linear in it.
+/// Small, so that a fit is linear.
 const SHARE: f64 = 0.02;
 const FRICTION: f64 = 0.5;
 
@@ -32,7 +32,7 @@ fn drawn(reference: &[f64; 10], random: &mut Random) -> [f64; 10] {
     [p[(3, 3)], p[(0, 3)], p[(1, 3)], p[(2, 3)], moment(0), ixy, ixz, moment(1), iyz, moment(2)]
 }
 
-/// One body and one friction of which torque tells five sums, with errors that are twice what their weights say.
+/// One body and one friction with five identifiable combinations; errors are twice as large as the weights assume.
 #[test]
 fn errors_of_many_fits_are_as_expected() {
     let mut random = Random::new(71);
@@ -69,7 +69,8 @@ fn errors_of_many_fits_are_as_expected() {
     ));
     let belief = Belief { body_share: SHARE, scalar_std: vec![SHARE * FRICTION] };
     for prior in [PhysicalPrior::Entropic, PhysicalPrior::Pullback, PhysicalPrior::Euclidean] {
-        // Weights of the prior are in units of a whole body, not of the belief: here as strong as it, and a fifth.
+        // Weights of the prior are in units of a whole body, not of the belief: as strong as the belief, and a fifth
+        // of that.
         let weight = if prior == PhysicalPrior::Pullback { 0.2 } else { 1.0 } / (SHARE * SHARE);
         let settings = PhysicalSettings { prior, prior_weight: weight, tolerance: 1e-9, ..PhysicalSettings::default() };
         let expected = expected_error(&problem(&DVector::zeros(base_count)), &settings, &covariance, &belief).unwrap();
@@ -87,7 +88,7 @@ fn errors_of_many_fits_are_as_expected() {
         }
         for k in 0..11 {
             let ratio = (squares[k] / f64::from(draws)).sqrt() / expected[k];
-            // The root of a mean of 400 squares scatters by 3.5 %: four of that, and 2 % for what is not linear.
+            // The root of a mean of 400 squares has a standard deviation of 3.5 %: 4 σ plus 2 % for nonlinearity.
             assert!((ratio - 1.0).abs() < 0.16, "{prior:?}, parameter {k}: {ratio}");
         }
     }

@@ -1,4 +1,4 @@
-//! The physically consistent fit against cvxpy with Clarabel (golden/cvxpy_physical.py).
+//! The physically consistent fit compared with cvxpy and Clarabel (golden/cvxpy_physical.py).
 
 use dynident_estimation::TriangularFactor;
 use dynident_estimation::consistent::{
@@ -8,8 +8,8 @@ use dynident_estimation::consistent::{
 use nalgebra::DMatrix;
 use serde_json::Value;
 
-/// What the issue asks. Points follow the objective by its square root: Clarabel stops at 1e-10 of its own measure, and
-/// so does the primal-dual route here. The other route is held to the objective, at its default tolerance.
+/// Required agreement. Points depend on the square root of the objective: Clarabel stops at 1e-10, and so does the
+/// primal-dual route here. The other route is compared by its objective, at its default tolerance.
 const AGREEMENT: f64 = 1.0e-5;
 const TOLERANCE: f64 = 1.0e-10;
 
@@ -75,7 +75,7 @@ fn both_routes_agree_with_cvxpy() {
                 ..PhysicalSettings::default()
             };
             let fit = physical_fit(&problem(case), &settings).unwrap();
-            // Ten times what was asked: the last digit of a certificate is rounding.
+            // Ten times the required value: the last digit of a certificate is rounding.
             assert!(
                 fit.kkt_residual() <= if route == PhysicalRoute::InteriorPoint { 1.0e-9 } else { 1.0e-7 },
                 "{name}: {fit:?}"

@@ -1,5 +1,5 @@
-//! The ends of intervals are where the profile of the data's cost meets its threshold: fits with the parameter held
-//! there say so, which share no program with the intervals.
+//! The ends of intervals are where the profile of the data's cost reaches the threshold, computed by independent fits
+//! with a fixed parameter.
 
 use crate::physical_problems::{Case, case};
 use dynident_estimation::TriangularFactor;
@@ -8,12 +8,11 @@ use dynident_estimation::consistent::{
 };
 use nalgebra::{DMatrix, DVector};
 
-/// Relative distance from the best set's value by which an end may be off: the hundredth that is promised, and as much
-/// for the fits.
+/// Allowed relative error of an end: a hundredth for the intervals, and as much for the fits.
 const EXACT: f64 = 0.02;
 
-/// The least cost of the data with a parameter held at a value, and the value that it has then: a spring far stiffer
-/// than the data draws it there.
+/// Minimum cost of the data with a parameter near `value`, and its actual value: a row much stiffer than the data
+/// fixes it.
 fn profile(case: &Case, index: usize, value: f64, width: f64) -> (f64, f64) {
     let (triangle, right) = &case.rows;
     let base = case.problem.base().matrix();
@@ -40,7 +39,7 @@ fn profile(case: &Case, index: usize, value: f64, width: f64) -> (f64, f64) {
 }
 
 #[test]
-fn ends_are_where_the_profile_meets_its_threshold() {
+fn interval_ends_lie_on_the_profile_threshold() {
     let mut kinds = [0; 3];
     for seed in [1, 2, 3, 5, 6, 7, 9, 10, 11] {
         let case = case(seed, 3);
@@ -48,7 +47,7 @@ fn ends_are_where_the_profile_meets_its_threshold() {
         let settings = IntervalSettings { physical, ..IntervalSettings::default() };
         let intervals = ConsistentIntervals::new(&case.problem, None, 1.0e6, settings).unwrap();
         let best = intervals.best();
-        // Half the square of the quantile of 95 %.
+        // Half the squared 95 % quantile.
         let threshold = best.data_objective + 0.5 * 1.959_964_f64.powi(2);
         for index in (0..best.parameters.len()).step_by(3) {
             let interval = intervals.of(index).unwrap();
@@ -61,7 +60,7 @@ fn ends_are_where_the_profile_meets_its_threshold() {
                     continue;
                 };
                 let (reach, size) = (end - value, value.abs().max(1.0e-3));
-                // Where the best set is at the end itself there is no profile.
+                // No profile exists if the best set is at the end itself.
                 if reach.abs() < 1.0e-4 * size {
                     continue;
                 }

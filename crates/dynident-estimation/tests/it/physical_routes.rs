@@ -1,5 +1,4 @@
-//! A thousand random problems: all end, all are feasible, all carry a certificate, and two solvers that share only the
-//! certificate agree.
+//! A thousand random problems: both solvers end, are feasible and certified, and agree.
 
 #![allow(clippy::print_stdout, reason = "the figures are the point of the long run")]
 
@@ -8,7 +7,6 @@ use dynident_estimation::consistent::{PhysicalFit, PhysicalRoute, PhysicalSettin
 use dynident_model::InertialParameters;
 use dynident_testing::count;
 
-/// What issue and book promise.
 const KKT: f64 = 1.0e-7;
 const AGREEMENT: f64 = 1.0e-6;
 const FEASIBLE: f64 = 1.0e-9;
@@ -23,7 +21,7 @@ struct Worst {
     failures: Vec<String>,
 }
 
-/// How far outside of the constraints the parameters are, in their own units, by the model's own pseudo-inertia.
+/// Violation of the constraints in units of the parameters, by the model's pseudo-inertia.
 fn infeasibility(case: &Case, fit: &PhysicalFit) -> f64 {
     let mut worst = 0.0_f64;
     let bodies = case.problem.bodies();
@@ -88,26 +86,25 @@ fn check(worst: &Worst) {
     assert!(worst.boundary > 0, "no optimum on the boundary: the problems are too easy");
 }
 
-/// Problems of the long run that neither route solved, or only one, before both let their multipliers' imbalance go
-/// while the barrier was still strong: an entropic prior against data that want bodies a million times as heavy as
-/// their references.
+/// Difficult problems of the long run: an entropic prior with data for bodies a million times as heavy as their
+/// references. They were unsolved before both routes removed the imbalance of the multipliers early.
 #[test]
 fn both_routes_find_the_same_optimum_of_problems_that_were_hard() {
-    // At 1757 and 1766 the interior point stalls at 5e-7 and 2e-7 and the other route has to finish. The last one has
-    // 28 bodies and takes most of the time: it is solved in the long run.
+    // At 1757 and 1766 the interior point stalls at 5e-7 and 2e-7 and the other route must finish. The last one has 28
+    // bodies, takes most of the time and is solved in the long run only.
     let seeds = [1081, 1110, 1113, 1757, 1766].into_iter().take(count(4, 5));
     check(&run(seeds.map(|seed| (seed, 2 + (seed % 29) as usize))));
 }
 
-/// Mostly small ones, one of twelve bodies in thirty.
+/// Mostly small problems; one in thirty has twelve bodies.
 #[test]
 fn both_routes_find_the_same_optimum_of_small_problems() {
     let size = |seed: u64| if seed % 30 == 7 { 12 } else { 2 + (seed % 4) as usize };
     check(&run((0..count(40, 150) as u64).map(|seed| (seed, size(seed)))));
 }
 
-/// What is asked for are 1,000: in the long run, a quarter of an hour in the release profile. The first 29 have each
-/// size from 2 to 30 bodies once; every day only those of up to nine are solved.
+/// 1,000 problems in the long run, a quarter of an hour in the release profile. The first 29 have each size from 2 to
+/// 30 bodies once; the daily run solves those of up to nine bodies.
 #[test]
 fn both_routes_find_the_same_optimum_of_problems_of_up_to_30_bodies() {
     let (problems, bodies) = (count(29, 1000) as u64, count(9, 30));

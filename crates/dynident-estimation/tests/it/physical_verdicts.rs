@@ -1,4 +1,4 @@
-//! Fits beyond the boundary of what bodies can be, and questions that have no answer.
+//! Fits beyond physical consistency, and contradictory problems.
 
 use dynident_estimation::TriangularFactor;
 use dynident_estimation::consistent::{
@@ -24,7 +24,6 @@ fn unit_factor(columns: usize, right: &[f64]) -> TriangularFactor {
     TriangularFactor::from_rows(columns, &panel, columns).unwrap()
 }
 
-/// All ten parameters of every body seen.
 fn seen(bodies: Vec<PhysicalBody>, scalars: Vec<PhysicalScalar>) -> PhysicalProblem {
     let columns = 10 * bodies.len() + scalars.len();
     let base = BaseMap::new(DMatrix::identity(columns, columns)).unwrap();
@@ -34,7 +33,7 @@ fn seen(bodies: Vec<PhysicalBody>, scalars: Vec<PhysicalScalar>) -> PhysicalProb
 #[test]
 fn the_nearest_feasible_vector_of_a_feasible_one_is_itself() {
     let own = [1.2, 0.02, 0.0, -0.01, 0.02, 0.0, 0.001, 0.025, 0.0, 0.02];
-    // Rows of unit weight: one for each parameter.
+    // Rows of unit weight, one per parameter.
     let rows_of = |right: &[f64]| {
         let base = BaseMap::new(DMatrix::identity(10, 10)).unwrap();
         PhysicalProblem::new(base, vec![body("bob")], vec![], &unit_factor(10, right)).unwrap()
@@ -43,12 +42,12 @@ fn the_nearest_feasible_vector_of_a_feasible_one_is_itself() {
     let fit = physical_fit(&rows_of(&own), &settings).unwrap();
     assert_eq!(fit.status, PhysicalStatus::Solved);
     for (found, own) in fit.base_values.iter().zip(own) {
-        // Rows of unit weight, objective to 5e-8: a point to its square root.
+        // Rows of unit weight, objective to 5e-8: accuracy of a point is its square root.
         assert!((found - own).abs() < 4e-4);
     }
     let moves = fit.moves_in_std(&own, &[1.0; 10]).unwrap();
     assert!(moves.iter().all(|m| m.unwrap().abs() < 4e-4));
-    // A pure mass deficit is fixed by the mass alone where rows see every parameter alike.
+    // With equal weights a pure mass deficit is corrected by the mass alone.
     let mut heavy = own;
     heavy[0] = -1.0;
     heavy[1] = 0.0;
@@ -89,10 +88,10 @@ fn contradictions_are_named() {
     let problem = problem.with_total_mass_kg([4.0, 4.5]).unwrap();
     let fit = physical_fit(&problem, &PhysicalSettings::default()).unwrap();
     let total = fit.parameters[0] + fit.parameters[10];
-    assert!(total > 4.0 && total < 4.001, "rows want no mass at all: {total}");
+    assert!(total > 4.0 && total < 4.001, "the data favour zero mass: {total}");
     assert!(fit.active.iter().any(|name| name.contains("total mass at least")), "{:?}", fit.active);
 
-    // All mass within 5 cm of the origin, yet its centre beyond 10 cm: each feasible alone.
+    // All mass within 5 cm of the origin, but its centre beyond 10 cm: each is feasible alone.
     let mut far = body("forearm");
     far.com_box_m = Some([[0.1, -0.1, -0.1], [0.2, 0.1, 0.1]]);
     far.inside = Some(dynident_estimation::consistent::Ellipsoid { centre_m: [0.0; 3], semi_axes_m: [0.05; 3] });
@@ -106,10 +105,9 @@ fn contradictions_are_named() {
     assert!(!error.to_string().contains("along y"), "{error}");
 }
 
-/// A start inside is looked for without the data, so nothing but the constraints holds a variable there: an offset has
-/// none.
+/// The search for an interior start ignores the data, so an unlimited offset would be undetermined.
 #[test]
-fn limits_away_from_the_prior_are_met_beside_a_scalar_without_any() {
+fn limits_far_from_the_prior_are_met_with_a_free_scalar() {
     let mut heavy = body("link");
     let least = 2.0 * heavy.reference[0];
     heavy.mass_kg = Some([least, 1.2 * least]);
@@ -120,7 +118,7 @@ fn limits_away_from_the_prior_are_met_beside_a_scalar_without_any() {
 }
 
 #[test]
-fn bodies_given_as_known_stay_and_bodies_without_mass_are_allowed() {
+fn known_bodies_stay_and_massless_bodies_are_allowed() {
     let (mut arm, mut tool) = (body("arm"), body("tool"));
     arm.known = Some([0.0; 10]);
     tool.known = Some(rough_body(0.5, 0.05));

@@ -1,4 +1,4 @@
-//! Columns that the data do not excite: named, fixed, never NaN.
+//! Unexcited columns are reported, fixed, and never NaN.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -26,7 +26,7 @@ fn one_joint(w: &DMatrix<f64>, tau: &DVector<f64>) -> LinearProblem {
     problem
 }
 
-/// Six columns of which 2 is zero, 3 = 2·p0 − p1 and 5 is rounding noise.
+/// Six columns: 2 is zero, 3 = 2·p0 − p1, 5 is rounding noise.
 fn deficient() -> (DMatrix<f64>, DVector<f64>) {
     let mut random = Random::new(3);
     let mut w = DMatrix::from_fn(200, 6, |_, _| random.normal());
@@ -59,12 +59,11 @@ fn unexcited_columns_are_named_and_fixed() {
         assert_eq!((estimate.values[column], estimate.std[column]), (0.0, 0.0));
         assert_eq!(estimate.relative_std_percent[column], None);
     }
-    // What p3 did now stands in p0 and p1: 3 + 2 and −1. Noise 0.1 over 200 rows: standard error 0.007, five of them
-    // 0.035.
+    // p0 and p1 include the effect of p3: 3 + 2 and −1. Noise 0.1 over 200 rows: standard error 0.007; tolerance 5 σ.
     for (column, expected) in [(0, 5.0), (1, -1.0), (4, 0.5)] {
         assert!((estimate.values[column] - expected).abs() < 0.035);
     }
-    // The same as a fit that never heard of the other columns (rounding only: the columns are well conditioned).
+    // Equal to a fit without the other columns up to rounding.
     let alone = ordinary_least_squares(&one_joint(&w.select_columns(&[0, 1, 4]), &tau), &WHITE).unwrap();
     for (k, column) in [0, 1, 4].into_iter().enumerate() {
         assert!((alone.values[k] - estimate.values[column]).abs() < 1e-12);
@@ -74,7 +73,7 @@ fn unexcited_columns_are_named_and_fixed() {
 }
 
 #[test]
-fn unexcited_columns_take_their_fallback_and_the_rest_answers_to_it() {
+fn unexcited_columns_take_their_fallback_and_others_adapt() {
     let (w, tau) = deficient();
     let problem = one_joint(&w, &tau).with_fallback(vec![9.0, 9.0, 7.0, 1.0, 9.0, 4.0]).unwrap();
     for estimate in [
@@ -83,7 +82,7 @@ fn unexcited_columns_take_their_fallback_and_the_rest_answers_to_it() {
     ] {
         assert_finite(&estimate);
         assert_eq!((estimate.values[2], estimate.values[3], estimate.values[5]), (7.0, 1.0, 4.0));
-        // With p3 at its true value 1, p0 and p1 are the truth again; bounds as above.
+        // With p3 at its true value, p0 and p1 are the truth.
         for (column, expected) in [(0, 3.0), (1, 0.0), (4, 0.5)] {
             assert!((estimate.values[column] - expected).abs() < 0.035);
         }
@@ -100,13 +99,13 @@ fn noise_free_torque_is_solved_exactly_and_the_iteration_ends() {
     assert_finite(&estimate);
     assert_eq!(estimate.status, EstimateStatus::Complete);
     for (found, expected) in estimate.values.iter().zip(theta) {
-        // Scaled condition near one: rounding of the columns of largest contribution (1e3) against 1.
+        // Condition number near one: rounding of the largest column (1e3) against 1.
         assert!((found - expected).abs() < 1e-12 * expected.abs().max(1.0), "{found} {expected}");
     }
 }
 
 #[test]
-fn silent_joints_and_empty_columns_stay_finite() {
+fn zero_torques_and_empty_columns_stay_finite() {
     // All torques zero; then also all columns zero.
     let mut random = Random::new(5);
     let w = DMatrix::from_fn(60, 2, |_, _| random.normal());
@@ -129,12 +128,12 @@ fn a_prior_excites_what_the_data_do_not() {
     let estimate = weighted_least_squares(&problem, &WeightedSettings::default()).unwrap();
     assert_finite(&estimate);
     assert_eq!(estimate.status, EstimateStatus::Complete);
-    // Nothing measured speaks of p2: mean and standard deviation stay the prior's (rounding).
+    // No data for p2: mean and standard deviation are those of the prior (rounding).
     assert!((estimate.values[2] - 1.0).abs() < 1e-9 && (estimate.std[2] - 1.0).abs() < 1e-9);
 }
 
 #[test]
-fn too_little_data_is_an_error_that_says_so() {
+fn too_few_data_are_an_error() {
     let w = DMatrix::from_fn(3, 3, |i, j| ((i + 2 * j) % 4) as f64 + f64::from(u8::from(i == j)));
     let problem = one_joint(&w, &DVector::from_element(3, 1.0));
     assert!(matches!(ordinary_least_squares(&problem, &WHITE), Err(EstimationError::TooFewRows { rows: 3, .. })));
@@ -142,7 +141,7 @@ fn too_little_data_is_an_error_that_says_so() {
     assert_eq!(ordinary_least_squares(&empty, &WHITE), Err(EstimationError::Empty));
     let nothing = LinearProblem::new(Vec::new(), Vec::new());
     assert_eq!(ordinary_least_squares(&nothing, &WHITE), Err(EstimationError::Empty));
-    // One segment only: no covariance from segments, and no silent change to another one.
+    // One segment only: an error instead of another covariance.
     let short = one_joint(&DMatrix::from_element(10, 1, 1.0), &DVector::from_element(10, 1.0));
     assert_eq!(
         ordinary_least_squares(&short, &OrdinarySettings::default()),
@@ -199,7 +198,7 @@ fn the_iteration_limit_is_a_status() {
 }
 
 #[test]
-fn an_estimate_serialises_and_its_correlations_are_sound() {
+fn estimates_serialise_with_valid_correlations() {
     let (w, tau) = deficient();
     let estimate = ordinary_least_squares(&one_joint(&w, &tau), &WHITE).unwrap();
     let json = serde_json::to_value(&estimate).unwrap();

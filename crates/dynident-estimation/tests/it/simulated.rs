@@ -1,4 +1,4 @@
-//! DIDIM, CLIE and CLOE on a plant whose closed loop is known in closed form.
+//! DIDIM, CLIE and CLOE on a plant with a closed-form solution.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -10,8 +10,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 const ROWS: usize = 400;
 const TRUTH: [f64; 3] = [2.0, 3.0, 12.0];
 
-/// `m q̈ + c q̇ + k q = τ = Kp (r − q) + Kd (ṙ − q̇)`, settled under a reference of four sines: every signal is a sum
-/// of sines with the loop's frequency response.
+/// `m q̈ + c q̇ + k q = τ = Kp (r − q) + Kd (ṙ − q̇)` in steady state with a reference of four sines: every signal is
+/// a sum of sines with the loop's frequency response.
 struct Plant {
     position: bool,
 }
@@ -20,7 +20,7 @@ impl Plant {
     fn signals(theta: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let [m, c, k] = [theta[0], theta[1], theta[2]];
         let (kp, kd) = (40.0, 6.0);
-        // Of second order: stable when all three coefficients are positive.
+        // Second order: stable if all three coefficients are positive.
         if !(m > 0.0 && c + kd > 0.0 && k + kp > 0.0) {
             return None;
         }
@@ -79,8 +79,7 @@ fn without_noise_all_three_find_the_parameters() {
         let problem = problem(position, 0.0, 0, [1.4, 4.0, 9.0]);
         let found = simulated_least_squares(&problem, &settings, &mut Plant { position }).unwrap();
         for (value, truth) in found.values.iter().zip(TRUTH) {
-            // Gauss-Newton ends in rounding; DIDIM's steps shrink by a constant factor each, so that it ends within the
-            // limit of steps times that.
+            // Gauss-Newton converges to rounding; DIDIM's steps shrink linearly.
             assert!((value - truth).abs() < 1e-5 * truth, "{criterion:?}: {value} for {truth}");
         }
     }
@@ -96,7 +95,7 @@ fn with_noise_they_agree_with_the_truth_within_their_error_bars() {
             let problem = problem(position, noise, seed, [1.4, 4.0, 9.0]);
             let found = simulated_least_squares(&problem, &settings, &mut Plant { position }).unwrap();
             assert_eq!(found.status, EstimateStatus::Complete, "{criterion:?} {position}");
-            // 397 degrees of freedom: a deviation of 28.
+            // 397 degrees of freedom: a standard deviation of 28.
             assert!((found.cost - 397.0).abs() < 4.0 * 28.2, "{}", found.cost);
             if criterion == SimulatedCriterion::Didim {
                 assert!(found.simulations <= 2 * found.iterations + 1);
@@ -105,8 +104,8 @@ fn with_noise_they_agree_with_the_truth_within_their_error_bars() {
                 square += ((found.values[k] - TRUTH[k]) / found.std[k]).powi(2) / 60.0;
             }
         }
-        // DIDIM's error bars leave out that the motion changes with θ, and its scatter may be larger or smaller for it;
-        // those of the others are the bound: a mean of 60 squares, 18 %, four of them.
+        // DIDIM's error bars ignore that the motion changes with θ; those of the others are the bound: the mean of 60
+        // squares has a standard deviation of 18 %; tolerance 4 σ.
         let allowed = if criterion == SimulatedCriterion::Didim { 4.0 } else { 1.75 };
         assert!(square < allowed, "{criterion:?} {position}: {square}");
     }

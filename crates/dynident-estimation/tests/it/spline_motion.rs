@@ -1,4 +1,4 @@
-//! Motion and parameters at once, the motion a spline: a pendulum with known truth.
+//! Motion and parameters estimated together with a spline motion: a pendulum with known truth.
 
 use dynident_estimation::{
     CovarianceMethod, EstimateStatus, EstimationError, SplineMotionEstimate, SplineMotionProblem, SplineMotionSettings,
@@ -7,7 +7,8 @@ use dynident_estimation::{
 use dynident_model::sample::Random;
 use dynident_model::terms::JointMotion;
 
-/// `τ_j = J_j q̈_j + g_j sin q_j + v_j q̇_j + c_j tanh(q̇_j/w) + o_j`, joints apart but for `k (q̈_1 + q̈_2)` in both.
+/// `τ_j = J_j q̈_j + g_j sin q_j + v_j q̇_j + c_j tanh(q̇_j/w) + o_j`, independent joints except for `k (q̈_1 +
+/// q̈_2)`.
 struct Pendulums {
     joints: usize,
 }
@@ -85,7 +86,8 @@ fn truth(joints: usize) -> Vec<f64> {
     all
 }
 
-/// A motion of three sines, its exact torque, and noise of both; the torque's of lag-one correlation `colour`.
+/// A motion of three sines, its exact torque, and noise of both; `colour` is the lag-1 correlation of the torque
+/// noise.
 fn record(
     joints: usize,
     (rate_hz, samples): (f64, usize),
@@ -121,7 +123,7 @@ fn fitted(joints: usize, records: Vec<SplineRecord>, settings: &SplineMotionSett
     let names: Vec<String> = (0..truth(joints).len()).map(|k| format!("p{k}")).collect();
     let held = vec![false; names.len()];
     let joint_names = (0..joints).map(|j| format!("joint{j}")).collect();
-    // A start that is 20 % off.
+    // A start that is 20 % wrong.
     let parameters = truth(joints).iter().map(|p| 1.2 * p).collect();
     let problem = SplineMotionProblem { names, joints: joint_names, records, parameters, held };
     spline_motion_least_squares(&problem, settings, &mut Pendulums { joints }).unwrap()
@@ -131,11 +133,10 @@ fn white() -> SplineMotionSettings {
     SplineMotionSettings { covariance: CovarianceMethod::White, ..SplineMotionSettings::default() }
 }
 
-/// Over seeded repetitions errors in own error bars must have a root mean square near one: with 6 runs of 11
-/// parameters each, chance leaves 1/√(2·66) = 9 %; three of these on either side and 10 % for what the smoothness's own
-/// uncertainty adds.
+/// Errors in units of their error bars must have an RMS near one: for 6 runs of 11 parameters the sampling error is
+/// 1/√(2·66) = 9 %; tolerance 3 σ plus 10 % for the uncertainty of the smoothness.
 #[test]
-fn errors_are_as_large_as_their_bars() {
+fn errors_agree_with_their_error_bars() {
     for colour in [0.0, 0.8] {
         let (mut squares, mut count) = (0.0, 0);
         for seed in 0..dynident_testing::count(6, 60) as u64 {
@@ -161,9 +162,9 @@ fn errors_are_as_large_as_their_bars() {
     }
 }
 
-/// Two pieces with a gap between them tell what one log of their length tells, and a parameter that is held stays.
+/// Two pieces with a gap are equivalent to one log of their length, and a held parameter does not change.
 #[test]
-fn pieces_have_motions_of_their_own() {
+fn pieces_have_separate_motions() {
     let mut random = Random::new(7);
     let whole = record(1, (200.0, 2000), (5e-4, 0.05, 0.0), &mut random);
     let part = |run: core::ops::Range<usize>| SplineRecord {
@@ -175,7 +176,7 @@ fn pieces_have_motions_of_their_own() {
     let two = fitted(1, vec![part(0..990), part(1010..2000)], &white());
     assert_eq!((two.logs.len(), two.motion.len()), (1, 2));
     for ((a, b), std) in one.estimate.values.iter().zip(&two.estimate.values).zip(&one.estimate.std) {
-        // One sample in a hundred is missing, and four ends are free where two were: a third of an error bar.
+        // One sample in a hundred is missing, and there are four free ends instead of two: a third of an error bar.
         assert!((a - b).abs() < 0.33 * std, "{a} {b} {std}");
     }
     for (a, b) in one.estimate.std.iter().zip(&two.estimate.std) {
@@ -191,7 +192,6 @@ fn pieces_have_motions_of_their_own() {
     assert_eq!(found.estimate.status, EstimateStatus::NotAllExcited);
 }
 
-/// The same for any number of threads, to the last bit.
 #[test]
 fn threads_do_not_change_the_estimate() {
     let made = |threads: usize| {
@@ -202,7 +202,6 @@ fn threads_do_not_change_the_estimate() {
     assert_eq!(made(1), made(3));
 }
 
-/// Whatever comes in, an error says what is wrong: no panic, no numbers made up.
 #[test]
 fn wrong_input_is_an_error() {
     let good = record(1, (200.0, 200), (5e-4, 0.05, 0.0), &mut Random::new(1));
@@ -230,7 +229,7 @@ fn wrong_input_is_an_error() {
         run(&begun(good.clone()), &none),
         Err(EstimationError::Setting { setting: "max_iterations", .. })
     ));
-    // At rest nothing tells inertia and friction apart.
+    // At rest inertia and friction are not distinguishable.
     let still = SplineRecord { q: vec![0.3; 200], tau: vec![1.0; 200], ..good };
     let found = run(&begun(still), &white());
     assert!(matches!(found, Err(EstimationError::Undetermined { .. })), "{found:?}");

@@ -1,4 +1,4 @@
-//! Factors as numbers: back to the last bit, and refused where no factor has such numbers.
+//! Factors as numbers: exact round trip, and errors for invalid numbers.
 
 use crate::common::Random;
 use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -13,7 +13,7 @@ fn factor(rows: usize, columns: usize, seed: u64) -> SegmentedFactor {
 }
 
 #[test]
-fn numbers_come_back_to_the_last_bit() {
+fn stored_values_are_restored_bit_identically() {
     for (rows, columns) in [(0, 3), (1, 1), (4, 3), (39, 3), (200, 3), (1000, 7)] {
         let own = factor(rows, columns, 3);
         let (shape, numbers) = (own.shape(), own.numbers());
@@ -21,7 +21,7 @@ fn numbers_come_back_to_the_last_bit() {
         let mut again = SegmentedFactor::from_numbers(&shape, &numbers).unwrap();
         assert_eq!((again.rows(), again.segment_rows()), (own.rows(), own.segment_rows()));
         assert_eq!(again.total(), own.total());
-        // It goes on as the first would.
+        // Absorbing more rows gives the same result.
         let mut own = own;
         let panel: Vec<f64> = (0..50 * (columns + 1)).map(|k| (k as f64).sin()).collect();
         own.absorb(&panel, 50).unwrap();
@@ -30,9 +30,9 @@ fn numbers_come_back_to_the_last_bit() {
     }
 }
 
-/// Merging neighbours keeps `‖τ − Wθ‖²`, by rounding of sums of squares of some hundred rows.
+/// Merging neighbours keeps `‖τ − Wθ‖²` up to rounding of sums of several hundred squares.
 #[test]
-fn fewer_segments_hold_the_same_rows() {
+fn fewer_segments_contain_the_same_rows() {
     let own = factor(700, 5, 9);
     let theta = [1.0, -2.0, 0.5, 0.0, 3.0];
     let whole = own.total().residual_sum_of_squares(&theta).unwrap();
@@ -46,11 +46,11 @@ fn fewer_segments_hold_the_same_rows() {
 }
 
 #[test]
-fn numbers_of_no_factor_are_refused() {
+fn invalid_stored_factors_are_refused() {
     let own = factor(1000, 3, 1);
     let (shape, numbers) = (own.shape(), own.numbers());
     let said = |shape, numbers: &[f64]| SegmentedFactor::from_numbers(shape, numbers).unwrap_err().to_string();
-    assert!(said(&shape, &numbers[1..]).contains("numbers of a stored factor"));
+    assert!(said(&shape, &numbers[1..]).contains("number of values of a stored factor"));
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         let mut harmed = numbers.clone();
         harmed[2] = bad;

@@ -1,4 +1,4 @@
-//! Validation figures against hand computation.
+//! Validation results compared with hand computation.
 
 use dynident_estimation::{EstimationError, Validation};
 use proptest::prelude::*;
@@ -36,7 +36,7 @@ fn figures_of_a_small_example() {
 }
 
 #[test]
-fn nothing_and_silence_give_no_ratios() {
+fn empty_and_zero_signals_give_no_ratios() {
     let mut validation = Validation::new(vec!["a".into()]);
     let report = validation.report();
     assert_eq!((report.samples, report.rmse_nm, report.relative_error_percent, report.r_squared), (0, 0.0, None, None));
@@ -71,7 +71,7 @@ proptest! {
         let square: f64 = measured.iter().zip(&predicted).map(|(m, p)| (m - p).powi(2)).sum();
         let joint = &validation.report().joints[0];
         prop_assert!((joint.rmse_nm - (square / n).sqrt()).abs() < 1e-9);
-        // Unless the torque is all but constant, the spread is known to 1e-9 despite an offset 200 times as large.
+        // For torque that is not nearly constant the spread is accurate to 1e-9 despite an offset 200 times as large.
         if spread > 1.0 {
             prop_assert!((joint.r_squared.unwrap() - (1.0 - square / spread)).abs() < 1e-6 * (1.0 + square / spread));
         }

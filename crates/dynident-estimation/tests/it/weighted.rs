@@ -1,4 +1,4 @@
-//! The noise of the joints settles where the plain iteration over dense rows does, in fewer solutions.
+//! The noise levels converge to those of the plain iteration over dense rows, in fewer solutions.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -7,10 +7,10 @@ use dynident_estimation::{
 use nalgebra::{DMatrix, DVector};
 
 const COLUMNS: usize = 12;
-/// Rows and noise of the joints: few rows for the columns, so that each joint's weight matters for the others' noise.
+/// Rows and noise of the joints: few rows per column, so that each joint's weight affects the noise of the others.
 const JOINTS: [(usize, f64); 4] = [(28, 1.0), (36, 0.1), (50, 3.0), (32, 0.4)];
 
-/// `[W | τ]` of every joint; all of them see all columns.
+/// `[W | τ]` of every joint, each with all columns.
 fn rows(random: &mut Random) -> Vec<(DMatrix<f64>, DVector<f64>)> {
     let truth = DVector::from_fn(COLUMNS, |column, _| 1.0 + column as f64 / 3.0);
     let of_joint = |&(count, sigma): &(usize, f64)| {
@@ -33,7 +33,7 @@ fn problem(rows: &[(DMatrix<f64>, DVector<f64>)]) -> LinearProblem {
     problem
 }
 
-/// What a solution weighted by `1/σ` leaves in every joint, by normal equations over the dense rows.
+/// Residual noise of every joint for weights `1/σ`, by normal equations over the dense rows.
 fn left(rows: &[(DMatrix<f64>, DVector<f64>)], sigma: &[f64]) -> Vec<f64> {
     let mut information = DMatrix::zeros(COLUMNS, COLUMNS);
     let mut right = DVector::zeros(COLUMNS);
@@ -50,7 +50,7 @@ fn left(rows: &[(DMatrix<f64>, DVector<f64>)], sigma: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn noise_settles_where_the_plain_iteration_does_and_sooner() {
+fn noise_converges_to_the_plain_iteration_and_faster() {
     let mut random = Random::new(20_261_128);
     let (mut plain_solutions, mut solutions) = (0, 0);
     for _ in 0..20 {
@@ -67,9 +67,9 @@ fn noise_settles_where_the_plain_iteration_does_and_sooner() {
                 plain_solutions += step;
                 break;
             }
-            assert!(step < 1_000, "the plain iteration does not settle");
+            assert!(step < 1_000, "the plain iteration does not converge");
         }
-        // Both end when a step changes nothing beyond 1e-6; a slow one may end ten steps before its limit.
+        // Both end when a step changes less than 1e-6; the slow iteration may then still be 1e-5 from its limit.
         for (found, plain) in found.joint_sigma.iter().zip(&sigma) {
             assert!((found / plain - 1.0).abs() < 1.0e-5, "{found} {plain}");
         }
@@ -83,7 +83,7 @@ fn noise_settles_where_the_plain_iteration_does_and_sooner() {
 }
 
 #[test]
-fn values_alone_are_those_of_the_estimate() {
+fn values_alone_equal_those_of_the_estimate() {
     let rows = rows(&mut Random::new(7));
     let (problem, settings) = (problem(&rows), WeightedSettings::default());
     let (values, estimate) =

@@ -1,5 +1,4 @@
-//! The golden files of other people's programs, in the order of Dynident's model. `golden/README.md` says what every
-//! key means.
+//! Golden files of other programs, in the order of Dynident's model. `golden/README.md` explains every key.
 
 use dynident_model::{Model, load_robot};
 use dynident_testing::repository;
@@ -9,19 +8,18 @@ use serde_json::Value;
 pub(crate) const ROBOTS: [&str; 8] =
     ["planar2r", "ur10", "panda", "panda_arm7", "iiwa14", "g1_29dof", "talos_reduced", "talos_full_v2"];
 
-/// Those with at most nine joints, whose files hold full regressors, derivatives and base parameters.
+/// Robots with at most nine joints, whose files contain full regressors, derivatives and base parameters.
 pub(crate) const ARMS: [&str; 5] = ["planar2r", "ur10", "panda", "panda_arm7", "iiwa14"];
 
-/// A robot as Dynident reads it, every joint moving by itself as in the files of the other programs.
+/// A robot with independent joints, as in the files of the other programs.
 pub(crate) fn robot(name: &str) -> Model {
     load_robot(repository(&format!("robots/{name}.urdf"))).unwrap().model.without_followers()
 }
 
-/// A robot and what another program says about it.
 pub(crate) struct Golden {
     pub(crate) model: Model,
     pub(crate) file: Value,
-    /// `theirs[j]`: where the file's vectors hold joint `j` of the model.
+    /// `theirs[j]`: index in the file's vectors of joint `j` of the model.
     theirs: Vec<usize>,
 }
 
@@ -45,13 +43,11 @@ impl Golden {
         self.file["states"].as_array().unwrap()
     }
 
-    /// One number per joint.
     pub(crate) fn vector(&self, value: &Value) -> Vec<f64> {
         let theirs = numbers(value);
         self.theirs.iter().map(|&k| theirs[k]).collect()
     }
 
-    /// Ten numbers per body.
     pub(crate) fn parameters(&self, value: &Value) -> Vec<f64> {
         let theirs = numbers(value);
         self.theirs.iter().flat_map(|&k| theirs[10 * k..10 * k + 10].to_vec()).collect()
@@ -63,7 +59,7 @@ impl Golden {
         self.theirs.iter().flat_map(|&i| self.theirs.iter().map(|&j| rows[i][j]).collect::<Vec<_>>()).collect()
     }
 
-    /// A symmetric one of which the file has the lower triangle.
+    /// A symmetric matrix from the file's lower triangle.
     pub(crate) fn symmetric(&self, value: &Value) -> Vec<f64> {
         let rows: Vec<Vec<f64>> = value.as_array().unwrap().iter().map(numbers).collect();
         let entry = |i: usize, j: usize| rows[i.max(j)][i.min(j)];
@@ -99,7 +95,7 @@ pub(crate) fn assert_close(ours: &[f64], golden: &[f64], tolerance: f64, what: &
     worst
 }
 
-/// Numbers that are equal but for a share of the largest of theirs.
+/// Asserts equality up to a share of the largest expected number.
 pub(crate) fn close(relative: f64, ours: &[f64], theirs: &[f64], what: &str) {
     assert_eq!(ours.len(), theirs.len(), "{what}");
     let scale = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));

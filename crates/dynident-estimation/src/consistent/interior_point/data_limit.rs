@@ -1,76 +1,74 @@
-//! How far variables can go while the data's half squares stay below a limit: the convex program
+//! Extreme values of variables while the data's half squares stay below a limit: the convex program
 //!
 //! ```text
 //!     minimise  g·x + ...   subject to  q(x) = c − ½‖A x − b‖² ≥ 0  and all other constraints.
 //! ```
 //!
-//! With multiplier λ of q and r = b − A x the Lagrangian's gradient has `−λ Aᵀr`, and Newton's system `λ AᵀA` beside
-//! the row `√(λ/q) Aᵀr` of a linear constraint, which stands behind those of the program's rows. The term of second
-//! order of its product, `½ λ ‖A Δx‖²`, is in the corrector. It begins where the program that minimises the same
-//! squares was on its way: λ is one there.
+//! With multiplier λ of q and r = b − A x the Lagrangian's gradient includes `−λ Aᵀr`. Newton's system includes `λ
+//! AᵀA` and the row `√(λ/q) Aᵀr` of a linear constraint, after the rows of the program. The corrector includes the
+//! second-order term of the product, `½ λ ‖A Δx‖²`. The start is an iterate of the program that minimises the same
+//! squares, with λ = 1.
 
 use super::{Certificate, DVector, Direction, InteriorPointResult, Newton, Pair, Program, State, Targets, from_state};
 
-/// Points and multipliers inside the cones on the way to the optimum of a program, with ever smaller gaps: where others
-/// begin that have the same variables, blocks and rows. Their own optima are not so near that they would be stuck at
-/// this one's boundary (Gondzio, Math. Programming 83 (1998) 125).
+/// Strictly interior iterates of a program with decreasing gaps, used as start points of other programs with the same
+/// variables, blocks and rows. Early iterates are better start points than the optimum, which is too close to the
+/// boundary of the other program (Gondzio, Math. Programming 83 (1998) 125).
 #[derive(Clone, Debug)]
-pub(in crate::consistent) struct OnTheWay(Vec<Stage>);
+pub(in crate::consistent) struct CentralPath(Vec<Stage>);
 
-/// A point on the way.
 #[derive(Clone, Debug)]
 struct Stage {
     state: State,
     data_squares: f64,
 }
 
-/// As [`interior_point`](super::interior_point), with what is on the way.
-pub(in crate::consistent) fn interior_point_on_the_way(
+/// As [`interior_point`](super::interior_point), and also returns the iterates.
+pub(in crate::consistent) fn interior_point_with_path(
     program: &Program,
     start: DVector<f64>,
     limits: (f64, usize),
-) -> Option<(InteriorPointResult, OnTheWay)> {
+) -> Option<(InteriorPointResult, CentralPath)> {
     let mut stages = Vec::new();
     let mut keep = |state: &State, _: &Certificate| {
         stages.push(Stage { state: state.clone(), data_squares: program.data_squares(&state.x) });
         false
     };
     let solved = from_state(program, State::new(program, start)?, limits.0, limits.1, &mut keep)?;
-    Some((solved, OnTheWay(stages)))
+    Some((solved, CentralPath(stages)))
 }
 
-impl OnTheWay {
-    /// The first point that leaves room between the least squares and their limit, on a central path that ends there.
+impl CentralPath {
+    /// The first iterate with enough room between the least squares and their limit and a small enough gap.
     fn first_within(&self, least: f64, limit: f64) -> Option<&Stage> {
         let room = limit - least;
         let begins = |stage: &&Stage| {
-            limit - stage.data_squares > LEAST_ROOM * room && stage.state.products() < LARGEST_GAP * room
+            limit - stage.data_squares > MIN_START_ROOM_SHARE * room
+                && stage.state.products() < MAX_START_GAP_SHARE * room
         };
         self.0.iter().find(begins).or_else(|| self.0.last()).filter(|stage| stage.data_squares < limit)
     }
 
-    /// Where a program with this limit begins.
     pub(in crate::consistent) fn start(&self, limits: (f64, f64)) -> Option<&DVector<f64>> {
         self.first_within(limits.0, limits.1).map(|stage| &stage.state.x.high)
     }
 }
 
-/// What data leave of the room below their limit where a program begins, at least, and the duality gap there at most,
-/// both as shares of that room.
-const LEAST_ROOM: f64 = 0.1;
-const LARGEST_GAP: f64 = 2.0;
+/// Minimum share of the room below the limit at the start of a program, and maximum duality gap there relative to that
+/// room.
+const MIN_START_ROOM_SHARE: f64 = 0.1;
+const MAX_START_GAP_SHARE: f64 = 2.0;
 
-/// How far the imbalance of a limited program alone may drive a point beside the room that the barrier leaves while μ
-/// falls. It begins balanced but for the direction in which it is to go.
-pub(super) const LARGEST_DRIVE: f64 = 30.0;
+/// Maximum displacement of a limited program by the imbalance alone, relative to the room of the barrier, while μ
+/// decreases. The start is balanced except in the search direction.
+pub(super) const MAX_DRIVE: f64 = 30.0;
 
-/// What is left of the room below the limit where a step would come to its end.
-const KEPT_ROOM: f64 = 0.1;
+/// Share of the room below the limit that a step must keep.
+const MIN_KEPT_ROOM_SHARE: f64 = 0.1;
 
-/// A limit's product of slack and multiplier over the mean of all, from which on a new limit begins anew.
-const LARGEST_PRODUCT: f64 = 50.0;
+/// Product of slack and multiplier of a limit relative to the mean, from which the program restarts for a new limit.
+const MAX_PRODUCT_RATIO: f64 = 50.0;
 
-/// What a point on the way to the farthest one looks like.
 pub(in crate::consistent) struct Iterate<'a> {
     pub(in crate::consistent) x: &'a DVector<f64>,
     /// `b − A x`.
@@ -80,24 +78,22 @@ pub(in crate::consistent) struct Iterate<'a> {
     pub(in crate::consistent) certificate: Certificate,
 }
 
-/// What is to be done there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::consistent) enum Next {
-    /// Go on, to a duality gap no less than this.
+    /// Continue to a duality gap not below this value.
     On(f64),
-    /// The limit is another.
+    /// Change the limit.
     Limit(f64),
-    /// Enough is known.
     Stop,
 }
 
-/// Follows the path of a program with a limit of its data from where another program, without the limit and without the
-/// last rows, was on its way; its least squares are `least`. `look` sees every point, each of which keeps the limit. It
-/// ends at [`Next::Stop`], and where double precision allows no step any more, iterations are used up, or no point of
-/// the way is inside.
+/// Follows the central path of a program with a limit of its data. `way` are the iterates of the program without the
+/// limit and without the last rows, `least` its least squares. `look` receives every iterate; each satisfies the limit.
+/// The search ends at [`Next::Stop`], if double precision allows no step, at the iteration limit, or if no start point
+/// is inside.
 pub(in crate::consistent) fn interior_point_within_limit(
     program: &mut Program,
-    way: &OnTheWay,
+    way: &CentralPath,
     least: f64,
     max_iterations: usize,
     look: &mut dyn FnMut(&Iterate<'_>) -> Next,
@@ -120,8 +116,8 @@ pub(in crate::consistent) fn interior_point_within_limit(
                 let slack = limit - program.data_squares(&state.x);
                 let mean = state.products() / state.degree() as f64;
                 match state.rows.last_mut() {
-                    Some(pair) if slack > 0.0 && slack * pair.force < LARGEST_PRODUCT * mean => pair.slack = slack,
-                    // Out of balance with the others, or outside, it would take long to come back.
+                    Some(pair) if slack > 0.0 && slack * pair.force < MAX_PRODUCT_RATIO * mean => pair.slack = slack,
+                    // A strongly unbalanced or infeasible pair would converge slowly.
                     _ => match State::within_limit(program, way, least) {
                         Some(begun) => state = begun,
                         None => return,
@@ -133,8 +129,8 @@ pub(in crate::consistent) fn interior_point_within_limit(
 }
 
 impl State {
-    /// Where a way begins for a program with a limit, with pairs for it and the rows that have come.
-    fn within_limit(program: &Program, way: &OnTheWay, least: f64) -> Option<Self> {
+    /// Start of a program with a limit, with pairs for the limit and the added rows.
+    fn within_limit(program: &Program, way: &CentralPath, least: f64) -> Option<Self> {
         let limit = program.data_limit?;
         let Stage { state, data_squares } = way.first_within(least, limit)?;
         let (x, mut rows) = (state.x.of_another(), state.rows.clone());
@@ -143,12 +139,11 @@ impl State {
             let slack = Some(row.value(&x.high)).filter(|&slack| slack > 0.0)?;
             rows.push(Pair { slack, force: mu / slack });
         }
-        // Without a limit the squares count once.
+        // Without a limit the squares have weight one.
         rows.push(Pair { slack: limit - data_squares, force: 1.0 });
         Some(Self { x, cones: state.cones.clone(), rows, balanced: false })
     }
 
-    /// The sum of all products of slacks and multipliers.
     fn products(&self) -> f64 {
         let cones = self.cones.iter().map(|cone| cone.scaling.lambda.norm_squared()).sum::<f64>();
         cones + self.rows.iter().map(|pair| pair.slack * pair.force).sum::<f64>()
@@ -160,7 +155,7 @@ impl State {
 }
 
 impl Newton<'_> {
-    /// The term of second order of a limit of the data.
+    /// Second-order term of the data limit.
     pub(super) fn bend(&self, targets: &mut Targets, affine: &Direction, share: f64) {
         let (Some(pair), Some(change), Some(target)) =
             (self.state.rows.last(), affine.row_dual.last(), targets.rows.last_mut())
@@ -170,15 +165,14 @@ impl Newton<'_> {
         *target += share * (pair.force + change) * 0.5 * self.moved_data(affine).norm_squared();
     }
 
-    /// How far a direction can be followed before little is left of the room below the limit: q bends by
-    /// `½ α² ‖A Δx‖²`.
+    /// Longest step that keeps a share of the room below the limit; q decreases by `½ α² ‖A Δx‖²`.
     pub(super) fn longest_within_limit(&self, direction: &Direction) -> f64 {
         let (Some(pair), Some(slope)) = (self.state.rows.last(), direction.row_primal.last()) else {
             return f64::INFINITY;
         };
-        let (room, bend) = ((1.0 - KEPT_ROOM) * pair.slack, self.moved_data(direction).norm_squared());
+        let (room, bend) = ((1.0 - MIN_KEPT_ROOM_SHARE) * pair.slack, self.moved_data(direction).norm_squared());
         let root = (slope * slope + 2.0 * room * bend).sqrt();
-        // The stable one of both ways to write the positive root.
+        // Numerically stable form of the positive root.
         let longest = if *slope > 0.0 { (slope + root) / bend } else { 2.0 * room / (root - slope) };
         if longest.is_nan() { f64::INFINITY } else { longest }
     }

@@ -1,4 +1,4 @@
-//! Parameter by parameter, in units of the prior body.
+//! Euclidean distance of the parameters, in units of the prior body.
 
 use super::PriorBody;
 use crate::consistent::conic::{LocalSquares, Program};

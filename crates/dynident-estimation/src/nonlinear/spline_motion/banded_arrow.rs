@@ -1,13 +1,13 @@
-//! A symmetric matrix whose first unknowns see their neighbours alone and whose last ones see all:
+//! A symmetric matrix with a band for the first unknowns and full rows for the last ones:
 //!
 //! ```text
 //!     H = [ B   A ]     B banded, size × size;  A dense, size × arrow;  D dense, arrow × arrow
 //!         [ Aᵀ  D ]
 //! ```
 //!
-//! The motion of a log is such a band, parameters are the arrow. `B = L Lᵀ` costs `size · bandwidth²`, what is left for
-//! the arrow is the Schur complement `D − (L⁻¹A)ᵀ(L⁻¹A)`, and the inverse inside the band follows from L without the
-//! rest of it (Takahashi, Fagan and Chin 1973; Rasmussen and Williams, Gaussian Processes for Machine Learning, B.3).
+//! The band is the motion of a log, the arrow the parameters. `B = L Lᵀ` costs `size · bandwidth²`; the Schur
+//! complement of the arrow is `D − (L⁻¹A)ᵀ(L⁻¹A)`, and the inverse inside the band follows from L alone (Takahashi,
+//! Fagan and Chin 1973; Rasmussen and Williams, Gaussian Processes for Machine Learning, B.3).
 
 use nalgebra::DMatrix;
 
@@ -28,7 +28,7 @@ pub(super) struct BandedArrow {
 }
 
 impl BandedArrow {
-    /// Zero, for unknowns that see `bandwidth` neighbours on either side.
+    /// Zero matrix for unknowns coupled to `bandwidth` neighbours on either side.
     pub(super) fn new(size: usize, bandwidth: usize, arrow: usize) -> Self {
         Self {
             size,
@@ -42,7 +42,7 @@ impl BandedArrow {
         }
     }
 
-    /// Adds `x xᵀ` and `x r` for a row whose entries are `own` from unknown `first` on and `arrow` (all of the arrow).
+    /// Adds `x xᵀ` and `x r` for a row with the entries `own` from unknown `first` on and `arrow` (the whole arrow).
     pub(super) fn add_row(&mut self, first: usize, own: &[f64], arrow: &[f64], r: f64) {
         let (wide, a) = (self.bandwidth + 1, self.arrow);
         for (k, &x) in own.iter().enumerate() {
@@ -68,17 +68,15 @@ impl BandedArrow {
         self.band[row * (self.bandwidth + 1) + self.bandwidth + column - row] += value;
     }
 
-    /// Adds to the right-hand side of unknown `row` of the band.
+    /// Adds to the right-hand side of row `row` of the band.
     pub(super) fn add_right(&mut self, row: usize, value: f64) {
         self.right[row] += value;
     }
 
-    /// The right-hand side of the band.
     pub(super) fn right(&self) -> &[f64] {
         &self.right
     }
 
-    /// `B x`.
     pub(super) fn product(&self, x: &[f64]) -> Vec<f64> {
         let (b, wide) = (self.bandwidth, self.bandwidth + 1);
         let mut out = vec![0.0; self.size];
@@ -102,8 +100,8 @@ impl BandedArrow {
         sum(&mut self.right_corner, &part.right_corner);
     }
 
-    /// Takes the band away: `B = L Lᵀ`, `W = L⁻¹A`. The number of the first unknown that those before it leave nothing
-    /// of, where B is not positive definite.
+    /// Eliminates the band: `B = L Lᵀ`, `W = L⁻¹A`. If B is not positive definite, the error is the number of the
+    /// first dependent unknown.
     pub(super) fn eliminated(&self) -> Result<Eliminated, usize> {
         let (b, wide, a) = (self.bandwidth, self.bandwidth + 1, self.arrow);
         let mut l = self.band.clone();
@@ -112,7 +110,6 @@ impl BandedArrow {
             let lowest = i.saturating_sub(b);
             let (before, own) = l.split_at_mut(i * wide);
             let own = &mut own[..wide];
-            // Places of columns `lowest..` in rows i and j.
             let from = lowest + b - i;
             for j in lowest..i {
                 let to = j + b - i;
@@ -155,7 +152,6 @@ impl BandedArrow {
     }
 }
 
-/// What is left once the band is taken away.
 #[derive(Clone, Debug)]
 pub(super) struct Eliminated {
     size: usize,
@@ -166,12 +162,12 @@ pub(super) struct Eliminated {
     y: Vec<f64>,
     /// `D − AᵀB⁻¹A`.
     pub(super) schur: DMatrix<f64>,
-    /// The arrow's right-hand side less what the band takes of it.
+    /// Right-hand side of the arrow after elimination.
     pub(super) right: Vec<f64>,
 }
 
 impl Eliminated {
-    /// The band's unknowns once the arrow's are known: `B⁻¹(b − A x)`.
+    /// Unknowns of the band for given unknowns of the arrow: `B⁻¹(b − A x)`.
     pub(super) fn band_solution(&self, arrow: &[f64]) -> Vec<f64> {
         let a = self.arrow;
         let mut x: Vec<f64> = (0..self.size).map(|i| self.y[i] - dot(&self.w[i * a..(i + 1) * a], arrow)).collect();
@@ -179,14 +175,14 @@ impl Eliminated {
         x
     }
 
-    /// `B⁻¹A`, row-major (size × arrow): how the band's unknowns follow the arrow's.
+    /// `B⁻¹A`, row-major (size × arrow): sensitivity of the band's unknowns to those of the arrow.
     pub(super) fn shares(&self) -> Vec<f64> {
         let mut v = self.w.clone();
         self.back(&mut v, self.arrow);
         v
     }
 
-    /// `x ← L⁻ᵀx` for `count` right-hand sides side by side.
+    /// `x ← L⁻ᵀx` for `count` right-hand sides.
     fn back(&self, x: &mut [f64], count: usize) {
         let (b, wide) = (self.bandwidth, self.bandwidth + 1);
         for i in (0..self.size).rev() {
@@ -205,13 +201,13 @@ impl Eliminated {
         }
     }
 
-    /// `2 Σ ln L_ii`, the logarithm of B's determinant.
+    /// `2 Σ ln L_ii`, the log-determinant of B.
     pub(super) fn log_determinant(&self) -> f64 {
         let wide = self.bandwidth + 1;
         2.0 * (0..self.size).map(|i| self.l[i * wide + self.bandwidth].ln()).sum::<f64>()
     }
 
-    /// The entries of `B⁻¹` inside the band.
+    /// Entries of `B⁻¹` inside the band.
     pub(super) fn inverse(&self) -> InverseBand {
         let (b, wide, size) = (self.bandwidth, self.bandwidth + 1, self.size);
         let mut z = vec![0.0; size * wide];
@@ -227,7 +223,6 @@ impl Eliminated {
             product[..later].fill(0.0);
             for k in 0..later {
                 let row = j + 1 + k;
-                // Entries (row, j + 1 ..= row).
                 let own = &z[row * wide + b - k..=row * wide + b];
                 product[k] += dot(own, &column[..=k]);
                 let x = column[k];
@@ -245,7 +240,6 @@ impl Eliminated {
     }
 }
 
-/// Entries of an inverse near its diagonal.
 #[derive(Clone, Debug)]
 pub(super) struct InverseBand {
     bandwidth: usize,
@@ -253,14 +247,13 @@ pub(super) struct InverseBand {
 }
 
 impl InverseBand {
-    /// Entry (row, column), at most a bandwidth apart.
+    /// Entry (row, column), at most a bandwidth from the diagonal.
     pub(super) fn entry(&self, row: usize, column: usize) -> f64 {
         let (row, column) = (row.max(column), row.min(column));
         self.z[row * (self.bandwidth + 1) + self.bandwidth + column - row]
     }
 }
 
-/// `to += x · from`.
 #[inline]
 pub(super) fn axpy(x: f64, from: &[f64], to: &mut [f64]) {
     for (to, from) in to.iter_mut().zip(from) {
@@ -268,7 +261,7 @@ pub(super) fn axpy(x: f64, from: &[f64], to: &mut [f64]) {
     }
 }
 
-/// Scalar product in four sums, so that several multiplications go on at a time.
+/// Scalar product in four independent sums.
 #[inline]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
@@ -291,7 +284,7 @@ mod tests {
     /// Random rows against nalgebra's dense Cholesky: agreement to rounding, 1e-9 of entries of order one at a
     /// condition number below 1e4.
     #[test]
-    fn the_banded_arrow_is_the_dense_matrix() {
+    fn banded_arrow_equals_the_dense_matrix() {
         let mut random = Random::new(3);
         for (size, window, arrow) in [(23, 6, 4), (12, 12, 0), (5, 1, 3)] {
             let mut matrix = BandedArrow::new(size, window - 1, arrow);
@@ -342,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_that_no_row_sees_is_named() {
+    fn unknowns_without_rows_are_named() {
         let mut matrix = BandedArrow::new(3, 1, 0);
         matrix.add_row(0, &[1.0, 0.5], &[], 0.0);
         matrix.add_row(0, &[0.2, 1.0], &[], 0.0);

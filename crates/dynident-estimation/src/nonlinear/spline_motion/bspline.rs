@@ -1,12 +1,11 @@
-//! Quintic B-splines on even knots that fall on samples: the functions that a motion is made of, and what their
-//! roughness costs.
+//! Quintic B-splines on uniform knots at sample instants, and their roughness penalty.
 
 use super::banded_arrow::BandedArrow;
 
-/// Functions that are not zero at one instant.
+/// Number of nonzero functions at one instant.
 pub(super) const ACTIVE: usize = 6;
-/// Coefficients of u⁰ to u⁵ of the functions over one interval, in units of 1/120, in the order of the functions
-/// (de Boor, A Practical Guide to Splines, IX).
+/// Coefficients of u⁰ to u⁵ of the functions over one interval, in units of 1/120, in the order of the functions (de
+/// Boor, A Practical Guide to Splines, IX).
 const PIECES: [[f64; ACTIVE]; ACTIVE] = [
     [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
     [26.0, -50.0, 20.0, 20.0, -20.0, 5.0],
@@ -15,17 +14,15 @@ const PIECES: [[f64; ACTIVE]; ACTIVE] = [
     [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
     [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
 ];
-/// Frequencies at which a symbol's mean logarithm is taken.
-const FREQUENCIES: usize = 4096;
+const SYMBOL_FREQUENCIES: usize = 4096;
 
-/// The functions of a piece of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Spline {
     pub(super) samples: usize,
     /// Samples between two knots.
     pub(super) step: usize,
     rate_hz: f64,
-    /// For each sample of an interval the six functions, their first and their second derivatives (1/s, 1/s²).
+    /// Six functions with first and second derivatives (1/s, 1/s²) for each sample of an interval.
     table: Vec<[[f64; ACTIVE]; 3]>,
 }
 
@@ -41,12 +38,11 @@ impl Spline {
         Self { samples, step, rate_hz, table: table.collect() }
     }
 
-    /// Number of functions.
     pub(super) fn functions(&self) -> usize {
         self.samples.saturating_sub(1) / self.step + ACTIVE
     }
 
-    /// The first function that is not zero at a sample.
+    /// First nonzero function at a sample.
     pub(super) fn first(&self, sample: usize) -> usize {
         sample / self.step
     }
@@ -56,8 +52,8 @@ impl Spline {
         &self.table[sample % self.step]
     }
 
-    /// Position, velocity and acceleration of joint number `joint` at samples `from..from + count`; coefficients stand
-    /// function by function, `joints` numbers each.
+    /// Position, velocity and acceleration of joint `joint` at samples `from..from + count`; coefficients are ordered
+    /// by function, with `joints` numbers each.
     pub(super) fn motion(&self, coefficients: &[f64], joint: usize, joints: usize, from: usize, out: [&mut [f64]; 3]) {
         let [q, dq, ddq] = out;
         let end = from + q.len();
@@ -75,7 +71,7 @@ impl Spline {
         }
     }
 
-    /// Positions less the spline's.
+    /// Positions minus the spline.
     pub(super) fn residual(&self, coefficients: &[f64], joint: usize, joints: usize, q: &[f64]) -> Vec<f64> {
         let mut left = Vec::with_capacity(q.len());
         for (interval, q) in q.chunks(self.step).enumerate() {
@@ -87,7 +83,6 @@ impl Spline {
         left
     }
 
-    /// Samples of an interval.
     pub(super) fn interval_samples(&self, interval: usize) -> usize {
         self.samples.saturating_sub(interval * self.step).min(self.step)
     }
@@ -110,7 +105,7 @@ impl Spline {
         })
     }
 
-    /// `cᵀ P c` and, function by function, `P c` of one joint.
+    /// `cᵀ P c`, and `P c` of one joint by function.
     pub(super) fn penalty(
         &self,
         gram: &[[f64; ACTIVE]; ACTIVE],
@@ -121,7 +116,7 @@ impl Spline {
         let mut product = vec![0.0; self.functions()];
         let mut sum = 0.0;
         for interval in 0..self.functions() + 1 - ACTIVE {
-            // Constants cost nothing: without them no digits are lost.
+            // Constants have zero penalty; subtracting them avoids cancellation.
             let base = coefficients[interval * joints + joint];
             let own: [f64; ACTIVE] = core::array::from_fn(|k| coefficients[(interval + k) * joints + joint] - base);
             for (a, row) in gram.iter().enumerate() {
@@ -133,8 +128,8 @@ impl Spline {
         (sum.max(0.0), product)
     }
 
-    /// Adds `position · BᵀB + penalty · P` of one joint to the band of all, and `position · Bᵀ r − penalty · P c` to
-    /// its right-hand side.
+    /// Adds `position · BᵀB + penalty · P` of one joint to the band, and `position · Bᵀ r − penalty · P c` to its
+    /// right-hand side.
     pub(super) fn add_to(
         &self,
         matrix: &mut BandedArrow,
@@ -162,7 +157,7 @@ impl Spline {
         self.add_roughness(matrix, joint, joints, penalty, gram, pulled);
     }
 
-    /// Adds `penalty · P` of one joint to the band of all, and `−penalty · P c` to its right-hand side.
+    /// Adds `penalty · P` of one joint to the band, and `−penalty · P c` to its right-hand side.
     pub(super) fn add_roughness(
         &self,
         matrix: &mut BandedArrow,
@@ -195,16 +190,16 @@ impl Spline {
         sum
     }
 
-    /// The mean logarithm of the roughness matrix's eigenvalues but for those that are zero, by its symbol (Szegő's
-    /// limit): what a prior of that order has for a normalisation.
+    /// Mean logarithm of the nonzero eigenvalues of the roughness matrix, from its symbol (Szegő's limit): the
+    /// normalisation of a prior of that order.
     pub(super) fn mean_log_roughness(&self, order: usize) -> f64 {
         let gram = self.roughness(order);
         // Interior rows are sums along the diagonals.
         let lag = |lag: usize| -> f64 { (0..ACTIVE - lag).map(|k| gram[k][k + lag]).sum() };
         let lags: [f64; ACTIVE] = core::array::from_fn(lag);
-        // The symbol near zero is a power that rounding hides: it is divided out, and its mean logarithm is zero.
-        let mean = (0..FREQUENCIES).map(|k| {
-            let omega = core::f64::consts::PI * (k as f64 + 0.5) / FREQUENCIES as f64;
+        // Near zero the symbol is a power that rounding hides. It is divided out; its mean logarithm is zero.
+        let mean = (0..SYMBOL_FREQUENCIES).map(|k| {
+            let omega = core::f64::consts::PI * (k as f64 + 0.5) / SYMBOL_FREQUENCIES as f64;
             let symbol = lags[0] + 2.0 * (1..ACTIVE).map(|l| lags[l] * (l as f64 * omega).cos()).sum::<f64>();
             let zero = (2.0 - 2.0 * omega.cos()).powi(order as i32);
             if omega < 0.3 { None } else { Some((symbol / zero).ln()) }
@@ -213,11 +208,11 @@ impl Spline {
         sum / f64::from(count.max(1))
     }
 
-    /// Rows whose products are an interval's share of the roughness: `Gram = Σ e eᵀ`, six less the order of them.
+    /// Rows with `Gram = Σ e eᵀ` for the roughness of an interval; six minus `order` of them.
     pub(super) fn roughness_rows(&self, order: usize) -> Vec<[f64; ACTIVE]> {
         let mut left = self.roughness(order);
         let mut rows = Vec::new();
-        // Cholesky with pivots of a matrix of known rank.
+        // Pivoted Cholesky of a matrix of known rank.
         for _ in 0..ACTIVE - order {
             let pivot = (0..ACTIVE).max_by(|a, b| left[*a][*a].total_cmp(&left[*b][*b])).unwrap_or(0);
             let root = left[pivot][pivot].max(f64::MIN_POSITIVE).sqrt();
@@ -233,7 +228,6 @@ impl Spline {
     }
 }
 
-/// Coefficients of a polynomial's derivative.
 fn coefficients(piece: &[f64; ACTIVE], order: usize) -> Vec<f64> {
     let mut own = piece.to_vec();
     for _ in 0..order {
@@ -250,17 +244,17 @@ fn derivative(piece: &[f64; ACTIVE], order: usize, u: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Functions add up to one, a cubic is met exactly (B-splines of order six hold all quintics; its coefficients are
-    /// the blossom at the knots), and the third derivative's square integrates to what it is.
+    /// The functions sum to one; a cubic is exact (its coefficients are the blossom at the knots); and the integral of
+    /// its squared third derivative is exact.
     #[test]
-    fn splines_hold_polynomials() {
+    fn splines_reproduce_polynomials() {
         let spline = Spline::new(41, 4, 20.0);
         for sample in 0..41 {
             let [values, rates, second] = spline.at(sample);
             assert!((values.iter().sum::<f64>() - 1.0).abs() < 1e-14);
             assert!(rates.iter().sum::<f64>().abs() < 1e-13 && second.iter().sum::<f64>().abs() < 1e-12);
         }
-        // t³ in knots: blossom at (k−2, .., k+2) about the middle is k³ minus the mean of pair products.
+        // t³ in knots: the blossom at (k−2, .., k+2) about the middle is k³ minus the mean of pair products.
         let h = 0.2;
         let cubic = |k: f64| -> f64 {
             let knots = [k - 2.0, k - 1.0, k, k + 1.0, k + 2.0];
@@ -282,7 +276,6 @@ mod tests {
             let t = k as f64 / 20.0;
             assert!((q - t.powi(3)).abs() < 1e-12 && (dq - 3.0 * t * t).abs() < 1e-11 && (ddq - 6.0 * t).abs() < 1e-10);
         }
-        // Ten and a bit intervals of 0.2 s: functions() − 5 of them.
         let length = h * (spline.functions() - 5) as f64;
         let (penalty, _) = spline.penalty(&spline.roughness(3), &coefficients, 0, 1);
         assert!((penalty - 36.0 * length).abs() < 1e-9 * penalty);
@@ -294,7 +287,7 @@ mod tests {
         assert!((from_rows - penalty).abs() < 1e-9 * penalty);
     }
 
-    /// Against the eigenvalues of the matrix itself: boundary effects are of the order of one over its size.
+    /// Compared with the eigenvalues of the matrix; boundary effects are of the order of one over its size.
     #[test]
     fn the_symbol_gives_the_determinant() {
         let spline = Spline::new(3001, 10, 500.0);
@@ -311,7 +304,8 @@ mod tests {
             }
             let mut eigenvalues: Vec<f64> = matrix.symmetric_eigenvalues().iter().copied().collect();
             eigenvalues.sort_by(f64::total_cmp);
-            // Eigenvalues below rounding of the largest cannot be checked: compare the upper half's share by order 2.
+            // Small eigenvalues are below rounding of the largest for higher orders, so only order up to 2 is
+            // compared.
             if order <= 2 {
                 let own = eigenvalues[order..].iter().map(|x| x.ln()).sum::<f64>() / (n - order) as f64;
                 assert!((own - spline.mean_log_roughness(order)).abs() < 0.2, "{order}: {own}");

@@ -1,5 +1,4 @@
-//! The parameters' covariance with the motion unknown: rows from which the motion is taken away, as any linear estimate
-//! has them.
+//! Covariance of the parameters with unknown motion, from rows without the motion.
 
 use super::banded_arrow::axpy;
 use super::bspline::ACTIVE;
@@ -12,8 +11,8 @@ use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor, solve, spli
 use crate::uncertainty::{Estimate, PointEstimate, joint_degrees_of_freedom};
 use rayon::prelude::*;
 
-/// The estimate that the last linearisation gives: `X̃ = X_θ − X_c B⁻¹A` for the rows of torque, of positions and of
-/// the prior on the motion; their normal matrix is the Schur complement.
+/// Estimate from the last linearisation: `X̃ = X_θ − X_c B⁻¹A` for the rows of torque, positions and motion prior;
+/// their normal matrix is the Schur complement.
 pub(super) fn estimate_of<M: TorqueModel>(
     problem: &SplineMotionProblem,
     settings: &SplineMotionSettings,
@@ -82,7 +81,7 @@ pub(super) fn estimate_of<M: TorqueModel>(
     Ok(estimate.into_estimate(&stacked, &settings.rank, settings.covariance)?)
 }
 
-/// Rows `[X̃ | r + X̃ θ]`, row after row.
+/// Rows `[X̃ | r + X̃ θ]`, one after another.
 struct Panel {
     columns: usize,
     values: Vec<f64>,
@@ -93,7 +92,7 @@ impl Panel {
         Self { columns, values: Vec::new() }
     }
 
-    /// A row whose entries are `own`, for the unknown `first` and each one `apart` from it.
+    /// Adds a row with the entries `own` for the unknown `first` and the following ones at distance `apart`.
     fn add(
         &mut self,
         (first, apart): (usize, usize),
@@ -129,8 +128,8 @@ impl Panel {
     }
 }
 
-/// Rows of a joint's positions: means over the samples of a torque row, times the root of their number. Below their
-/// rate nothing of what follows the parameters is lost.
+/// Rows of a joint's positions: means over the samples of a torque row, times the root of their number. Faster
+/// position changes carry no information about the parameters.
 fn positions(
     piece: &Piece<'_>,
     coefficients: &[f64],
@@ -158,7 +157,7 @@ fn positions(
     panel
 }
 
-/// Rows of the prior on a joint's motion.
+/// Rows of the prior of a joint's motion.
 fn roughness(
     piece: &Piece<'_>,
     coefficients: &[f64],

@@ -1,4 +1,4 @@
-//! Motion and parameters of any log from one likelihood, the motion a smoothing spline.
+//! Motion and parameters of any log from one likelihood, with a smoothing spline as motion.
 
 use super::bspline::Spline;
 use super::covariance::estimate_of;
@@ -9,34 +9,28 @@ use super::problem::{
 };
 use super::rows::{FreeParameters, Piece};
 use super::smoothing::smoothed;
-use super::system::{Paid, System, TorqueInformation, torque_information};
+use super::system::{EffectiveUnknowns, System, TorqueInformation, torque_information};
 use crate::error::EstimationError;
 use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
 use rayon::prelude::*;
 
-/// Longest time between knots that is tried, s, and how much closer the next one is.
-const LONGEST_SPACING_S: f64 = 0.5;
-const CLOSER: f64 = 1.5;
-/// Rows in an interval between knots, at least, where the rate allows: so many that friction which turns within an
-/// interval is followed.
-const ROWS_OF_INTERVAL: usize = 6;
-/// A torque's σ never falls below this share of the torque's own size: noise-free data leave rounding.
-const LEAST_TORQUE_SIGMA: f64 = 1e-7;
-/// Noise levels have settled when none moves by more than this share.
-const SETTLED: f64 = 0.05;
-/// However much the unknowns bend to the torque, at least this share of its noise stays in its residuals.
-const LEAST_SHARE: f64 = 0.1;
-/// Own seconds: what lasts longer than this in the torque's residuals is the model's error and not noise: a filter that
-/// took it away would take what slow motion says of the parameters as well.
-const LONGEST_NOISE_S: f64 = 0.1;
-/// After so many steps orders of autoregressions fall only, and after so many levels stay: what goes to and fro between
-/// two descriptions of the noise that are as good as each other comes to rest.
-const ORDERS_FALL: usize = 6;
-const LEVELS_STAY: usize = 12;
-/// How often levels are found again from one linearisation: at first, when they are far off, and later.
-const EARLY: (usize, usize) = (3, 3);
+/// Ratio of successive tested times between knots.
+const SPACING_RATIO: f64 = 1.5;
+/// Minimum number of rows between knots, if the rate allows, so that friction reversals within an interval are
+/// resolved.
+const MIN_ROWS_PER_INTERVAL: usize = 6;
+/// Lower limit of a torque's σ relative to the size of the torque, for noise-free data.
+const MIN_TORQUE_SIGMA_SHARE: f64 = 1e-7;
+/// Maximum relative change of noise levels at convergence.
+const LEVEL_TOLERANCE: f64 = 0.05;
+const MIN_REMAINING_NOISE_SHARE: f64 = 0.1;
+/// After ORDERS_DECREASE_AFTER steps the autoregression orders may only decrease, and after LEVELS_FIXED_AFTER steps
+/// the noise levels are fixed, to stop oscillation between two equally good noise models.
+const ORDERS_DECREASE_AFTER: usize = 6;
+const LEVELS_FIXED_AFTER: usize = 12;
+/// Updates of the noise levels per linearisation: in early steps, and later.
+const LEVEL_UPDATES: (usize, usize) = (3, 3);
 
-/// Motion and parameters of one step.
 #[derive(Clone)]
 struct State {
     coefficients: Vec<Vec<f64>>,
@@ -49,27 +43,26 @@ struct State {
 ///     Σ_j ‖q_j − B c_j‖²/σ_qj²  +  Σ_j ‖A_j (τ_j − f_j(Bc, Ḃc, B̈c, θ))‖²/σ_τj²  +  Σ_j λ_j ∫ (dʳq_j/dtʳ)² dt
 /// ```
 ///
-/// B are quintic B-splines, the third sum says that the r-th derivative of a motion is white noise of intensity 1/λ
-/// (an integrated Wiener process, a Gaussian process prior); A_j whitens the torque's noise, an autoregression of its
-/// residuals. σ_q, σ_τ, λ maximise the restricted likelihood, in which motion and parameters are integrated out about
-/// their best values; r and the knots' spacing are chosen from the positions. There is no cut-off: a frequency at which
-/// positions say nothing is smoothed away by as much as they are noisy, and where torque tells more of a motion than
-/// the encoder does, it counts by its own precision.
+/// B are quintic B-splines. The third sum is a Gaussian process prior: the r-th derivative of a motion is white noise
+/// of intensity 1/λ (integrated Wiener process). A_j whitens the torque noise, an autoregression of its residuals.
+/// σ_q, σ_τ, λ maximise the restricted likelihood (motion and parameters integrated out at their optimum); r and the
+/// knot spacing are selected from the positions. There is no cut-off frequency: noisy frequencies of the positions are
+/// smoothed, and torque contributes to the motion by its precision.
 ///
-/// Each step linearises the torque at all samples (Gauss and Newton; a step that raises the sum is halved). The
-/// motion's block of the normal equations is a band, the parameters are its arrow: the motion is eliminated by a banded
-/// Cholesky factor, parameters are solved for by the Schur complement, whose inverse is their covariance with the
-/// motion unknown. Torque rows are means of a few samples, at least six between knots. Levels follow `σ² = RSS/(N −
-/// paid)`, `λ = (rank P − paid)/(cᵀPc)` from the inverse's entries inside the band (Harville, JASA 72 (1977) 320; Wood
-/// and Fasiolo, Biometrics 73 (2017) 1071).
+/// Each step linearises the torque at all samples (Gauss-Newton; a step that increases the sum is halved). In the
+/// normal equations the motion is a band and the parameters are an arrow. The motion is eliminated by a banded
+/// Cholesky factor; the inverse of the Schur complement is the covariance of the parameters with unknown motion.
+/// Torque rows are means of a few samples, at least six between knots. The levels follow `σ² = RSS/(N − effective
+/// unknowns)`, `λ = (rank P − effective unknowns)/(cᵀPc)` from the entries of the inverse inside the band (Harville,
+/// JASA 72 (1977) 320; Wood and Fasiolo, Biometrics 73 (2017) 1071).
 ///
 /// Ramsay, Hooker, Campbell and Cao, J. R. Statist. Soc. B 69 (2007) 741, for fits of equations of motion to smoothed
 /// records; Wahba, Spline Models for Observational Data (1990), for the prior.
 ///
 /// # Errors
-/// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Unusable`] for
-/// numbers that are none, [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not
-/// separate a parameter from those before it, and whatever the model returns. Reaching `max_iterations` is a status,
+/// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for wrong shapes, [`EstimationError::Unusable`] for
+/// values that are not finite, [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] if the rows do not
+/// separate a parameter from the previous ones, and the errors of the model. Reaching `max_iterations` is a status,
 /// not an error.
 #[doc(alias("smoothing spline", "Gaussian process", "state estimation", "errors in variables"))]
 pub fn spline_motion_least_squares<M: TorqueModel>(
@@ -86,18 +79,18 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     first_torque_levels(&fit.pieces, &residuals, &mut noise);
     let first = state.clone();
     let (mut iterations, mut converged) = (0, false);
-    let mut paid = None;
+    let mut effective = None;
     while !converged && iterations < settings.max_iterations {
         iterations += 1;
         let information = fit.information(model, &state, &noise)?;
         let before_levels = noise.clone();
         let again = match iterations {
-            early if early <= EARLY.0 => EARLY.1,
-            late if late > LEVELS_STAY => 0,
+            early if early <= LEVEL_UPDATES.0 => LEVEL_UPDATES.1,
+            late if late > LEVELS_FIXED_AFTER => 0,
             _ => 1,
         };
         for _ in 0..again {
-            paid = Some(fit.find_levels(&information, &state, &mut noise)?);
+            effective = Some(fit.find_levels(&information, &state, &mut noise)?);
         }
         let Solved { step, .. } = fit.solve(&information, &state, &noise)?;
         let before = cost(&fit.pieces, &state, &residuals, &noise);
@@ -106,14 +99,14 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
         if let Some(better) = better {
             (state, residuals) = (better.state, better.residuals);
         }
-        if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_STAY) {
-            let longest_noise_s = LONGEST_NOISE_S * settings.own_second_s;
+        if let Some(effective) = effective.as_ref().filter(|_| iterations <= LEVELS_FIXED_AFTER) {
+            let longest_noise_s = settings.max_noise_memory_s * settings.own_second_s;
             let most = settings.most_autoregression;
-            torque_levels(&fit.pieces, &residuals, paid, &mut noise, most, iterations, longest_noise_s);
+            torque_levels(&fit.pieces, &residuals, effective, &mut noise, most, iterations, longest_noise_s);
         }
         let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
-        converged = step.length <= settings.tolerance && change <= SETTLED && iterations > 2;
-        if worse && step.length > settings.tolerance && change <= SETTLED {
+        converged = step.length <= settings.tolerance && change <= LEVEL_TOLERANCE && iterations > 2;
+        if worse && step.length > settings.tolerance && change <= LEVEL_TOLERANCE {
             break;
         }
     }
@@ -122,7 +115,7 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     let at_start = all_residuals(&pieces, model, &first)?;
     let cost_at_start = cost(&pieces, &first, &at_start, &noise);
     let converged = converged && cost_now <= cost_at_start * (1.0 + 1e-9);
-    let logs = log_fits(&pieces, &noise, paid.as_ref());
+    let logs = log_fits(&pieces, &noise, effective.as_ref());
     let estimate = estimate_of(
         problem,
         settings,
@@ -135,7 +128,6 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     Ok(SplineMotionEstimate { estimate, motion: motion.collect(), logs, cost_at_start, cost: cost_now })
 }
 
-/// Data that all steps of a fit share.
 struct Fit<'a> {
     problem: &'a SplineMotionProblem,
     settings: &'a SplineMotionSettings,
@@ -143,13 +135,11 @@ struct Fit<'a> {
     pieces: Vec<Piece<'a>>,
 }
 
-/// A linearised system and its solution.
 struct Solved {
     system: System,
     step: Step,
 }
 
-/// A Gauss-Newton step.
 struct Step {
     parameters: Vec<f64>,
     motion: Vec<Vec<f64>>,
@@ -157,14 +147,14 @@ struct Step {
     length: f64,
 }
 
-/// A state with the torque's residuals there: piece by piece, joint by joint.
+/// A state with its torque residuals, by piece and joint.
 struct Evaluated {
     state: State,
     residuals: Vec<Vec<Vec<f64>>>,
 }
 
 impl Fit<'_> {
-    /// The torque linearised at a state, piece by piece.
+    /// Linearised torque at a state, by piece.
     fn information<M: TorqueModel>(
         &self,
         model: &mut M,
@@ -193,23 +183,23 @@ impl Fit<'_> {
         Ok(Solved { system, step: Step { parameters, motion, length } })
     }
 
-    /// Levels of positions and smoothness about the linearised optimum, which moves with them.
+    /// Updates the noise levels of positions and the smoothness at the linearised optimum.
     fn find_levels(
         &self,
         information: &[TorqueInformation],
         state: &State,
         noise: &mut [LogNoise],
-    ) -> Result<Paid, EstimationError> {
+    ) -> Result<EffectiveUnknowns, EstimationError> {
         let Solved { system, step } = self.solve(information, state, noise)?;
-        let found = Paid::new(&system, &self.pieces, information, noise, &self.free);
+        let found = EffectiveUnknowns::new(&system, &self.pieces, information, noise, &self.free);
         let moved: Vec<Vec<f64>> =
             state.coefficients.iter().zip(&step.motion).map(|(c, step)| sum(c, step, 1.0)).collect();
         found.levels(&self.pieces, &moved, noise);
         Ok(found)
     }
 
-    /// The state after the whole step, or a half of it, a quarter and so on, whose cost is not above `before`; none if
-    /// no share of the step has one.
+    /// The state after the longest of the full, half, quarter, ... step with a cost of at most `before`; `None` if
+    /// no step has one.
     fn descended<M: TorqueModel>(
         &self,
         model: &mut M,
@@ -238,7 +228,7 @@ impl Fit<'_> {
     }
 }
 
-/// The torque's first levels: the root mean squares of its residuals.
+/// First torque noise levels: RMS of the residuals.
 fn first_torque_levels(pieces: &[Piece<'_>], residuals: &[Vec<Vec<f64>>], noise: &mut [LogNoise]) {
     for (log, own) in noise.iter_mut().enumerate() {
         let of_log = || pieces.iter().zip(residuals).filter(move |(piece, _)| piece.record.log == log);
@@ -252,10 +242,10 @@ fn first_torque_levels(pieces: &[Piece<'_>], residuals: &[Vec<Vec<f64>>], noise:
     }
 }
 
-/// Pieces with their knots, levels of every log, and coefficients of every piece.
+/// Pieces with their knots, noise levels of every log, and coefficients of every piece.
 type Beginning<'a> = (Vec<Piece<'a>>, Vec<LogNoise>, Vec<Vec<f64>>);
 
-/// Knots, the motion that the positions alone give, and its levels.
+/// Knots, motion from the positions alone, and its noise levels.
 fn begin<'a>(
     problem: &'a SplineMotionProblem,
     settings: &SplineMotionSettings,
@@ -270,16 +260,16 @@ fn begin<'a>(
         let Some(&(_, any)) = own.first() else { return Err(EstimationError::Empty) };
         let rate_hz = any.rate_hz;
         if let Some((_, other)) = own.iter().find(|(_, record)| record.rate_hz != rate_hz) {
-            let fix = "pieces of one log have one rate: give them numbers of their own";
+            let fix = "pieces of one log must have the same rate: use separate log numbers";
             return Err(EstimationError::Setting { setting: "rate_hz", value: other.rate_hz, fix });
         }
-        // Each log's share of the unknowns is its share of the samples.
+        // The unknowns are shared among the logs by samples.
         let least = (all * joints).div_ceil(settings.max_unknowns).max(2);
         let mut ladder = Vec::new();
-        let mut step = LONGEST_SPACING_S * settings.own_second_s * rate_hz;
+        let mut step = settings.max_knot_spacing_s * settings.own_second_s * rate_hz;
         while step.round() as usize > least {
             ladder.push(step.round() as usize);
-            step /= CLOSER;
+            step /= SPACING_RATIO;
         }
         ladder.push(least);
         if let Some(spacing_s) = settings.knot_spacing_s {
@@ -294,7 +284,7 @@ fn begin<'a>(
         };
         let positions: Vec<Vec<&[f64]>> = (0..joints).map(position).collect();
         let (step, found) = smoothed(&positions, rate_hz, &ladder);
-        let mean_of = (step / ROWS_OF_INTERVAL).max(1);
+        let mean_of = (step / MIN_ROWS_PER_INTERVAL).max(1);
         let mut pieces = Vec::new();
         for (place, (number, record)) in own.into_iter().enumerate() {
             let spline = Spline::new(samples(record), step, rate_hz);
@@ -338,7 +328,7 @@ fn all_residuals<M: TorqueModel>(
     each.map(|(piece, own)| piece.residuals(model, own, &state.parameters)).collect()
 }
 
-/// The sum of squares that is made small, at these levels.
+/// The sum of squares to minimise, at these noise levels.
 fn cost(pieces: &[Piece<'_>], state: &State, residuals: &[Vec<Vec<f64>>], noise: &[LogNoise]) -> f64 {
     let mut sum = 0.0;
     for ((piece, coefficients), torques) in pieces.iter().zip(&state.coefficients).zip(residuals) {
@@ -361,14 +351,14 @@ fn least_sigma(pieces: &[Piece<'_>], log: usize, joint: usize) -> f64 {
     let own = of_log.flat_map(|piece| &piece.record.tau[joint * piece.samples()..(joint + 1) * piece.samples()]);
     let (sum, count) = own.fold((0.0, 0), |(sum, count), tau| (sum + tau * tau, count + 1));
     let size = (sum / f64::from(count.max(1))).sqrt();
-    if size > 0.0 { LEAST_TORQUE_SIGMA * size } else { LEAST_TORQUE_SIGMA }
+    if size > 0.0 { MIN_TORQUE_SIGMA_SHARE * size } else { MIN_TORQUE_SIGMA_SHARE }
 }
 
-/// Colour and σ of the torques' noise by the residuals.
+/// Autoregression and σ of the torque noise from the residuals.
 fn torque_levels(
     pieces: &[Piece<'_>],
     residuals: &[Vec<Vec<f64>>],
-    paid: &Paid,
+    effective: &EffectiveUnknowns,
     noise: &mut [LogNoise],
     most: usize,
     iterations: usize,
@@ -378,20 +368,20 @@ fn torque_levels(
         for joint in 0..own.colours.len() {
             let of_log = pieces.iter().zip(residuals).filter(|(piece, _)| piece.record.log == log);
             let of_joint: Vec<&[f64]> = of_log.map(|(_, r)| r[joint].as_slice()).collect();
-            // Of the longest piece: what stands between two pieces is not known.
-            // What motion and parameters can take of the noise is gone from the residual; its mean is added again
-            // (the expectation step of Dempster, Laird and Rubin, J. R. Statist. Soc. B 39 (1977) 1).
+            // From the longest piece: samples between pieces are unknown. Motion and parameters absorb part of the
+            // noise; its expectation is added back (expectation step of Dempster, Laird and Rubin, J. R. Statist. Soc.
+            // B 39 (1977) 1).
             let rows: usize = of_joint.iter().map(|r| r.len()).sum();
-            let taken = &paid.torque[log][joint];
+            let taken = &effective.torque[log][joint];
             let product =
                 |r: &&[f64], lag: usize| r.iter().zip(&r[lag.min(r.len())..]).map(|(a, b)| a * b).sum::<f64>();
             let left = |lag: usize| of_joint.iter().map(|r| product(r, lag)).sum::<f64>() / rows.max(1) as f64;
-            // What is taken grows with the noise: as large as where both agree, which is where small steps lead to.
+            // The absorbed part grows with the noise; `growth` makes both consistent in small steps.
             let before = own.torque_variance[joint];
-            let growth = (left(0) / (before - taken[0]).max(LEAST_SHARE * before)).clamp(0.5, 2.0);
+            let growth = (left(0) / (before - taken[0]).max(MIN_REMAINING_NOISE_SHARE * before)).clamp(0.5, 2.0);
             let covariances: Vec<f64> =
                 taken.iter().enumerate().map(|(lag, taken)| left(lag) + growth * taken).collect();
-            let most = if iterations > ORDERS_FALL { own.colours[joint].len() } else { most };
+            let most = if iterations > ORDERS_DECREASE_AFTER { own.colours[joint].len() } else { most };
             let (colour, variance) = from_covariances(&covariances[..=most.min(rows / 4)], rows);
             let row_s = pieces.iter().find(|piece| piece.record.log == log);
             let row_s = row_s.map_or(1.0, |piece| piece.mean_of as f64 / piece.record.rate_hz);
@@ -403,7 +393,7 @@ fn torque_levels(
     }
 }
 
-fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&Paid>) -> Vec<SplineLogFit> {
+fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], effective: Option<&EffectiveUnknowns>) -> Vec<SplineLogFit> {
     let of_log = |(log, own): (usize, &LogNoise)| {
         let of_log: Vec<&Piece<'_>> = pieces.iter().filter(|piece| piece.record.log == log).collect();
         let functions: usize = of_log.iter().map(|piece| piece.spline.functions()).sum();
@@ -412,7 +402,7 @@ fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&Paid>) -> Ve
             torque_std: own.torque_std[joint],
             torque_autoregression: own.colours[joint].clone(),
             order: own.positions[joint].order,
-            used_functions: paid.map_or(0.0, |paid| functions as f64 - paid.smoothness[log][joint]),
+            used_functions: effective.map_or(0.0, |effective| functions as f64 - effective.smoothness[log][joint]),
         };
         let any = of_log.first();
         SplineLogFit {

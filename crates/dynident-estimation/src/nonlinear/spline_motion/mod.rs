@@ -1,14 +1,14 @@
-//! Motion and parameters of any log at once: positions and torques of every joint, the motion a smoothing spline whose
-//! smoothness the likelihood chooses.
+//! Motion and parameters of any log from positions and torques, with a smoothing spline as motion; the likelihood
+//! selects the smoothness.
 //!
-//! | file | what |
+//! | file | content |
 //! | --- | --- |
-//! | `problem.rs` | what is sought and measured, what the model is asked, what comes out |
-//! | `fit.rs` | [`spline_motion_least_squares`]: the steps and the noise levels |
-//! | `smoothing.rs` | the motion from positions alone |
-//! | `rows.rs`, `system.rs` | whitened torque rows; normal equations, the motion eliminated; who pays for which unknown |
-//! | `covariance.rs` | the parameters' covariance |
-//! | `bspline.rs`, `banded_arrow.rs` | functions of the motion; a band with an arrow |
+//! | `problem.rs` | problem, settings, model trait and results |
+//! | `fit.rs` | [`spline_motion_least_squares`]: steps and noise levels |
+//! | `smoothing.rs` | motion from positions alone |
+//! | `rows.rs`, `system.rs` | whitened torque rows; normal equations with the motion eliminated; effective unknowns |
+//! | `covariance.rs` | covariance of the parameters |
+//! | `bspline.rs`, `banded_arrow.rs` | basis functions of the motion; band matrix with an arrow |
 
 mod banded_arrow;
 mod bspline;

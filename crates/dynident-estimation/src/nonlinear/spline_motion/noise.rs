@@ -1,28 +1,25 @@
-//! How noisy positions and torques of a log are, and how smooth its motion: what the likelihood finds beside motion and
-//! parameters.
+//! Noise of positions and torques of a log, and smoothness of its motion.
 
 use super::smoothing::Smoothness;
 
-/// Of one log.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LogNoise {
-    /// Joint by joint.
+    /// By joint.
     pub(super) positions: Vec<Smoothness>,
-    /// σ of what is new in a row's torque, joint by joint, N m (N).
+    /// σ of the innovation of a row's torque by joint, N m (N).
     pub(super) torque_std: Vec<f64>,
-    /// Variance of a row's torque noise, old and new together, joint by joint.
+    /// Total variance of a row's torque noise by joint.
     pub(super) torque_variance: Vec<f64>,
-    /// Autoregression of the torque's noise from row to row, joint by joint.
+    /// Autoregression of the torque noise from row to row, by joint.
     pub(super) colours: Vec<Vec<f64>>,
 }
 
 impl LogNoise {
-    /// The longest autoregression.
     pub(super) fn most_order(&self) -> usize {
         self.colours.iter().map(Vec::len).max().unwrap_or(0)
     }
 
-    /// The largest change of any level, as a logarithm.
+    /// Largest change of any noise level, as a logarithm.
     pub(super) fn change(&self, other: &Self) -> f64 {
         let positions = self.positions.iter().zip(&other.positions);
         let positions = positions.map(|(a, b)| (a.position_std / b.position_std).ln().abs());

@@ -1,4 +1,4 @@
-//! What is sought, what was measured, what the model has to say of it, and what comes out.
+//! Problem, settings, model trait and results.
 
 use crate::error::{EstimationError, expect, require, within};
 use crate::factor::RankSettings;
@@ -6,20 +6,20 @@ use crate::uncertainty::{CovarianceMethod, Estimate};
 use dynident_model::terms::JointMotion;
 use serde::{Deserialize, Serialize};
 
-/// One uninterrupted piece of a log: positions and torques as they were measured, on an even clock.
+/// One uninterrupted piece of a log: measured positions and torques at a constant rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplineRecord {
-    /// Number of the log: pieces of one log share their noise and the smoothness of their motion.
+    /// Number of the log: pieces of one log share noise and smoothness.
     pub log: usize,
-    /// Samples a second.
+    /// Sampling rate.
     pub rate_hz: f64,
-    /// Positions (rad, m), joint after joint, as many samples each.
+    /// Positions (rad, m), joint after joint, with the same number of samples each.
     pub q: Vec<f64>,
-    /// Torques (N m, N), likewise.
+    /// Torques (N m, N), in the same order.
     pub tau: Vec<f64>,
 }
 
-/// Torques of a block of samples about a motion and parameters, with derivatives.
+/// Torques of a block of samples at given motion and parameters, with derivatives.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TorqueSlopes {
     /// Torques, joint-major.
@@ -27,22 +27,22 @@ pub struct TorqueSlopes {
     /// Derivative of torque `j` by variable `v` at sample `s`, at `(j · 3 joints + v) · samples + s`; variables are
     /// all positions, then all velocities, then all accelerations.
     pub by_motion: Vec<f64>,
-    /// For each joint the numbers of the parameters that its torque depends on.
+    /// Numbers of the parameters of each joint's torque.
     pub columns: Vec<Vec<usize>>,
-    /// For each joint the derivatives by these, column after column.
+    /// Derivatives of each joint's torque by these parameters, column after column.
     pub by_parameters: Vec<Vec<f64>>,
 }
 
-/// What [`spline_motion_least_squares`](crate::spline_motion_least_squares()) asks: the torque that a motion needs.
+/// Torque model of [`spline_motion_least_squares`](crate::spline_motion_least_squares()).
 pub trait TorqueModel {
-    /// Why a torque could not be made.
+    /// Error of the model.
     type Error: From<EstimationError>;
 
-    /// Torques, joint-major, of samples `first..first + motion.samples` of record number `record`; `place` holds record
-    /// and first. Blocks of a record come in the order of time, from its first sample on.
+    /// Torques, joint-major, of samples `first..first + motion.samples` of a record; `place` is (record, first).
+    /// Blocks of a record come in order of time, from its first sample on.
     ///
     /// # Errors
-    /// As the model says.
+    /// Defined by the model.
     fn torque(
         &mut self,
         place: (usize, usize),
@@ -50,11 +50,11 @@ pub trait TorqueModel {
         parameters: &[f64],
     ) -> Result<Vec<f64>, Self::Error>;
 
-    /// The same with derivatives. A function that jumps may be given the derivative zero: rows near the jump then hold
-    /// no information about the instant of it.
+    /// Torques with derivatives. A discontinuous function may have the derivative zero; rows near the jump then carry
+    /// no information about its instant.
     ///
     /// # Errors
-    /// As the model says.
+    /// Defined by the model.
     fn slopes(
         &mut self,
         place: (usize, usize),
@@ -63,81 +63,87 @@ pub trait TorqueModel {
     ) -> Result<TorqueSlopes, Self::Error>;
 }
 
-/// What is sought, what was measured, and where to begin.
+/// Measurements and start values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplineMotionProblem {
     /// Names of the parameters.
     pub names: Vec<String>,
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// What was measured.
+    /// Measured positions and torques.
     pub records: Vec<SplineRecord>,
-    /// The parameters at the start, such as a least-squares estimate.
+    /// Start values of the parameters, for example a least-squares estimate.
     pub parameters: Vec<f64>,
-    /// Parameter by parameter whether it stays what it is at the start: what the data do not excite, or is given.
+    /// Whether each parameter is held at its start value (unexcited or given).
     pub held: Vec<bool>,
 }
 
 impl SplineMotionProblem {
-    /// Checks shapes and numbers.
     pub(super) fn check(&self) -> Result<(), EstimationError> {
         let joints = self.joints.len();
         if joints == 0 || self.records.is_empty() {
             return Err(EstimationError::Empty);
         }
         expect("parameters of the start", self.names.len(), self.parameters.len())?;
-        expect("parameters that are held or not", self.names.len(), self.held.len())?;
+        expect("flags of held parameters", self.names.len(), self.held.len())?;
         for record in &self.records {
             expect("torques of a record, one for each position", record.q.len(), record.tau.len())?;
             let samples = record.q.len() / joints;
             expect("positions of a record, as many for each joint", samples * joints, record.q.len())?;
-            within("rate_hz", record.rate_hz, 1e-6..=1e9, "give samples a second")?;
-            if samples < LEAST_SAMPLES {
+            within("rate_hz", record.rate_hz, 1e-6..=1e9, "use samples per second")?;
+            if samples < MIN_SAMPLES {
                 let what = "a piece of a log".to_owned();
-                return Err(EstimationError::TooFewRows { what, rows: samples, parameters: LEAST_SAMPLES as f64 });
+                return Err(EstimationError::TooFewRows { what, rows: samples, parameters: MIN_SAMPLES as f64 });
             }
-            if let Some(place) = record.q.iter().chain(&record.tau).position(|x| x.is_nan() || x.abs() > LARGEST) {
+            if let Some(place) = record.q.iter().chain(&record.tau).position(|x| x.is_nan() || x.abs() > MAX_MAGNITUDE)
+            {
                 let value = record.q.iter().chain(&record.tau).nth(place).copied().unwrap_or(f64::NAN);
                 let (row, column) = (place % samples, place / samples);
-                return Err(EstimationError::Unusable { row, column, value, limit: LARGEST });
+                return Err(EstimationError::Unusable { row, column, value, limit: MAX_MAGNITUDE });
             }
         }
         Ok(())
     }
 }
 
-/// A shorter piece says too little of its own motion.
-const LEAST_SAMPLES: usize = 16;
-/// The square of a larger number leaves no room for sums.
-const LARGEST: f64 = 1e100;
+/// A shorter piece does not determine its motion.
+const MIN_SAMPLES: usize = 16;
+/// Larger values overflow when squared and summed.
+const MAX_MAGNITUDE: f64 = 1e100;
 
 /// Settings of [`spline_motion_least_squares`](crate::spline_motion_least_squares()).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SplineMotionSettings {
-    /// When a column counts as excited, once the motion is taken out.
+    /// Criteria for an excited column after the motion is eliminated.
     #[serde(skip)]
     pub rank: RankSettings,
-    /// The covariance to report, of whitened rows.
+    /// Method of the reported covariance of whitened rows.
     #[serde(skip)]
     pub covariance: CovarianceMethod,
-    /// Highest order of the autoregression that a torque's residuals may have; the order is Schwarz's. Default 4; 0
-    /// takes the torque's noise for white.
+    /// Maximum order of the autoregression of a torque's residuals, selected by Schwarz's criterion. Default 4; 0
+    /// assumes white torque noise.
     pub most_autoregression: usize,
-    /// Length of a step of the parameters, in error bars over all directions, at which the iteration ends. Default
-    /// 0.03.
+    /// The iteration ends at this step length of the parameters, in error bars over all directions. Default 0.03.
     pub tolerance: f64,
-    /// Most steps. Default 30; five to ten are usual.
+    /// Maximum number of steps. Default 30; five to ten are usual.
     pub max_iterations: usize,
-    /// Seconds to which a second of a usual arm corresponds: the unit of the longest spacing of knots (0.5) and of the
-    /// longest memory of the torque's noise (0.1). Default 1.
+    /// Time scale of the robot relative to a usual arm: a factor of `max_knot_spacing_s` and `max_noise_memory_s`.
+    /// Default 1.
     #[serde(skip)]
     pub own_second_s: f64,
-    /// Seconds between two knots; by default what the positions make likeliest.
+    /// Longest tested time between knots for a robot of time scale 1, s. Default 0.5.
+    #[serde(skip)]
+    pub max_knot_spacing_s: f64,
+    /// Longest memory of torque noise for a robot of time scale 1, s: residuals with a longer memory are model errors,
+    /// and whitening them would remove the information of slow motion about the parameters. Default 0.1.
+    #[serde(skip)]
+    pub max_noise_memory_s: f64,
+    /// Seconds between two knots; by default the most likely spacing for the positions.
     pub knot_spacing_s: Option<f64>,
-    /// Most unknowns of the motion over all joints and logs: knots move apart where there would be more. Default
-    /// 60 000, which take some 200 MB.
+    /// Maximum number of unknowns of the motion over all joints and logs; a larger number increases the knot spacing.
+    /// Default 60 000, which needs about 200 MB.
     pub max_unknowns: usize,
 }
 
@@ -150,6 +156,8 @@ impl Default for SplineMotionSettings {
             tolerance: 0.03,
             max_iterations: 30,
             own_second_s: 1.0,
+            max_knot_spacing_s: 0.5,
+            max_noise_memory_s: 0.1,
             knot_spacing_s: None,
             max_unknowns: 60_000,
         }
@@ -161,71 +169,76 @@ impl SplineMotionSettings {
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for an order above 16, a tolerance outside 1e-6 to 1, fewer than two iterations,
-    /// fewer than a thousand unknowns, a second that is not positive, or rank settings out of range.
+    /// fewer than a thousand unknowns, a time or time scale that is not positive, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let fix = "give 0 to 16";
+        let fix = "use 0 to 16";
         require(self.most_autoregression <= 16, "most_autoregression", self.most_autoregression as f64, fix)?;
-        within("tolerance", self.tolerance, 1.0e-6..=1.0, "give a length in error bars from 1e-6 to 1")?;
-        let is_second = self.own_second_s > 0.0 && self.own_second_s.is_finite();
-        require(is_second, "own_second_s", self.own_second_s, "give a positive number")?;
-        require(self.max_iterations >= 2, "max_iterations", self.max_iterations as f64, "give at least 2")?;
-        let fix = "give seconds, above 0 and at most 10000";
+        within("tolerance", self.tolerance, 1.0e-6..=1.0, "use a length in error bars from 1e-6 to 1")?;
+        for (setting, value) in [
+            ("own_second_s", self.own_second_s),
+            ("max_knot_spacing_s", self.max_knot_spacing_s),
+            ("max_noise_memory_s", self.max_noise_memory_s),
+        ] {
+            require(value > 0.0 && value.is_finite(), setting, value, "use a positive number")?;
+        }
+        require(self.max_iterations >= 2, "max_iterations", self.max_iterations as f64, "use at least 2")?;
+        let fix = "use seconds above 0 and at most 10000";
         require(
             self.knot_spacing_s.is_none_or(|s| s > 0.0 && s <= 1e4),
             "knot_spacing_s",
             self.knot_spacing_s.unwrap_or_default(),
             fix,
         )?;
-        require(self.max_unknowns >= 1000, "max_unknowns", self.max_unknowns as f64, "give at least 1000")
+        require(self.max_unknowns >= 1000, "max_unknowns", self.max_unknowns as f64, "use at least 1000")
     }
 }
 
-/// Noise and motion of one joint in one log, as they were found.
+/// Estimated noise and motion of one joint in one log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SplineJointFit {
     /// Standard deviation of a sample's position, rad (m).
     pub position_std: f64,
-    /// Standard deviation of what is new in a row's torque, N m (N).
+    /// Standard deviation of the innovation of a row's torque, N m (N).
     pub torque_std: f64,
-    /// Coefficients of the autoregression from row to row that its torque's noise was found to be; none if white.
+    /// Coefficients of the autoregression of the torque noise from row to row; empty for white noise.
     pub torque_autoregression: Vec<f64>,
-    /// The derivative of the position that is white noise by the prior.
+    /// Order of the derivative of the position that is white noise in the prior.
     pub order: usize,
-    /// How many of the motion's functions positions and torques determine.
+    /// Effective number of the motion's functions that positions and torques determine.
     pub used_functions: f64,
 }
 
-/// One log's motion, as it was found.
+/// Estimated motion of one log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SplineLogFit {
     /// Seconds between two knots.
     pub knot_spacing_s: f64,
-    /// Functions of every joint's motion.
+    /// Number of functions of every joint's motion.
     pub functions: usize,
     /// Rows of each joint's torque.
     pub rows: usize,
-    /// How many samples a row is the mean of.
+    /// Number of samples averaged in a row.
     pub samples_of_row: usize,
-    /// Joint by joint.
+    /// Results by joint.
     pub joints: Vec<SplineJointFit>,
 }
 
-/// What [`spline_motion_least_squares`](crate::spline_motion_least_squares()) found.
+/// Result of [`spline_motion_least_squares`](crate::spline_motion_least_squares()).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SplineMotionEstimate {
-    /// The parameters. Joints of the estimate are channels here: torques, positions and roughness of every log's
-    /// joints; their σ are those of whitened rows.
+    /// The parameters. The joints of the estimate are channels here: torques, positions and roughness of every log's
+    /// joints, with σ of whitened rows.
     pub estimate: Estimate,
     /// Positions, velocities and accelerations of every record, joint-major.
     #[serde(skip)]
     pub motion: Vec<[Vec<f64>; 3]>,
-    /// Log by log.
+    /// Results by log.
     pub logs: Vec<SplineLogFit>,
-    /// What the sum of squares was with the parameters and the motion of the start, and the noise of the end.
+    /// Sum of squares for parameters and motion of the start with the final noise.
     pub cost_at_start: f64,
-    /// What it is.
+    /// Final sum of squares.
     pub cost: f64,
 }

@@ -1,7 +1,7 @@
-//! Whitened rows of torque about a motion and parameters: what a row depends on is a window of the motion's functions,
-//! those of all joints, and the parameters.
+//! Whitened torque rows at given motion and parameters. A row depends on a window of the motion's functions of all
+//! joints and on the parameters.
 //!
-//! A row is the mean over a few samples, less what the autoregression foretells from the rows before it.
+//! A row is the mean over a few samples, minus the prediction of the autoregression from previous rows.
 
 use super::banded_arrow::{BandedArrow, axpy};
 use super::bspline::{ACTIVE, Spline};
@@ -10,37 +10,33 @@ use crate::error::{EstimationError, expect};
 use dynident_model::terms::JointMotion;
 use rayon::prelude::*;
 
-/// Rows that are made at a time.
-const CHUNK: usize = 512;
+const CHUNK_ROWS: usize = 512;
 
 /// A record with the functions of its motion.
 #[derive(Clone, Debug)]
 pub(super) struct Piece<'a> {
-    /// Its number among the records.
     pub(super) number: usize,
     pub(super) record: &'a SplineRecord,
     pub(super) spline: Spline,
     pub(super) joints: usize,
-    /// Samples of a row.
+    /// Samples per row.
     pub(super) mean_of: usize,
 }
 
-/// Whitened rows of one joint, some of them.
+/// Some whitened rows of one joint.
 #[derive(Clone, Debug, Default)]
 pub(super) struct JointRows {
     /// First unknown of the window of each row.
     pub(super) first: Vec<usize>,
-    /// Width of the windows.
     pub(super) width: usize,
-    /// Derivatives by the motion's unknowns, row after row.
+    /// Derivatives by the motion's unknowns, by row.
     pub(super) own: Vec<f64>,
-    /// Derivatives by the free parameters, row after row.
+    /// Derivatives by the free parameters, by row.
     pub(super) arrow: Vec<f64>,
-    /// Residuals.
     pub(super) residual: Vec<f64>,
 }
 
-/// Parameters that are free, by their place among these.
+/// Numbers of the free parameters, and the index of each parameter among them.
 #[derive(Clone, Debug)]
 pub(super) struct FreeParameters {
     pub(super) free: Vec<usize>,
@@ -65,27 +61,25 @@ impl Piece<'_> {
         self.spline.samples
     }
 
-    /// Rows of each joint before whitening; samples at the end that fill none are left out.
+    /// Number of rows of each joint before whitening; incomplete rows at the end are dropped.
     pub(super) fn rows(&self) -> usize {
         self.samples() / self.mean_of
     }
 
-    /// Unknowns of the motion.
     pub(super) fn unknowns(&self) -> usize {
         self.spline.functions() * self.joints
     }
 
-    /// Functions that act on a row whitened by so many before it.
+    /// Number of functions that act on a row whitened with `order` previous rows.
     fn window(&self, order: usize) -> usize {
         ACTIVE + (self.mean_of * (order + 1) - 1).div_ceil(self.spline.step)
     }
 
-    /// How far unknowns see one another.
+    /// Half bandwidth of the coupled unknowns.
     pub(super) fn bandwidth(&self, order: usize) -> usize {
         self.window(order).min(self.spline.functions()) * self.joints - 1
     }
 
-    /// Positions of a joint.
     pub(super) fn q(&self, joint: usize) -> &[f64] {
         &self.record.q[joint * self.samples()..(joint + 1) * self.samples()]
     }
@@ -101,7 +95,7 @@ impl Piece<'_> {
         out
     }
 
-    /// Means of the measured torque less the model's over the rows, joint by joint.
+    /// Row means of the measured minus the modelled torque, by joint.
     pub(super) fn residuals<M: TorqueModel>(
         &self,
         model: &mut M,
@@ -109,8 +103,8 @@ impl Piece<'_> {
         parameters: &[f64],
     ) -> Result<Vec<Vec<f64>>, M::Error> {
         let mut all = vec![Vec::with_capacity(self.rows()); self.joints];
-        for from in (0..self.rows()).step_by(CHUNK) {
-            let rows = CHUNK.min(self.rows() - from);
+        for from in (0..self.rows()).step_by(CHUNK_ROWS) {
+            let rows = CHUNK_ROWS.min(self.rows() - from);
             let (first, count) = (from * self.mean_of, rows * self.mean_of);
             let [q, dq, ddq] = self.motion(coefficients, first, count);
             let motion = JointMotion { samples: count, q: &q, dq: &dq, ddq: &ddq };
@@ -132,8 +126,7 @@ impl Piece<'_> {
         to.extend(rows.map(mean));
     }
 
-    /// Gives all rows to `take`, some hundred of every joint at a time: whitened, and as they were, up to `lags` of
-    /// those before included.
+    /// Passes all rows to `take` in chunks for all joints: whitened, and unwhitened with up to `lags` previous rows.
     pub(super) fn each_rows<M: TorqueModel>(
         &self,
         model: &mut M,
@@ -142,10 +135,10 @@ impl Piece<'_> {
         mut take: impl FnMut(&[JointRows], &[JointRows]),
     ) -> Result<(), M::Error> {
         let lags = colours.iter().map(Vec::len).fold(lags, usize::max);
-        // Rows before whitening that the next chunk begins with.
+        // Unwhitened rows carried over to the next chunk.
         let mut carried: Vec<JointRows> = vec![JointRows::default(); self.joints];
-        for from in (0..self.rows()).step_by(CHUNK) {
-            let rows = CHUNK.min(self.rows() - from);
+        for from in (0..self.rows()).step_by(CHUNK_ROWS) {
+            let rows = CHUNK_ROWS.min(self.rows() - from);
             let (first, count) = (from * self.mean_of, rows * self.mean_of);
             let [q, dq, ddq] = self.motion(coefficients, first, count);
             let motion = JointMotion { samples: count, q: &q, dq: &dq, ddq: &ddq };
@@ -182,7 +175,7 @@ impl Piece<'_> {
         }
     }
 
-    /// Rows before whitening, windows as wide as one row's functions.
+    /// Unwhitened rows, with windows as wide as one row's functions.
     fn raw(&self, joint: usize, from: usize, rows: usize, slopes: &TorqueSlopes, free: &FreeParameters) -> JointRows {
         let (joints, mean_of) = (self.joints, self.mean_of);
         let (count, share) = (rows * mean_of, 1.0 / mean_of as f64);
@@ -223,13 +216,13 @@ impl Piece<'_> {
         out
     }
 
-    /// Rows from `new` on less what the autoregression foretells from those before; the first ones of all are spent.
+    /// Rows from `new` on minus the prediction of the autoregression; the very first rows are lost.
     fn whitened(&self, raw: &JointRows, new: usize, colour: &[f64], parameters: usize) -> JointRows {
         let (order, rows) = (colour.len(), raw.first.len());
         let width = self.window(order).min(self.spline.functions()) * self.joints;
         let mut out = JointRows { width, ..JointRows::default() };
         for row in order.max(new)..rows {
-            // A window that would pass the last function begins earlier.
+            // A window beyond the last function begins earlier.
             let first = raw.first[row - order].min(self.unknowns() - width);
             let (own_from, arrow_from) = (out.own.len(), out.arrow.len());
             out.own.resize(own_from + width, 0.0);
@@ -254,7 +247,6 @@ impl Piece<'_> {
 }
 
 impl JointRows {
-    /// Some of the rows.
     pub(super) fn part(&self, run: core::ops::Range<usize>, parameters: usize) -> Self {
         Self {
             first: self.first[run.clone()].to_vec(),
@@ -281,19 +273,18 @@ impl JointRows {
         self.residual.drain(..from);
     }
 
-    /// Number of rows.
     pub(super) fn count(&self) -> usize {
         self.first.len()
     }
 
-    /// The window, the parameters and the residual of row `row`.
+    /// Window, parameters and residual of row `row`.
     pub(super) fn row(&self, row: usize, parameters: usize) -> (usize, &[f64], &[f64], f64) {
         let own = &self.own[row * self.width..(row + 1) * self.width];
         let arrow = &self.arrow[row * parameters..(row + 1) * parameters];
         (self.first[row], own, arrow, self.residual[row])
     }
 
-    /// Adds the rows, each divided by `sigma`, to a matrix of all of the motion's unknowns.
+    /// Adds the rows, divided by `sigma`, to a matrix of the motion's unknowns.
     pub(super) fn information(&self, parameters: usize, bandwidth: usize, sigma: f64) -> Option<(usize, BandedArrow)> {
         let first = *self.first.first()?;
         let last = self.first.last()? + self.width;

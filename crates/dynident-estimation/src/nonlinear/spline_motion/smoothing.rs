@@ -1,30 +1,28 @@
-//! A motion from positions alone: smoothing splines whose smoothness the positions' own likelihood chooses.
+//! Motion from positions alone: smoothing splines whose smoothness is selected by the likelihood of the positions.
 //!
-//! `q_t = q(t) + σ e_t` with white e and `dʳq/dtʳ` white noise of intensity 1/λ (an integrated Wiener process): the
-//! mean of q given the positions is a spline with the penalty `λ ∫ (dʳq/dtʳ)² dt`, and σ, λ and r follow from the
+//! `q_t = q(t) + σ e_t` with white e and `dʳq/dtʳ` white noise of intensity 1/λ (an integrated Wiener process). The
+//! mean of q given the positions is a spline with the penalty `λ ∫ (dʳq/dtʳ)² dt`; σ, λ and r follow from the
 //! restricted likelihood. Wahba, Ann. Statist. 13 (1985) 1378; Wecker and Ansley, JASA 78 (1983) 81.
 
 use super::banded_arrow::{BandedArrow, dot};
 use super::bspline::{ACTIVE, Spline};
 use rayon::prelude::*;
 
-/// Derivatives that may be white noise: acceleration to the fifth.
+/// Tested orders r of the white derivative.
 pub(super) const ORDERS: core::ops::RangeInclusive<usize> = 2..=5;
-/// Narrower spacings are not tried once so many in a row were less likely.
-const ENOUGH: usize = 3;
-/// Decades of λσ² that are searched, in units of where both terms are alike at the highest frequency.
-/// Beyond the last one double precision does not hold both.
-const DECADES: (i32, i32) = (-6, 11);
-/// Steps of the golden section after that.
-const SECTIONS: usize = 14;
-/// σ of a position never falls below this, rad (m): an encoder of 26 bits steps by 9e-8 rad, and
-/// noise-free data leave rounding.
-pub(super) const LEAST_SIGMA: f64 = 1e-7;
+/// The search ends after this number of consecutive shorter spacings with a lower likelihood.
+const MAX_WORSE_SPACINGS: usize = 3;
+/// Searched decades of λσ², relative to the value at which both terms are equal at the highest frequency. Beyond the
+/// last one both terms do not fit into double precision.
+const RATIO_DECADES: (i32, i32) = (-6, 11);
+const GOLDEN_SECTION_STEPS: usize = 14;
+/// Lower limit of σ of a position, rad (m): an encoder of 26 bits has steps of 9e-8 rad, and noise-free data have
+/// rounding only.
+pub(super) const MIN_SIGMA: f64 = 1e-7;
 
-/// How smooth a joint's motion in a log is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Smoothness {
-    /// r: the derivative that is white noise.
+    /// r: order of the white derivative.
     pub(super) order: usize,
     /// λ.
     pub(super) penalty: f64,
@@ -32,19 +30,17 @@ pub(super) struct Smoothness {
     pub(super) position_std: f64,
 }
 
-/// One joint's motion in all pieces of a log.
 #[derive(Clone, Debug)]
 pub(super) struct Smoothed {
     pub(super) smoothness: Smoothness,
-    /// Coefficients of every piece.
     pub(super) coefficients: Vec<Vec<f64>>,
-    /// Twice the negative logarithm of the restricted likelihood.
+    /// −2 ln of the restricted likelihood.
     criterion: f64,
 }
 
-/// The spacing of knots, in samples, next narrower to the one that is likeliest for all joints together, and each
-/// joint's motion with it: torque tells more of an acceleration than positions do. `positions[joint][piece]`; `ladder`
-/// from wide to narrow.
+/// Returns the next narrower spacing of knots, in samples, after the most likely one for all joints together, and each
+/// joint's motion with it; the narrower one is used because torque resolves accelerations better than positions do.
+/// `positions[joint][piece]`; `ladder` from wide to narrow.
 pub(super) fn smoothed(positions: &[Vec<&[f64]>], rate_hz: f64, ladder: &[usize]) -> (usize, Vec<Smoothed>) {
     let likeliest = |own: &Vec<&[f64]>, step: usize| {
         let pieces: Option<Vec<Rough>> = own.iter().map(|q| Rough::new(q, rate_hz, step)).collect();
@@ -61,7 +57,7 @@ pub(super) fn smoothed(positions: &[Vec<&[f64]>], rate_hz: f64, ladder: &[usize]
         if tried[last].0 < tried[best].0 {
             best = last;
         }
-        if last - best == ENOUGH {
+        if last - best == MAX_WORSE_SPACINGS {
             break;
         }
     }
@@ -73,17 +69,18 @@ pub(super) fn smoothed(positions: &[Vec<&[f64]>], rate_hz: f64, ladder: &[usize]
     (2, Vec::new())
 }
 
-/// A piece's positions about a spline that is hardly smoothed: whatever the smoothness, the rest is small numbers.
+/// Positions of a piece relative to a hardly smoothed spline, so that the remaining numbers are small for any
+/// smoothness.
 struct Rough {
     spline: Spline,
     samples: usize,
-    /// Position that all others are counted from: a joint far from zero loses no digits.
+    /// Position offset, which avoids cancellation for a joint far from zero.
     offset: f64,
     coefficients: Vec<f64>,
-    /// `BᵀB` with `Bᵀ r` on the right, r what that spline leaves,
+    /// `BᵀB` with right-hand side `Bᵀ r`; r is the residual of that spline.
     normal: BandedArrow,
     right: Vec<f64>,
-    /// and its sum of squares.
+    /// Sum of squares of r.
     squares: f64,
 }
 
@@ -93,7 +90,7 @@ impl Rough {
         let offset = q.first().copied().unwrap_or_default();
         let moved: Vec<f64> = q.iter().map(|q| q - offset).collect();
         let (count, gram) = (spline.functions(), spline.roughness(3));
-        let least = unit(&spline, &gram) * 10.0_f64.powi(DECADES.0);
+        let least = unit(&spline, &gram) * 10.0_f64.powi(RATIO_DECADES.0);
         let mut matrix = BandedArrow::new(count, ACTIVE - 1, 0);
         spline.add_to(&mut matrix, (0, 1), (1.0, &moved), (least, &gram, &[]));
         let coefficients = matrix.eliminated().ok()?.band_solution(&[]);
@@ -106,26 +103,26 @@ impl Rough {
     }
 }
 
-/// The largest λ that double precision holds beside positions of that noise.
+/// Largest λ that double precision allows for positions of that noise.
 pub(super) fn most_penalty(spline: &Spline, gram: &[[f64; ACTIVE]; ACTIVE], position_std: f64) -> f64 {
-    unit(spline, gram) * 10.0_f64.powi(DECADES.1) / (position_std * position_std)
+    unit(spline, gram) * 10.0_f64.powi(RATIO_DECADES.1) / (position_std * position_std)
 }
 
-/// Where positions and roughness are alike at the highest frequency.
+/// Ratio at which positions and roughness are equal at the highest frequency.
 fn unit(spline: &Spline, gram: &[[f64; ACTIVE]; ACTIVE]) -> f64 {
     let trace = |matrix: &[[f64; ACTIVE]; ACTIVE]| (0..ACTIVE).map(|k| matrix[k][k]).sum::<f64>();
     trace(&spline.products(spline.step)) / trace(gram)
 }
 
-/// The likeliest smoothness of a given order.
+/// Most likely smoothness of a given order.
 fn of_order(pieces: &[Rough], order: usize) -> Smoothed {
     let Some(any) = pieces.first() else { return empty(order) };
     let gram = any.spline.roughness(order);
     let unit = unit(&any.spline, &gram);
     let normal = any.spline.mean_log_roughness(order);
     let at = |decades: f64| fitted(pieces, unit * 10.0_f64.powf(decades), &gram, normal, order);
-    let mut best = (f64::from(DECADES.0), at(f64::from(DECADES.0)));
-    for decade in DECADES.0 + 1..=DECADES.1 {
+    let mut best = (f64::from(RATIO_DECADES.0), at(f64::from(RATIO_DECADES.0)));
+    for decade in RATIO_DECADES.0 + 1..=RATIO_DECADES.1 {
         let next = at(f64::from(decade));
         if next.criterion < best.1.criterion {
             best = (f64::from(decade), next);
@@ -136,7 +133,7 @@ fn of_order(pieces: &[Rough], order: usize) -> Smoothed {
     let places = |low: f64, high: f64| (high - golden * (high - low), low + golden * (high - low));
     let (mut a, mut b) = places(low, high);
     let (mut left, mut right) = (at(a), at(b));
-    for _ in 0..SECTIONS {
+    for _ in 0..GOLDEN_SECTION_STEPS {
         if left.criterion <= right.criterion {
             (high, b, right) = (b, a, left);
             a = places(low, high).0;
@@ -151,11 +148,11 @@ fn of_order(pieces: &[Rough], order: usize) -> Smoothed {
 }
 
 fn empty(order: usize) -> Smoothed {
-    let smoothness = Smoothness { order, penalty: 1.0, position_std: LEAST_SIGMA };
+    let smoothness = Smoothness { order, penalty: 1.0, position_std: MIN_SIGMA };
     Smoothed { smoothness, coefficients: Vec::new(), criterion: f64::INFINITY }
 }
 
-/// The spline for one ratio λσ², with twice the negative logarithm of its restricted likelihood.
+/// Spline for one ratio λσ², with −2 ln of its restricted likelihood.
 fn fitted(pieces: &[Rough], ratio: f64, gram: &[[f64; ACTIVE]; ACTIVE], normal: f64, order: usize) -> Smoothed {
     let (mut squares, mut rough, mut log_determinant) = (0.0, 0.0, 0.0);
     let (mut samples, mut functions, mut free) = (0, 0, 0);
@@ -171,7 +168,7 @@ fn fitted(pieces: &[Rough], ratio: f64, gram: &[[f64; ACTIVE]; ACTIVE], normal: 
         rough += spline.penalty(gram, &own, 0, 1).0;
         let curved = dot(&step, &piece.normal.product(&step));
         squares += (piece.squares - 2.0 * dot(&step, &piece.right) + curved).max(0.0);
-        // The prior is flat over polynomials as functions, whatever the number of knots.
+        // The prior is flat over polynomials as functions, for any number of knots.
         log_determinant += solved.log_determinant() + order as f64 * (count as f64).ln();
         samples += piece.samples;
         functions += count;
@@ -182,7 +179,7 @@ fn fitted(pieces: &[Rough], ratio: f64, gram: &[[f64; ACTIVE]; ACTIVE], normal: 
     if freedom < 1.0 {
         return empty(order);
     }
-    let variance = ((squares + ratio * rough) / freedom).max(LEAST_SIGMA * LEAST_SIGMA);
+    let variance = ((squares + ratio * rough) / freedom).max(MIN_SIGMA * MIN_SIGMA);
     let proper = (functions - free) as f64;
     let criterion = freedom * variance.ln() + (squares + ratio * rough) / variance + log_determinant
         - proper * (ratio.ln() + normal);
@@ -190,7 +187,7 @@ fn fitted(pieces: &[Rough], ratio: f64, gram: &[[f64; ACTIVE]; ACTIVE], normal: 
     Smoothed { smoothness, coefficients, criterion }
 }
 
-/// `tr(Z BᵀB)` for a joint, by the entries of Z.
+/// `tr(Z BᵀB)` for a joint from the entries of Z.
 pub(super) fn sample_trace(spline: &Spline, joint: usize, joints: usize, entry: &dyn Fn(usize, usize) -> f64) -> f64 {
     let full = spline.products(spline.step);
     let of = |interval: usize| {
@@ -201,7 +198,6 @@ pub(super) fn sample_trace(spline: &Spline, joint: usize, joints: usize, entry: 
     (0..spline.functions() + 1 - ACTIVE).map(of).sum()
 }
 
-/// `tr(Z P)` for a joint.
 pub(super) fn rough_trace(
     spline: &Spline,
     gram: &[[f64; ACTIVE]; ACTIVE],
@@ -236,10 +232,9 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    /// White noise of 2 mrad on a motion of three harmonics: σ of 2000 samples has an error of 1.6 %, four of these;
-    /// the velocity's error must be far below that of any filter wide enough for the motion and closer to a sample.
+    /// White noise of 2 mrad on a motion of three harmonics: σ of 2000 samples has an error of 1.6 %; tolerance 4 σ.
     #[test]
-    fn noise_and_smoothness_come_from_the_positions() {
+    fn noise_and_smoothness_are_estimated_from_positions() {
         let mut random = Random::new(11);
         let truth = |t: f64| (2.0 * t).sin() + 0.5 * (3.1 * t).cos() + 0.2 * (7.3 * t).sin();
         let rate = |t: f64| 2.0 * (2.0 * t).cos() - 1.55 * (3.1 * t).sin() + 1.46 * (7.3 * t).cos();
@@ -254,17 +249,17 @@ mod tests {
         let [q, dq, ddq] = &mut out;
         spline.motion(&own.coefficients[0], 0, 1, 200, [q, dq, ddq]);
         let error = dq.iter().enumerate().map(|(k, dq)| (dq - rate((200 + k) as f64 / 200.0)).powi(2)).sum::<f64>();
-        // A filter that lets 4 Hz through, three and a half times the highest frequency, leaves σ √(2 · 4/200) · 2π
-        // 4/√3 = 5.8 mrad/s; differences of samples 400 mrad/s.
+        // A filter of 4 Hz, three and a half times the highest frequency, gives σ √(2 · 4/200) · 2π 4/√3 = 5.8 mrad/s;
+        // differences of samples 400 mrad/s.
         assert!((error / 1600.0).sqrt() < 5.8e-3, "{}", (error / 1600.0).sqrt());
     }
 
-    /// Nothing but a constant: no motion is made up, and nothing divides by zero.
+    /// Constant positions: no motion and no division by zero.
     #[test]
-    fn a_joint_at_rest_is_at_rest() {
+    fn a_resting_joint_has_no_velocity() {
         let q = vec![0.7; 500];
         let (_, found) = smoothed(&[vec![&q]], 100.0, &[50, 20, 10, 5, 2]);
         assert!(found[0].coefficients[0].iter().all(|c| (c - 0.7).abs() < 1e-9));
-        assert!(found[0].smoothness.penalty.is_finite() && found[0].smoothness.position_std >= LEAST_SIGMA);
+        assert!(found[0].smoothness.penalty.is_finite() && found[0].smoothness.position_std >= MIN_SIGMA);
     }
 }

@@ -1,33 +1,30 @@
-//! The normal equations of motion and parameters about where they are, the motion taken away, and what each source of
-//! information pays for.
+//! Normal equations of motion and parameters with the motion eliminated, and the effective number of unknowns of each
+//! source of information.
 
 use super::banded_arrow::{BandedArrow, Eliminated, InverseBand, axpy, dot};
 use super::noise::LogNoise;
 use super::problem::TorqueModel;
 use super::rows::{FreeParameters, JointRows, Piece};
-use super::smoothing::{LEAST_SIGMA, most_penalty, rough_trace, sample_trace};
+use super::smoothing::{MIN_SIGMA, most_penalty, rough_trace, sample_trace};
 use crate::error::EstimationError;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-/// Rows of each joint and log of which the leverage is looked at.
-const LEVERAGES: usize = 200;
-/// A pivot of the scaled Schur complement that counts as zero: rounding of what the motion takes of a column.
-const SINGULAR: f64 = 1e-12;
-/// Levels change at most so much at a time.
-const MOST_CHANGE: f64 = 10.0;
+const LEVERAGE_ROWS: usize = 200;
+/// Pivot of the scaled Schur complement that is treated as zero (rounding).
+const MIN_PIVOT: f64 = 1e-12;
+/// Maximum factor of a change of noise levels per step.
+const MAX_LEVEL_RATIO: f64 = 10.0;
 
-/// What positions and torques say about the motion of a record and the parameters, linearised.
+/// Linearised information of the torque of a record about motion and parameters.
 #[derive(Clone, Debug)]
 pub(super) struct TorqueInformation {
     matrix: BandedArrow,
-    /// Of each joint some rows before whitening, each with `lags` before it: so many rows belong together, the latest
-    /// last.
+    /// Some unwhitened rows of each joint in groups of `lags + 1` consecutive rows, the latest last.
     some: Vec<JointRows>,
     lags: usize,
 }
 
-/// Linearised torque rows of a record.
 pub(super) fn torque_information<M: TorqueModel>(
     piece: &Piece<'_>,
     model: &mut M,
@@ -41,7 +38,7 @@ pub(super) fn torque_information<M: TorqueModel>(
     let bandwidth = piece.bandwidth(noise.most_order().max(lags));
     let mut matrix = BandedArrow::new(piece.unknowns(), bandwidth, count);
     let mut some = vec![JointRows::default(); piece.joints];
-    let every = piece.rows().div_ceil(LEVERAGES).max(1);
+    let every = piece.rows().div_ceil(LEVERAGE_ROWS).max(1);
     let mut passed = 0;
     piece.each_rows(model, (coefficients, parameters, free), (&noise.colours, lags), |joints, raw| {
         let part = |(joint, own): (usize, &JointRows)| own.information(count, bandwidth, noise.torque_std[joint]);
@@ -62,17 +59,17 @@ pub(super) fn torque_information<M: TorqueModel>(
     Ok(TorqueInformation { matrix, some, lags })
 }
 
-/// The system of all records: motions taken away, parameters solved for.
+/// System of all records: motions eliminated, parameters solved.
 pub(super) struct System {
     pieces: Vec<Eliminated>,
     scale: DVector<f64>,
-    /// Of the scaled Schur complement.
+    /// Factor of the scaled Schur complement.
     factor: Option<Cholesky<f64, Dyn>>,
     right: DVector<f64>,
 }
 
 impl System {
-    /// Torque's information with that of positions and smoothness at these levels.
+    /// Information of the torque with that of positions and smoothness at these noise levels.
     pub(super) fn new(
         pieces: &[Piece<'_>],
         torques: &[TorqueInformation],
@@ -112,7 +109,7 @@ impl System {
         let scaled = DMatrix::from_fn(count, count, |i, j| schur[(i, j)] * scale[i] * scale[j]);
         let factor = if count > 0 {
             let factor = scaled.cholesky().ok_or_else(|| undetermined(count - 1))?;
-            if let Some(place) = factor.l_dirty().diagonal().iter().position(|pivot| pivot * pivot < SINGULAR) {
+            if let Some(place) = factor.l_dirty().diagonal().iter().position(|pivot| pivot * pivot < MIN_PIVOT) {
                 return Err(undetermined(place));
             }
             Some(factor)
@@ -122,7 +119,7 @@ impl System {
         Ok(Self { pieces, scale, factor, right })
     }
 
-    /// The step of the free parameters, and its length in error bars over all directions.
+    /// Step of the free parameters, and its length in error bars over all directions.
     pub(super) fn step(&self) -> (Vec<f64>, f64) {
         let Some(factor) = &self.factor else { return (Vec::new(), 0.0) };
         let step = factor.solve(&self.right.component_mul(&self.scale)).component_mul(&self.scale);
@@ -130,21 +127,19 @@ impl System {
         (step.as_slice().to_vec(), length)
     }
 
-    /// The step of a record's motion that goes with one of the parameters.
     pub(super) fn motion_step(&self, piece: usize, of_parameters: &[f64]) -> Vec<f64> {
         self.pieces[piece].band_solution(of_parameters)
     }
 
-    /// How the motion of a record follows the parameters, row-major.
+    /// Sensitivity of the motion of a record to the parameters, row-major.
     pub(super) fn shares(&self, piece: usize) -> Vec<f64> {
         self.pieces[piece].shares()
     }
 
-    /// Entries of the whole inverse near its diagonal.
+    /// Entries of the full inverse near its diagonal.
     fn inverse(&self, piece: usize) -> Inverse {
         let eliminated = &self.pieces[piece];
         let parameters = self.right.len();
-        // Columns of the lower factor of the parameters' covariance.
         let root = self.factor.as_ref().map(|factor| {
             let mut inverse = factor.l().solve_lower_triangular(&DMatrix::identity(parameters, parameters));
             if let Some(inverse) = &mut inverse {
@@ -154,7 +149,6 @@ impl System {
         });
         let root = root.unwrap_or_else(|| DMatrix::zeros(0, 0));
         let shares = eliminated.shares();
-        // Rows of V L⁻ᵀ.
         let columns = shares.len() / parameters.max(1);
         let spread = if parameters == 0 {
             Vec::new()
@@ -170,7 +164,7 @@ struct Inverse {
     /// `L⁻¹` of the parameters' information.
     root: DMatrix<f64>,
     shares: Vec<f64>,
-    /// `L⁻¹ Vᵀ`, column after column: one for each unknown of the motion.
+    /// `L⁻¹ Vᵀ`, column-major: one column per unknown of the motion.
     spread: Vec<f64>,
     parameters: usize,
 }
@@ -182,7 +176,7 @@ impl Inverse {
         self.near.entry(row, column) + far
     }
 
-    /// `x_tᵀ H⁻¹ x_{t−l}` for l = 0 to `rows − 1`, rows in the order of time.
+    /// `x_tᵀ H⁻¹ x_{t−l}` for l = 0 to `rows − 1`, rows in order of time.
     fn covariances(&self, rows: &JointRows) -> Vec<f64> {
         let p = self.parameters;
         let far = |row: usize| {
@@ -211,16 +205,16 @@ impl Inverse {
     }
 }
 
-/// How many unknowns each source of information pays for, log by log and joint by joint.
+/// Effective number of unknowns that each source of information determines, by log and joint.
 #[derive(Clone, Debug)]
-pub(super) struct Paid {
+pub(super) struct EffectiveUnknowns {
     pub(super) position: Vec<Vec<f64>>,
     pub(super) smoothness: Vec<Vec<f64>>,
-    /// For each lag the mean covariance of the torques that motion and parameters make of rows so far apart.
+    /// Mean covariance, for each lag, of the torque predictions of rows at that distance.
     pub(super) torque: Vec<Vec<Vec<f64>>>,
 }
 
-impl Paid {
+impl EffectiveUnknowns {
     pub(super) fn new(
         system: &System,
         pieces: &[Piece<'_>],
@@ -270,8 +264,8 @@ impl Paid {
         Self { position, smoothness, torque }
     }
 
-    /// Noise of the positions and smoothness of the motion by what they leave and pay for: a step towards the maximum
-    /// of the restricted likelihood (Harville, JASA 72 (1977) 320; Wood and Fasiolo, Biometrics 73 (2017) 1071).
+    /// Updates noise of the positions and smoothness of the motion: a step towards the maximum of the restricted
+    /// likelihood (Harville, JASA 72 (1977) 320; Wood and Fasiolo, Biometrics 73 (2017) 1071).
     pub(super) fn levels(&self, pieces: &[Piece<'_>], coefficients: &[Vec<f64>], noise: &mut [LogNoise]) {
         for (log, own) in noise.iter_mut().enumerate() {
             for (joint, smoothness) in own.positions.iter_mut().enumerate() {
@@ -289,11 +283,11 @@ impl Paid {
                 }
                 let within = |old: f64, new: f64| {
                     let new = if new.is_finite() { new } else { old };
-                    new.clamp(old / MOST_CHANGE, old * MOST_CHANGE)
+                    new.clamp(old / MAX_LEVEL_RATIO, old * MAX_LEVEL_RATIO)
                 };
                 let freedom = (samples as f64 - self.position[log][joint]).max(1.0);
-                let sigma = (squares / freedom).sqrt().max(LEAST_SIGMA);
-                smoothness.position_std = within(smoothness.position_std, sigma).max(LEAST_SIGMA);
+                let sigma = (squares / freedom).sqrt().max(MIN_SIGMA);
+                smoothness.position_std = within(smoothness.position_std, sigma).max(MIN_SIGMA);
                 let moved = (rank as f64 - self.smoothness[log][joint]).max(1e-3);
                 if rough > 0.0 {
                     smoothness.penalty = within(smoothness.penalty, moved / rough);

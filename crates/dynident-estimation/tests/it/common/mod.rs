@@ -1,7 +1,6 @@
-//! Shared by the tests: a small seeded generator.
+//! Seeded random numbers for the tests.
 
-/// xorshift64* (Vigna, ACM Trans. Math. Softw. 42 (2016) 30) with Box-Muller normals: enough for tests, the same on
-/// every robot.
+/// xorshift64* (Vigna, ACM Trans. Math. Softw. 42 (2016) 30) with Box-Muller normals: the same on every computer.
 pub(crate) struct Random(u64);
 
 impl Random {

@@ -1,4 +1,4 @@
-//! Random physical problems: noisy, near-singular, with their optimum on the boundary, with and without limits.
+//! Random physical problems: noisy, near-singular, with optimum on the boundary, with and without limits.
 use dynident_estimation::TriangularFactor;
 use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalScalar, PhysicalSettings, rough_body,
@@ -10,7 +10,7 @@ fn below(random: &mut Random, count: usize) -> usize {
     (random.uniform(0.0, 1.0) * count as f64) as usize
 }
 
-/// A body of point masses: consistent by construction, on the cone's boundary with three points or fewer.
+/// A body of point masses: always consistent; on the cone's boundary for at most three points.
 fn points(random: &mut Random, count: usize) -> [f64; 10] {
     let mut body = [0.0; 10];
     let size = 10_f64.powf(random.uniform(-1.5, 0.0));
@@ -29,10 +29,10 @@ fn points(random: &mut Random, count: usize) -> [f64; 10] {
 pub(crate) struct Case {
     pub(crate) problem: PhysicalProblem,
     pub(crate) settings: PhysicalSettings,
-    /// R of the data, column by column, and ρ: what the problem was made from, for other solvers.
-    #[allow(dead_code, reason = "the benchmark asks for it")]
+    /// R of the data, column by column, and ρ, for other solvers.
+    #[allow(dead_code, reason = "used by the benchmark")]
     pub(crate) rows: (DMatrix<f64>, DVector<f64>),
-    #[allow(dead_code, reason = "the benchmark asks for it")]
+    #[allow(dead_code, reason = "used by the benchmark")]
     pub(crate) total_mass_kg: Option<[f64; 2]>,
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
         let body = points(&mut random, count);
         truth.extend(body);
         let near = rough_body(body[0] * random.uniform(0.5, 2.0), random.uniform(0.05, 0.5));
-        // A prior that is not centred and not aligned: the rough body and a share of another.
+        // A prior that is neither centred nor aligned.
         let other = points(&mut random, 5);
         let reference = core::array::from_fn(|k| near[k] + 0.2 * other[k]);
         let limited = kind == 3 && below(&mut random, 2) == 0;
@@ -80,8 +80,8 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
             scale: 1.0,
         });
     }
-    // Base columns: some 60 % of the bodies' are independent, the others go into up to four of them; scalars stand
-    // alone.
+    // Base columns: about 60 % of the bodies' columns are independent, the others depend on up to four of them;
+    // scalars are independent.
     let mut independent: Vec<usize> =
         (0..columns).filter(|&c| c >= 10 * bodies || random.uniform(0.0, 1.0) < 0.6).collect();
     independent.dedup();
