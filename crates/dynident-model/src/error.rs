@@ -1,4 +1,4 @@
-//! What can be wrong with a model's parts.
+//! Errors in the parts of a model.
 
 use thiserror::Error;
 
@@ -32,18 +32,18 @@ pub enum ModelError {
         /// The joint.
         joint: String,
     },
-    /// Joints that follow each other.
+    /// Joints that follow each other in a cycle.
     #[error("joint `{joint}` follows joints that follow it: one of them has to move by itself")]
     MimicCircle {
-        /// One of them.
+        /// One of the joints.
         joint: String,
     },
-    /// A joint that is left without the one that it follows.
+    /// A mimic joint whose source is not in the model.
     #[error("joint `{joint}` follows `{source_joint}`, which is dropped: drop both, or neither")]
     LostSource {
         /// The joint.
         joint: String,
-        /// What it follows.
+        /// Its source.
         source_joint: String,
     },
     /// A link that does not exist.
@@ -54,13 +54,13 @@ pub enum ModelError {
         /// The names that exist.
         known: Vec<String>,
     },
-    /// A body with no link at all.
+    /// A body without any link.
     #[error("a body has no link: every body needs the link that its joint moves")]
     BodyWithoutLink,
-    /// An infinite or undefined number.
+    /// A value that is not finite.
     #[error("{what} is not a finite number")]
     NotFinite {
-        /// What it was.
+        /// The value.
         what: String,
     },
     /// A joint that does not exist.

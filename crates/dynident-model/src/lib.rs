@@ -1,9 +1,8 @@
-//! **What is this robot?** Spatial algebra, joints, the link tree, the ten inertial parameters of a body, torque
-//! terms of friction, drives and couplings; readers and writers of robot descriptions; the audit of a model's
-//! physics.
+//! Robot models: spatial algebra, joints, the link tree, the ten inertial parameters of a body, torque terms of
+//! friction, drives and couplings; readers and writers of robot descriptions; the audit of a model's physics.
 //!
-//! One convention everywhere: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's
-//! origin; SI units and radians; joints by name.
+//! Conventions: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's origin, SI units
+//! and radians, joints by name.
 //!
 //! | task | take |
 //! | --- | --- |
@@ -42,7 +41,7 @@
 //! assert_eq!((rod.mass_kg(), rod.first_moment().0[2]), (2.0, -1.0));
 //! assert!(audit(&pendulum).iter().all(|finding| finding.level != AuditLevel::Problem));
 //!
-//! // What acts on its joint beside the rigid bodies, each with one parameter.
+//! Torque terms in addition to the rigid-body dynamics, one parameter each.
 //! let coulomb = Some(CoulombShape::Smooth { width: 0.01 });
 //! let terms = terms_per_joint(&pendulum, |_| DriveChoice { viscous: true, coulomb, ..DriveChoice::default() });
 //! assert_eq!(terms.iter().map(|term| term.symbol()).collect::<Vec<_>>(), ["fv1", "fc1"]);

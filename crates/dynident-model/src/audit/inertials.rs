@@ -1,4 +1,4 @@
-//! Inertials of the moving links: can such a body exist, and is it likely?
+//! Checks whether the inertials of the moving links are physically consistent and plausible.
 
 use super::AuditLevel::{Info, Problem, Warning};
 use super::{Findings, Lengths};
@@ -7,23 +7,21 @@ use crate::spatial::{Mat3, Vec3};
 use crate::tree::{Link, Model};
 use nalgebra::Matrix3;
 
-/// Heavier single links are found on no common arm, kg.
+/// Upper limit of a plausible link mass, kg; no link of a common arm is heavier.
 const LARGEST_MASS_KG: f64 = 1000.0;
-/// The densest metal, kg/m³: of all bodies with one mass, a ball of osmium has nearly the least inertia that matter
-/// allows.
+/// Density of osmium, the densest metal, kg/m³. A solid ball of it has nearly the smallest inertia possible for its
+/// mass.
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
-/// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits
-/// are usual there.
+/// Tolerance of the physical inequalities relative to the largest moment: files often have 3 digits.
 const ROUNDING: f64 = 1e-2;
-/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the inertia about the frame's
-/// origin.
+/// Rounding error of the eigenvalues relative to the inertia about the frame's origin.
 const NUMERICAL: f64 = 1e-9;
-/// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit
-/// slip.
+/// Distance of the centre of mass from the frame, in body lengths, above which it gives a warning, and above which it
+/// is a unit error.
 const FAR: f64 = 3.0;
 const ABSURDLY_FAR: f64 = 50.0;
-/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; bodies given rightly
-/// rarely look as if more than this came from it.
+/// Share of the parallel-axis term in the inertia above which the moments may be about the link's origin. A uniform rod
+/// about its end has 0.75; correct inertials rarely exceed 0.7.
 const MOSTLY_SHIFT: f64 = 0.7;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
@@ -40,7 +38,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     equal(model, findings);
 }
 
-/// Mass and principal moments that a body can have.
+/// Checks for a positive mass and possible principal moments.
 fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
@@ -55,7 +53,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
         return;
     };
     let [least, middle, most] = moments;
-    // The moments are a difference from the inertia about the frame's origin, and carry its rounding.
+    // The moments are a difference from the inertia about the frame's origin and carry its rounding error.
     let rounding = NUMERICAL * trace(&inertial.inertia_at_origin()).abs();
     if least < -rounding {
         let message = format!(
@@ -75,7 +73,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
     }
 }
 
-/// Sizes that the robot's lengths make plausible.
+/// Compares mass, centre of mass and inertia with the robot's lengths.
 fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
@@ -95,7 +93,7 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
             format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}");
         findings.add(if absurd { Problem } else { Warning }, "centre-of-mass-outside", place(), message);
     }
-    // Mean square distance of the mass from its centre: half the trace of the inertia over the mass.
+    // Mean square distance of the mass from its centre: `½ tr(I) / m`.
     let square = 0.5 * trace(&inertia) / mass;
     if square > (FAR * length_m).powi(2) {
         findings.add(
@@ -130,8 +128,8 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     }
 }
 
-/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the
-/// parallel-axis term a consistent body remains, and that term is most of the inertia given.
+/// Reports an inertia that was computed about the link's origin but written as if about the centre of mass: without the
+/// parallel-axis term, which is most of the inertia, a consistent body remains.
 fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);
@@ -152,7 +150,7 @@ fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &
     }
 }
 
-/// Bodies and links without any inertial.
+/// Reports bodies and links without an inertial.
 fn unknown(model: &Model, index: usize, findings: &mut Findings) {
     let body = &model.bodies()[index];
     let place = || format!("link {}", body.name());
@@ -170,7 +168,7 @@ fn unknown(model: &Model, index: usize, findings: &mut Findings) {
     }
 }
 
-/// Joints that move no mass at all.
+/// Reports joints that move no mass.
 fn massless(model: &Model, findings: &mut Findings) {
     let known: Vec<bool> = model.inertials().iter().map(|inertial| *inertial != InertialParameters::ZERO).collect();
     let moves_mass = |joint: usize| (0..known.len()).any(|body| known[body] && model.moves(joint, body));
@@ -181,7 +179,7 @@ fn massless(model: &Model, findings: &mut Findings) {
     }
 }
 
-/// Links that all have one inertial.
+/// Reports that all links have the same inertial.
 fn equal(model: &Model, findings: &mut Findings) {
     let known: Vec<(&Link, &InertialParameters)> = model
         .bodies()

@@ -1,17 +1,18 @@
-//! Joints: limits, offsets, friction, followers.
+//! Checks of the joints: limits, offsets, friction, mimic joints.
 
 use super::AuditLevel::{Info, Problem, Warning};
 use super::{Findings, Lengths};
 use crate::joint::{Joint, JointKind};
 use crate::tree::Model;
 
-/// No common robot has two joints further apart, m.
+/// Largest plausible distance between two joints, m.
 const LARGEST_OFFSET_M: f64 = 10.0;
-/// Nearly five turns: more than any common multi-turn joint, far less than a half turn in degrees. rad.
+/// Largest plausible position limit, rad: nearly five turns, more than common multi-turn joints and far below 180
+/// (degrees).
 const LARGEST_TURN_RAD: f64 = 30.0;
-/// Longer than any common rail, m.
+/// Largest plausible stroke of a rail, m.
 const LARGEST_STROKE_M: f64 = 100.0;
-/// Faster than the joints of small legged robots by a factor of two, rad/s.
+/// Largest plausible joint velocity, rad/s: twice that of small legged robots.
 const LARGEST_REVOLUTE_VELOCITY_RAD_S: f64 = 100.0;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
@@ -39,7 +40,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
             findings.add(Info, "mimic", place(), format!("follows {}{rest}", mimic.source_names()));
         }
     }
-    // All offsets in one point leave nothing to compare with, and no arm looks like that.
+    // If all joints have the same origin, no length is left for comparison.
     if lengths.reach > 0.0 && lengths.reach < 1e-3 {
         let message = format!("all joint origins lie within {:.2e} m: are lengths in kilometres?", lengths.reach);
         findings.add(Warning, "length-unit", "model".to_owned(), message);
@@ -63,7 +64,7 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
                 add(Warning, "limit-range", cannot);
             }
             (Some(_), Some(_)) => {}
-            // What it follows has limits of its own.
+            // The limits of a mimic joint follow from its sources.
             _ if follows => {}
             _ => {
                 let has = "has no position limits: no excitation can be designed until they are given";
@@ -99,7 +100,7 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
         }
     }
     match limits.effort {
-        // A joint that follows others has no drive.
+        // A mimic joint has no drive.
         _ if follows => {}
         Some(effort) if effort <= 0.0 => {
             let has = format!("has an effort limit of {effort}, so that it could carry nothing: give the real one");

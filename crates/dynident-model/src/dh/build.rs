@@ -1,4 +1,4 @@
-//! From the keys of a D-H table to the link tree.
+//! Builds the link tree from the keys of a D-H table.
 
 use super::table::{Base, Dynamics, Inertial, Limits, Number, Row, Table};
 use super::{DhError, DhFault};
@@ -12,18 +12,18 @@ use crate::urdf::{MAX_MAGNITUDE, MAX_MOVING_JOINTS};
 use std::collections::{HashMap, HashSet};
 use toml::Spanned;
 
-/// The model that `table`, read from `text`, describes, with what it is in the other convention.
+/// Builds the model of `table`, read from `text`. If the table is meant in the other convention, the model says so.
 pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
     let stated = model_in(text, table, table.convention)?;
     let other = table.convention.other();
-    // What the table is not meant to be is no reason to refuse it.
+    // A failure in the other convention is not an error of the table.
     Ok(match model_in(text, table, other) {
         Ok(model) => stated.with_other_convention(other, model),
         Err(_) => stated,
     })
 }
 
-/// The model that `table` describes in this convention.
+/// Builds the model of `table` in the given convention.
 fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model, DhError> {
     let source = Source { text };
     let gravity = table.gravity_m_s2.as_ref().map(|gravity| source.finite("gravity_m_s2", gravity)).transpose()?;
@@ -80,7 +80,7 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
     model.and_then(|model| model.with_gravity(gravity)).map_err(|error| source.fault(0, DhFault::Model(error)))
 }
 
-/// Where a link is.
+/// Place of a link.
 #[derive(Clone, Copy)]
 struct LinkPlace {
     /// The body it moves with; `None` for the base.
@@ -89,7 +89,7 @@ struct LinkPlace {
     body_from_dh: Transform,
 }
 
-/// A row's names and the place of its D-H frame.
+/// Names of a row, and its D-H frame.
 pub(super) struct RowFrame {
     pub(super) joint: String,
     pub(super) link: String,
@@ -113,9 +113,9 @@ fn default_link(joint: &str) -> String {
     format!("{joint}_link")
 }
 
-/// Where a row puts the body frame and the D-H frame.
+/// Body frame and D-H frame of a row.
 struct Frames {
-    /// The body frame at position zero, in the parent's D-H frame.
+    /// Body frame at position zero, in the parent's D-H frame.
     placement: Transform,
     /// D-H frame i in body frame i.
     body_from_dh: Transform,
@@ -154,7 +154,7 @@ impl Source<'_> {
         }
     }
 
-    /// The place of a row's parent link, by default the link of the row before.
+    /// Place of a row's parent link; by default, the link of the previous row.
     fn parent(&self, row: &Row, previous: &str, places: &HashMap<String, LinkPlace>) -> Result<LinkPlace, DhError> {
         let parent = row.parent.as_ref().map_or(previous, |parent| parent.get_ref());
         places.get(parent).copied().ok_or_else(|| {
@@ -166,7 +166,6 @@ impl Source<'_> {
         })
     }
 
-    /// The joint of a row.
     fn joint(&self, row: &Row, name: &str, parent: LinkPlace, frames: &Frames) -> Result<Joint, DhError> {
         let kind = JointKind::from(row.kind);
         let sign = row.sign.as_ref().map_or(1.0, |sign| *sign.get_ref());
@@ -190,7 +189,7 @@ impl Source<'_> {
         })
     }
 
-    /// The one of two keys that is given.
+    /// Value of a quantity that may be given by one of two keys.
     fn one_of(&self, keys: [&'static str; 2], numbers: [&Number; 2]) -> Result<[Option<f64>; 2], DhError> {
         if let [Some(_), Some(second)] = numbers {
             return Err(self.fault(second.span().start, DhFault::BothUnits { first: keys[0], second: keys[1] }));
@@ -198,7 +197,7 @@ impl Source<'_> {
         Ok([self.number(keys[0], numbers[0])?, self.number(keys[1], numbers[1])?])
     }
 
-    /// An angle in radians or degrees, 0 if neither is given, as sine and cosine.
+    /// Sine and cosine of an angle in radians or degrees; the angle is 0 if neither key is given.
     fn angle(&self, keys: [&'static str; 2], numbers: [&Number; 2]) -> Result<(f64, f64), DhError> {
         Ok(match self.one_of(keys, numbers)? {
             [_, Some(degrees)] => sin_cos_degrees(degrees),
@@ -301,8 +300,8 @@ impl Source<'_> {
     }
 }
 
-/// Sine and cosine of degrees, exact at multiples of 90: right angles are the rule in D-H tables, and structural zeros
-/// hang on them.
+/// Sine and cosine of degrees, exact at multiples of 90. Most angles in D-H tables are right angles, and structural
+/// zeros of the model depend on exact values.
 fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),

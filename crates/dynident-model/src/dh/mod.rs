@@ -42,11 +42,11 @@
 //! | `standard` (Denavit and Hartenberg 1955; Paul 1981) | `Rz(θ) Tz(d) Tx(a) Rx(α)` | those after joint i: `a_i`, `α_i` |
 //!
 //! **Frames.** In the modified convention the model's body frame i is D-H frame i: its z axis is the joint's axis. In
-//! the standard convention the axis of joint i is z of frame i-1, so that D-H frame i does not lie on it: there the
-//! body frame is frame i-1 turned by `Rz(θ)` (slid along z by `s q`), and D-H frame i stands in it at `Tz(d) Tx(a)
-//! Rx(α)`. Inertials in the table are always given in D-H frame i; the reader carries them into the body frame.
+//! the standard convention the axis of joint i is z of frame i-1. There the body frame is frame i-1 rotated by `Rz(θ)`
+//! (or translated along z by `s q`), and D-H frame i in it is `Tz(d) Tx(a) Rx(α)`. Inertials in the table are always
+//! given in D-H frame i; the reader transforms them into the body frame.
 //!
-//! **Inertials**, where known (otherwise the body is unknown, never zero), are one of
+//! **Inertials** are given in one of two forms; a body without an inertial is unknown, not massless:
 //! - `mass_kg`, `com_m` and `inertia_at_com` (kg m², about the centre of mass) or `inertia_at_origin` (about the origin
 //!   of D-H frame i), both as `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`;
 //! - `parameters`, all ten in the order [`INERTIAL_NAMES`](crate::INERTIAL_NAMES).
@@ -65,14 +65,14 @@ use thiserror::Error;
 /// Why a D-H table could not be read, with line and column.
 pub type DhError = Located<DhFault>;
 
-/// What is wrong in a D-H table, and the fix.
+/// A fault in a D-H table, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DhFault {
     /// Not TOML, a key that does not exist, or a value of the wrong kind.
     #[error("{reason}; fix this entry of the D-H table")]
     Toml {
-        /// What the TOML parser says.
+        /// Message of the TOML parser.
         reason: String,
     },
     /// A number that is not finite, or beyond [`MAX_MAGNITUDE`](crate::urdf::MAX_MAGNITUDE).
@@ -83,7 +83,7 @@ pub enum DhFault {
         /// The number.
         value: f64,
     },
-    /// One quantity given twice, in two units.
+    /// One quantity given in two units.
     #[error("`{first}` and `{second}` say the same thing: keep one")]
     BothUnits {
         /// One key.
@@ -107,7 +107,7 @@ pub enum DhFault {
         /// The value.
         sign: f64,
     },
-    /// A name without a character.
+    /// An empty name.
     #[error("a {what} has an empty name: give it one")]
     EmptyName {
         /// `joint` or `link`.
@@ -121,7 +121,7 @@ pub enum DhFault {
         /// The name.
         name: String,
     },
-    /// A parent that no earlier joint moves.
+    /// A parent link that no earlier row defines.
     #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
     UnknownParent {
         /// The name.
@@ -138,12 +138,12 @@ pub enum DhFault {
         /// The limit.
         limit: usize,
     },
-    /// An inertial that is neither complete nor absent.
+    /// An inertial that is incomplete or overdetermined.
     #[error(
         "the inertial is not complete or says things twice: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
     )]
     Inertial,
-    /// The parts do not make a model.
+    /// The parts do not form a valid model.
     #[error("{0}; fix the table")]
     Model(#[from] ModelError),
 }
@@ -151,14 +151,13 @@ pub enum DhFault {
 /// Reads a D-H table (format: [module documentation](self)).
 ///
 /// # Errors
-/// If the text is no TOML, holds unknown keys or unusable values, or describes no tree; with line and column.
+/// The text is not TOML, contains unknown keys or invalid values, or does not describe a tree; with line and column.
 pub fn read_dh(text: &str) -> Result<Model, DhError> {
     let (text, table) = parsed(text)?;
     build::model(text, &table)
 }
 
-/// The text without a byte order mark, which is no part of the table (positions are counted after it, as editors do),
-/// and its keys.
+/// The text without a byte order mark (positions start after it, as in editors), and its keys.
 fn parsed(text: &str) -> Result<(&str, table::Table), DhError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let table = toml::from_str(text)

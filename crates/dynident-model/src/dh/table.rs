@@ -1,4 +1,4 @@
-//! The keys of a D-H table, as they stand in the file.
+//! The keys of a D-H table in the file.
 
 use crate::dh_convention::DhConvention;
 use crate::joint::JointKind;

@@ -1,8 +1,7 @@
-//! `<connect>` under `<equality>`: chains of the parallelogram kind are closed, as `[[robot.loop]]` of a study closes
-//! them.
+//! `<connect>` under `<equality>`: closes chains of the parallelogram kind, as `[[robot.loop]]` of a study does.
 //!
-//! The two points are the anchor and what it meets in the drawn pose. The file does not say which joints are passive:
-//! of those that the chain moves, the ones that no actuator drives and that follow nothing yet.
+//! The two points are the anchor and the coinciding point in the drawn pose. MJCF does not mark passive joints: they
+//! are the joints of the chain without an actuator that do not follow another joint.
 
 use super::bodies::LinkPlace;
 use super::classes::Stated;
@@ -15,18 +14,18 @@ use crate::spatial::{Transform, Vec3};
 use crate::tree::Model;
 use std::collections::HashSet;
 
-/// Chains that are tried: their sizes multiply, and robots have a few.
+/// Maximum number of chains; robots have few, and their sizes multiply.
 const MOST: usize = 16;
 
 /// A `<connect>` that names a body and an anchor.
 pub(super) struct Connect<'t> {
     pub(super) stated: Stated<'t>,
     pub(super) bodies: [String; 2],
-    /// In the frame of the first body, m.
+    /// Anchor in the frame of the first body, m.
     pub(super) anchor: Vec3,
 }
 
-/// What is known of the bodies and joints that chains close.
+/// Bodies and joints of the document.
 pub(super) struct Around<'a> {
     pub(super) document: &'a Expanded,
     pub(super) links: &'a [LinkPlace],
@@ -36,7 +35,7 @@ pub(super) struct Around<'a> {
     pub(super) driven: &'a HashSet<String>,
 }
 
-/// The robot with its chains closed; those that are no parallelograms are noted with the reason, and stay open.
+/// Closes the chains of a robot. Chains that are not parallelograms stay open, with a notice.
 pub(super) fn closed(
     model: Model,
     connects: &[Connect<'_>],
@@ -63,7 +62,7 @@ pub(super) fn closed(
         match loops::followers(&model, &closures) {
             Ok(followers) => break followers,
             Err(error) => {
-                // One chain less: the one that is at fault, where the error says so.
+                // Removes one chain: the one that the error names, otherwise the first.
                 let at_fault = held.iter().position(|(_, closure)| blames(&error, closure)).unwrap_or(0);
                 let (connect, _) = held.remove(at_fault);
                 left(connect, error.to_string());
@@ -84,7 +83,7 @@ fn blames(error: &LoopError, closure: &LoopClosure) -> bool {
     }
 }
 
-/// The cut of a chain, or why there is none.
+/// Cut of a chain, or the reason why it cannot be closed.
 fn closure(model: &Model, connect: &Connect<'_>, around: &Around<'_>) -> Result<LoopClosure, String> {
     let way = |link: &String| loops::way_to(model, link).ok_or_else(|| format!("there is no body `{link}`"));
     let [(first, first_placement), (second, second_placement)] = [way(&connect.bodies[0])?, way(&connect.bodies[1])?];

@@ -1,4 +1,4 @@
-//! What can be wrong in an MJCF.
+//! Errors of the MJCF reader.
 
 use crate::error::ModelError;
 use crate::place::Located;
@@ -7,11 +7,11 @@ use thiserror::Error;
 /// Why an MJCF could not be read, with line and column.
 pub type MjcfError = Located<MjcfFault>;
 
-/// What is wrong in an MJCF, and the fix.
+/// A fault in an MJCF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MjcfFault {
-    /// A fault in a file that stands in an `<include>` here.
+    /// A fault in a file that is included here.
     #[error("in the included `{file}`, {line}:{column}: {fault}")]
     Included {
         /// The file as the document names it.
@@ -31,7 +31,7 @@ pub enum MjcfFault {
         /// Why.
         reason: String,
     },
-    /// A file that is included twice, by itself perhaps.
+    /// A file that is included twice, possibly by itself.
     #[error("`{file}` is included a second time: delete one <include>, MuJoCo takes each file once")]
     IncludedTwice {
         /// The file.
@@ -40,10 +40,10 @@ pub enum MjcfFault {
     /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml {
-        /// What the XML parser says.
+        /// Message of the XML parser.
         reason: String,
     },
-    /// More elements or bytes than a robot has.
+    /// More elements or bytes than allowed.
     #[error("the document has more than {limit} {what}: give the MJCF of one robot")]
     TooLarge {
         /// The limit.
@@ -71,18 +71,18 @@ pub enum MjcfFault {
         /// The attribute.
         attribute: &'static str,
     },
-    /// Something that is not a usable number.
+    /// An invalid number.
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number {
         /// The element.
         element: String,
         /// The attribute.
         attribute: String,
-        /// What stands there, shortened.
+        /// The text, shortened.
         text: String,
-        /// What is wrong with it.
+        /// Reason.
         fault: &'static str,
-        /// What to write.
+        /// Expected form.
         fix: &'static str,
     },
     /// Too many or too few numbers.
@@ -92,24 +92,24 @@ pub enum MjcfFault {
         element: String,
         /// The attribute.
         attribute: String,
-        /// How many are needed.
+        /// Expected number of values.
         expected: usize,
-        /// How many stand there.
+        /// Number of values found.
         found: usize,
     },
-    /// A word that the attribute does not take.
+    /// An invalid keyword.
     #[error("`{attribute}` of <{element}> is `{text}`: write {expected}")]
     Word {
         /// The element.
         element: String,
         /// The attribute.
         attribute: String,
-        /// What stands there, shortened.
+        /// The text, shortened.
         text: String,
-        /// What it takes.
+        /// Valid keywords.
         expected: &'static str,
     },
-    /// Two bodies or two joints with one name, or two classes.
+    /// Two bodies, two joints or two classes with the same name.
     #[error("{kind} `{name}` is defined a second time: rename or delete one")]
     DuplicateName {
         /// `body`, `joint` or `default class`.
@@ -123,7 +123,7 @@ pub enum MjcfFault {
         /// The class.
         class: String,
     },
-    /// A joint that an actuator or an equality names is not there.
+    /// An actuator or an equality names an unknown joint.
     #[error("<{element}> names joint `{joint}`, which is not defined: add the joint or fix the name")]
     UnknownJoint {
         /// The element.
@@ -131,7 +131,7 @@ pub enum MjcfFault {
         /// The joint.
         joint: String,
     },
-    /// Two statements of which only one may stand.
+    /// Two attributes that exclude each other.
     #[error("<{element}> has both `{first}` and `{second}`: keep one of them")]
     Both {
         /// The element.
@@ -141,7 +141,7 @@ pub enum MjcfFault {
         /// The other.
         second: &'static str,
     },
-    /// A vector that gives no direction.
+    /// A vector without a direction.
     #[error("`{attribute}` of <{element}> gives no direction: write a vector with a length, such as `0 0 1`")]
     NoDirection {
         /// The element.
@@ -158,12 +158,12 @@ pub enum MjcfFault {
     /// `<inertial>` outside a body.
     #[error("the world has no inertia: delete this <inertial>, or put it into a <body>")]
     WorldInertial,
-    /// A joint or body that a robot on a fixed base does not have.
+    /// A joint or body that is impossible for a robot on a fixed base.
     #[error("{what} is not supported: {fix}")]
     Unsupported {
-        /// What stands there.
+        /// The unsupported element.
         what: String,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
     /// A geom without the sizes of its type.
@@ -171,10 +171,10 @@ pub enum MjcfFault {
     Size {
         /// The type.
         kind: &'static str,
-        /// How many.
+        /// Expected number of sizes.
         needed: usize,
     },
-    /// A mass, density, moment or bound below zero.
+    /// A negative mass, density, moment or bound.
     #[error("`{attribute}` of <{element}> is negative: write a value of zero or more")]
     Negative {
         /// The element.
@@ -182,7 +182,7 @@ pub enum MjcfFault {
         /// The attribute.
         attribute: &'static str,
     },
-    /// `settotalmass` with masses that are not known.
+    /// `settotalmass` with unknown masses.
     #[error("`settotalmass` needs all masses, and that of body `{body}` {why}: give the body an <inertial>")]
     TotalMass {
         /// The body.
@@ -190,16 +190,16 @@ pub enum MjcfFault {
         /// Why its mass is not known.
         why: &'static str,
     },
-    /// Nothing moves.
+    /// No moving joint.
     #[error("the model has no joint of type hinge or slide: give the MJCF of a robot that moves")]
     NoMovingJoint,
-    /// More moving joints than a description may have.
+    /// More moving joints than allowed.
     #[error("the model has more than {limit} joints: fix those that the log does not hold")]
     TooManyJoints {
         /// The limit.
         limit: usize,
     },
-    /// The parts do not make a model.
+    /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }

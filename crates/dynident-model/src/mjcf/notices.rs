@@ -1,42 +1,42 @@
-//! What a document says and the model does not hold.
+//! Contents of a document that the model cannot represent.
 
 use super::classes::Stated;
 use super::expanded::{Expanded, Place};
 use core::fmt;
 
-/// Something in an MJCF that the model does not hold.
+/// A part of an MJCF that the model does not represent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfNotice {
-    /// The included file in which it stands; `None` for the main one.
+    /// Included file; `None` for the main file.
     pub file: Option<String>,
     /// Line, from 1.
     pub line: u32,
-    /// What is not held.
+    /// The part.
     pub loss: Loss,
 }
 
-/// What is not held.
+/// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Loss {
-    /// The mass of a body is not known, since one of its geoms has no solid that is computed.
+    /// The mass of a body is unknown, because one of its geoms is not a simple solid.
     UnknownMass {
         /// The body.
         body: String,
-        /// Why.
+        /// Reason.
         why: &'static str,
     },
-    /// A joint with a spring that is no straight line: its first factor counts alone.
+    /// A joint with a nonlinear spring, of which only the linear coefficient is used.
     SpringPolynomial {
         /// The joint.
         joint: String,
     },
-    /// Damping that grows with more than the velocity.
+    /// Nonlinear damping.
     DampingPolynomial {
         /// The joint.
         joint: String,
     },
-    /// An effort limit that is not the same both ways.
+    /// An asymmetric effort limit.
     OneSidedEffort {
         /// The joint.
         joint: String,
@@ -45,7 +45,7 @@ pub enum Loss {
         /// Highest, Nm or N.
         high: f64,
     },
-    /// A body that MuJoCo holds up.
+    /// A body with gravity compensation.
     GravityCompensation {
         /// The body.
         body: String,
@@ -54,39 +54,39 @@ pub enum Loss {
     Constraint {
         /// The element under `<equality>`.
         element: String,
-        /// What it joins.
+        /// The bodies or joints.
         between: String,
     },
-    /// A closed chain that the model does not hold.
+    /// A closed chain that the model does not represent.
     Chain {
-        /// What it joins.
+        /// The bodies.
         between: String,
-        /// Why not.
+        /// Reason.
         why: String,
     },
-    /// A coupling of two joints by more than a straight line.
+    /// A nonlinear coupling of two joints.
     CouplingPolynomial {
         /// The joint that follows.
         joint: String,
     },
-    /// Tendons with a spring, damping, friction or inertia of their own.
+    /// A tendon with a spring, damping, friction or inertia.
     Tendon {
         /// The tendon.
         tendon: String,
     },
-    /// A medium around the robot.
+    /// A fluid around the robot.
     Medium,
-    /// An element or attribute that MJCF's joints, bodies and inertials do not have, as far as this reader knows.
+    /// An element or attribute that this reader does not know for joints, bodies and inertials.
     Unread {
         /// The element.
         element: String,
-        /// The attribute, or none for the element itself.
+        /// The attribute; `None` for the element itself.
         attribute: Option<String>,
     },
 }
 
 impl Loss {
-    /// A short name.
+    /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
@@ -166,14 +166,13 @@ impl fmt::Display for Loss {
     }
 }
 
-/// The notices so far.
 #[derive(Default)]
 pub(super) struct Notices {
     pub(super) list: Vec<MjcfNotice>,
 }
 
 impl Notices {
-    /// Most that are kept.
+    /// Maximum number of notices.
     const MOST: usize = 200;
 
     pub(super) fn note(&mut self, stated: &Stated<'_>, loss: Loss) {

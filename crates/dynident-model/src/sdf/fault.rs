@@ -1,4 +1,4 @@
-//! What can be wrong in an SDF.
+//! Errors of the SDF reader.
 
 use crate::error::ModelError;
 use crate::place::Located;
@@ -9,14 +9,14 @@ use thiserror::Error;
 /// Why an SDF could not be read, with line and column.
 pub type SdfError = Located<SdfFault>;
 
-/// What is wrong in an SDF, and the fix.
+/// A fault in an SDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SdfFault {
     /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml {
-        /// What the XML parser says.
+        /// Message of the XML parser.
         reason: String,
     },
     /// More elements than a robot has.
@@ -37,16 +37,16 @@ pub enum SdfFault {
         /// Name of the root element.
         root: String,
     },
-    /// `version` is none.
+    /// An invalid `version`.
     #[error("`version` of <sdf> is `{text}`: write one such as 1.9, by which frames are understood")]
     Version {
-        /// What stands there, shortened.
+        /// The text, shortened.
         text: String,
     },
     /// No model.
     #[error("there is no <model> here: give the SDF of one robot{hint}")]
     NoModel {
-        /// More on the fix.
+        /// Additional hint.
         hint: &'static str,
     },
     /// Several worlds or models.
@@ -55,13 +55,13 @@ pub enum SdfFault {
         /// Worlds or models.
         what: &'static str,
     },
-    /// More links, joints and frames than a robot has.
+    /// More links, joints and frames than allowed.
     #[error("the model has more than {limit} links, joints and frames: give the SDF of one robot")]
     TooMany {
         /// The limit.
         limit: usize,
     },
-    /// Models nested deeper than a robot's.
+    /// Models nested too deep.
     #[error("models are nested more than {limit} deep: give the SDF of one robot")]
     TooDeep {
         /// The limit.
@@ -70,14 +70,14 @@ pub enum SdfFault {
     /// An attribute or element is missing.
     #[error("<{element}> has no {kind} `{name}`: add it")]
     Missing {
-        /// The element around.
+        /// Surrounding element.
         element: String,
         /// `attribute` or `element`.
         kind: &'static str,
         /// What is missing.
         name: &'static str,
     },
-    /// Something that is not a usable number.
+    /// An invalid number.
     #[error("<{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number {
         /// The element.
@@ -94,12 +94,12 @@ pub enum SdfFault {
     Count {
         /// The element.
         element: String,
-        /// How many are needed.
+        /// Expected number of values.
         expected: usize,
-        /// How many stand there.
+        /// Number of values found.
         found: usize,
     },
-    /// A word that is none of those expected.
+    /// An invalid keyword.
     #[error("`{text}` of <{element}> is not known: write {expected}")]
     Word {
         /// The element.
@@ -109,27 +109,27 @@ pub enum SdfFault {
         /// What is.
         expected: &'static str,
     },
-    /// Two things in one scope with one name.
+    /// A repeated name in one scope.
     #[error("`{name}` is defined a second time: rename or delete one")]
     DuplicateName {
         /// The name.
         name: String,
     },
-    /// A frame that is not there.
+    /// An unknown frame.
     #[error("{of} refers to `{name}`, which is no link, joint, frame or nested model here: add it or fix the name")]
     UnknownFrame {
         /// The frame.
         name: String,
-        /// What refers to it.
+        /// Element that refers to it.
         of: String,
     },
     /// Frames whose poses refer to each other.
     #[error("the pose of `{name}` refers back to itself: give one of these frames another `relative_to`")]
     FrameLoop {
-        /// One of them.
+        /// One of the frames.
         name: String,
     },
-    /// A link that two joints carry.
+    /// A link with two parent joints.
     #[error("link `{link}` is the child of joints `{first}` and `{second}`: delete one, closed chains are not read")]
     TwoParents {
         /// The link.
@@ -139,7 +139,7 @@ pub enum SdfFault {
         /// The other.
         second: String,
     },
-    /// Parts that no joint joins.
+    /// Links that are not connected by a joint.
     #[error("links `{first}` and `{second}` are both carried by no joint: fix one of them to the other, or to `world`")]
     SeveralRoots {
         /// One root.
@@ -167,30 +167,30 @@ pub enum SdfFault {
         /// The joint.
         joint: String,
     },
-    /// A joint that a robot on a fixed base does not have, or something else that is not read.
+    /// An unsupported element, such as a joint that is impossible for a robot on a fixed base.
     #[error("{what} is not supported: {fix}")]
     Unsupported {
-        /// What stands there.
+        /// The unsupported element.
         what: String,
-        /// What to do.
+        /// The fix.
         fix: &'static str,
     },
-    /// A mass below zero.
+    /// A negative mass.
     #[error("the mass of link `{link}` is negative: write a value of zero or more")]
     NegativeMass {
         /// The link.
         link: String,
     },
-    /// Nothing moves.
+    /// No moving joint.
     #[error("the model has no joint of type revolute, continuous or prismatic: give the SDF of a robot that moves")]
     NoMovingJoint,
-    /// More moving joints than a description may have.
+    /// More moving joints than allowed.
     #[error("the model has more than {limit} joints: fix those that the log does not hold")]
     TooManyJoints {
         /// The limit.
         limit: usize,
     },
-    /// The parts do not make a model.
+    /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }
@@ -201,7 +201,7 @@ pub(super) fn fault_at(node: Node<'_, '_>, fault: SdfFault) -> SdfError {
     Located { line: at.row, column: at.col, fault }
 }
 
-/// What the XML parser says.
+/// Converts an error of the XML parser.
 pub(super) fn of_xml(text: &str, error: &roxmltree::Error) -> SdfError {
     let (at, why) = malformed(text, error);
     let fault = match why {

@@ -1,19 +1,19 @@
-//! What a document says and the model does not hold.
+//! Contents of a document that the model cannot represent.
 
 use super::line;
 use core::fmt;
 use roxmltree::Node;
 
-/// Something in an SDF that the model does not hold.
+/// A part of an SDF that the model does not represent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SdfNotice {
     /// Line, from 1.
     pub line: u32,
-    /// What is not held.
+    /// Kind of the part.
     pub loss: SdfLoss,
 }
 
-/// What is not held.
+/// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SdfLoss {
@@ -21,28 +21,28 @@ pub enum SdfLoss {
     UnknownMass {
         /// The link.
         link: String,
-        /// Why.
+        /// Reason.
         why: &'static str,
     },
-    /// A link on which gravity does not act.
+    /// A link without gravity.
     Weightless {
         /// The link.
         link: String,
     },
-    /// The mass of a fluid around a link.
+    /// Added mass of a fluid around a link.
     AddedMass {
         /// The link.
         link: String,
     },
     /// A model in another file.
     Include {
-        /// Where it is.
+        /// URI of the model.
         uri: String,
     },
 }
 
 impl SdfLoss {
-    /// A short name.
+    /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
@@ -72,14 +72,13 @@ impl fmt::Display for SdfLoss {
     }
 }
 
-/// The notices so far.
 #[derive(Default)]
 pub(super) struct Notices {
     pub(super) list: Vec<SdfNotice>,
 }
 
 impl Notices {
-    /// Most that are kept.
+    /// Maximum number of notices.
     const MOST: usize = 200;
 
     pub(super) fn note(&mut self, node: Node<'_, '_>, loss: SdfLoss) {

@@ -1,4 +1,4 @@
-//! The links, joints and frames of a model and of those nested in it, by their full names.
+//! Links, joints and frames of a model and its nested models, by their full names.
 
 use super::fault::{SdfError, SdfFault, fault_at};
 use super::values::{child, children, required_text, text, word_of};
@@ -8,14 +8,14 @@ use std::collections::HashMap;
 
 /// The model's own frame.
 pub(super) const MODEL: &str = "__model__";
-/// What the base stands on.
+/// The fixed world.
 pub(super) const WORLD: &str = "world";
-/// Most links, joints, frames and nested models: some steps compare each with each.
+/// Maximum number of links, joints, frames and nested models: some steps are quadratic in it.
 const MOST_ITEMS: usize = 5000;
-/// Most models in each other.
+/// Maximum nesting depth of models.
 const MOST_NESTED: usize = 20;
 
-/// What has a name and a pose.
+/// Kinds of elements with a name and a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Link,
@@ -28,15 +28,15 @@ pub(super) enum Kind {
 pub(super) struct Item<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) kind: Kind,
-    /// With the names of the models around it: `gripper::finger`.
+    /// Full name with the surrounding models: `gripper::finger`.
     pub(super) name: String,
-    /// Names of the models around it, with `::` behind each.
+    /// Names of the surrounding models, each followed by `::`.
     pub(super) scope: String,
-    /// Frame that its pose is relative to, by its full name; empty for the frame of the outermost model.
+    /// Full name of the frame that its pose is relative to; empty for the outermost model.
     pub(super) relative_to: String,
 }
 
-/// All of them, in the order of the document, with their places by name.
+/// All items in the order of the document, with their indices by name.
 pub(super) struct Scopes<'a, 'input> {
     pub(super) version: Version,
     /// The outermost model.
@@ -45,7 +45,7 @@ pub(super) struct Scopes<'a, 'input> {
     pub(super) by_name: HashMap<String, usize>,
 }
 
-/// A name as it is seen from `scope`, in full; empty for the frame of the outermost model.
+/// Full name of `name` in `scope`; empty for the frame of the outermost model.
 pub(super) fn full_name(scope: &str, name: &str) -> String {
     match name {
         MODEL => scope.trim_end_matches("::").to_owned(),
@@ -56,10 +56,10 @@ pub(super) fn full_name(scope: &str, name: &str) -> String {
     }
 }
 
-/// Collects `model` and what is nested in it.
+/// Collects the items of `model` and its nested models.
 pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> Result<Scopes<'a, 'input>, SdfError> {
     let mut found = Scopes { version, model, items: Vec::new(), by_name: HashMap::new() };
-    // Models still to look through, innermost last; each is looked through before what follows it.
+    // Models to be visited, innermost last, so that a nested model is visited before its successors.
     let mut ahead = vec![(model, String::new(), 0)];
     while let Some((model, scope, depth)) = ahead.pop() {
         if depth > MOST_NESTED {
@@ -92,9 +92,9 @@ pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> R
     Ok(found)
 }
 
-/// Which frame the pose of an element is relative to, as its scope names it.
+/// Frame that the pose of an element is relative to, as named in its scope.
 fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&'a str, SdfError> {
-    // Before 1.7 there were no other frames: links stood in the model, joints in their child.
+    // Before version 1.7, poses of links are relative to the model and those of joints to their child.
     let stated = child(node, "pose").and_then(|pose| pose.attribute("relative_to")).filter(|frame| !frame.is_empty());
     if let Some(stated) = stated.filter(|_| version >= Version([1, 7])) {
         return Ok(stated);
@@ -112,7 +112,7 @@ fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&
     })
 }
 
-/// Models in other files, which are not read.
+/// Notes models in other files, which are not read.
 pub(super) fn note_includes(model: Node<'_, '_>, notices: &mut Notices) {
     for include in model.descendants().filter(|node| node.has_tag_name("include")) {
         let uri = children(include, "uri").next().map_or("", text).to_owned();

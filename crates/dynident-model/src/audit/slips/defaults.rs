@@ -2,7 +2,7 @@
 
 use super::{Search, SlipKind};
 
-/// Links whose moments are exactly 1 about every axis, which no designed body has.
+/// Reports links whose moments are exactly 1 about every axis.
 pub(super) fn look(search: &mut Search) {
     let is_default = |place: &usize| search.now[*place].moments == [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
     let places: Vec<usize> = (0..search.now.len()).filter(is_default).collect();

@@ -1,18 +1,18 @@
-//! Numbers in the wrong slot or with the wrong sign: what makes a body of moments that no body has.
+//! Moments in the wrong slot or with the wrong sign.
 
 use super::{Search, SlipKind, possible, principal, shown};
 use crate::urdf::StatedInertial;
 
-/// One way to read the six numbers, if they look like it and it gives a body.
+/// One interpretation of the six moments that gives a possible body.
 struct Reading {
     kind: SlipKind,
-    /// The numbers that were meant; none where one of them is not in the file.
+    /// Corrected numbers; `None` if the file does not contain one of them.
     meant: Option<StatedInertial>,
     evidence: String,
 }
 
-/// Reads every link that no body is like in each of the ways. A way that alone explains a link is its slip; where
-/// several do, the one that explains most links of the file counts, if there is only one such.
+/// Tries all interpretations for every impossible link. If several explain a link, the one that explains most links of
+/// the file is used, provided it is unique.
 pub(super) fn look(search: &mut Search) {
     let broken: Vec<usize> = (0..search.now.len()).filter(|&place| !is_body(&search.now[place])).collect();
     let readings: Vec<Vec<Reading>> = broken.iter().map(|&place| readings(&search.now[place])).collect();
@@ -86,7 +86,7 @@ fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Reading)]) {
     }
 }
 
-/// Every way in which the numbers of one link make a body.
+/// All interpretations that make a possible body of one link's numbers.
 fn readings(stated: &StatedInertial) -> Vec<Reading> {
     let [xx, xy, xz, yy, yz, zz] = stated.moments;
     let before = shown(principal(&stated.moments));
@@ -113,9 +113,9 @@ fn readings(stated: &StatedInertial) -> Vec<Reading> {
     if products.map(|x| x + 0.0) != stated.moments && possible(&products) {
         way(SlipKind::NegatedProducts, stated.mass_kg, products.map(|x| x + 0.0), true);
     }
-    // The row-major walk: ixy stands again where iyy belongs, and the true iyy (large) where iyz does.
+    // In a matrix written row by row, ixy is repeated in the slot of iyy, and the true iyy (large) is in that of iyz.
     if yy == xy && yz > 0.0 && yz.abs() > zz.abs() {
-        // Any izz between |xx - yy| and xx + yy makes a body of the upper left block, if that is one.
+        // Any izz between |xx - yy| and xx + yy is possible if the upper left block is positive definite.
         let middle = (xx * xx + yz * yz).sqrt();
         let moments = [xx, xy, xz, yz, zz, middle];
         if possible(&moments) {

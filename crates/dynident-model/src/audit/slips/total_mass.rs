@@ -3,15 +3,15 @@
 use super::{Search, SlipKind, shifted, trace};
 use crate::urdf::StatedInertial;
 
-/// A total is stated to some digits, and screws are left out.
+/// Relative tolerance of the total: it is rounded, and screws are often left out.
 const NEAR: f64 = 0.015;
-/// One explanation among many must fit better than that.
+/// Relative tolerance for a correction of one mass, stricter because many corrections are tried.
 const EXACT: f64 = 0.003;
 
-/// Units of a total, and the power of ten that makes kilograms.
+/// Units of a total, with the power of ten to kilograms.
 const UNITS: [(&str, i32); 2] = [("kg", 0), ("g", -3)];
 
-/// Compares the sum with the total that the caller or a comment of the file states.
+/// Compares the sum of the masses with the total given by the caller or by a comment of the file.
 pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
     let Some(total) = total_kg.or_else(|| commented(text)).filter(|total| *total > 0.0 && total.is_finite()) else {
         return;
@@ -22,7 +22,6 @@ pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
         return;
     }
     let evidence = format!("masses add up to {sum} kg, the stated total is {total} kg");
-    // All in another unit.
     if let Some(power) = [-3, 3].into_iter().find(|&power| near(shifted(sum, power), NEAR)) {
         let all: Vec<(usize, StatedInertial)> = (0..search.now.len())
             .map(|place| (place, scaled(&search.now[place], power)))
@@ -33,7 +32,7 @@ pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
         search.note(SlipKind::TotalMass, message, evidence, all);
         return;
     }
-    // One of them with the point in another place.
+    // One mass with a misplaced decimal point.
     let mut ways: Vec<(usize, i32)> = Vec::new();
     for (place, one) in search.now.iter().enumerate().filter(|(_, one)| one.mass_kg > 0.0) {
         let powers = [-3, -2, -1, 1, 2, 3];
@@ -45,7 +44,7 @@ pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
                 .map(|power| (place, power)),
         );
     }
-    // One that stands there twice.
+    // A duplicated link.
     let twice: Vec<usize> = (0..search.now.len())
         .filter(|&place| {
             let one = &search.now[place];
@@ -79,8 +78,8 @@ pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
     }
 }
 
-/// Whether the radius of gyration over the link's length comes nearer to that of the other links: among some ten links
-/// and six powers one fits a total by chance often enough.
+/// Whether the correction brings the radius of gyration over link length closer to that of the other links. This check
+/// is needed because among ten links and six powers one matches a total by chance often enough.
 fn nearer_to_the_others(search: &Search, place: usize, power: i32) -> bool {
     let Some(lengths) = &search.lengths else { return true };
     let figure = |place: usize| {
@@ -91,7 +90,7 @@ fn nearer_to_the_others(search: &Search, place: usize, power: i32) -> bool {
     others.sort_by(f64::total_cmp);
     let Some(&middle) = others.get(others.len() / 2) else { return true };
     let before = figure(place) - middle;
-    // The radius goes with the root of the mass.
+    // The radius of gyration scales with 1/√mass.
     (before - 0.5 * f64::from(power)).abs() < before.abs()
 }
 
@@ -99,7 +98,7 @@ fn scaled(stated: &StatedInertial, power: i32) -> StatedInertial {
     StatedInertial { mass_kg: shifted(stated.mass_kg, power), ..stated.clone() }
 }
 
-/// The total that a comment states: `total mass` or `total weight`, then a number and its unit.
+/// The total in a comment: `total mass` or `total weight`, then a number and its unit.
 fn commented(text: &str) -> Option<f64> {
     let mut rest = text;
     while let Some(start) = rest.find("<!--") {
