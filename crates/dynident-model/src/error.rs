@@ -49,9 +49,9 @@ pub enum ModelError {
     /// A link that does not exist.
     #[error("there is no link `{link}`; the links are: {}", known.join(", "))]
     UnknownLink {
-        /// The name asked for.
+        /// The requested name.
         link: String,
-        /// The names that exist.
+        /// Existing names.
         known: Vec<String>,
     },
     /// A body without any link.
@@ -66,9 +66,9 @@ pub enum ModelError {
     /// A joint that does not exist.
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
     UnknownJoint {
-        /// The name asked for.
+        /// The requested name.
         joint: String,
-        /// The names that exist.
+        /// Existing names.
         known: Vec<String>,
     },
 }

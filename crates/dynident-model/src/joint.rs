@@ -41,7 +41,7 @@ pub struct JointLimits {
 /// A spring at a joint; the drive has to give the torque `τ = stiffness (q - reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSpring {
-    /// Nm/rad (N/m).
+    /// Stiffness, Nm/rad (N/m).
     pub stiffness: f64,
     /// Position of zero torque, rad or m.
     pub reference: f64,
@@ -129,9 +129,9 @@ pub struct JointMap {
     pub translation: Vec3,
     /// Axis in the parent frame for a prismatic joint, zero for a revolute one.
     pub slide: Vec3,
-    /// Of a revolute joint about an axis of its frame that stands along an axis of the parent's: these axes, of the
-    /// parent and of the child (0, 1, 2 for x, y, z). The rotation then has five entries that are not zero. Right
-    /// angles count within 1e-15 rad, which is what rounding leaves of them: below the rounding of any result.
+    /// Axes of parent and child (0, 1, 2 for x, y, z) along which the axis of a revolute joint is aligned, if it is
+    /// aligned in both frames. The rotation then has five nonzero entries. The tolerance is 1e-15 rad, below the
+    /// rounding error of any result.
     pub along: Option<(usize, usize)>,
     /// Nonzero entries of the origin.
     pub shift: Shift,

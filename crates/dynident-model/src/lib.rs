@@ -41,7 +41,7 @@
 //! assert_eq!((rod.mass_kg(), rod.first_moment().0[2]), (2.0, -1.0));
 //! assert!(audit(&pendulum).iter().all(|finding| finding.level != AuditLevel::Problem));
 //!
-//! Torque terms in addition to the rigid-body dynamics, one parameter each.
+//! // Torque terms in addition to the rigid-body dynamics, one parameter each.
 //! let coulomb = Some(CoulombShape::Smooth { width: 0.01 });
 //! let terms = terms_per_joint(&pendulum, |_| DriveChoice { viscous: true, coulomb, ..DriveChoice::default() });
 //! assert_eq!(terms.iter().map(|term| term.symbol()).collect::<Vec<_>>(), ["fv1", "fc1"]);

@@ -17,9 +17,9 @@ const PER_SECOND: f64 = 8.0;
 /// length and time in the description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnScale {
-    /// Of an arm of 1.2 m: 1.
+/// Scale of time; 1 for an arm of 1.2 m.
     time: f64,
-    /// Of an arm of 1.2 m: 1.
+/// Scale of length; 1 for an arm of 1.2 m.
     length: f64,
 }
 
@@ -28,8 +28,7 @@ impl OwnScale {
     pub const USUAL: Self = Self { time: 1.0, length: 1.0 };
 
     /// Scale of a model from its longest chain of joints ([`Model::arm_m`]) and its gravity. Standard gravity is used
-    /// if the model has none, because logs without gravity are also recorded on earth. A model without any length has
-    /// the scale of a typical arm.
+    /// if the model has none. A model without any length has the scale of a typical arm.
     pub fn of(model: &Model) -> Self {
         let length_m = Some(model.arm_m()).filter(|length_m| *length_m > 0.0).unwrap_or(USUAL_ARM_M);
         let own = model.gravity().norm();

@@ -89,7 +89,7 @@ pub enum ReadError {
     NoDescription {
         /// The file.
         path: PathBuf,
-        /// What it seems to be.
+        /// Guess of its kind.
         what: &'static str,
         /// The fix.
         fix: &'static str,

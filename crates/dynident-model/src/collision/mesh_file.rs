@@ -41,7 +41,7 @@ pub enum MeshError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         fault: MeshFault,
     },
     /// The reader of the description does not support the shape.

@@ -83,9 +83,9 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
 /// Place of a link.
 #[derive(Clone, Copy)]
 struct LinkPlace {
-    /// The body it moves with; `None` for the base.
+    /// Body that the link belongs to; `None` for the base.
     body: Option<usize>,
-    /// Its D-H frame in the frame of that body.
+    /// D-H frame of the link in the frame of that body.
     body_from_dh: Transform,
 }
 

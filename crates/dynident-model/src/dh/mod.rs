@@ -126,7 +126,7 @@ pub enum DhFault {
     UnknownParent {
         /// The name.
         parent: String,
-        /// Links that are known at this place.
+        /// Links that are defined above this row.
         known: Vec<String>,
     },
     /// No joint.

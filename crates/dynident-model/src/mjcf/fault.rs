@@ -48,7 +48,7 @@ pub enum MjcfFault {
     TooLarge {
         /// The limit.
         limit: usize,
-        /// Of what.
+        /// Limited quantity.
         what: &'static str,
     },
     /// Thousands of attributes in one tag, or of namespaces.
@@ -187,7 +187,7 @@ pub enum MjcfFault {
     TotalMass {
         /// The body.
         body: String,
-        /// Why its mass is not known.
+        /// Reason why its mass is unknown.
         why: &'static str,
     },
     /// No moving joint.

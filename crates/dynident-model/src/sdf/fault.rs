@@ -74,7 +74,7 @@ pub enum SdfFault {
         element: String,
         /// `attribute` or `element`.
         kind: &'static str,
-        /// What is missing.
+        /// Name of the missing part.
         name: &'static str,
     },
     /// An invalid number.
@@ -82,11 +82,11 @@ pub enum SdfFault {
     Number {
         /// The element.
         element: String,
-        /// What stands there, shortened.
+        /// The text, shortened.
         text: String,
-        /// What is wrong with it.
+        /// Reason.
         fault: &'static str,
-        /// What to write.
+        /// Expected form.
         fix: &'static str,
     },
     /// Too many or too few numbers.
@@ -104,9 +104,9 @@ pub enum SdfFault {
     Word {
         /// The element.
         element: String,
-        /// What stands there, shortened.
+        /// The text, shortened.
         text: String,
-        /// What is.
+        /// Valid keywords.
         expected: &'static str,
     },
     /// A repeated name in one scope.

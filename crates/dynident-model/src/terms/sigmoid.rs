@@ -1,8 +1,8 @@
 //! Friction as one sigmoid: `τ = φ₁ [1/(1 + e^{-φ₂(q̇ + φ₃)}) - 1/(1 + e^{-φ₂ φ₃})]`.
 //!
-//! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0`
-//! it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE
-//! RA-L 4 (2019) 4147.
+//! It is a Coulomb step of height `φ₁` centred at `-φ₃`, linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is
+//! half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4
+//! (2019) 4147.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
@@ -29,9 +29,9 @@ fn logistic(x: f64) -> f64 {
     0.5 * (1.0 + (0.5 * x).tanh())
 }
 
-/// Widths of half a Coulomb step that recordings choose from, rad/s or m/s of a usual arm.
+/// Candidate widths of half a Coulomb step, rad/s or m/s of a typical arm.
 const WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
-/// Largest distance of the step from rest, in units of its width.
+/// Largest shift of the step from zero velocity, in units of its width.
 const MAX_SHIFT: f64 = 2.0;
 
 impl VelocityLaw for Sigmoid {
@@ -124,7 +124,7 @@ impl TermKind for Sigmoid {
         (self.offset_speed.abs() <= rest).then_some((coulomb, 0.5))
     }
 
-    /// The step's distance from rest in units of its width.
+    /// Second coordinate: shift of the step in units of its width.
     fn coordinates(&self) -> Vec<f64> {
         vec![self.steepness.ln(), 0.5 * self.offset_speed * self.steepness]
     }

@@ -113,7 +113,7 @@ pub enum UrdfFault {
     /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml {
-        /// What the XML parser says.
+        /// Message of the XML parser.
         reason: String,
     },
     /// More elements, texts and comments than a robot has.
@@ -133,7 +133,7 @@ pub enum UrdfFault {
     NotUrdf {
         /// Name of the root element.
         root: String,
-        /// What the file seems to be.
+        /// Guess of the format.
         hint: &'static str,
     },
     /// Macros that were not expanded.
@@ -145,13 +145,13 @@ pub enum UrdfFault {
     /// An element is missing.
     #[error("<{parent}> of `{owner}` has no <{element}>: add it{hint}")]
     MissingElement {
-        /// The element around.
+        /// Surrounding element.
         parent: &'static str,
         /// Name of the link or joint.
         owner: String,
         /// The element that is missing.
         element: &'static str,
-        /// More on the fix.
+        /// Additional hint.
         hint: &'static str,
     },
     /// A link with two inertials.
@@ -176,18 +176,18 @@ pub enum UrdfFault {
         /// The attribute.
         attribute: &'static str,
     },
-    /// Something that is not a usable number.
+    /// An invalid number.
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number {
         /// The element.
         element: String,
         /// The attribute.
         attribute: String,
-        /// What stands there, shortened.
+        /// The text, shortened.
         text: String,
-        /// What is wrong with it.
+        /// Reason.
         fault: &'static str,
-        /// What to write.
+        /// Expected form.
         fix: &'static str,
     },
     /// Too many or too few numbers.
@@ -197,9 +197,9 @@ pub enum UrdfFault {
         element: String,
         /// The attribute.
         attribute: String,
-        /// How many are needed.
+        /// Expected number of values.
         expected: usize,
-        /// How many stand there.
+        /// Number of values found.
         found: usize,
     },
     /// Two links or two joints with one name.
@@ -229,7 +229,7 @@ pub enum UrdfFault {
     /// A rotation that is given in two ways.
     #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
     TwoRotations {
-        /// What the origin belongs to.
+        /// Owner of the origin.
         owner: String,
     },
     /// A quaternion that is no rotation.
@@ -237,7 +237,7 @@ pub enum UrdfFault {
         "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
     )]
     NoRotation {
-        /// What the origin belongs to.
+        /// Owner of the origin.
         owner: String,
         /// Its length.
         norm: f64,
@@ -261,7 +261,7 @@ pub enum UrdfFault {
         joint: String,
         /// The type.
         kind: String,
-        /// More on the fix.
+        /// Additional hint.
         hint: &'static str,
     },
     /// An axis of length zero.
@@ -273,7 +273,7 @@ pub enum UrdfFault {
     /// No link at all.
     #[error("the robot has no <link>: add its links and joints")]
     NoLinks,
-    /// Nothing moves.
+    /// No moving joint.
     #[error("the robot has no moving joint: give at least one of type revolute, continuous or prismatic")]
     NoMovingJoint,
     /// A closed chain of joints.
@@ -296,7 +296,7 @@ pub enum UrdfFault {
         /// The limit.
         limit: usize,
     },
-    /// The parts do not make a model.
+    /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }

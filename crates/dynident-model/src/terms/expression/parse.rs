@@ -1,60 +1,60 @@
-//! Reads expressions: a descent by precedence. `-q^2` is `-(q^2)`, `2^-1` is a half, `a^b^c` is `a^(b^c)`.
+//! Recursive-descent parser of expressions. `-q^2` is `-(q^2)`, `2^-1` is 0.5, `a^b^c` is `a^(b^c)`.
 
 use super::operations::{ExpressionFunction, ExpressionFunction2, ExpressionNode, value};
 use super::{LARGEST, MOST_NODES};
 use thiserror::Error;
 
-/// The longest text, in characters: that of the most operations, with all digits of their numbers, is shorter.
+/// Maximum length, characters; longer than the maximum number of operations with all digits of their numbers.
 const MOST_CHARACTERS: usize = 10_000;
-/// So many characters of it stand in a message.
+/// Maximum number of characters of the text in a message.
 const MOST_SHOWN: usize = 2000;
-/// The deepest nesting of parentheses, functions and signs: each takes a frame of the stack.
+/// Maximum nesting of parentheses, functions and signs, each of which uses a stack frame.
 const MOST_DEPTH: usize = 64;
-/// Whole exponents up to this are products; beyond, powers of what is not negative.
+/// Largest integer exponent that is computed by products; larger ones are powers with a nonnegative base.
 const MOST_PRODUCT: f64 = 64.0;
 
-/// What the joints are called in an expression.
+/// Names of joints in an expression.
 #[derive(Clone, Copy, Debug)]
 pub struct JointNames<'a> {
     /// The joint whose position and velocity are `q` and `dq`.
     pub own: Option<usize>,
-    /// The joints' names; where there are none, joints stand by numbers only, and of any size.
+    /// Names of the joints; if empty, joints have numbers only, without an upper limit.
     pub names: &'a [String],
 }
 
-/// An expression that cannot be read, with the place.
+/// A parse error of an expression, with its place.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("`{text}`, character {character}: {problem}")]
 pub struct ExpressionError {
     /// The expression.
     pub text: String,
-    /// Where, in characters from 1.
+    /// Place, in characters from 1.
     pub character: usize,
-    /// What is wrong, and the fix.
+    /// The error, with the fix.
     pub problem: ExpressionProblem,
 }
 
-/// What can be wrong with an expression.
+/// Kind of a parse error.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ExpressionProblem {
     /// Too long.
     #[error("more than {most} {of}: write a shorter expression, or a table")]
     TooLong {
-        /// How many there may be.
+        /// Upper limit.
         most: usize,
-        /// Of what.
+        /// Limited quantity.
         of: &'static str,
     },
-    /// Something else is needed here.
+    /// Unexpected text.
     #[error("{found} where {expected} is expected")]
     Expected {
-        /// What belongs here.
+        /// Expected element.
         expected: &'static str,
-        /// What stands here.
+        /// Element found.
         found: String,
     },
-    /// A name that means nothing.
+    /// An unknown name.
     #[error(
         "nothing is called `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
         functions()
@@ -63,27 +63,27 @@ pub enum ExpressionProblem {
         /// The name.
         name: String,
     },
-    /// A joint that is not there.
+    /// An unknown joint.
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
     Joint {
         /// The joint.
         joint: String,
-        /// The joints that are there.
+        /// Existing joints.
         known: Vec<String>,
     },
-    /// `q` where there is no own joint.
+    /// `q` without a default joint.
     #[error("whose {name} is not said: write {name}1, {name}2, ..")]
     WhichJoint {
         /// `q` or `dq`.
         name: &'static str,
     },
-    /// An exponent that moves.
+    /// An exponent that is not constant.
     #[error("the exponent is no number: write exp(exponent * ln(base))")]
     Exponent,
-    /// A number that is none, or beyond 1e12.
+    /// A number that is not finite, or exceeds 1e12.
     #[error("{what} has no value of at most 1e12 in size")]
     Value {
-        /// The part.
+        /// The faulty part.
         what: &'static str,
     },
 }
@@ -107,9 +107,9 @@ pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<Expressio
 
 struct Parser<'a> {
     characters: Vec<char>,
-    /// The next character.
+    /// Index of the next character.
     at: usize,
-    /// Where the word began that is being read: the place of a fault.
+    /// Start of the current word, which is the place of a fault.
     begin: usize,
     depth: usize,
     nodes: Vec<ExpressionNode>,
@@ -131,7 +131,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The next character that is no space, where a fault would be.
+    /// The next character that is not a space; it becomes the place of a fault.
     fn peek(&mut self) -> Option<char> {
         while self.characters.get(self.at).is_some_and(|c| c.is_whitespace()) {
             self.at += 1;
@@ -341,7 +341,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Behind `q(`: a name up to `)`, or in quotes.
+    /// Parses a name after `q(`, up to `)` or in quotes.
     fn joint_by_name(&mut self) -> Parsed {
         let quote = self.peek().filter(|c| matches!(c, '"' | '\''));
         self.at += usize::from(quote.is_some());
@@ -368,7 +368,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// The value of operations in which no joint stands; `first` is the place of the first of them.
+/// Value of operations without joints; `first` is the index of the first operation.
 fn number_of(nodes: &[ExpressionNode], first: usize) -> Option<f64> {
     if nodes.iter().any(|node| matches!(node, ExpressionNode::Position(_) | ExpressionNode::Velocity(_))) {
         return None;

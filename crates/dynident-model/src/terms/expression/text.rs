@@ -1,9 +1,9 @@
-//! The text of an expression in which joints stand by their numbers: it reads back to the same operations.
+//! Canonical text of an expression with joint numbers; it parses to the same operations.
 
 use super::{Expression, ExpressionNode};
 use core::fmt;
 
-/// How tightly a text holds together.
+/// Operator precedence of a text.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 enum Strength {
     Sum,
@@ -24,14 +24,14 @@ impl fmt::Display for Expression {
     }
 }
 
-/// The text of an operation. Every part is used once, so its text is taken.
+/// Text of an operation. Every operand is used once, so its text is moved.
 fn written(node: ExpressionNode, texts: &mut [(String, Strength)]) -> (String, Strength) {
     let mut part = |place: usize, least: Strength| {
         let (text, strength) = core::mem::replace(&mut texts[place], (String::new(), Strength::Atom));
         if strength >= least { text } else { format!("({text})") }
     };
     match node {
-        // A number with a sign is no atom: `-2^x` is not `(-2)^x`.
+        // A signed number is not an atom: `-2^x` differs from `(-2)^x`.
         ExpressionNode::Number(x) => {
             (format!("{x:?}"), if x.is_sign_negative() { Strength::Sign } else { Strength::Atom })
         }
