@@ -17,9 +17,9 @@ const PER_SECOND: f64 = 8.0;
 /// length and time in the description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnScale {
-/// Scale of time; 1 for an arm of 1.2 m.
+    /// Scale of time; 1 for an arm of 1.2 m.
     time: f64,
-/// Scale of length; 1 for an arm of 1.2 m.
+    /// Scale of length; 1 for an arm of 1.2 m.
     length: f64,
 }
 

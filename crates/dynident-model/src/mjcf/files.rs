@@ -1,4 +1,3 @@
-
 use super::expanded::MAX_BYTES;
 use std::path::Path;
 

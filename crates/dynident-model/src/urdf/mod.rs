@@ -1,9 +1,9 @@
 //! URDF, the Unified Robot Description Format: reading and writing back.
 //!
-//! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
-//! Fixed joints are lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>`
-//! is unknown, never zero. A joint with `mimic` is no degree of freedom: it follows its source. Joints stand depth
-//! first, in the order of the document under each link. A rotation of `<origin>` is `rpy` or, as in URDF 1.1,
+//! Supported are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
+//! Links connected by fixed joints are merged: [`Body::links`](crate::Body) keeps every link with its frame. A link
+//! without `<inertial>` is unknown, not massless. A joint with `mimic` is not a degree of freedom. Joints are ordered
+//! depth first, in the order of the document under each link. The rotation of `<origin>` is `rpy` or (URDF 1.1)
 //! `quat_xyzw`.
 //!
 //! ```
@@ -45,31 +45,31 @@ use crate::xml::{MAX_NODES, Malformed, flood, malformed};
 use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
-/// Most moving joints that a description may have.
+/// Maximum number of moving joints.
 pub const MAX_MOVING_JOINTS: usize = 1000;
 
-/// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and
-/// products of such numbers would leave the range of `f64`.
+/// Largest length, angle, mass or inertia accepted in a description. Larger numbers are mistakes, and their products
+/// would exceed the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
 
-/// What a URDF says.
+/// Result of reading a URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfRobot {
     /// The robot on a fixed base, gravity along -z.
     pub model: Model,
-    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a
-    /// misspelling) or because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
+    /// Elements inside links, inertials and joints that were ignored, because URDF does not define them (often a
+    /// misspelling) or because they repeat an earlier one. At most [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
-    /// What is against the rules of XML or URDF and yet leaves no doubt about the robot, in the order of the document.
+    /// Violations of the XML or URDF rules that do not make the robot ambiguous, in the order of the document.
     pub irregularities: Vec<UrdfIrregularity>,
 }
 
 impl UrdfRobot {
-    /// Most unread elements that are listed.
+    /// Maximum number of ignored elements in the list.
     pub const MAX_UNREAD: usize = 20;
 }
 
-/// An element that was not read.
+/// An ignored element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnreadElement {
     /// Line, from 1.
@@ -78,27 +78,27 @@ pub struct UnreadElement {
     pub column: u32,
     /// Name of the element.
     pub element: String,
-    /// Name of the element around it.
+    /// Name of the parent element.
     pub parent: String,
 }
 
-/// Something against the rules that leaves no doubt about the robot: other readers of URDF pass over it.
+/// A violation of the rules that does not make the robot ambiguous; other URDF readers ignore it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum UrdfIrregularity {
-    /// Names with a namespace prefix that the document does not declare.
+    /// Names with an undeclared namespace prefix.
     UndeclaredPrefix {
-        /// Line of the first of them, from 1.
+        /// Line of the first one, from 1.
         line: u32,
         /// The prefix.
         prefix: String,
     },
-    /// A joint follows a joint that the document does not hold. It counts as free, as every follower does.
+    /// A mimic joint whose source is not in the document; it is treated as independent.
     UnknownMimic {
         /// Line of the joint, from 1.
         line: u32,
         /// The joint.
         joint: String,
-        /// The joint it should follow.
+        /// The missing source.
         source_joint: String,
     },
 }
@@ -106,7 +106,7 @@ pub enum UrdfIrregularity {
 /// Why a URDF could not be read, with line and column.
 pub type UrdfError = Located<UrdfFault>;
 
-/// What is wrong in a URDF, and the fix.
+/// A fault in a URDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum UrdfFault {
@@ -116,7 +116,7 @@ pub enum UrdfFault {
         /// Message of the XML parser.
         reason: String,
     },
-    /// More elements, texts and comments than a robot has.
+    /// More nodes than allowed.
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
     TooLarge {
         /// The limit.
@@ -136,7 +136,7 @@ pub enum UrdfFault {
         /// Guess of the format.
         hint: &'static str,
     },
-    /// Macros that were not expanded.
+    /// Unexpanded macros.
     #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
     Xacro {
         /// The macro.
@@ -168,7 +168,7 @@ pub enum UrdfFault {
         /// The attribute.
         attribute: &'static str,
     },
-    /// A name without a character.
+    /// An empty name.
     #[error("<{element}> has an empty `{attribute}`: fill it in")]
     EmptyName {
         /// The element.
@@ -220,26 +220,26 @@ pub enum UrdfFault {
         /// The name of the link.
         link: String,
     },
-    /// A joint follows itself.
+    /// A joint that mimics itself.
     #[error("joint `{joint}` mimics itself: fix the name or delete <mimic>")]
     OwnMimic {
         /// The joint.
         joint: String,
     },
-    /// A rotation that is given in two ways.
+    /// A rotation in two forms.
     #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
     TwoRotations {
         /// Owner of the origin.
         owner: String,
     },
-    /// A quaternion that is no rotation.
+    /// An invalid quaternion.
     #[error(
         "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
     )]
     NoRotation {
         /// Owner of the origin.
         owner: String,
-        /// Its length.
+        /// Norm of the quaternion.
         norm: f64,
     },
     /// A link that is the child of two joints.
@@ -254,7 +254,7 @@ pub enum UrdfFault {
         /// The later joint.
         second: String,
     },
-    /// A joint type that cannot be used.
+    /// An unsupported joint type.
     #[error("joint `{joint}` is of type `{kind}`: use revolute, continuous, prismatic or fixed{hint}")]
     JointType {
         /// The joint.
@@ -270,7 +270,7 @@ pub enum UrdfFault {
         /// The joint.
         joint: String,
     },
-    /// No link at all.
+    /// No link.
     #[error("the robot has no <link>: add its links and joints")]
     NoLinks,
     /// No moving joint.
@@ -304,7 +304,7 @@ pub enum UrdfFault {
 /// Reads a URDF.
 ///
 /// # Errors
-/// If the text is malformed XML, no URDF, or describes no tree of links on one fixed base; with line and column.
+/// Malformed XML, not a URDF, or no tree of links on one fixed base; with line and column.
 pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
     let (regular, undeclared) = prefixes::without_undeclared(text);
     let document = parse(&regular)?;
@@ -338,7 +338,7 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
     Ok(UrdfRobot { model, unread, irregularities })
 }
 
-/// The XML tree of a URDF, if it is one, whose prefixes are all declared.
+/// Parses the XML tree; fails if it is not a URDF.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
     if let Some(at) = flood(text) {
         return Err(Located::at(text, at, UrdfFault::Flood));

@@ -1,23 +1,23 @@
-//! Namespace prefixes that a document uses and does not declare (`<gazebo:plugin>`): the XML parser must refuse them,
-//! other readers of URDF know no namespaces and read on. Their colon becomes an underscore, so that every byte stays
-//! at its place and no such name is one of URDF's.
+//! Undeclared namespace prefixes (`<gazebo:plugin>`): the XML parser rejects them, but other URDF readers ignore
+//! namespaces. Their colon is replaced by an underscore, so that every byte keeps its place and no such name is one of
+//! URDF's.
 
 use crate::xml::length_beside_elements;
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-/// Most different prefixes that are mended; a document with more is left to the parser.
+/// Maximum number of different prefixes that are replaced; a document with more is passed to the parser unchanged.
 const MAX_PREFIXES: usize = 100;
 
-/// A prefix without a declaration.
+/// An undeclared prefix.
 pub(super) struct Undeclared<'a> {
-    /// Byte at which it stands first.
+    /// Byte position of its first occurrence.
     pub(super) at: usize,
     pub(super) prefix: &'a str,
 }
 
-/// `text` with an underscore for the colon behind every prefix that no `xmlns:` declares, of the same length; and these
-/// prefixes, in the order of the text. One pass; malformed markup is left to the parser, and xacro to its own message.
+/// Replaces the colon after every undeclared prefix by an underscore, and returns the prefixes in the order of the
+/// text. Needs one pass; malformed markup is left to the parser, and xacro has a separate error.
 pub(super) fn without_undeclared(text: &str) -> (Cow<'_, str>, Vec<Undeclared<'_>>) {
     let declared: HashSet<&str> = text.match_indices("xmlns:").map(|(at, key)| name(&text[at + key.len()..])).collect();
     let known = |prefix: &str| matches!(prefix, "" | "xml" | "xmlns" | "xacro") || declared.contains(prefix);
@@ -45,7 +45,7 @@ pub(super) fn without_undeclared(text: &str) -> (Cow<'_, str>, Vec<Undeclared<'_
     (Cow::Owned(mended), found)
 }
 
-/// Hands every prefix of an element's or an attribute's name to `take`, with its place.
+/// Calls `take` with the place of every prefix in the name of an element or attribute.
 fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
     let mut at = 0;
     while let Some(start) = text[at..].find('<').map(|next| at + next) {
@@ -55,7 +55,7 @@ fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
             continue;
         }
         let mut quote = None;
-        // Where the name that is being read began.
+        // Start of the current name.
         let mut word = Some(start + 1);
         at = text.len();
         for (offset, byte) in rest.bytes().enumerate().skip(1) {
@@ -80,7 +80,7 @@ fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
     }
 }
 
-/// The name with which `text` begins.
+/// The name at the start of `text`.
 fn name(text: &str) -> &str {
     let end = text.find(|c: char| c.is_ascii_whitespace() || matches!(c, '=' | '>' | '/' | '"' | '\'' | '<'));
     &text[..end.unwrap_or(text.len())]

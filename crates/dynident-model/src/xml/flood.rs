@@ -1,21 +1,20 @@
-//! Guard against documents on which the XML parser's work or memory grows with the square of their length: very many
-//! attributes in one tag (each is compared with all others), and very many namespaces nested in each other (each
-//! element keeps all of them).
+//! Guard against documents for which the XML parser needs quadratic time or memory: very many attributes in one tag
+//! (each is compared with all others), and very many nested namespaces (each element keeps all of them).
 
-/// Most attributes in one tag; the richest tags of real descriptions have a dozen.
+/// Maximum number of attributes in one tag; real descriptions have at most about twelve.
 const MAX_ATTRIBUTES: usize = 1000;
-/// Most namespace declarations in a document.
+/// Maximum number of namespace declarations in a document.
 const MAX_NAMESPACES: usize = 5000;
 
-/// Where text begins with a comment, a CDATA section or an instruction: its length, all of the text if it never ends.
+/// Length of a comment, CDATA section or instruction at the start of a text; the whole text if it is not closed.
 pub(crate) fn length_beside_elements(rest: &str) -> Option<usize> {
     let kinds = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
     let (open, close) = kinds.into_iter().find(|(open, _)| rest.starts_with(open))?;
     Some(rest[open.len()..].find(close).map_or(rest.len(), |end| open.len() + end + close.len()))
 }
 
-/// The byte at which a document becomes a flood, if it does. One pass, no memory; malformed markup is left to the
-/// parser.
+/// Byte position at which a document exceeds the limits, if any. Needs one pass and no memory; malformed markup is left
+/// to the parser.
 pub(crate) fn flood(text: &str) -> Option<usize> {
     if let Some((at, _)) = text.match_indices("xmlns").nth(MAX_NAMESPACES) {
         return Some(at);
@@ -60,7 +59,7 @@ mod tests {
             assert_eq!(flood(&format!("{before}<c{}/>", &attributes[8..])), None, "{before}");
         }
         assert_eq!(flood(&"<a xmlns:b='c'>".repeat(5001)), Some(5000 * 15 + 3));
-        // An end that never comes is the parser's business.
+        // A missing end is left to the parser.
         assert_eq!(flood("<!-- <"), None);
         assert_eq!(flood("<a b='"), None);
     }

@@ -1,5 +1,5 @@
-//! MJCF: rules of the format, what is refused, what is said. The torques of whole models are held against MuJoCo's in
-//! the tests of `dynident-dynamics`.
+//! MJCF: rules of the format, errors and notices. Torques of whole models are compared with MuJoCo in the tests of
+//! `dynident-dynamics`.
 
 use crate::common::{mutate, mutations};
 use dynident_model::mjcf::Loss;
@@ -9,7 +9,7 @@ use dynident_model::{
 use dynident_testing::{count, repository};
 use proptest::prelude::*;
 
-/// A document around the contents of a body that one hinge moves.
+/// A document around the contents of a body with one hinge.
 fn with_body(contents: &str) -> String {
     format!("<mujoco><worldbody><body name=\"b\"><joint name=\"j\"/>{contents}</body></worldbody></mujoco>")
 }
@@ -136,7 +136,8 @@ fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
       </actuator></mujoco>"#;
     let robot = read_mjcf(text).unwrap();
     let efforts: Vec<Option<f64>> = robot.model.joints().iter().map(|joint| joint.limits.effort).collect();
-    // The default of motors is that of all actuators: `general` states its own, `velocity` is no force.
+    // The default of motors applies to all actuators: `general` overrides it, and a `velocity` actuator has no force
+    // range.
     assert_eq!(efforts, [Some(60.0), Some(5.0), None, Some(7.0), None, Some(1.5), Some(6.0)]);
     assert!(
         matches!(&robot.notices[0].loss, Loss::OneSidedEffort { joint, high, .. } if joint == "`one-sided`" && *high == 3.0)
@@ -144,7 +145,7 @@ fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
     assert_eq!((robot.notices.len(), robot.notices[0].line), (1, 6));
 }
 
-/// A four-bar linkage: a crank of 1 m, a rod, and a rocker that the rod meets at `anchor`.
+/// A four-bar linkage: a crank of 1 m, a rod, and a rocker that is connected to the rod at `anchor`.
 fn linkage(actuator: &str, anchor: &str) -> String {
     format!(
         r#"<mujoco><worldbody>
@@ -209,7 +210,7 @@ fn a_mass_by_a_mesh_is_unknown_and_said() {
     let body = &robot.model.bodies()[0];
     assert!(body.links[0].inertial.is_none() && body.links[1].inertial.is_some());
     assert!(matches!(&robot.notices[0].loss, Loss::UnknownMass { body, .. } if body == "b"));
-    // Weightless, of a group that does not count, or beside an <inertial>: nothing is missing.
+    // Massless, of an excluded group, or in addition to an <inertial>: the mass is known.
     for geom in ["mass=\"0\"", "density=\"0\"", "group=\"7\""] {
         let text = with_body(&format!("<geom type=\"mesh\" mesh=\"m\" {geom}/><geom size=\"1\"/>"));
         let robot = read_mjcf(&text).unwrap();
@@ -244,7 +245,7 @@ fn files_are_recognised_by_their_content() {
         std::fs::write(&path, with_body("<geom size=\"1\"/>")).unwrap();
         assert_eq!(load_robot(&path).unwrap().format, DescriptionFormat::Mjcf, "{name}");
     }
-    // The folder of the document counts, not that of the program.
+    // Files are searched relative to the document, not to the working directory.
     std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\"arm.xml\"/></mujoco>").unwrap();
     assert_eq!(load_robot(folder.path().join("main.xml")).unwrap().model.dof(), 1);
     std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\"none.xml\"/></mujoco>").unwrap();
@@ -296,7 +297,7 @@ const PIECES: [&str; 14] = [
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(1000, 20_000) as u32) })]
 
-    /// What is read after all is finite, can be audited, and can be rewritten without a change.
+    /// If a mutated file can be read, it is finite, can be audited, and can be rewritten without a change.
     #[test]
     fn a_mutated_mjcf_never_panics(
         file in 0..FILES.len(),

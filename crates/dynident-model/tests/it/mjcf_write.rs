@@ -1,4 +1,4 @@
-//! Writing back into an MJCF: the new values are read again, and everything else stays byte for byte.
+//! Writing into an MJCF: the new values can be read, and all other bytes stay.
 
 use dynident_model::mjcf::included_from;
 use dynident_model::{
@@ -11,7 +11,7 @@ fn no_files(_: &str) -> Result<String, String> {
     Err("no files".to_owned())
 }
 
-/// Bodies that can be real and are no one's: the description's with a point mass beside them.
+/// Physically consistent bodies: those of the description plus a point mass.
 fn other_bodies(model: &Model) -> Vec<InertialParameters> {
     let beside = |(k, inertial): (usize, &InertialParameters)| {
         let place = Vec3([0.02 + 0.01 * k as f64, -0.03, 0.05]);
@@ -21,8 +21,8 @@ fn other_bodies(model: &Model) -> Vec<InertialParameters> {
     model.inertials().iter().enumerate().map(beside).collect()
 }
 
-/// 1e-12 relative to the largest of a body's ten parameters: moving the inertia to the centre of mass and back costs
-/// some ten roundings.
+/// Tolerance relative to the largest parameter of a body: about ten roundings of the transform to the centre of mass
+/// and back.
 fn assert_same_inertials(model: &Model, expected: &[InertialParameters], what: &str) {
     for (found, expected) in model.inertials().iter().zip(expected) {
         let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -32,8 +32,8 @@ fn assert_same_inertials(model: &Model, expected: &[InertialParameters], what: &
     }
 }
 
-/// Every model of `golden/mjcf`: given new bodies and drives, MuJoCo's own or said why not; without a change the same
-/// bytes.
+/// Every model of `golden/mjcf` accepts new bodies and drives or is rejected with a known reason; without a change all
+/// bytes stay.
 #[test]
 fn published_models_take_new_bodies_and_drives() {
     let mut written = 0;
@@ -72,7 +72,7 @@ fn published_models_take_new_bodies_and_drives() {
                 }
                 written += 1;
             }
-            // Two joints in one body, or a compiler that changes masses.
+            // Two joints in one body, or a compiler setting that changes masses.
             Err(error) => {
                 let message = error.to_string();
                 let known = ["stands between two joints", "of <compiler> changes the masses"];
@@ -83,7 +83,7 @@ fn published_models_take_new_bodies_and_drives() {
     assert!(written >= 15, "{written}");
 }
 
-/// What MuJoCo has loaded and computed with (`golden/mjcf.py`) is what this writer writes, byte for byte.
+/// The writer gives exactly the file that MuJoCo has loaded and computed with (`golden/mjcf.py`).
 #[test]
 fn the_written_panda_is_the_one_that_mujoco_has_read() {
     let robot = load_robot(repository("golden/mjcf/robosuite_panda.xml")).unwrap();
@@ -110,7 +110,7 @@ const ARM: &str = "<mujoco>\r\n  <!-- mine -->\r\n  <worldbody>\r\n    <body nam
 #[test]
 fn only_inertials_and_drives_change() {
     let model = read_mjcf(ARM).unwrap().model;
-    // The link's frame stands at the hinge, half a metre along x.
+    // The link's frame is at the hinge, half a metre along x.
     let inertial = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
     let links = link_changes(&model, &[inertial]).unwrap();
     let joint = JointChange {

@@ -1,10 +1,10 @@
-//! The robot descriptions at hand, and a small arm.
+//! Robot descriptions for tests, and a small arm.
 
 use dynident_testing::{recordings, repository};
 use proptest::prelude::*;
 use std::path::PathBuf;
 
-/// All URDF files at hand: of the repository, and beside the recordings.
+/// All available URDF files: in the repository, and next to the recordings.
 pub(crate) fn foreign_urdfs() -> Vec<PathBuf> {
     let mut directories = vec![repository("robots")];
     if let Some(data) = recordings() {
@@ -21,19 +21,18 @@ pub(crate) fn foreign_urdfs() -> Vec<PathBuf> {
     files
 }
 
-/// A clean arm of three joints (one prismatic), with a tool of two links fixed to the last, one of them without
+/// A correct arm of three joints (one prismatic); two tool links are fixed to the last link, one of them without
 /// inertial.
 pub(crate) const ARM: &str = include_str!("arm.urdf");
 
-/// One mutation of a text: where, and what to do there.
+/// One mutation of a text: place, kind, value.
 pub(crate) type Mutation = (prop::sample::Index, u8, u8);
 
-/// Up to five mutations.
 pub(crate) fn mutations() -> impl Strategy<Value = Vec<Mutation>> {
     prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), any::<u8>()), 1..6)
 }
 
-/// The text with bytes set, flipped, taken out, doubled, and `pieces` put in.
+/// The text with bytes set, flipped, removed or doubled, and with `pieces` inserted.
 pub(crate) fn mutate(text: &str, mutations: &[Mutation], pieces: &[&str]) -> String {
     let mut bytes = text.as_bytes().to_vec();
     for (index, what, value) in mutations {
