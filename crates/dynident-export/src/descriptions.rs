@@ -1,4 +1,4 @@
-//! Descriptions for simulators: MJCF and URDF, with what they cannot hold said.
+//! Robot descriptions for simulators (MJCF and URDF), with notes on unsupported contents.
 
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
@@ -12,12 +12,12 @@ use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, writ
 use dynident_text::xml::{self, escaped};
 use std::borrow::Cow;
 
-/// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
-/// leaves rounding, a narrow smooth step in place of a sign some thousandth.
+/// Friction errors below this share of the friction are not reported: rounding errors, or about 0.1 % for a narrow
+/// smooth step in place of a sign.
 const WORTH_SAYING: f64 = 1e-3;
 
-/// MuJoCo's MJCF: bodies with their inertials, joints with limits, `armature`, `damping` and `frictionloss`, a motor
-/// for each joint. No shapes.
+/// MuJoCo's MJCF: bodies with inertials, joints with limits, `armature`, `damping` and `frictionloss`, one motor per
+/// joint. Without shapes.
 pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let (model, bodies) = (robot.model(), robot.model().body_count());
     let friction = frictions(robot, "frictionloss", "damping", &mut notes);
@@ -47,7 +47,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     Ok(Exported { text, notes })
 }
 
-/// URDF: links with their inertials, joints with limits, damping and friction. No shapes.
+/// URDF: links with inertials, joints with limits, damping and friction. Without shapes.
 pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
@@ -101,7 +101,7 @@ pub(crate) fn frictions(
     nearest
 }
 
-/// Terms that no joint of a description has; springs of joints where the format does not hold them.
+/// Notes on terms that a robot description cannot represent; springs only if the format has none.
 pub(crate) fn left_out(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
@@ -132,7 +132,7 @@ fn joint_name<'a>(robot: &'a RobotModel, term: &TorqueTerm) -> &'a str {
     term.own_joint().map_or("", |joint| &robot.model().joints()[joint].name)
 }
 
-/// Whether it is the spring of its joint in the robot's description.
+/// Whether the term is the spring of its joint in the robot description.
 fn is_spring(term: &TorqueTerm) -> bool {
     term.property() == Some(JointProperty::Stiffness)
 }
@@ -185,7 +185,7 @@ fn write_body(
     Ok(())
 }
 
-/// The joints that follow others: an equality of joints, or of a tendon whose length their law keeps.
+/// Writes mimic joints: an equality of joints, or of a tendon whose length is constant under the mimic law.
 fn write_followers(text: &mut String, model: &Model) {
     let Some(coupling) = model.coupling() else { return };
     let (mut tendons, mut equalities) = (String::new(), String::new());
@@ -214,12 +214,12 @@ fn write_followers(text: &mut String, model: &Model) {
     let _ = write!(text, "  <equality>\n{equalities}  </equality>\n");
 }
 
-/// A link's name, unless it is the one that MuJoCo keeps for what does not move.
+/// Name of a link; renamed if it is the reserved name of the fixed body in MuJoCo.
 fn body_name(link: &str) -> Cow<'_, str> {
     if link == "world" { Cow::Borrowed("world_link") } else { escaped(link) }
 }
 
-/// Mass, centre of mass and inertia about it of a body, which simulators read only of one that can be real.
+/// Mass, centre of mass and inertia about it of a body; simulators accept only physically consistent bodies.
 pub(crate) fn real_inertial(
     model: &Model,
     index: usize,
@@ -248,7 +248,7 @@ fn placement(placement: &Transform) -> String {
     format!(" pos=\"{x:?} {y:?} {z:?}\" quat=\"{a:?} {b:?} {c:?} {d:?}\"")
 }
 
-/// Notes as a comment of XML.
+/// Notes as an XML comment.
 pub(crate) fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();

@@ -1,5 +1,5 @@
-//! The functions that every language gets, as graphs: the recursive Newton-Euler and composite-rigid-body algorithms
-//! run over symbols.
+//! The functions of all languages as graphs: runs the recursive Newton-Euler and composite-rigid-body algorithms over
+//! symbols.
 
 use crate::declared_torque::declared_torque;
 use crate::drive_torque::{drive_inertia, friction};
@@ -11,11 +11,11 @@ use dynident_dynamics::{inverse_dynamics_over, mass_matrix_over};
 use dynident_lanes::Scalar;
 use dynident_model::{Model, Vec3};
 
-/// One function: inputs are joint vectors, the output is a joint vector or a square matrix by rows.
+/// One function: inputs are joint vectors, the output is a joint vector or a row-major square matrix.
 #[derive(Debug)]
 pub(crate) struct Equation {
     pub(crate) name: &'static str,
-    /// What it computes, in a line.
+    /// One-line description.
     pub(crate) about: &'static str,
     pub(crate) inputs: &'static [Input],
     pub(crate) output: &'static str,
@@ -24,7 +24,7 @@ pub(crate) struct Equation {
 }
 
 impl Equation {
-    /// The names of its inputs, as arguments stand.
+    /// Names of the arguments, in order.
     pub(crate) fn arguments(&self) -> String {
         self.inputs.iter().map(|input| input.name()).collect::<Vec<_>>().join(", ")
     }
@@ -40,7 +40,7 @@ pub(crate) struct Equations {
 
 impl Equations {
     /// # Errors
-    /// A torque term that is no function of the motion, a joint that moves no inertia, numbers that overflow.
+    /// A torque term that is not a function of the motion, a joint without inertia, or an overflow.
     pub(crate) fn of(robot: &RobotModel) -> Result<Self, ExportError> {
         let reduced = robot.reduced()?;
         let weightless = reduced.clone().with_gravity(Vec3::ZERO)?;
@@ -64,7 +64,6 @@ struct Inputs {
 }
 
 impl Inputs {
-    /// Of a robot with `dof` joints.
     fn new(dof: usize) -> Self {
         let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
             .map(|input| Symbol::inputs(input, dof));
@@ -91,7 +90,7 @@ impl Values {
         let rotors = drive_inertia(robot);
         let friction = friction(robot, dq)?;
         let declared = declared_torque(robot, q, dq)?;
-        // Torque other than that of rigid bodies and inertia of drives.
+        // Torques other than those of rigid bodies and drive inertia.
         let other: Vec<Symbol> = match &declared {
             Some(declared) => friction.iter().zip(declared).map(|(&friction, &declared)| friction + declared).collect(),
             None => friction.clone(),
@@ -171,7 +170,7 @@ impl Values {
     }
 }
 
-/// `M(q)` with the inertia of the drives.
+/// `M(q)` including drive inertia.
 fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
     let mut mass_matrix = mass_matrix_over(reduced, q);
     for (entry, &rotor) in mass_matrix.iter_mut().zip(rotors) {
@@ -180,7 +179,7 @@ fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
     mass_matrix
 }
 
-/// The torque of a motion, with the inertia of the drives and `other` torques.
+/// Inverse dynamics with drive inertia and `other` torques.
 fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -> Vec<Symbol> {
     let Inputs { q, dq, ddq, .. } = inputs;
     let mut inverse = inverse_dynamics_over(reduced, q, dq, ddq);
@@ -193,7 +192,7 @@ fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -
     inverse
 }
 
-/// The accelerations under torques.
+/// Forward dynamics.
 fn forward(
     reduced: &Model,
     inputs: &Inputs,
@@ -207,9 +206,9 @@ fn forward(
         .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })
 }
 
-/// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that branches that do not see each other stay zero
-/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5). The number of the joint whose pivot is no
-/// positive number, if one is a number at all.
+/// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept
+/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5). Fails with the index of a joint whose pivot is
+/// constant and not positive.
 fn solved(mut m: Vec<Symbol>, mut b: Vec<Symbol>) -> Result<Vec<Symbol>, usize> {
     let dof = b.len();
     let mut inverses = vec![Symbol::ZERO; dof];

@@ -1,4 +1,4 @@
-//! What cannot be exported, and why.
+//! Errors of the export.
 
 use dynident_dynamics::ParametricModelError;
 use dynident_model::ModelError;
@@ -9,7 +9,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// Values of another number than there are terms.
+    /// The number of values differs from the number of terms.
     #[error("{found} values for {expected} torque terms: give one for each")]
     Values {
         /// Number of terms.
@@ -17,7 +17,7 @@ pub enum ExportError {
         /// Number of values.
         found: usize,
     },
-    /// A value that is no number.
+    /// A value that is not finite.
     #[error("the value of {symbol} is {value}, not a finite number")]
     NotFinite {
         /// The term's symbol.
@@ -25,14 +25,14 @@ pub enum ExportError {
         /// Its value.
         value: f64,
     },
-    /// A body with a number that no simulator takes, or from which one follows.
+    /// A body with a number that simulators reject, or that leads to such a number.
     #[error(
         "body `{body}`: {quantity} is {value:e}; all numbers of a body have to be finite and at most {MAX_MAGNITUDE:e}: identify the model again"
     )]
     Body {
         /// The body.
         body: String,
-        /// Which of its numbers.
+        /// The number.
         quantity: &'static str,
         /// Its value.
         value: f64,
@@ -45,7 +45,7 @@ pub enum ExportError {
         /// The number.
         value: f64,
     },
-    /// Recorded velocities of another number of joints.
+    /// Recorded velocities for a different number of joints.
     #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty where nothing is known")]
     Velocities {
         /// Number of joints.
@@ -53,7 +53,7 @@ pub enum ExportError {
         /// Number of lists.
         found: usize,
     },
-    /// A recorded velocity that is none.
+    /// An invalid recorded velocity.
     #[error(
         "joint `{joint}`: {samples} samples of the velocity {velocity}: it has to be finite and not zero, with a positive number of samples"
     )]
@@ -65,13 +65,13 @@ pub enum ExportError {
         /// Its weight.
         samples: f64,
     },
-    /// Bodies whose dynamics are unknown.
+    /// Bodies without inertials.
     #[error("the bodies {} have no inertial: their dynamics are unknown", bodies.join(", "))]
     Unknown {
         /// Their names.
         bodies: Vec<String>,
     },
-    /// A torque term that needs more than the motion of this moment.
+    /// A torque term that is not a function of the current motion.
     #[error(
         "{symbol} ({kind}) cannot be written as a function of q, dq and ddq: it needs {needs}; identify with another friction law ([drive] of the study) to export"
     )]
@@ -80,10 +80,10 @@ pub enum ExportError {
         symbol: String,
         /// Its kind.
         kind: &'static str,
-        /// What it needs beside.
+        /// The additional quantity that it needs.
         needs: &'static str,
     },
-    /// A joint that moves nothing.
+    /// A joint that moves no inertia.
     #[error(
         "joint `{joint}` moves no inertia, so it has no acceleration under a torque: give its body a mass, or lock it"
     )]
@@ -91,26 +91,26 @@ pub enum ExportError {
         /// The joint.
         joint: String,
     },
-    /// A body that a simulator refuses.
+    /// A body that a simulator rejects.
     #[error(
         "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so {reader} would refuse it: identify with physical consistency, which is the default"
     )]
     NotPhysical {
         /// The body.
         body: String,
-        /// Who would refuse it.
+        /// The simulator.
         reader: &'static str,
     },
-    /// What JSON cannot hold.
+    /// A value that JSON cannot represent.
     #[error("the model cannot be written as JSON: {message}")]
     Json {
-        /// Why.
+        /// The reason.
         message: String,
     },
     /// Terms that do not belong to the model.
     #[error(transparent)]
     Terms(#[from] ParametricModelError),
-    /// Numbers that are no model.
+    /// Numbers that do not form a valid model.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

@@ -1,15 +1,15 @@
-//! The expression graph: every value once, constants folded, zeros gone.
+//! Expression graph with unique values, folded constants and without zeros.
 //!
-//! A node is made only where the algebra leaves one: `x + 0`, `x · 0`, `x · 1` and sums of constants are folded, signs
-//! are moved outward so that `a b` and `-a b` share their product, and equal nodes are the same node. Adding zero and
-//! moving a sign change no bit of a finite result; two constant factors in a row become one, which rounds once less.
+//! Nodes are simplified when they are created: `x + 0`, `x · 0`, `x · 1` and sums of constants are folded, signs are
+//! moved outward so that `a b` and `-a b` share their product, and equal nodes are merged. Adding zero and moving a
+//! sign keep every bit of a finite result; two consecutive constant factors are merged, which rounds once less.
 
 use std::collections::HashMap;
 
-/// Place of a node in its graph. Smaller places never depend on larger ones.
+/// Index of a node in its graph. A node depends only on smaller indices.
 pub(crate) type Id = u32;
 
-/// What a generated function is given.
+/// Input of a generated function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Input {
     Position,
@@ -19,7 +19,7 @@ pub(crate) enum Input {
 }
 
 impl Input {
-    /// Its name in every language.
+    /// Name in all languages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Position => "q",
@@ -30,7 +30,7 @@ impl Input {
     }
 }
 
-/// Functions of one value.
+/// Functions of one argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Function {
     Sin,
@@ -47,7 +47,7 @@ pub(crate) enum Function {
     Abs,
 }
 
-/// Functions of two values.
+/// Functions of two arguments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Function2 {
     Atan2,
@@ -56,7 +56,7 @@ pub(crate) enum Function2 {
 }
 
 impl Function {
-    /// What nearly every language calls it.
+    /// Name in most languages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Sin => "sin",
@@ -75,7 +75,7 @@ impl Function {
     }
 }
 
-/// One value. Numbers are kept as bits, so that equal ones are found.
+/// One value. Numbers are stored as bits for comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {
     Constant(u64),
@@ -88,14 +88,14 @@ pub(crate) enum Node {
     Recip(Id),
     Call(Function, Id),
     Call2(Function2, Id, Id),
-    /// `x^p` of a positive x.
+    /// `x^p` for positive x.
     Power(Id, u64),
-    /// The sign of x, zero while `|x|` is at most the band.
+    /// Sign of x; zero if `|x|` is at most the band.
     Step(Id, u64),
 }
 
 impl Node {
-    /// The nodes that it is made of.
+    /// Operands of the node.
     pub(crate) fn parts(self) -> impl Iterator<Item = Id> {
         let (a, b) = match self {
             Self::Constant(_) | Self::Input(..) => (None, None),
@@ -106,7 +106,7 @@ impl Node {
     }
 }
 
-/// The graph of one robot. Zero and one stand at the first two places.
+/// The graph of one robot. Zero and one have the first two indices.
 #[derive(Debug)]
 pub(crate) struct Graph {
     nodes: Vec<Node>,
@@ -124,7 +124,7 @@ impl Graph {
         graph
     }
 
-    /// Whether a function of this kind is in it.
+    /// Whether the graph contains a node of this kind.
     pub(crate) fn has(&self, kind: impl Fn(Node) -> bool) -> bool {
         self.nodes.iter().any(|&node| kind(node))
     }
@@ -163,7 +163,7 @@ impl Graph {
     }
 
     pub(crate) fn constant(&mut self, value: f64) -> Id {
-        // Minus zero is zero: the two differ in no sum.
+        // Negative zero becomes zero, which changes no sum.
         self.place(Node::Constant((value + 0.0).to_bits()))
     }
 
@@ -179,7 +179,7 @@ impl Graph {
         }
     }
 
-    /// The value without its sign, and whether it had one.
+    /// The value without its sign, and whether it was negative.
     fn sign(&mut self, a: Id) -> (Id, bool) {
         match self.node(a) {
             Node::Neg(inner) => (inner, true),
@@ -208,7 +208,7 @@ impl Graph {
         self.add(a, b)
     }
 
-    /// `a - b` of values without a sign: always with the earlier one first, so that `b - a` shares it.
+    /// `a - b` of values without a sign, always with the smaller index first, so that `b - a` shares the node.
     fn difference(&mut self, a: Id, b: Id) -> Id {
         match a.cmp(&b) {
             core::cmp::Ordering::Less => self.place(Node::Sub(a, b)),
@@ -235,7 +235,7 @@ impl Graph {
         if minus_a == minus_b { product } else { self.neg(product) }
     }
 
-    /// Of values without a sign, neither zero nor one.
+    /// Product of values without a sign, neither zero nor one.
     fn product(&mut self, a: Id, b: Id) -> Id {
         let (constant, other) = match (self.number(a), self.number(b)) {
             (Some(value), _) => (Some(value), b),

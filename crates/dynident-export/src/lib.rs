@@ -1,9 +1,9 @@
-//! **In which form does a controller or a simulator read the model?** A [`RobotModel`] in, text out.
+//! Exports identified models to controllers and simulators: a [`RobotModel`] in, text out.
 //!
-//! The recursive Newton-Euler and composite-rigid-body algorithms of `dynident-dynamics` run over symbols in place of
-//! numbers. What they leave is an expression graph with the constants of this one robot folded in (its base parameters,
-//! so that as few of them as possible are left), zeros gone and equal values shared. Every language prints that graph
-//! as straight-line code:
+//! The recursive Newton-Euler and composite-rigid-body algorithms of `dynident-dynamics` run over symbols instead of
+//! numbers. The result is an expression graph with the constants of this robot folded in (as base parameters, to
+//! minimise their number), without zeros and with shared common values. Every language prints that graph as
+//! straight-line code:
 //!
 //! | target | what it is |
 //! | --- | --- |
@@ -16,9 +16,9 @@
 //! | [`Target::Ros2Yaml`] | parameters of a ROS 2 node |
 //! | [`Target::Json`] | all numbers, a [`ModelFile`] |
 //!
-//! Armature, damping, friction, delay and gain of every joint with their error bars are a [`SimulatorFile`].
+//! The error bars of armature, damping, friction, delay and gain of every joint are in a [`SimulatorFile`].
 //!
-//! A payload by itself becomes the command of a controller: [`payload_command`].
+//! [`payload_command`] writes a payload as the command of a controller.
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +

@@ -1,47 +1,47 @@
-//! From a graph to the lines of a function: only what its outputs need, each value in a line of its own or, if it is
-//! short and used once, where it is used.
+//! Converts a graph to the lines of a function. It contains only values that its outputs need; short values that are
+//! used once are inlined.
 
 use crate::graph::{Function, Function2, Graph, Id, Input, Node};
 use crate::symbol::Symbol;
 
-/// Longest text that is written where it is used, in characters.
+/// Maximum length of an inlined expression, characters.
 const LONGEST_INLINE: usize = 48;
 
-/// What languages write differently.
+/// Syntax that differs between languages.
 pub(crate) trait Syntax {
-    /// An entry of a joint vector; joints are counted from zero.
+    /// An entry of a joint vector; joints are numbered from zero.
     fn input(&self, input: Input, joint: usize) -> String;
 
-    /// A function of one value.
+    /// A function of one argument.
     fn call(&self, function: Function, of: &str) -> String;
 
-    /// A function of two values.
+    /// A function of two arguments.
     fn call2(&self, function: Function2, first: &str, second: &str) -> String;
 
     /// `of^exponent`.
     fn power(&self, of: &str, exponent: f64) -> String;
 
-    /// The sign of `of`, zero while its size is at most `dead_band`.
+    /// Sign of `of`; zero if its magnitude is at most `dead_band`.
     fn step(&self, of: &str, dead_band: f64) -> String;
 
-    /// A number, so that it reads back to the last bit.
+    /// A number that parses to the same bits.
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
 }
 
-/// The lines of a function.
+/// Lines of a function.
 #[derive(Debug)]
 pub(crate) struct Statements {
     /// Name and expression, in order.
     pub(crate) lines: Vec<(String, String)>,
-    /// The expression of every output.
+    /// Expression of every output.
     pub(crate) outputs: Vec<String>,
     /// The inputs that are used.
     pub(crate) used: Vec<Input>,
 }
 
-/// How tightly a text holds together.
+/// Operator precedence of a text.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 enum Strength {
     Sum,
@@ -86,8 +86,8 @@ pub(crate) fn statements(graph: &Graph, outputs: &[Symbol], syntax: &dyn Syntax)
     Statements { lines, outputs: outputs.iter().map(|output| text(output.id())).collect(), used }
 }
 
-/// A node in terms of the texts of its parts. Right operands keep parentheses, so that sums are made in the order of
-/// the graph.
+/// Text of a node from the texts of its operands. Right operands keep parentheses, so that the order of summation is
+/// that of the graph.
 fn written(node: Node, texts: &[Option<(String, Strength)>], syntax: &dyn Syntax) -> (String, Strength) {
     let part = |id: Id, least: Strength| match &texts[id as usize] {
         Some((text, strength)) if *strength >= least => text.clone(),

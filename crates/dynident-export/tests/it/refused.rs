@@ -1,4 +1,4 @@
-//! What cannot be written is named.
+//! Errors of models that cannot be exported.
 
 use super::common::{all_terms, tree};
 use dynident_export::{RobotModel, Target, export};
@@ -49,7 +49,7 @@ fn a_term_by_temperature_is_noted() {
     assert!(exported.text.contains(note));
 }
 
-/// Numbers from which infinity follows: no form writes `inf`.
+/// No format writes `inf` for numbers that overflow.
 #[test]
 fn numbers_that_overflow() {
     let model = tree().model().clone();
@@ -60,7 +60,7 @@ fn numbers_that_overflow() {
     };
     let large = with([1e308; 10]);
     assert!(large.contains("body `left`") && large.contains("1e308"), "{large}");
-    // The centre of mass is the first moment over the mass.
+    // The centre of mass is the first moment divided by the mass.
     let mut light = [0.0; 10];
     (light[0], light[1]) = (1e-305, 1e8);
     assert!(with(light).contains("the centre of mass is inf"), "{}", with(light));
