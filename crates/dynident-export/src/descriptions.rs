@@ -72,7 +72,7 @@ pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     Ok(Exported { text: format!("{head}\n{}{rest}", comment(&notes)), notes })
 }
 
-/// The nearest friction of every joint, and a sentence on each that is not the law itself.
+/// The nearest friction of every joint, with a note for each approximation.
 pub(crate) fn frictions(
     robot: &RobotModel,
     coulomb: &str,

@@ -6,8 +6,8 @@ use crate::symbol::Symbol;
 use dynident_lanes::Scalar;
 use dynident_model::terms::{JointMotion, TermConstant, TorqueTerm};
 
-/// Torque of friction and offsets of every joint at the velocities `dq`: what the terms add that does not follow
-/// accelerations. Terms that change with temperature count as being at their reference.
+/// Friction and offset torque of every joint at the velocities `dq`. Temperature-dependent terms are at their
+/// reference temperature.
 ///
 /// # Errors
 /// A term that needs more than the velocity.

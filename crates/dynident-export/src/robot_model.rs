@@ -7,8 +7,8 @@ use dynident_model::terms::TorqueTerm;
 use dynident_model::urdf::MAX_MAGNITUDE;
 use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
 
-/// Entries of rotations closer than this to 0 or ±1 are that number: what rounding leaves of a right angle written as
-/// 1.5707963267948966, some units of the last place. It moves a link of one metre by a femtometre.
+/// Tolerance for rotation entries near 0 or ±1: rounding error of a right angle written as 1.5707963267948966. It
+/// moves a link of one metre by a femtometre.
 const DUST: f64 = 1e-15;
 
 /// A robot with inertial parameters of every body and a value of every torque term.

@@ -64,7 +64,7 @@ pub struct SimulatorJoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatorValue {
-    /// The number.
+    /// The value.
     pub value: f64,
     /// Half width of its 95 % interval; null if the logs do not determine it, with the reason in `note`.
     pub half_width_95: Option<f64>,

@@ -38,6 +38,7 @@ pub enum Target {
 }
 
 impl Target {
+    /// All formats.
     pub const ALL: [Self; 10] = [
         Self::C,
         Self::Cpp,

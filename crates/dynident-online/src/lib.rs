@@ -1,5 +1,5 @@
-//! **Does the model still hold, now?** One sample at a time, without allocation: the parameters as the newest samples
-//! have them, what touches the robot, what it carries, and whether the model has drifted.
+//! Online monitoring of a robot, one sample at a time and without allocation: recursive estimates of the parameters,
+//! detection of contacts, payloads and drift.
 //!
 //! | task | take |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! **What has the operating system to do?** Programs, folders and files, for all other crates of Dynident.
+//! Access to the operating system for all crates of Dynident: programs, folders and files.
 //!
 //! | task | take |
 //! | --- | --- |
