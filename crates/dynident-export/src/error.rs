@@ -8,69 +8,39 @@ use thiserror::Error;
 /// Why a model could not be written.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum ExportError {
     /// The number of values differs from the number of terms.
     #[error("{found} values for {expected} torque terms: give one for each")]
-    Values {
-        /// Number of terms.
-        expected: usize,
-        /// Number of values.
-        found: usize,
-    },
+    Values { expected: usize, found: usize },
     /// A value that is not finite.
     #[error("the value of {symbol} is {value}, not a finite number")]
     NotFinite {
         /// The term's symbol.
         symbol: String,
-        /// Its value.
         value: f64,
     },
     /// A body with a number that simulators reject, or that leads to such a number.
     #[error(
         "body `{body}`: {quantity} is {value:e}; all numbers of a body have to be finite and at most {MAX_MAGNITUDE:e}: identify the model again"
     )]
-    Body {
-        /// The body.
-        body: String,
-        /// The number.
-        quantity: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    Body { body: String, quantity: &'static str, value: f64 },
     /// The equations of motion overflow.
     #[error(
         "the equations of motion hold the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
     )]
-    Overflow {
-        /// The number.
-        value: f64,
-    },
+    Overflow { value: f64 },
     /// Recorded velocities for a different number of joints.
     #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty where nothing is known")]
-    Velocities {
-        /// Number of joints.
-        expected: usize,
-        /// Number of lists.
-        found: usize,
-    },
+    Velocities { expected: usize, found: usize },
     /// An invalid recorded velocity.
     #[error(
         "joint `{joint}`: {samples} samples of the velocity {velocity}: it has to be finite and not zero, with a positive number of samples"
     )]
-    Velocity {
-        /// The joint.
-        joint: String,
-        /// The velocity.
-        velocity: f64,
-        /// Its weight.
-        samples: f64,
-    },
+    Velocity { joint: String, velocity: f64, samples: f64 },
     /// Bodies without inertials.
     #[error("the bodies {} have no inertial: their dynamics are unknown", bodies.join(", "))]
-    Unknown {
-        /// Their names.
-        bodies: Vec<String>,
-    },
+    Unknown { bodies: Vec<String> },
     /// A torque term that is not a function of the current motion.
     #[error(
         "{symbol} ({kind}) cannot be written as a function of q, dq and ddq: it needs {needs}; identify with another friction law ([drive] of the study) to export"
@@ -78,35 +48,22 @@ pub enum ExportError {
     Term {
         /// The term's symbol.
         symbol: String,
-        /// Its kind.
         kind: &'static str,
-        /// The additional quantity that it needs.
         needs: &'static str,
     },
     /// A joint that moves no inertia.
     #[error(
         "joint `{joint}` moves no inertia, so it has no acceleration under a torque: give its body a mass, or lock it"
     )]
-    NoInertia {
-        /// The joint.
-        joint: String,
-    },
+    NoInertia { joint: String },
     /// A body that a simulator rejects.
     #[error(
         "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so {reader} would refuse it: identify with physical consistency, which is the default"
     )]
-    NotPhysical {
-        /// The body.
-        body: String,
-        /// The simulator.
-        reader: &'static str,
-    },
+    NotPhysical { body: String, reader: &'static str },
     /// A value that JSON cannot represent.
     #[error("the model cannot be written as JSON: {message}")]
-    Json {
-        /// The reason.
-        message: String,
-    },
+    Json { message: String },
     /// Terms that do not belong to the model.
     #[error(transparent)]
     Terms(#[from] ParametricModelError),

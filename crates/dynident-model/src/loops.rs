@@ -36,57 +36,30 @@ pub struct LoopClosure {
 /// Why the mimic law of passive joints could not be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum LoopError {
     /// An unknown link.
     #[error("there is no link `{link}` to close a loop at")]
-    UnknownLink {
-        /// The name.
-        link: String,
-    },
+    UnknownLink { link: String },
     /// An unknown joint.
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
-    UnknownJoint {
-        /// The name.
-        joint: String,
-        /// Existing joints.
-        known: Vec<String>,
-    },
+    UnknownJoint { joint: String, known: Vec<String> },
     /// A point that is not finite.
     #[error("points_m of the loop at `{link}`: give finite numbers, m")]
-    NotFinite {
-        /// The link.
-        link: String,
-    },
+    NotFinite { link: String },
     /// A loop that does not close near the description's zero position.
     #[error(
         "the loop between `{first}` and `{second}` does not close: with the other joints at zero its points stay {gap_m:.3e} m apart; check links, points_m and which joints are passive"
     )]
-    Open {
-        /// One link.
-        first: String,
-        /// The other link.
-        second: String,
-        /// The distance, m.
-        gap_m: f64,
-    },
+    Open { first: String, second: String, gap_m: f64 },
     /// Passive joints that the loops do not determine.
     #[error("the loops leave the passive joints {} free to move: name only joints that a loop holds", joints.join(", "))]
-    Undetermined {
-        /// The joints.
-        joints: Vec<String>,
-    },
+    Undetermined { joints: Vec<String> },
     /// A loop whose passive joints do not follow linearly.
     #[error(
         "the loop between `{first}` and `{second}` is no parallelogram: passive joints that follow linearly leave a gap of {gap_m:.3e} m in some posture"
     )]
-    NotLinear {
-        /// One link.
-        first: String,
-        /// The other link.
-        second: String,
-        /// The largest distance, m.
-        gap_m: f64,
-    },
+    NotLinear { first: String, second: String, gap_m: f64 },
 }
 
 /// Mimic laws of the passive joints, for [`Model::with_followers`]. Existing mimic laws of passive joints are replaced;

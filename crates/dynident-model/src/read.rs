@@ -51,87 +51,38 @@ pub struct Robot {
 /// Why a file could not be read as a robot. Every message begins with the file, and with line and column if known.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum ReadError {
     /// The file cannot be opened or read.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
+    File { path: PathBuf, source: std::io::Error },
     /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
     #[error("{}: larger than {} MiB: this is no robot description, name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-    },
+    TooLarge { path: PathBuf },
     /// The file is empty.
     #[error("{}:1:1: the file is empty: name a URDF, an MJCF, an SDF or a D-H table", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
+    Empty { path: PathBuf },
     /// The file is not UTF-8 text.
     #[error("{}:{line}:{column}: not UTF-8 text{hint}: save the description as UTF-8", path.display())]
-    Encoding {
-        /// The file.
-        path: PathBuf,
-        /// Line of the first bad byte.
-        line: u32,
-        /// Column of the first bad byte.
-        column: u32,
-        /// Guess of the encoding.
-        hint: &'static str,
-    },
+    Encoding { path: PathBuf, line: u32, column: u32, hint: &'static str },
     /// A file of another kind.
     #[error("{}:1:1: {what}, not a robot description: {fix}", path.display())]
-    NoDescription {
-        /// The file.
-        path: PathBuf,
-        /// Guess of its kind.
-        what: &'static str,
-        /// The fix.
-        fix: &'static str,
-    },
+    NoDescription { path: PathBuf, what: &'static str, fix: &'static str },
     /// The file contains xacro macros. xacro evaluates Python expressions in the file, so this crate does not run it.
     #[error("{}: the file contains xacro macros: expand it first (`xacro robot.urdf.xacro > robot.urdf`)", path.display())]
-    Macros {
-        /// The file.
-        path: PathBuf,
-    },
+    Macros { path: PathBuf },
     /// The URDF is faulty.
     #[error("{}:{source}", path.display())]
-    Urdf {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<UrdfError>,
-    },
+    Urdf { path: PathBuf, source: Box<UrdfError> },
     /// The MJCF is faulty.
     #[error("{}:{source}", path.display())]
-    Mjcf {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<MjcfError>,
-    },
+    Mjcf { path: PathBuf, source: Box<MjcfError> },
     /// The SDF is faulty.
     #[error("{}:{source}", path.display())]
-    Sdf {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<SdfError>,
-    },
+    Sdf { path: PathBuf, source: Box<SdfError> },
     /// The D-H table is faulty.
     #[error("{}:{source}", path.display())]
-    Dh {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<DhError>,
-    },
+    Dh { path: PathBuf, source: Box<DhError> },
 }
 
 /// Reads a robot description. `.toml` is a D-H table; `.urdf`, `.xml` and any other text that begins with `<` is an

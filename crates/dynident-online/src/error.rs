@@ -7,36 +7,20 @@ use thiserror::Error;
 /// Why a sample or a setting is invalid. An invalid sample changes nothing.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum OnlineError {
     /// A vector of a different length.
     #[error("{what}: {found} entries where {expected} are needed")]
-    Length {
-        /// Name of the vector.
-        what: &'static str,
-        /// Expected length.
-        expected: usize,
-        /// Actual length.
-        found: usize,
-    },
+    Length { what: &'static str, expected: usize, found: usize },
     /// An invalid value.
     #[error("{what} = {value}: {fix}")]
-    Number {
-        /// Name of the value.
-        what: &'static str,
-        /// The value.
-        value: f64,
-        /// The fix.
-        fix: &'static str,
-    },
+    Number { what: &'static str, value: f64, fix: &'static str },
     /// A covariance that is not positive definite.
     #[error("the covariance of the start is not positive definite: give that of an identified model")]
     Covariance,
     /// Temperature-dependent friction.
     #[error("joint {joint}: its friction follows its temperature, which samples do not have: identify without it")]
-    Temperature {
-        /// The joint.
-        joint: String,
-    },
+    Temperature { joint: String },
     /// No consistent parameters were found.
     #[error(transparent)]
     Consistency(#[from] ConsistencyError),

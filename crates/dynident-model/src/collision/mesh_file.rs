@@ -19,31 +19,21 @@ const LEVELS: usize = 8;
 /// Why a collision shape cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum MeshError {
     /// No such file.
     #[error("mesh `{name}` is missing (searched next to and above {})", folder.display())]
     Missing {
-        /// The name in the description.
         name: String,
         /// Folder of the description.
         folder: PathBuf,
     },
     /// The file cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    File { path: PathBuf, source: std::io::Error },
     /// The file contains no usable mesh.
     #[error("{}: {fault}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        fault: MeshFault,
-    },
+    Content { path: PathBuf, fault: MeshFault },
     /// The reader of the description does not support the shape.
     #[error("{what}")]
     Unsupported {

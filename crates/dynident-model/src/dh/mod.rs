@@ -68,76 +68,38 @@ pub type DhError = Located<DhFault>;
 /// A fault in a D-H table, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum DhFault {
     /// Not TOML, a key that does not exist, or a value of the wrong kind.
     #[error("{reason}; fix this entry of the D-H table")]
-    Toml {
-        /// Message of the TOML parser.
-        reason: String,
-    },
+    Toml { reason: String },
     /// A number that is not finite, or beyond [`MAX_MAGNITUDE`](crate::urdf::MAX_MAGNITUDE).
     #[error("`{key}` is {value:e}: write a finite number below 1e9")]
-    Number {
-        /// The key.
-        key: &'static str,
-        /// The number.
-        value: f64,
-    },
+    Number { key: &'static str, value: f64 },
     /// One quantity given in two units.
     #[error("`{first}` and `{second}` say the same thing: keep one")]
-    BothUnits {
-        /// One key.
-        first: &'static str,
-        /// The other.
-        second: &'static str,
-    },
+    BothUnits { first: &'static str, second: &'static str },
     /// A key that does not fit the kind of joint.
     #[error("`{key}` does not fit a {kind} joint: use {fix}")]
-    WrongUnit {
-        /// The key.
-        key: &'static str,
-        /// Kind of the joint.
-        kind: &'static str,
-        /// The keys that fit.
-        fix: &'static str,
-    },
+    WrongUnit { key: &'static str, kind: &'static str, fix: &'static str },
     /// A sign that is neither 1 nor -1.
     #[error("`sign` is {sign}: write 1 or -1")]
-    Sign {
-        /// The value.
-        sign: f64,
-    },
+    Sign { sign: f64 },
     /// An empty name.
     #[error("a {what} has an empty name: give it one")]
-    EmptyName {
-        /// `joint` or `link`.
-        what: &'static str,
-    },
+    EmptyName { what: &'static str },
     /// Two joints or two links with one name.
     #[error("{what} `{name}` stands twice: rename one")]
-    DuplicateName {
-        /// `joint` or `link`.
-        what: &'static str,
-        /// The name.
-        name: String,
-    },
+    DuplicateName { what: &'static str, name: String },
     /// A parent link that no earlier row defines.
     #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
-    UnknownParent {
-        /// The name.
-        parent: String,
-        /// Links that are defined above this row.
-        known: Vec<String>,
-    },
+    UnknownParent { parent: String, known: Vec<String> },
     /// No joint.
     #[error("the table has no joint: add [[joint]] entries")]
     NoJoint,
     /// More joints than [`MAX_MOVING_JOINTS`](crate::urdf::MAX_MOVING_JOINTS).
     #[error("the table has more than {limit} joints: remove some")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
+    TooManyJoints { limit: usize },
     /// An inertial that is incomplete or overdetermined.
     #[error(
         "the inertial is not complete or says things twice: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"

@@ -18,27 +18,16 @@ pub struct MjcfNotice {
 /// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum Loss {
     /// The mass of a body is unknown, because one of its geoms is not a simple solid.
-    UnknownMass {
-        /// The body.
-        body: String,
-        /// Reason.
-        why: &'static str,
-    },
+    UnknownMass { body: String, why: &'static str },
     /// A joint with a nonlinear spring, of which only the linear coefficient is used.
-    SpringPolynomial {
-        /// The joint.
-        joint: String,
-    },
+    SpringPolynomial { joint: String },
     /// Nonlinear damping.
-    DampingPolynomial {
-        /// The joint.
-        joint: String,
-    },
+    DampingPolynomial { joint: String },
     /// An asymmetric effort limit.
     OneSidedEffort {
-        /// The joint.
         joint: String,
         /// Lowest, Nm or N.
         low: f64,
@@ -46,39 +35,19 @@ pub enum Loss {
         high: f64,
     },
     /// A body with gravity compensation.
-    GravityCompensation {
-        /// The body.
-        body: String,
-    },
+    GravityCompensation { body: String },
     /// A constraint between bodies or joints.
-    Constraint {
-        /// The element under `<equality>`.
-        element: String,
-        /// The bodies or joints.
-        between: String,
-    },
+    Constraint { element: String, between: String },
     /// A closed chain that the model does not represent.
-    Chain {
-        /// The bodies.
-        between: String,
-        /// Reason.
-        why: String,
-    },
+    Chain { between: String, why: String },
     /// A nonlinear coupling of two joints.
-    CouplingPolynomial {
-        /// The joint that follows.
-        joint: String,
-    },
+    CouplingPolynomial { joint: String },
     /// A tendon with a spring, damping, friction or inertia.
-    Tendon {
-        /// The tendon.
-        tendon: String,
-    },
+    Tendon { tendon: String },
     /// A fluid around the robot.
     Medium,
     /// An element or attribute that this reader does not know for joints, bodies and inertials.
     Unread {
-        /// The element.
         element: String,
         /// The attribute; `None` for the element itself.
         attribute: Option<String>,

@@ -24,66 +24,36 @@ use thiserror::Error;
 /// Why values could not be written into an MJCF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum MjcfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] MjcfError),
     /// A change to a body or joint that the original does not contain.
     #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
-    Unknown {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    Unknown { kind: &'static str, name: String },
     /// Two changes to one body or joint.
     #[error("two changes to {kind} `{name}`: give one")]
-    Repeated {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    Repeated { kind: &'static str, name: String },
     /// A body or joint in an included file.
     #[error("{kind} `{name}` stands in an included file, which is not rewritten: put the robot into one file")]
-    Included {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    Included { kind: &'static str, name: String },
     /// A value that is not finite or exceeds the magnitude limit.
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
-    NotFinite {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    NotFinite { kind: &'static str, name: String },
     /// Values that MuJoCo rejects.
     #[error(
         "the new values of body `{body}` are those of no body with mass, which MuJoCo refuses: use physically consistent parameters"
     )]
-    NotPhysical {
-        /// The body.
-        body: String,
-    },
+    NotPhysical { body: String },
     /// Mass between two joints of one body.
     #[error(
         "`{link}` stands between two joints of one MJCF body and cannot hold mass there: write the joints into bodies of their own"
     )]
-    Between {
-        /// The link.
-        link: String,
-    },
+    Between { link: String },
     /// A setting of `<compiler>` that would change the written values.
     #[error("`{setting}` of <compiler> changes the masses that are written: {fix}")]
-    Compiler {
-        /// The attribute.
-        setting: &'static str,
-        /// The fix.
-        fix: &'static str,
-    },
+    Compiler { setting: &'static str, fix: &'static str },
 }
 
 /// Writes the changes into `original` and keeps all other bytes. Inertials, given in the links' frames as by

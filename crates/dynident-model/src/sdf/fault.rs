@@ -12,19 +12,14 @@ pub type SdfError = Located<SdfFault>;
 /// A fault in an SDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum SdfFault {
     /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
-    Xml {
-        /// Message of the XML parser.
-        reason: String,
-    },
+    Xml { reason: String },
     /// More elements than a robot has.
     #[error("the document has more than {limit} nodes: give the SDF of one robot")]
-    TooLarge {
-        /// The limit.
-        limit: u32,
-    },
+    TooLarge { limit: u32 },
     /// Thousands of attributes in one tag, or of namespaces.
     #[error("more attributes in a tag, or namespaces in the document, than any robot has: give the SDF of one robot")]
     Flood,
@@ -33,163 +28,70 @@ pub enum SdfFault {
     Doctype,
     /// The root element is not `<sdf>`.
     #[error("the root element is <{root}>, not <sdf>: give an SDF file")]
-    NotSdf {
-        /// Name of the root element.
-        root: String,
-    },
+    NotSdf { root: String },
     /// An invalid `version`.
     #[error("`version` of <sdf> is `{text}`: write one such as 1.9, by which frames are understood")]
-    Version {
-        /// The text, shortened.
-        text: String,
-    },
+    Version { text: String },
     /// No model.
     #[error("there is no <model> here: give the SDF of one robot{hint}")]
-    NoModel {
-        /// Additional hint.
-        hint: &'static str,
-    },
+    NoModel { hint: &'static str },
     /// Several worlds or models.
     #[error("there are several {what}: keep that of the robot")]
-    Several {
-        /// Worlds or models.
-        what: &'static str,
-    },
+    Several { what: &'static str },
     /// More links, joints and frames than allowed.
     #[error("the model has more than {limit} links, joints and frames: give the SDF of one robot")]
-    TooMany {
-        /// The limit.
-        limit: usize,
-    },
+    TooMany { limit: usize },
     /// Models nested too deep.
     #[error("models are nested more than {limit} deep: give the SDF of one robot")]
-    TooDeep {
-        /// The limit.
-        limit: usize,
-    },
+    TooDeep { limit: usize },
     /// An attribute or element is missing.
     #[error("<{element}> has no {kind} `{name}`: add it")]
-    Missing {
-        /// Surrounding element.
-        element: String,
-        /// `attribute` or `element`.
-        kind: &'static str,
-        /// Name of the missing part.
-        name: &'static str,
-    },
+    Missing { element: String, kind: &'static str, name: &'static str },
     /// An invalid number.
     #[error("<{element}> holds `{text}`, which is {fault}: write {fix}")]
-    Number {
-        /// The element.
-        element: String,
-        /// The text, shortened.
-        text: String,
-        /// Reason.
-        fault: &'static str,
-        /// Expected form.
-        fix: &'static str,
-    },
+    Number { element: String, text: String, fault: &'static str, fix: &'static str },
     /// Too many or too few numbers.
     #[error("<{element}> holds {found} numbers: write {expected}, separated by spaces")]
-    Count {
-        /// The element.
-        element: String,
-        /// Expected number of values.
-        expected: usize,
-        /// Number of values found.
-        found: usize,
-    },
+    Count { element: String, expected: usize, found: usize },
     /// An invalid keyword.
     #[error("`{text}` of <{element}> is not known: write {expected}")]
-    Word {
-        /// The element.
-        element: String,
-        /// The text, shortened.
-        text: String,
-        /// Valid keywords.
-        expected: &'static str,
-    },
+    Word { element: String, text: String, expected: &'static str },
     /// A repeated name in one scope.
     #[error("`{name}` is defined a second time: rename or delete one")]
-    DuplicateName {
-        /// The name.
-        name: String,
-    },
+    DuplicateName { name: String },
     /// An unknown frame.
     #[error("{of} refers to `{name}`, which is no link, joint, frame or nested model here: add it or fix the name")]
-    UnknownFrame {
-        /// The frame.
-        name: String,
-        /// Element that refers to it.
-        of: String,
-    },
+    UnknownFrame { name: String, of: String },
     /// Frames whose poses refer to each other.
     #[error("the pose of `{name}` refers back to itself: give one of these frames another `relative_to`")]
-    FrameLoop {
-        /// One of the frames.
-        name: String,
-    },
+    FrameLoop { name: String },
     /// A link with two parent joints.
     #[error("link `{link}` is the child of joints `{first}` and `{second}`: delete one, closed chains are not read")]
-    TwoParents {
-        /// The link.
-        link: String,
-        /// One joint.
-        first: String,
-        /// The other.
-        second: String,
-    },
+    TwoParents { link: String, first: String, second: String },
     /// Links that are not connected by a joint.
     #[error("links `{first}` and `{second}` are both carried by no joint: fix one of them to the other, or to `world`")]
-    SeveralRoots {
-        /// One root.
-        first: String,
-        /// Another.
-        second: String,
-    },
+    SeveralRoots { first: String, second: String },
     /// Links that carry each other.
     #[error("link `{link}` is carried by itself through its joints: delete one joint of the loop")]
-    Loop {
-        /// One of the links.
-        link: String,
-    },
+    Loop { link: String },
     /// A joint that joins a link with itself.
     #[error("joint `{joint}` joins `{link}` with itself: fix <parent> or <child>")]
-    SameLink {
-        /// The joint.
-        joint: String,
-        /// The link.
-        link: String,
-    },
+    SameLink { joint: String, link: String },
     /// An axis without direction.
     #[error("the axis of joint `{joint}` has no direction: write a vector with a length, such as `0 0 1`")]
-    ZeroAxis {
-        /// The joint.
-        joint: String,
-    },
+    ZeroAxis { joint: String },
     /// An unsupported element, such as a joint that is impossible for a robot on a fixed base.
     #[error("{what} is not supported: {fix}")]
-    Unsupported {
-        /// The unsupported element.
-        what: String,
-        /// The fix.
-        fix: &'static str,
-    },
+    Unsupported { what: String, fix: &'static str },
     /// A negative mass.
     #[error("the mass of link `{link}` is negative: write a value of zero or more")]
-    NegativeMass {
-        /// The link.
-        link: String,
-    },
+    NegativeMass { link: String },
     /// No moving joint.
     #[error("the model has no joint of type revolute, continuous or prismatic: give the SDF of a robot that moves")]
     NoMovingJoint,
     /// More moving joints than allowed.
     #[error("the model has more than {limit} joints: fix those that the log does not hold")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
+    TooManyJoints { limit: usize },
     /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),

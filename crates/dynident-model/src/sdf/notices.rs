@@ -16,29 +16,16 @@ pub struct SdfNotice {
 /// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum SdfLoss {
     /// The mass of a link is not stated.
-    UnknownMass {
-        /// The link.
-        link: String,
-        /// Reason.
-        why: &'static str,
-    },
+    UnknownMass { link: String, why: &'static str },
     /// A link without gravity.
-    Weightless {
-        /// The link.
-        link: String,
-    },
+    Weightless { link: String },
     /// Added mass of a fluid around a link.
-    AddedMass {
-        /// The link.
-        link: String,
-    },
+    AddedMass { link: String },
     /// A model in another file.
-    Include {
-        /// URI of the model.
-        uri: String,
-    },
+    Include { uri: String },
 }
 
 impl SdfLoss {

@@ -19,30 +19,14 @@ pub struct StatedJoint {
 
 /// An invalid constant of a stated law.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum StatedFault {
     /// A number outside its range.
-    Range {
-        /// The key.
-        key: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest and largest valid value.
-        range: [f64; 2],
-    },
+    Range { key: &'static str, value: f64, range: [f64; 2] },
     /// A number that is listed twice.
-    Twice {
-        /// The key of the list.
-        key: &'static str,
-        /// The number.
-        value: f64,
-    },
+    Twice { key: &'static str, value: f64 },
     /// Keys that disable the whole law.
-    Empty {
-        /// The problem.
-        problem: &'static str,
-        /// The fix.
-        fix: &'static str,
-    },
+    Empty { problem: &'static str, fix: &'static str },
 }
 
 /// Valid range of velocities, rad/s or m/s.

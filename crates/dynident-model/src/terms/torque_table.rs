@@ -36,31 +36,17 @@ pub struct TorqueTable {
 /// Error of a torque table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum TorqueTableError {
     /// Too few or too many points.
     #[error("{found} points: give 2 to {MOST_POINTS}")]
-    Points {
-        /// Number of points.
-        found: usize,
-    },
+    Points { found: usize },
     /// A number that is not finite or too large.
     #[error("point {number}: {value}: give numbers of at most {LARGEST:e} in size")]
-    Number {
-        /// Index of the point, from 1.
-        number: usize,
-        /// The value.
-        value: f64,
-    },
+    Number { number: usize, value: f64 },
     /// Positions that do not ascend.
     #[error("point {number}: position {position} after {before}: sort the points by position, each once")]
-    Order {
-        /// Index of the point, from 1.
-        number: usize,
-        /// Its position.
-        position: f64,
-        /// Position of the previous point.
-        before: f64,
-    },
+    Order { number: usize, position: f64, before: f64 },
 }
 
 /// One cubic: `torque + b t + c t² + d t³` with `t` from zero to `width`.

@@ -84,21 +84,19 @@ pub struct UnreadElement {
 
 /// A violation of the rules that does not make the robot ambiguous; other URDF readers ignore it.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum UrdfIrregularity {
     /// Names with an undeclared namespace prefix.
     UndeclaredPrefix {
         /// Line of the first one, from 1.
         line: u32,
-        /// The prefix.
         prefix: String,
     },
     /// A mimic joint whose source is not in the document; it is treated as independent.
     UnknownMimic {
         /// Line of the joint, from 1.
         line: u32,
-        /// The joint.
         joint: String,
-        /// The missing source.
         source_joint: String,
     },
 }
@@ -109,19 +107,14 @@ pub type UrdfError = Located<UrdfFault>;
 /// A fault in a URDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum UrdfFault {
     /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
-    Xml {
-        /// Message of the XML parser.
-        reason: String,
-    },
+    Xml { reason: String },
     /// More nodes than allowed.
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
-    TooLarge {
-        /// The limit.
-        limit: u32,
-    },
+    TooLarge { limit: u32 },
     /// Thousands of attributes in one tag, or of namespaces.
     #[error("more attributes in a tag, or namespaces in the document, than any robot has: name the URDF of one robot")]
     Flood,
@@ -130,146 +123,56 @@ pub enum UrdfFault {
     Doctype,
     /// The root element is not `<robot>`.
     #[error("the root element is <{root}>, not <robot>: give a URDF file{hint}")]
-    NotUrdf {
-        /// Name of the root element.
-        root: String,
-        /// Guess of the format.
-        hint: &'static str,
-    },
+    NotUrdf { root: String, hint: &'static str },
     /// Unexpanded macros.
     #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
-    Xacro {
-        /// The macro.
-        what: String,
-    },
+    Xacro { what: String },
     /// An element is missing.
     #[error("<{parent}> of `{owner}` has no <{element}>: add it{hint}")]
-    MissingElement {
-        /// Surrounding element.
-        parent: &'static str,
-        /// Name of the link or joint.
-        owner: String,
-        /// The element that is missing.
-        element: &'static str,
-        /// Additional hint.
-        hint: &'static str,
-    },
+    MissingElement { parent: &'static str, owner: String, element: &'static str, hint: &'static str },
     /// A link with two inertials.
     #[error("link `{link}` has a second <inertial>: keep one")]
-    RepeatedInertial {
-        /// The link.
-        link: String,
-    },
+    RepeatedInertial { link: String },
     /// An attribute is missing.
     #[error("<{element}> has no attribute `{attribute}`: add it")]
-    MissingAttribute {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
+    MissingAttribute { element: String, attribute: &'static str },
     /// An empty name.
     #[error("<{element}> has an empty `{attribute}`: fill it in")]
-    EmptyName {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
+    EmptyName { element: String, attribute: &'static str },
     /// An invalid number.
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
-    Number {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// The text, shortened.
-        text: String,
-        /// Reason.
-        fault: &'static str,
-        /// Expected form.
-        fix: &'static str,
-    },
+    Number { element: String, attribute: String, text: String, fault: &'static str, fix: &'static str },
     /// Too many or too few numbers.
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
-    Count {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// Expected number of values.
-        expected: usize,
-        /// Number of values found.
-        found: usize,
-    },
+    Count { element: String, attribute: String, expected: usize, found: usize },
     /// Two links or two joints with one name.
     #[error("{kind} `{name}` is defined a second time (first in line {first_line}): rename or delete one")]
-    DuplicateName {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-        /// Line of the first definition.
-        first_line: u32,
-    },
+    DuplicateName { kind: &'static str, name: String, first_line: u32 },
     /// A joint names a link that does not exist.
     #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or fix the name")]
-    UnknownLink {
-        /// The joint.
-        joint: String,
-        /// The name of the link.
-        link: String,
-    },
+    UnknownLink { joint: String, link: String },
     /// A joint that mimics itself.
     #[error("joint `{joint}` mimics itself: fix the name or delete <mimic>")]
-    OwnMimic {
-        /// The joint.
-        joint: String,
-    },
+    OwnMimic { joint: String },
     /// A rotation in two forms.
     #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
-    TwoRotations {
-        /// Owner of the origin.
-        owner: String,
-    },
+    TwoRotations { owner: String },
     /// An invalid quaternion.
     #[error(
         "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
     )]
-    NoRotation {
-        /// Owner of the origin.
-        owner: String,
-        /// Norm of the quaternion.
-        norm: f64,
-    },
+    NoRotation { owner: String, norm: f64 },
     /// A link that is the child of two joints.
     #[error(
         "link `{link}` is the child of joint `{first}` and of joint `{second}`: a link has one parent, delete one joint"
     )]
-    TwoParents {
-        /// The link.
-        link: String,
-        /// The earlier joint.
-        first: String,
-        /// The later joint.
-        second: String,
-    },
+    TwoParents { link: String, first: String, second: String },
     /// An unsupported joint type.
     #[error("joint `{joint}` is of type `{kind}`: use revolute, continuous, prismatic or fixed{hint}")]
-    JointType {
-        /// The joint.
-        joint: String,
-        /// The type.
-        kind: String,
-        /// Additional hint.
-        hint: &'static str,
-    },
+    JointType { joint: String, kind: String, hint: &'static str },
     /// An axis of length zero.
     #[error("the axis of joint `{joint}` has length zero: give its direction, such as `0 0 1`")]
-    ZeroAxis {
-        /// The joint.
-        joint: String,
-    },
+    ZeroAxis { joint: String },
     /// No link.
     #[error("the robot has no <link>: add its links and joints")]
     NoLinks,
@@ -278,24 +181,13 @@ pub enum UrdfFault {
     NoMovingJoint,
     /// A closed chain of joints.
     #[error("link `{link}` is its own ancestor: the joints form a loop; cut it at one joint")]
-    Loop {
-        /// A link of the loop.
-        link: String,
-    },
+    Loop { link: String },
     /// More than one link without a parent.
     #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
-    SeveralRoots {
-        /// The first root.
-        first: String,
-        /// The second root.
-        second: String,
-    },
+    SeveralRoots { first: String, second: String },
     /// More moving joints than [`MAX_MOVING_JOINTS`].
     #[error("the robot has more than {limit} moving joints: fix those that the log does not hold")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
+    TooManyJoints { limit: usize },
     /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),

@@ -61,58 +61,31 @@ pub struct JointChange {
 /// Why values could not be written into a URDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum UrdfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] UrdfError),
     /// A change to a link or joint that the original does not contain.
     #[error("the URDF has no {kind} `{name}`: write into the file that the model was read from")]
-    Unknown {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    Unknown { kind: &'static str, name: String },
     /// Two changes to one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
-    Repeated {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    Repeated { kind: &'static str, name: String },
     /// A value that is not finite.
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
-    NotFinite {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    NotFinite { kind: &'static str, name: String },
     /// Moments without mass, which URDF cannot represent.
     #[error("link `{link}` has moments but no mass, which URDF cannot express: use physically consistent parameters")]
-    NoMass {
-        /// The link.
-        link: String,
-    },
+    NoMass { link: String },
     /// A value that exceeds the magnitude limit.
     #[error(
         "the new values of link `{link}` hold {value:e}, beyond the {MAX_MAGNITUDE:e} that a description may hold: check its lengths and masses"
     )]
-    TooLarge {
-        /// The link.
-        link: String,
-        /// The value.
-        value: f64,
-    },
+    TooLarge { link: String, value: f64 },
     /// The number of parameter sets differs from the number of moving bodies.
     #[error("{found} parameter sets for {expected} moving bodies")]
-    Counts {
-        /// Number of moving bodies.
-        expected: usize,
-        /// Number of parameter sets.
-        found: usize,
-    },
+    Counts { expected: usize, found: usize },
 }
 
 /// The changes that give every moving body of `model` the parameters `inertials` (body frames, one per joint): the

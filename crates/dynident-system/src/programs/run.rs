@@ -30,61 +30,29 @@ pub struct RunLimits {
 /// Why a program gave no output. The program and all its child processes have been stopped.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum RunError {
     /// An unknown program.
     #[error("the program {program} is not installed, or not in a folder of PATH")]
-    NotFound {
-        /// The program.
-        program: String,
-    },
+    NotFound { program: String },
     /// The system could not start the program.
     #[error("the program {program} cannot be started: {source}")]
-    NotStarted {
-        /// The program.
-        program: String,
-        /// Error of the operating system.
-        source: io::Error,
-    },
+    NotStarted { program: String, source: io::Error },
     /// The time limit was exceeded.
     #[error("the program {program} did not end within {limit_s} s and was stopped")]
-    TimedOut {
-        /// The program.
-        program: String,
-        /// The time limit, s.
-        limit_s: f64,
-    },
+    TimedOut { program: String, limit_s: f64 },
     /// A stop was requested while it ran.
     #[error("the program {program} was stopped on request")]
-    Stopped {
-        /// The program.
-        program: String,
-    },
+    Stopped { program: String },
     /// The output limit was exceeded.
     #[error("the program {program} wrote more than {} MiB and was stopped", most_bytes >> 20)]
-    TooLarge {
-        /// The program.
-        program: String,
-        /// The limit, bytes.
-        most_bytes: u64,
-    },
+    TooLarge { program: String, most_bytes: u64 },
     /// The program failed.
     #[error("the program {program} failed ({exit}): {message}")]
-    Failed {
-        /// The program.
-        program: String,
-        /// Exit status.
-        exit: String,
-        /// The end of its standard error, on one line.
-        message: String,
-    },
+    Failed { program: String, exit: String, message: String },
     /// The output could not be read.
     #[error("the output of the program {program} cannot be read: {source}")]
-    Output {
-        /// The program.
-        program: String,
-        /// The reason.
-        source: io::Error,
-    },
+    Output { program: String, source: io::Error },
 }
 
 /// Runs a program without standard input until it ends, and returns its standard output. Afterwards no process of its

@@ -37,55 +37,32 @@ pub struct ExpressionError {
 /// Kind of a parse error.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum ExpressionProblem {
     /// Too long.
     #[error("more than {most} {of}: write a shorter expression, or a table")]
-    TooLong {
-        /// Upper limit.
-        most: usize,
-        /// Limited quantity.
-        of: &'static str,
-    },
+    TooLong { most: usize, of: &'static str },
     /// Unexpected text.
     #[error("{found} where {expected} is expected")]
-    Expected {
-        /// Expected element.
-        expected: &'static str,
-        /// Element found.
-        found: String,
-    },
+    Expected { expected: &'static str, found: String },
     /// An unknown name.
     #[error(
         "nothing is called `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
         functions()
     )]
-    Name {
-        /// The name.
-        name: String,
-    },
+    Name { name: String },
     /// An unknown joint.
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
-    Joint {
-        /// The joint.
-        joint: String,
-        /// Existing joints.
-        known: Vec<String>,
-    },
+    Joint { joint: String, known: Vec<String> },
     /// `q` without a default joint.
     #[error("whose {name} is not said: write {name}1, {name}2, ..")]
-    WhichJoint {
-        /// `q` or `dq`.
-        name: &'static str,
-    },
+    WhichJoint { name: &'static str },
     /// An exponent that is not constant.
     #[error("the exponent is no number: write exp(exponent * ln(base))")]
     Exponent,
     /// A number that is not finite, or exceeds 1e12.
     #[error("{what} has no value of at most 1e12 in size")]
-    Value {
-        /// The faulty part.
-        what: &'static str,
-    },
+    Value { what: &'static str },
 }
 
 fn functions() -> String {
