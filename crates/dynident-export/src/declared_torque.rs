@@ -85,7 +85,6 @@ fn call(function: ExpressionFunction, x: Symbol) -> Symbol {
     x.call(function)
 }
 
-/// Computes `x^p` by squaring.
 fn whole_power(x: Symbol, exponent: i32) -> Symbol {
     let (mut left, mut square, mut power) = (exponent.unsigned_abs(), x, Symbol::ONE);
     while left > 0 {

@@ -14,14 +14,14 @@ use std::borrow::Cow;
 
 /// Friction errors below this share of the friction are not reported: rounding errors, or about 0.1 % for a narrow
 /// smooth step in place of a sign.
-const WORTH_SAYING: f64 = 1e-3;
+const MIN_REPORTED_ERROR_RATIO: f64 = 1e-3;
 
 /// MuJoCo's MJCF: bodies with inertials, joints with limits, `armature`, `damping` and `frictionloss`, one motor per
 /// joint. Without shapes.
 pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let (model, bodies) = (robot.model(), robot.model().body_count());
     let friction = frictions(robot, "frictionloss", "damping", &mut notes);
-    notes.extend(left_out(robot, true));
+    notes.extend(omitted_terms(robot, true));
     notes.push("MJCF has no velocity limits; shapes are left out.".to_owned());
     let rotors = drive_inertia(robot);
     let [gx, gy, gz] = model.gravity().0;
@@ -51,7 +51,7 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
 pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
-    notes.extend(left_out(robot, false));
+    notes.extend(omitted_terms(robot, false));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("URDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
     }
@@ -82,7 +82,7 @@ pub(crate) fn frictions(
     let joints = robot.model().joints();
     let nearest: Vec<_> = (0..joints.len()).map(|joint| NearestFriction::of(robot, joint)).collect();
     for (joint, found) in joints.iter().zip(&nearest) {
-        if found.most_error > WORTH_SAYING * (found.coulomb + found.viscous * found.most_speed) {
+        if found.most_error > MIN_REPORTED_ERROR_RATIO * (found.coulomb + found.viscous * found.most_speed) {
             let over = match found.over {
                 ComparedOver::RecordedMotion => "over the recorded motion, velocities",
                 ComparedOver::VelocityLimit => "for velocities",
@@ -102,7 +102,7 @@ pub(crate) fn frictions(
 }
 
 /// Notes on terms that a robot description cannot represent; springs only if the format has none.
-pub(crate) fn left_out(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
+pub(crate) fn omitted_terms(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
         let (symbol, unit) = (term.symbol(), term.unit());
@@ -132,7 +132,6 @@ fn joint_name<'a>(robot: &'a RobotModel, term: &TorqueTerm) -> &'a str {
     term.own_joint().map_or("", |joint| &robot.model().joints()[joint].name)
 }
 
-/// Whether the term is the spring of its joint in the robot description.
 fn is_spring(term: &TorqueTerm) -> bool {
     term.property() == Some(JointProperty::Stiffness)
 }
@@ -220,7 +219,7 @@ fn body_name(link: &str) -> Cow<'_, str> {
 }
 
 /// Mass, centre of mass and inertia about it of a body; simulators accept only physically consistent bodies.
-pub(crate) fn real_inertial(
+pub(crate) fn consistent_inertial(
     model: &Model,
     index: usize,
     reader: &'static str,
@@ -235,7 +234,7 @@ pub(crate) fn real_inertial(
 }
 
 fn inertial(model: &Model, index: usize) -> Result<String, ExportError> {
-    let (mass, com, inertia) = real_inertial(model, index, "MuJoCo")?;
+    let (mass, com, inertia) = consistent_inertial(model, index, "MuJoCo")?;
     let ([x, y, z], i) = (com.0, inertia.0);
     Ok(format!(
         "<inertial mass=\"{mass:?}\" pos=\"{x:?} {y:?} {z:?}\" fullinertia=\"{:?} {:?} {:?} {:?} {:?} {:?}\"/>",
@@ -248,7 +247,6 @@ fn placement(placement: &Transform) -> String {
     format!(" pos=\"{x:?} {y:?} {z:?}\" quat=\"{a:?} {b:?} {c:?} {d:?}\"")
 }
 
-/// Notes as an XML comment.
 pub(crate) fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();

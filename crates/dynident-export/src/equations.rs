@@ -15,7 +15,6 @@ use dynident_model::{Model, Vec3};
 #[derive(Debug)]
 pub(crate) struct Equation {
     pub(crate) name: &'static str,
-    /// One-line description.
     pub(crate) about: &'static str,
     pub(crate) inputs: &'static [Input],
     pub(crate) output: &'static str,
@@ -24,13 +23,11 @@ pub(crate) struct Equation {
 }
 
 impl Equation {
-    /// Names of the arguments, in order.
     pub(crate) fn arguments(&self) -> String {
         self.inputs.iter().map(|input| input.name()).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// All functions of a robot over one graph.
 #[derive(Debug)]
 pub(crate) struct Equations {
     pub(crate) dof: usize,
@@ -53,13 +50,11 @@ impl Equations {
     }
 }
 
-/// Symbols of the inputs.
 struct Inputs {
     q: Vec<Symbol>,
     dq: Vec<Symbol>,
     ddq: Vec<Symbol>,
     tau: Vec<Symbol>,
-    /// Zero velocities or accelerations.
     rest: Vec<Symbol>,
 }
 
@@ -71,7 +66,6 @@ impl Inputs {
     }
 }
 
-/// Symbols of the outputs of all functions.
 struct Values {
     inverse: Vec<Symbol>,
     gravity: Vec<Symbol>,
@@ -109,7 +103,6 @@ impl Values {
         })
     }
 
-    /// The functions with these outputs.
     fn functions(self) -> Vec<Equation> {
         let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
             name,
@@ -170,7 +163,6 @@ impl Values {
     }
 }
 
-/// `M(q)` including drive inertia.
 fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
     let mut mass_matrix = mass_matrix_over(reduced, q);
     for (entry, &rotor) in mass_matrix.iter_mut().zip(rotors) {
@@ -179,7 +171,6 @@ fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
     mass_matrix
 }
 
-/// Inverse dynamics with drive inertia and `other` torques.
 fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -> Vec<Symbol> {
     let Inputs { q, dq, ddq, .. } = inputs;
     let mut inverse = inverse_dynamics_over(reduced, q, dq, ddq);
@@ -192,7 +183,6 @@ fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -
     inverse
 }
 
-/// Forward dynamics.
 fn forward(
     reduced: &Model,
     inputs: &Inputs,

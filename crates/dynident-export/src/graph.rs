@@ -9,7 +9,6 @@ use std::collections::HashMap;
 /// Index of a node in its graph. A node depends only on smaller indices.
 pub(crate) type Id = u32;
 
-/// Input of a generated function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Input {
     Position,
@@ -30,7 +29,6 @@ impl Input {
     }
 }
 
-/// Functions of one argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Function {
     Sin,
@@ -47,7 +45,6 @@ pub(crate) enum Function {
     Abs,
 }
 
-/// Functions of two arguments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Function2 {
     Atan2,
@@ -84,7 +81,6 @@ pub(crate) enum Node {
     Sub(Id, Id),
     Mul(Id, Id),
     Neg(Id),
-    /// `1 / x`.
     Recip(Id),
     Call(Function, Id),
     Call2(Function2, Id, Id),
@@ -95,7 +91,6 @@ pub(crate) enum Node {
 }
 
 impl Node {
-    /// Operands of the node.
     pub(crate) fn parts(self) -> impl Iterator<Item = Id> {
         let (a, b) = match self {
             Self::Constant(_) | Self::Input(..) => (None, None),
@@ -124,7 +119,6 @@ impl Graph {
         graph
     }
 
-    /// Whether the graph contains a node of this kind.
     pub(crate) fn has(&self, kind: impl Fn(Node) -> bool) -> bool {
         self.nodes.iter().any(|&node| kind(node))
     }
@@ -146,7 +140,6 @@ impl Graph {
         place
     }
 
-    /// The first constant that is not finite.
     pub(crate) fn not_finite(&self) -> Option<f64> {
         self.nodes.iter().find_map(|node| match node {
             Node::Constant(bits) => Some(f64::from_bits(*bits)).filter(|value| !value.is_finite()),
@@ -154,7 +147,6 @@ impl Graph {
         })
     }
 
-    /// The value of a constant.
     pub(crate) fn number(&self, id: Id) -> Option<f64> {
         match self.node(id) {
             Node::Constant(bits) => Some(f64::from_bits(bits)),

@@ -209,7 +209,6 @@ impl ModelFile {
     }
 }
 
-/// The model as JSON.
 pub(crate) fn model_json(robot: &RobotModel, notes: Vec<String>) -> Result<Exported, ExportError> {
     let text = dynident_text::json::to_string_pretty(&ModelFile::of(robot, &notes));
     Ok(Exported { text: text.map_err(|error| ExportError::Json { message: error.to_string() })? + "\n", notes })
@@ -222,7 +221,6 @@ impl ModelPlacement {
 }
 
 impl ModelTerm {
-    /// Terms of a robot that satisfy `wanted`.
     pub(crate) fn of(robot: &RobotModel, wanted: impl Fn(&TorqueTerm) -> bool) -> Vec<Self> {
         let joints = robot.model().joints();
         let terms = robot.terms().filter(|(term, _)| wanted(term));
@@ -290,7 +288,6 @@ fn links(body: &Body) -> Vec<ModelLink> {
     body.links.iter().map(link).collect()
 }
 
-/// xx, xy, xz, yy, yz, zz.
 pub(crate) fn upper_triangle(m: &[[f64; 3]; 3]) -> [f64; 6] {
     [m[0][0], m[0][1], m[0][2], m[1][1], m[1][2], m[2][2]]
 }

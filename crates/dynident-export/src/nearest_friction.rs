@@ -5,10 +5,10 @@ use crate::recorded_velocity::RecordedVelocity;
 use crate::robot_model::RobotModel;
 
 /// Number of equally spaced speeds for the comparison without a recorded motion; enough to resolve the shape of a law.
-const SPEEDS: u32 = 200;
+const SPEED_COUNT: u32 = 200;
 
 /// Speed range of joints without a velocity limit, rad/s or m/s.
-const DEFAULT_SPEED: f64 = 1.0;
+const DEFAULT_MAX_SPEED: f64 = 1.0;
 
 /// Velocities over which the nearest friction is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,8 +109,8 @@ fn velocities(robot: &RobotModel, joint: usize) -> (ComparedOver, Vec<RecordedVe
         return (ComparedOver::RecordedMotion, recorded.to_vec());
     }
     let limit = robot.model().joints()[joint].limits.velocity;
-    let most = limit.filter(|speed| speed.is_finite() && *speed > 0.0).unwrap_or(DEFAULT_SPEED);
-    let speeds = (1..=SPEEDS).map(|k| most * f64::from(k) / f64::from(SPEEDS));
+    let most = limit.filter(|speed| speed.is_finite() && *speed > 0.0).unwrap_or(DEFAULT_MAX_SPEED);
+    let speeds = (1..=SPEED_COUNT).map(|k| most * f64::from(k) / f64::from(SPEED_COUNT));
     let even = speeds.flat_map(|dq| [dq, -dq]).map(|velocity| RecordedVelocity { velocity, samples: 1.0 });
     (ComparedOver::VelocityLimit, even.collect())
 }
@@ -126,7 +126,7 @@ enum Fit {
 
 /// Determinant of the normal equations, relative to `Σw Σw q̇²`, below which only one speed was recorded, so that
 /// Coulomb and viscous friction are indistinguishable.
-const ONE_SPEED: f64 = 1e-9;
+const MIN_DETERMINANT_RATIO: f64 = 1e-9;
 
 /// `Σw`, `Σw |q̇|`, `Σw q̇²`, `Σw sign(q̇) τ`, `Σw q̇ τ`.
 fn sums(samples: &[RecordedVelocity], tau: &[f64]) -> [f64; 5] {
@@ -144,7 +144,7 @@ fn sums(samples: &[RecordedVelocity], tau: &[f64]) -> [f64; 5] {
 impl Fit {
     fn of(samples: &[RecordedVelocity], tau: &[f64]) -> Self {
         let [count, size, square, by_sign, by_speed] = sums(samples, tau);
-        if count * square - size * size <= ONE_SPEED * count * square {
+        if count * square - size * size <= MIN_DETERMINANT_RATIO * count * square {
             return if by_sign > 0.0 { Self::CoulombOnly } else { Self::Neither };
         }
         // On the boundary one value is zero and the other is its separate least-squares estimate.

@@ -5,8 +5,7 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use dynident_text::identifier;
 use nalgebra::Matrix3;
 
-/// Maximum length of a RAPID identifier.
-const RAPID_LENGTH: usize = 32;
+const MAX_RAPID_NAME_LENGTH: usize = 32;
 
 /// Manufacturer of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +40,7 @@ pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<S
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
     let ([x, y, z], mut name) = (com, identifier(&payload.name));
-    name.truncate(RAPID_LENGTH);
+    name.truncate(MAX_RAPID_NAME_LENGTH);
     if ![mass].iter().chain(&com).chain(i.as_flattened()).all(|x| x.is_finite()) {
         return None;
     }

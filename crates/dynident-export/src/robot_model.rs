@@ -9,7 +9,7 @@ use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
 
 /// Tolerance for rotation entries near 0 or ±1: rounding error of a right angle written as 1.5707963267948966. It
 /// moves a link of one metre by a femtometre.
-const DUST: f64 = 1e-15;
+const RIGHT_ANGLE_TOLERANCE: f64 = 1e-15;
 
 /// A robot with inertial parameters of every body and a value of every torque term.
 #[derive(Clone, Debug)]
@@ -65,7 +65,6 @@ impl RobotModel {
         Ok(Self { velocities, ..self })
     }
 
-    /// Recorded velocities of a joint; `None` if there are none.
     pub(crate) fn recorded_velocities(&self, joint: usize) -> Option<&[RecordedVelocity]> {
         self.velocities.get(joint).map(Vec::as_slice).filter(|velocities| !velocities.is_empty())
     }
@@ -91,17 +90,17 @@ impl RobotModel {
     /// Its bodies are not physically consistent, but `M(q)`, `C(q, q̇) q̇` and `g(q)` are those of the robot, because
     /// `Y π = Y_b θ` for every motion.
     pub(crate) fn reduced(&self) -> Result<Model, ExportError> {
-        let swept = swept(&self.model)?;
-        let rigid = ParametricModel::new(swept.clone(), Vec::new())?;
+        let with_exact_right_angles = with_exact_right_angles(&self.model)?;
+        let rigid = ParametricModel::new(with_exact_right_angles.clone(), Vec::new())?;
         let values = rigid.base().values(&self.model.parameter_vector());
-        let mut inertials = vec![InertialParameters::ZERO; swept.body_count()];
+        let mut inertials = vec![InertialParameters::ZERO; with_exact_right_angles.body_count()];
         for (column, value) in rigid.base().base_columns().into_iter().zip(values) {
             match column {
                 Column::Body { body, parameter } => inertials[body].0[parameter] = value,
                 Column::Term(_) => {}
             }
         }
-        Ok(swept.with_inertials(&inertials)?)
+        Ok(with_exact_right_angles.with_inertials(&inertials)?)
     }
 }
 
@@ -122,9 +121,8 @@ fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), Export
     Ok(())
 }
 
-/// The same model with exact right angles.
-fn swept(model: &Model) -> Result<Model, ExportError> {
-    let sweep = |x: f64| if (x - x.round()).abs() < DUST && x.abs() < 1.5 { x.round() } else { x };
+fn with_exact_right_angles(model: &Model) -> Result<Model, ExportError> {
+    let sweep = |x: f64| if (x - x.round()).abs() < RIGHT_ANGLE_TOLERANCE && x.abs() < 1.5 { x.round() } else { x };
     let joint = |joint: &Joint| Joint {
         placement: Transform {
             rotation: Mat3(joint.placement.rotation.0.map(|row| row.map(sweep))),

@@ -105,18 +105,18 @@ fn about_centre(inertial: &InertialParameters, body: &str) -> Result<([f64; 3], 
 }
 
 /// Words that YAML 1.1 does not parse as text.
-const NO_TEXT: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
+const RESERVED_WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
 
 /// Maximum key length; YAML allows 1024 characters before the colon.
-const KEY_LENGTH: usize = 200;
+const MAX_KEY_LENGTH: usize = 200;
 
 /// Unique parameter names of letters, digits and `_`, not starting with a digit, and not reserved in YAML.
 fn parameter_names(names: &[&str]) -> Vec<String> {
     let mut taken: Vec<String> = Vec::new();
     for name in names {
         let safe = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-        let mut key: String = name.chars().take(KEY_LENGTH).map(safe).collect();
-        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || NO_TEXT.contains(&&*key.to_ascii_lowercase()) {
+        let mut key: String = name.chars().take(MAX_KEY_LENGTH).map(safe).collect();
+        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || RESERVED_WORDS.contains(&&*key.to_ascii_lowercase()) {
             key.insert_str(0, "joint_");
         }
         let mut free = key.clone();

@@ -1,6 +1,6 @@
 //! SDF for Gazebo and Drake.
 
-use crate::descriptions::{comment, frictions, left_out, real_inertial, spring};
+use crate::descriptions::{comment, consistent_inertial, frictions, omitted_terms, spring};
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::nearest_friction::NearestFriction;
@@ -15,7 +15,7 @@ use dynident_text::xml::escaped;
 pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
-    notes.extend(left_out(robot, true));
+    notes.extend(omitted_terms(robot, true));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("SDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
     }
@@ -41,7 +41,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
     );
     write_frames(&mut text, model.base(), &base, &mut names);
     for (index, (joint, body)) in model.tree_joints().iter().zip(model.bodies()).enumerate() {
-        let (mass, com, inertia) = real_inertial(model, index, "libsdformat")?;
+        let (mass, com, inertia) = consistent_inertial(model, index, "libsdformat")?;
         let (link, parent) = (&links[index], joint.parent.map_or(&base, |parent| &links[parent]));
         let [x, y, z] = com.0;
         let i = inertia.0;
@@ -140,7 +140,6 @@ impl Names {
         free
     }
 
-    /// Notes on renamed parts.
     fn notes(&self) -> impl Iterator<Item = String> {
         let others = self.taken.iter().filter(|(original, name)| escaped(original) != *name);
         others.map(|(original, name)| {

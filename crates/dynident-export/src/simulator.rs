@@ -1,6 +1,6 @@
 //! Joint parameters of simulators, with error bars.
 
-use crate::descriptions::left_out;
+use crate::descriptions::omitted_terms;
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
 use crate::exported::Exported;
@@ -13,11 +13,9 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`SimulatorFile`].
 pub const SIMULATOR_SCHEMA: &str = "dynident/simulator/1";
 
-/// Note on a missing error bar of the drive inertia.
-const NO_DRIVE_INERTIA: &str = "the study has no drive inertia, so that a part of it stands in the links' (drive.drive_inertia = true asks for it)";
+const NO_DRIVE_INERTIA_NOTE: &str = "the study has no drive inertia, so that a part of it stands in the links' (drive.drive_inertia = true asks for it)";
 
-/// Note on a missing error bar of zero friction.
-const NO_FRICTION: &str = "not in the identified law, or held at zero, which is its limit";
+const NO_FRICTION_NOTE: &str = "not in the identified law, or held at zero, which is its limit";
 
 /// Joint parameters of a simulator in addition to the bodies: `τ = armature q̈ + damping q̇ + frictionloss sign(q̇)`,
 /// delay and gain of the drive.
@@ -141,9 +139,19 @@ impl SimulatorFile {
             };
             SimulatorJoint {
                 name: model.joints()[joint].name.clone(),
-                armature: value(rotors[joint * model.dof() + joint], &drives, NO_DRIVE_INERTIA, unit("kg m^2", "kg")),
-                damping: value(nearest.viscous, &of_shares(|one| one.viscous), NO_FRICTION, unit("Nm s/rad", "N s/m")),
-                frictionloss: value(nearest.coulomb, &of_shares(|one| one.coulomb), NO_FRICTION, unit("Nm", "N")),
+                armature: value(
+                    rotors[joint * model.dof() + joint],
+                    &drives,
+                    NO_DRIVE_INERTIA_NOTE,
+                    unit("kg m^2", "kg"),
+                ),
+                damping: value(
+                    nearest.viscous,
+                    &of_shares(|one| one.viscous),
+                    NO_FRICTION_NOTE,
+                    unit("Nm s/rad", "N s/m"),
+                ),
+                frictionloss: value(nearest.coulomb, &of_shares(|one| one.coulomb), NO_FRICTION_NOTE, unit("Nm", "N")),
                 friction_error: FrictionError {
                     rms_nm: nearest.rms_error,
                     most_nm: nearest.most_error,
@@ -158,7 +166,7 @@ impl SimulatorFile {
             }
         });
         let joints = joints.collect();
-        let notes = further.iter().cloned().chain(left_out(robot, true)).collect();
+        let notes = further.iter().cloned().chain(omitted_terms(robot, true)).collect();
         Ok(Self {
             schema: SIMULATOR_SCHEMA.to_owned(),
             name: model.name().to_owned(),

@@ -10,7 +10,6 @@ thread_local! {
     static GRAPH: RefCell<Graph> = RefCell::new(Graph::new());
 }
 
-/// A node of this thread's graph.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Symbol(Id);
 
@@ -30,7 +29,6 @@ impl Symbol {
         self.0
     }
 
-    /// One input of every joint.
     pub(crate) fn inputs(input: Input, dof: usize) -> Vec<Self> {
         (0..dof).map(|joint| in_graph(|graph| graph.input(input, joint))).collect()
     }
@@ -39,7 +37,6 @@ impl Symbol {
         self == Self::ZERO
     }
 
-    /// The value, if it is a constant.
     pub(crate) fn number(self) -> Option<f64> {
         GRAPH.with_borrow(|graph| graph.number(self.0))
     }

@@ -18,7 +18,6 @@ pub struct JointCoupling {
     driving: Vec<usize>,
     /// Nonzero entries of `G` by tree joint: degree of freedom, multiplier.
     rows: Vec<Vec<(usize, f64)>>,
-    /// `q_0`, rad or m.
     offsets: Vec<f64>,
 }
 

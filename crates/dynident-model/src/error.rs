@@ -34,6 +34,9 @@ pub enum ModelError {
     /// A value that is not finite.
     #[error("{what} is not a finite number")]
     NotFinite { what: String },
+    /// A setting that is not positive.
+    #[error("setting `{setting}` is {value}: give a positive number")]
+    NotPositive { setting: &'static str, value: f64 },
     /// A joint that does not exist.
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
     UnknownJoint { joint: String, known: Vec<String> },

@@ -1,7 +1,7 @@
 //! A joint between a body and its parent.
 
 use crate::spatial::{Mat3, Transform, Vec3};
-use crate::structure::{EXACT, Shift};
+use crate::structure::{PARALLEL_TOLERANCE_RAD, Shift};
 
 /// The kinds of joint with a degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,7 +139,7 @@ pub struct JointMap {
 
 /// Axes of parent and child along which `axis` is aligned, for a joint with the rotation `placement`.
 fn axes_along(placement: &Mat3, axis: Vec3) -> Option<(usize, usize)> {
-    let only = |v: Vec3| (0..3).find(|&k| (0..3).all(|i| i == k || v[i].abs() <= EXACT));
+    let only = |v: Vec3| (0..3).find(|&k| (0..3).all(|i| i == k || v[i].abs() <= PARALLEL_TOLERANCE_RAD));
     let child = only(axis)?;
     let row = |k: usize| placement.0[k][child];
     Some((only(Vec3([row(0), row(1), row(2)]))?, child))

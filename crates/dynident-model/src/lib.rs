@@ -74,7 +74,10 @@ pub mod urdf;
 mod xacro;
 mod xml;
 
-pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
+pub use audit::{
+    AuditFinding, AuditLevel, AuditSettings, Correction, Slip, SlipKind, SlipSettings, Slips, audit, audit_with, slips,
+    slips_with,
+};
 pub use coupling::JointCoupling;
 pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use dh_convention::DhConvention;

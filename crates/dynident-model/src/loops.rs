@@ -13,14 +13,14 @@ use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
 /// Largest gap of a closed loop relative to its size: lengths in descriptions have at least seven digits.
-const CLOSES: f64 = 1e-6;
+const GAP_TOLERANCE: f64 = 1e-6;
 /// Number of random postures that are tested, and their range about zero, rad (a fifth of it in metres).
-const POSTURES: usize = 50;
-const TRIED_RAD: f64 = 1.5;
+const POSTURE_COUNT: usize = 50;
+const POSTURE_RANGE_RAD: f64 = 1.5;
 /// Newton iterations from the description's zero position.
-const STEPS: usize = 30;
+const NEWTON_STEPS: usize = 30;
 /// Multipliers within this distance of an integer are rounded to it: those of parallelograms are integers.
-const WHOLE: f64 = 1e-7;
+const INTEGER_TOLERANCE: f64 = 1e-7;
 
 /// The cut of a loop: a point of one link that coincides with a point of another.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,21 +79,16 @@ pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mi
     Ok(loops.mimics(&law))
 }
 
-/// Loops of a model, and the joints of the tree that move them.
 struct Loops<'a> {
     model: &'a Model,
     cuts: Vec<Cut>,
-    /// Joints without drives.
     passive: Vec<usize>,
-    /// Other joints of the loops.
     active: Vec<usize>,
 }
 
-/// Linear law `q_p = C q_a + c`.
 struct Law {
     /// `C`: one row per passive joint, one column per active joint.
     multipliers: DMatrix<f64>,
-    /// `c`.
     offsets: Vec<f64>,
 }
 
@@ -119,7 +114,7 @@ impl<'a> Loops<'a> {
     fn closed(&self) -> Result<Vec<f64>, LoopError> {
         let Self { model, cuts, passive, .. } = self;
         let mut q = vec![0.0; model.tree_joints().len()];
-        for _ in 0..STEPS {
+        for _ in 0..NEWTON_STEPS {
             let (gap, jacobian) = (gaps(model, cuts, &q), jacobian(model, cuts, &q, passive));
             let Ok(step) = jacobian.svd(true, true).solve(&gap, 1e-9) else { break };
             for (&joint, step) in passive.iter().zip(step.iter()) {
@@ -127,7 +122,7 @@ impl<'a> Loops<'a> {
             }
         }
         let (gap_m, cut) = worst(model, cuts, &q);
-        if gap_m.is_nan() || gap_m > CLOSES * cut.size_m {
+        if gap_m.is_nan() || gap_m > GAP_TOLERANCE * cut.size_m {
             let [first, second] = cut.links.clone();
             return Err(LoopError::Open { first, second, gap_m });
         }
@@ -145,7 +140,7 @@ impl<'a> Loops<'a> {
         }
         let of_active = jacobian(model, cuts, q, active);
         let solved = of_passive.solve(&of_active, 1e-9 * largest).unwrap_or_else(|_| of_active.map(|_| f64::NAN));
-        let whole = |x: f64| if (x - x.round()).abs() < WHOLE { x.round() + 0.0 } else { x };
+        let whole = |x: f64| if (x - x.round()).abs() < INTEGER_TOLERANCE { x.round() + 0.0 } else { x };
         let offsets = passive.iter().map(|&joint| whole(q[joint])).collect();
         Ok(Law { multipliers: (-solved).map(whole), offsets })
     }
@@ -154,9 +149,10 @@ impl<'a> Loops<'a> {
     fn check(&self, law: &Law, mut q: Vec<f64>) -> Result<(), LoopError> {
         let Self { model, cuts, passive, active } = self;
         let mut random = Random::new(1);
-        for _ in 0..POSTURES {
+        for _ in 0..POSTURE_COUNT {
             for &joint in active {
-                let reach = if model.tree_joints()[joint].turns() { TRIED_RAD } else { 0.2 * TRIED_RAD };
+                let reach =
+                    if model.tree_joints()[joint].turns() { POSTURE_RANGE_RAD } else { 0.2 * POSTURE_RANGE_RAD };
                 q[joint] = random.uniform(-reach, reach);
             }
             for (row, &joint) in passive.iter().enumerate() {
@@ -167,7 +163,7 @@ impl<'a> Loops<'a> {
             let (gap_m, cut) = worst(model, cuts, &q);
             // The multipliers are only as exact as the lengths of the description, and postures far from zero amplify
             // their errors.
-            if gap_m.is_nan() || gap_m > 10.0 * CLOSES * cut.size_m {
+            if gap_m.is_nan() || gap_m > 10.0 * GAP_TOLERANCE * cut.size_m {
                 let [first, second] = cut.links.clone();
                 return Err(LoopError::NotLinear { first, second, gap_m });
             }
@@ -175,7 +171,6 @@ impl<'a> Loops<'a> {
         Ok(())
     }
 
-    /// The law in terms of joint names.
     fn mimics(&self, law: &Law) -> Vec<(String, Mimic)> {
         let tree = self.model.tree_joints();
         let follower = |(row, &joint): (usize, &usize)| {
@@ -192,14 +187,13 @@ impl<'a> Loops<'a> {
 
 /// Tree joints on the path to a link, and the pose of the link in the frame of the last joint's body, or of the base if
 /// there is no joint.
-pub(crate) fn way_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
+pub(crate) fn path_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
     let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
     let mut all = core::iter::once((None, model.base())).chain(bodies);
     let (body, own) = all.find_map(|(body, of)| Some((body, of.links.iter().find(|own| own.name == *link)?)))?;
     Some((body.map_or_else(Vec::new, |body| model.path(body)), own.placement))
 }
 
-/// A loop with its names resolved.
 struct Cut {
     links: [String; 2],
     /// Both ends: tree joints on the path, and the point in the frame of the last joint's body (or of the base).
@@ -214,7 +208,8 @@ impl Cut {
             if closure.points_m[k].iter().any(|x| !x.is_finite()) {
                 return Err(LoopError::NotFinite { link: link.clone() });
             }
-            let (path, placement) = way_to(model, link).ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
+            let (path, placement) =
+                path_to(model, link).ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
             Ok((path, placement.point(Vec3(closure.points_m[k]))))
         };
         let ends = [end(0)?, end(1)?];
@@ -245,7 +240,6 @@ fn gaps(model: &Model, cuts: &[Cut], q: &[f64]) -> DVector<f64> {
     DVector::from_iterator(3 * cuts.len(), cuts.iter().flat_map(|cut| gap(cut).0))
 }
 
-/// The loop with the largest gap relative to its size.
 fn worst<'c>(model: &Model, cuts: &'c [Cut], q: &[f64]) -> (f64, &'c Cut) {
     let gap = |cut: &Cut| (cut.end(model, 0, q).0 - cut.end(model, 1, q).0).norm();
     let of_size = |cut: &&Cut| gap(cut) / cut.size_m;

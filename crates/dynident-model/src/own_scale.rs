@@ -4,9 +4,9 @@ use crate::tree::{Model, STANDARD_GRAVITY};
 
 /// Length of the typical arm, m, from the first joint to the tip, at which the characteristic time is one second. Most
 /// bench arms have 0.9 to 1.7 m.
-const USUAL_ARM_M: f64 = 9.81 / PER_SECOND;
+const TYPICAL_ARM_M: f64 = 9.81 / TIME_SCALE_SQUARED;
 /// Square of the characteristic time in units of `length / gravity`.
-const PER_SECOND: f64 = 8.0;
+const TIME_SCALE_SQUARED: f64 = 8.0;
 
 /// Scale factors of time and length relative to a typical arm of 1.2 m.
 ///
@@ -30,13 +30,13 @@ impl OwnScale {
     /// Scale of a model from its longest chain of joints ([`Model::arm_m`]) and its gravity. Standard gravity is used
     /// if the model has none. A model without any length has the scale of a typical arm.
     pub fn of(model: &Model) -> Self {
-        let length_m = Some(model.arm_m()).filter(|length_m| *length_m > 0.0).unwrap_or(USUAL_ARM_M);
+        let length_m = Some(model.arm_m()).filter(|length_m| *length_m > 0.0).unwrap_or(TYPICAL_ARM_M);
         let own = model.gravity().norm();
         let gravity_m_s2 = if own > 0.0 { own } else { STANDARD_GRAVITY.norm() };
         let usable = |factor: f64| if factor.is_normal() && factor > 0.0 { factor } else { 1.0 };
         Self {
-            time: usable((PER_SECOND * length_m / gravity_m_s2).sqrt()),
-            length: usable(PER_SECOND * length_m / STANDARD_GRAVITY.norm()),
+            time: usable((TIME_SCALE_SQUARED * length_m / gravity_m_s2).sqrt()),
+            length: usable(TIME_SCALE_SQUARED * length_m / STANDARD_GRAVITY.norm()),
         }
     }
 
@@ -117,8 +117,8 @@ mod tests {
 
     #[test]
     fn an_arm_of_usual_length_on_earth_has_seconds_and_metres() {
-        let usual = arm(USUAL_ARM_M);
-        assert_eq!(usual.arm_m(), USUAL_ARM_M);
+        let usual = arm(TYPICAL_ARM_M);
+        assert_eq!(usual.arm_m(), TYPICAL_ARM_M);
         assert_eq!(usual.own_scale(), OwnScale::USUAL);
         assert_eq!(usual.with_gravity(Vec3::ZERO).unwrap().own_scale(), OwnScale::USUAL);
     }

@@ -15,7 +15,6 @@ pub struct Located<F: Error> {
 }
 
 impl<F: Error> Located<F> {
-    /// `fault` at byte `offset` of `text`.
     pub(crate) fn at(text: &str, offset: usize, fault: F) -> Self {
         let (line, column) = line_and_column(text, offset);
         Self { line, column, fault }

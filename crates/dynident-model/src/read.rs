@@ -119,7 +119,6 @@ pub fn has_xacro_macros(path: &Path) -> Result<bool, ReadError> {
     Ok(has_macros(&description_text(path)?))
 }
 
-/// Reads the text of a robot file.
 fn description_text(path: &Path) -> Result<String, ReadError> {
     let named = || path.to_owned();
     let bytes = bounded(path)?;
@@ -180,7 +179,6 @@ pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
     Ok(Robot { model, format, path: named(), text, unread, irregularities, notices, sdf_notices })
 }
 
-/// Reads a file up to the size limit.
 fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     // The size reported by the system may be wrong (kernel files), so the read itself is bounded.
@@ -193,7 +191,6 @@ fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
     Ok(bytes)
 }
 
-/// Extensions of recordings and tables.
 const RECORDINGS: [&str; 16] = [
     "csv", "tsv", "dat", "log", "mcap", "bag", "db3", "h5", "hdf5", "mat", "npy", "npz", "parquet", "feather", "xlsx",
     "ods",

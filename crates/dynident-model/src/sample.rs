@@ -57,7 +57,6 @@ impl Random {
     }
 }
 
-/// A joint without limits or friction.
 fn plain_joint(name: String, kind: JointKind, parent: Option<usize>, placement: Transform, axis: Vec3) -> Joint {
     Joint {
         name,

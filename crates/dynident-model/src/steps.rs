@@ -15,7 +15,7 @@
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
 use crate::spatial::{Mat3, Vec3};
-use crate::structure::{EXACT, Shift};
+use crate::structure::{PARALLEL_TOLERANCE_RAD, Shift};
 
 /// Constant part of the rotation from a body's inner frame to its parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +85,7 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
     let turn = |parent: usize| {
         let children = (parent + 1..tree.len()).filter(|&child| tree[child].parent == Some(parent));
         let mut relatives = children.map(|child| relative(child, &plain[parent]).0);
-        let right = relatives.find(|w| w[2][2].abs() <= EXACT);
+        let right = relatives.find(|w| w[2][2].abs() <= PARALLEL_TOLERANCE_RAD);
         // W = Rz(γ) Rx(α) Rz(δ), third column: (sin γ sin α, -cos γ sin α, cos α).
         right.map_or(0.0, |w| w[0][2].atan2(-w[1][2]))
     };
@@ -165,7 +165,6 @@ fn regroup(steps: &mut [JointStep]) {
 }
 
 impl StepRotation {
-    /// The child's z axis in the parent's frame.
     fn axis(&self) -> Vec3 {
         match self {
             Self::Aligned => Vec3([0.0, 0.0, 1.0]),
@@ -179,9 +178,9 @@ impl StepRotation {
 fn constant_rotation(w: &Mat3) -> (StepRotation, f64) {
     let m = &w.0;
     let slant = m[0][2].hypot(m[1][2]);
-    if m[2][2] > 0.0 && slant <= EXACT {
+    if m[2][2] > 0.0 && slant <= PARALLEL_TOLERANCE_RAD {
         (StepRotation::Aligned, m[1][0].atan2(m[0][0]))
-    } else if m[2][2].abs() <= EXACT && m[0][2].abs() <= EXACT && m[1][2] < 0.0 {
+    } else if m[2][2].abs() <= PARALLEL_TOLERANCE_RAD && m[0][2].abs() <= PARALLEL_TOLERANCE_RAD && m[1][2] < 0.0 {
         // Rx(90°) Rz(δ) has the third row (sin δ, cos δ, 0).
         (StepRotation::Quarter, m[2][0].atan2(m[2][1]))
     } else {

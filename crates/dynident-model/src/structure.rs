@@ -4,7 +4,7 @@ use crate::spatial::Vec3;
 
 /// Tolerance of parallel and perpendicular axes, rad: rounding error of rotations by multiples of 90° written as roll,
 /// pitch and yaw. It changes results by less than their own rounding error.
-pub(crate) const EXACT: f64 = 1e-15;
+pub(crate) const PARALLEL_TOLERANCE_RAD: f64 = 1e-15;
 
 /// Nonzero entries of an origin in the parent's frame; products with zeros are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

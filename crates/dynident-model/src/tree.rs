@@ -70,7 +70,6 @@ pub struct Model {
     other_convention: Option<Box<OtherConvention>>,
 }
 
-/// The model of a D-H table read in the other convention.
 #[derive(Clone, Debug, PartialEq)]
 struct OtherConvention {
     convention: DhConvention,
@@ -278,7 +277,6 @@ impl Model {
         self.other_convention.as_ref().map(|other| (other.convention, &other.model))
     }
 
-    /// Stores the model of the other convention.
     pub(crate) fn with_other_convention(mut self, convention: DhConvention, model: Self) -> Self {
         self.other_convention = Some(Box::new(OtherConvention { convention, model }));
         self

@@ -108,8 +108,8 @@ impl ContactMonitor {
                     fix,
                 });
             }
-            let looks = [settings.collision_s, settings.payload_s];
-            let found = looks.map(|constant_s| Watched::new(residuals, constant_s, settings.rate_hz));
+            let time_constants = [settings.collision_s, settings.payload_s];
+            let found = time_constants.map(|constant_s| MeanStatistics::new(residuals, constant_s, settings.rate_hz));
             levels.push(found.map(|one| one.level));
             let heights = found.map(|one| one.threshold(settings.rate_hz, residuals.len(), each));
             if let Some(&value) = heights.iter().find(|height| !(**height > 0.0 && height.is_finite())) {
@@ -146,10 +146,11 @@ impl ContactMonitor {
         check_positive("std_nm", std_nm)?;
         check_positive("correlation_s", &[correlation_s])?;
         let each = settings.false_alarms_per_hour / (2.0 * std_nm.len().max(1) as f64);
-        let (looks, rate_hz) = ([settings.collision_s, settings.payload_s], settings.rate_hz);
+        let (time_constants, rate_hz) = ([settings.collision_s, settings.payload_s], settings.rate_hz);
         let of = |std: &f64| {
-            looks.map(|constant_s| {
-                let height = |share: f64, crossings_hz: f64| share.sqrt() * rice(2.0 * 3600.0 * crossings_hz / each);
+            time_constants.map(|constant_s| {
+                let height =
+                    |share: f64, crossings_hz: f64| share.sqrt() * rice_height(2.0 * 3600.0 * crossings_hz / each);
                 let slow = height(
                     correlation_s / (correlation_s + constant_s),
                     1.0 / (core::f64::consts::TAU * (correlation_s * constant_s).sqrt()),
@@ -178,7 +179,7 @@ impl ContactMonitor {
     /// A different number of residuals, or a value that is not finite; the state is then unchanged.
     pub fn add(&mut self, residuals: &[f64]) -> Result<Option<Contact>, OnlineError> {
         check("residuals", residuals, self.means.len())?;
-        let gains = [self.settings.collision_s, self.settings.payload_s].map(|s| gain(s, self.settings.rate_hz));
+        let gains = [self.settings.collision_s, self.settings.payload_s].map(|s| mean_gain(s, self.settings.rate_hz));
         let (mut strongest, mut most) = (None, 1.0);
         for (joint, residual) in residuals.iter().enumerate() {
             for (place, look) in [Look::Collision, Look::Payload].into_iter().enumerate() {
@@ -201,13 +202,12 @@ impl ContactMonitor {
 }
 
 /// Weight of a new sample in an exponential mean.
-fn gain(constant_s: f64, rate_hz: f64) -> f64 {
+fn mean_gain(constant_s: f64, rate_hz: f64) -> f64 {
     1.0 - (-1.0 / (constant_s * rate_hz)).exp()
 }
 
-/// Statistics of one mean on undisturbed motion.
 #[derive(Clone, Copy)]
-struct Watched {
+struct MeanStatistics {
     level: f64,
     std: f64,
     /// Number of upward crossings of the level, and largest distance from it.
@@ -215,16 +215,16 @@ struct Watched {
     largest: f64,
 }
 
-impl Watched {
+impl MeanStatistics {
     fn new(residuals: &[f64], constant_s: f64, rate_hz: f64) -> Self {
-        let gain = gain(constant_s, rate_hz);
+        let mean_gain = mean_gain(constant_s, rate_hz);
         // The initial transient is skipped.
         let skipped = ((3.0 * constant_s * rate_hz) as usize).min(residuals.len() / 2);
         let mut mean = residuals.first().copied().unwrap_or(0.0);
         let means: Vec<f64> = residuals
             .iter()
             .map(|residual| {
-                mean += gain * (residual - mean);
+                mean += mean_gain * (residual - mean);
                 mean
             })
             .skip(skipped)
@@ -240,13 +240,13 @@ impl Watched {
     fn threshold(&self, rate_hz: f64, samples: usize, per_hour: f64) -> f64 {
         let seen_s = samples as f64 / rate_hz;
         let crossings_hz = self.crossings.max(1) as f64 / seen_s;
-        let expected = self.std * rice(2.0 * crossings_hz * seen_s);
+        let expected = self.std * rice_height(2.0 * crossings_hz * seen_s);
         let heavier = (self.largest / expected).max(1.0);
-        heavier * self.std * rice(2.0 * 3600.0 * crossings_hz / per_hour)
+        heavier * self.std * rice_height(2.0 * 3600.0 * crossings_hz / per_hour)
     }
 }
 
 /// Height, in standard deviations, that a Gaussian process exceeds once per this number of level crossings.
-fn rice(crossings: f64) -> f64 {
+fn rice_height(crossings: f64) -> f64 {
     (2.0 * crossings.max(core::f64::consts::E).ln()).sqrt()
 }

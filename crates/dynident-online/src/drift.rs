@@ -5,12 +5,6 @@ use crate::estimator::{OnlineEstimator, StartingPoint};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-/// Minimum number of checks that determine mean and variance of the statistic.
-const LEAST_LEARNED: usize = 8;
-
-/// Confidence of the upper limit of the statistic's variance.
-const CONFIDENCE: f64 = 0.95;
-
 /// Settings of drift detection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriftSettings {
@@ -18,26 +12,44 @@ pub struct DriftSettings {
     pub check_s: f64,
     /// Allowed false alarms per hour.
     pub false_alarms_per_hour: f64,
+    /// Minimum number of checks that determine mean and variance of the statistic; at least 2, default 8.
+    pub min_learned_checks: usize,
+    /// Confidence of the upper limit of the statistic's variance, between 0 and 1, default 0.95.
+    pub variance_confidence: f64,
 }
 
 impl DriftSettings {
     /// One false alarm in ten hours.
     pub fn new(check_s: f64) -> Self {
-        Self { check_s, false_alarms_per_hour: 0.1 }
+        Self { check_s, false_alarms_per_hour: 0.1, min_learned_checks: 8, variance_confidence: 0.95 }
     }
 
     /// Checks the settings.
     ///
     /// # Errors
-    /// A value that is not positive, or more allowed alarms than half of the checks.
+    /// A value that is not positive, more allowed alarms than half of the checks, or a value outside its range.
     pub fn validate(&self) -> Result<(), OnlineError> {
         check_positive("check_s", &[self.check_s])?;
         check_positive("false_alarms_per_hour", &[self.false_alarms_per_hour])?;
-        if self.level() < 0.5 {
-            return Ok(());
+        let faults = [
+            (
+                self.level() < 0.5,
+                "false_alarms_per_hour",
+                self.false_alarms_per_hour,
+                "allow fewer than one in two checks",
+            ),
+            (self.min_learned_checks >= 2, "min_learned_checks", self.min_learned_checks as f64, "give at least 2"),
+            (
+                self.variance_confidence > 0.0 && self.variance_confidence < 1.0,
+                "variance_confidence",
+                self.variance_confidence,
+                "give a number between 0 and 1",
+            ),
+        ];
+        match faults.into_iter().find(|(is_valid, ..)| !is_valid) {
+            Some((_, what, value, fix)) => Err(OnlineError::Number { what, value, fix }),
+            None => Ok(()),
         }
-        let fix = "give less than one for every second check";
-        Err(OnlineError::Number { what: "false_alarms_per_hour", value: self.false_alarms_per_hour, fix })
     }
 
     /// Allowed share of checks with a false alarm.
@@ -97,14 +109,14 @@ impl DriftMonitor {
 
     /// Whether enough checks were learned; before that, [`check`](Self::check) returns `None`.
     pub fn is_ready(&self) -> bool {
-        self.learned.len() >= LEAST_LEARNED
+        self.learned.len() >= self.settings.min_learned_checks
     }
 
-    /// Learns from a time in which the reference is true of the robot; to be called as often as
-    /// [`check`](Self::check) will be, eight times at least and better thirty. Allocates.
+    /// Learns the statistic while the reference is correct. Call it at the same interval as [`check`](Self::check)
+    /// later, at least eight times, preferably thirty times. Allocates.
     ///
     /// # Errors
-    /// An estimator of another robot, or one that has seen nothing.
+    /// An estimator of a different robot, or one without samples.
     pub fn learn(&mut self, estimator: &OnlineEstimator) -> Result<(), OnlineError> {
         let (statistic, _) = self.distance(estimator)?;
         check_positive("the distance from the reference", &[statistic])?;
@@ -121,7 +133,8 @@ impl DriftMonitor {
         let mean = self.learned.iter().sum::<f64>() / count;
         let squares: f64 = self.learned.iter().map(|one| (one / mean - 1.0).powi(2)).sum();
         // Upper limit of the variance.
-        let variance = squares / ChiSquared::new(count - 1.0).ok()?.inverse_cdf(1.0 - CONFIDENCE);
+        let variance =
+            squares / ChiSquared::new(count - 1.0).ok()?.inverse_cdf(1.0 - self.settings.variance_confidence);
         let freedom = 2.0 / variance.max(f64::EPSILON);
         let tail = FisherSnedecor::new(freedom, count * freedom).ok()?;
         Some(tail.inverse_cdf(1.0 - self.settings.level()))

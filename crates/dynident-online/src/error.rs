@@ -40,7 +40,6 @@ pub(crate) fn check(what: &'static str, values: &[f64], expected: usize) -> Resu
     }
 }
 
-/// Checks that all values are positive and finite.
 pub(crate) fn check_positive(what: &'static str, values: &[f64]) -> Result<(), OnlineError> {
     match values.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
         Some(&value) => Err(OnlineError::Number { what, value, fix: "give a positive number" }),

@@ -10,7 +10,7 @@ use dynident_model::terms::JointMotion;
 use nalgebra::{Cholesky, DMatrix};
 
 /// Weight above which all rows are rescaled, to prevent an overflow of its square.
-const LARGEST_GROWTH: f64 = 1e30;
+const MAX_GROWTH: f64 = 1e30;
 
 /// Settings of the estimator: weights of samples.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,8 +149,7 @@ impl OnlineEstimator {
         &self.settings
     }
 
-    /// Computes the regressor of the next sample.
-    fn see(&mut self, q: &[f64], dq: &[f64], ddq: &[f64]) {
+    fn update_regressor(&mut self, q: &[f64], dq: &[f64], ddq: &[f64]) {
         let motion = JointMotion { samples: 1, q, dq, ddq };
         let (model, layout) = (self.model.model(), self.model.layout());
         regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
@@ -175,7 +174,6 @@ impl OnlineEstimator {
         }
     }
 
-    /// Factor of the logged torque of a joint.
     fn gain(&self, joint: usize) -> f64 {
         self.model.torque_gains.get(joint).copied().unwrap_or(1.0)
     }
@@ -189,7 +187,7 @@ impl OnlineEstimator {
         for (what, values) in [("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)] {
             check(what, values, dof)?;
         }
-        self.see(q, dq, ddq);
+        self.update_regressor(q, dq, ddq);
         let layout = self.model.layout();
         let columns = layout.columns().len();
         for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
@@ -203,7 +201,7 @@ impl OnlineEstimator {
         self.factor.absorb()?;
         self.samples += 1;
         self.growth *= self.growth_per_sample;
-        if self.growth > LARGEST_GROWTH {
+        if self.growth > MAX_GROWTH {
             self.factor.scale(1.0 / self.growth)?;
             self.growth = 1.0;
         }
@@ -274,7 +272,7 @@ fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, Onli
         Some(own) => {
             own.l().solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?
         }
-        None => inverse_root(&covariance)?,
+        None => inverse_square_root(&covariance)?,
     };
     let right = &root * nalgebra::DVector::from_column_slice(&start.values);
     Ok(root.iter().chain(right.iter()).copied().collect())
@@ -282,8 +280,8 @@ fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, Onli
 
 /// `V^(-1/2)` of a rank-deficient covariance, such as from fewer segments than parameters. Small eigenvalues of the
 /// correlation matrix are raised to 1e-4 of the largest, so that unknown directions are not treated as exactly known.
-fn inverse_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
-    const LEAST_SHARE: f64 = 1e-4;
+fn inverse_square_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
+    const MIN_EIGENVALUE_RATIO: f64 = 1e-4;
     let std = covariance.diagonal().map(f64::sqrt);
     if !std.iter().all(|value| *value > 0.0 && value.is_finite()) {
         return Err(OnlineError::Covariance);
@@ -295,6 +293,6 @@ fn inverse_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> 
     if eigen.eigenvalues.min() < -1e-9 * largest {
         return Err(OnlineError::Covariance);
     }
-    let scale = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE * largest).sqrt());
+    let scale = eigen.eigenvalues.map(|value| value.max(MIN_EIGENVALUE_RATIO * largest).sqrt());
     Ok(DMatrix::from_fn(std.len(), std.len(), |i, j| eigen.eigenvectors[(j, i)] / (scale[i] * std[j])))
 }

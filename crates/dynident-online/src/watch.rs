@@ -7,9 +7,6 @@ use crate::error::{OnlineError, check_positive};
 use crate::estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
 use dynident_identification::RegressorModel;
 
-/// Time between drift checks, in half-lives of the estimator.
-const CHECK_HALF_LIVES: f64 = 4.0;
-
 /// Settings of the monitoring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchSettings {
@@ -26,6 +23,8 @@ pub struct WatchSettings {
     pub half_window: usize,
     /// Allowed false drift alarms per hour.
     pub drift_alarms_per_hour: f64,
+    /// Time between drift checks, in half-lives of the estimator; checks are nearly independent at the default of 4.
+    pub drift_check_half_lives: f64,
 }
 
 impl WatchSettings {
@@ -39,6 +38,7 @@ impl WatchSettings {
             band_hz: None,
             half_window: 10,
             drift_alarms_per_hour: 0.1,
+            drift_check_half_lives: 4.0,
         }
     }
 }
@@ -103,6 +103,7 @@ impl Watch {
         let contact =
             ContactMonitor::from_band(settings.contact.clone(), std_nm, settings.correlation_s, settings.band_hz)?;
         check_positive("half_life_s", settings.half_life_s.as_slice())?;
+        check_positive("drift_check_half_lives", &[settings.drift_check_half_lives])?;
         let online = OnlineSettings {
             half_life_samples: settings.half_life_s.map(|half| half * rate_hz),
             // For noise with a correlation of e^(-t/τ), or white noise up to the filter's cut-off.
@@ -119,10 +120,11 @@ impl Watch {
             let found = reference.values.len();
             return Err(OnlineError::Length { what: "values of the reference", expected: columns, found });
         }
-        let check_s = settings.half_life_s.map(|half| CHECK_HALF_LIVES * half);
+        let check_s = settings.half_life_s.map(|half| settings.drift_check_half_lives * half);
         let values = reference.values.clone();
         let drift = |check_s| {
-            let settings = DriftSettings { check_s, false_alarms_per_hour: settings.drift_alarms_per_hour };
+            let false_alarms_per_hour = settings.drift_alarms_per_hour;
+            let settings = DriftSettings { false_alarms_per_hour, ..DriftSettings::new(check_s) };
             DriftMonitor::new(settings, reference)
         };
         let samples_to_check = check_s.map_or(u64::MAX, |check_s| (check_s * rate_hz).ceil() as u64);
@@ -147,7 +149,7 @@ impl Watch {
     /// As [`OnlineEstimator::add`]; the state is then unchanged.
     pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
         let Self { estimator, reference, residuals, contact, .. } = self;
-        look(estimator, reference, residuals, contact, [q, dq, ddq, tau])
+        add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
     /// Adds measured positions and torques. Velocities and accelerations come from [`DelayedDerivatives`], so the
@@ -158,7 +160,7 @@ impl Watch {
     pub fn add_measured(&mut self, q: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
         let Self { derivatives, estimator, reference, residuals, contact, .. } = self;
         let Some(DelayedSample { q, dq, ddq, tau }) = derivatives.add(q, tau)? else { return Ok(None) };
-        look(estimator, reference, residuals, contact, [q, dq, ddq, tau])
+        add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
     /// Whether [`check_drift`](Self::check_drift) is due.
@@ -227,7 +229,7 @@ impl Watch {
 }
 
 /// Adds a sample to the estimator, and its residual to the contact monitor.
-fn look(
+fn add_sample(
     estimator: &mut OnlineEstimator,
     reference: &[f64],
     residuals: &mut [f64],

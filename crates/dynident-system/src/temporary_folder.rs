@@ -6,9 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::Builder;
 
-/// Prefix of the names of temporary folders.
 const PREFIX: &str = ".dynident-temporary-";
-/// Number of random characters at the end of the name.
 const RANDOM_CHARACTERS: usize = 6;
 /// Maximum number of attempts to create a folder that no other program treats as abandoned.
 const ATTEMPTS: usize = 100;

@@ -9,7 +9,6 @@ use core::fmt::Write;
 pub(super) struct CSyntax {
     /// `std::` in C++.
     pub(super) functions: &'static str,
-    /// Name of the step function.
     pub(super) step: String,
 }
 

@@ -17,11 +17,9 @@ use crate::graph::Input;
 use crate::robot_model::RobotModel;
 use crate::statements::{Statements, Syntax, statements};
 
-/// Input of a language writer.
 pub(crate) struct Source<'a> {
     pub(crate) robot: &'a RobotModel,
     pub(crate) equations: &'a Equations,
-    /// Lines of the comment at the head.
     pub(crate) notes: &'a [String],
 }
 
@@ -30,7 +28,6 @@ impl Source<'_> {
         self.equations.dof
     }
 
-    /// Statements of a function.
     fn statements(&self, function: &Equation, syntax: &dyn Syntax) -> Statements {
         statements(&self.equations.graph, &function.values, syntax)
     }
@@ -51,7 +48,6 @@ impl Source<'_> {
     }
 }
 
-/// Inputs of a function that its statements do not use.
 fn unused<'a>(function: &'a Equation, statements: &'a Statements) -> impl Iterator<Item = &'static str> + 'a {
     function.inputs.iter().filter(|input| !statements.used.contains(input)).map(|input| Input::name(*input))
 }

@@ -40,7 +40,6 @@ impl Syntax for PythonSyntax {
     }
 }
 
-/// A module of functions.
 pub(crate) fn python_module(source: &Source<'_>) -> String {
     let dof = source.dof();
     let mut text = source.comment("#");

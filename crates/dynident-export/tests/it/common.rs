@@ -194,7 +194,6 @@ pub(crate) fn rigid_accelerations(model: &Model, state: &Expected) -> Vec<f64> {
     forward_dynamics(model, &mut Workspace::new(model), &state.q, &state.dq, &state.tau).to_vec()
 }
 
-/// Whether a program can be run.
 pub(crate) fn has(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }

@@ -1,45 +1,33 @@
 //! Checks whether the inertials of the moving links are physically consistent and plausible.
 
 use super::AuditLevel::{Info, Problem, Warning};
-use super::{Findings, Lengths};
+use super::{AuditSettings, Findings, Lengths};
 use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Vec3};
 use crate::tree::{Link, Model};
 use nalgebra::Matrix3;
 
-/// Upper limit of a plausible link mass, kg; no link of a common arm is heavier.
-const LARGEST_MASS_KG: f64 = 1000.0;
 /// Density of osmium, the densest metal, kg/m³. A solid ball of it has nearly the smallest inertia possible for its
 /// mass.
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
-/// Tolerance of the physical inequalities relative to the largest moment: files often have 3 digits.
-const ROUNDING: f64 = 1e-2;
 /// Rounding error of the eigenvalues relative to the inertia about the frame's origin.
-const NUMERICAL: f64 = 1e-9;
-/// Distance of the centre of mass from the frame, in body lengths, above which it gives a warning, and above which it
-/// is a unit error.
-const FAR: f64 = 3.0;
-const ABSURDLY_FAR: f64 = 50.0;
-/// Share of the parallel-axis term in the inertia above which the moments may be about the link's origin. A uniform rod
-/// about its end has 0.75; correct inertials rarely exceed 0.7.
-const MOSTLY_SHIFT: f64 = 0.7;
+const EIGENVALUE_ROUNDING: f64 = 1e-9;
 
-pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
+pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, findings: &mut Findings) {
     for (index, body) in model.bodies().iter().enumerate() {
         for link in &body.links {
             if let Some(inertial) = &link.inertial {
-                check_consistent(&link.name, inertial, findings);
-                likely(&link.name, inertial, lengths.bodies[index], findings);
+                check_consistent(&link.name, inertial, settings, findings);
+                check_plausible(&link.name, inertial, lengths.bodies[index], settings, findings);
             }
         }
-        unknown(model, index, findings);
+        report_unknown(model, index, findings);
     }
-    massless(model, findings);
-    equal(model, findings);
+    report_massless(model, findings);
+    report_equal(model, findings);
 }
 
-/// Checks for a positive mass and possible principal moments.
-fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Findings) {
+fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditSettings, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
     if *inertial == InertialParameters::ZERO {
@@ -54,7 +42,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
     };
     let [least, middle, most] = moments;
     // The moments are a difference from the inertia about the frame's origin and carry its rounding error.
-    let rounding = NUMERICAL * trace(&inertial.inertia_at_origin()).abs();
+    let rounding = EIGENVALUE_ROUNDING * trace(&inertial.inertia_at_origin()).abs();
     if least < -rounding {
         let message = format!(
             "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: none may be negative; \
@@ -63,7 +51,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
         findings.add(Problem, "inertia-not-positive", place(), message);
     } else if least + middle < most - rounding {
         let excess = (most - least - middle) / most;
-        let level = if excess < ROUNDING { Warning } else { Problem };
+        let level = if excess < settings.moment_rounding { Warning } else { Problem };
         let message = format!(
             "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2: the largest may not exceed the sum of the others \
              (by {:.2} % here); no mass distribution has them, check the moments",
@@ -73,12 +61,17 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
     }
 }
 
-/// Compares mass, centre of mass and inertia with the robot's lengths.
-fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &mut Findings) {
+fn check_plausible(
+    link: &str,
+    inertial: &InertialParameters,
+    length_m: f64,
+    settings: &AuditSettings,
+    findings: &mut Findings,
+) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
     let (Some(com), Some(inertia)) = (inertial.com_m(), inertial.inertia_at_com()) else { return };
-    if mass > LARGEST_MASS_KG {
+    if mass > settings.max_link_mass_kg {
         let message = format!("has mass {mass} kg: if that is grams, divide by 1000");
         findings.add(Warning, "mass-absurd", place(), message);
     }
@@ -86,8 +79,8 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
         return;
     }
     let distance = com.norm();
-    if distance > FAR * length_m {
-        let absurd = distance > ABSURDLY_FAR * length_m;
+    if distance > settings.max_distance_lengths * length_m {
+        let absurd = distance > settings.problem_distance_lengths * length_m;
         let fix = if absurd { "; if that is millimetres, divide by 1000" } else { ": check its frame and unit" };
         let message =
             format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}");
@@ -95,9 +88,9 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     }
     // Mean square distance of the mass from its centre: `½ tr(I) / m`.
     let square = 0.5 * trace(&inertia) / mass;
-    if square > (FAR * length_m).powi(2) {
+    if square > (settings.max_distance_lengths * length_m).powi(2) {
         findings.add(
-            if square > (ABSURDLY_FAR * length_m).powi(2) { Problem } else { Warning },
+            if square > (settings.problem_distance_lengths * length_m).powi(2) { Problem } else { Warning },
             "inertia-too-large",
             place(),
             format!(
@@ -115,7 +108,7 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
         );
         findings.add(Warning, "inertia-too-small", place(), message);
     }
-    about_origin(link, inertial, com, &inertia, findings);
+    check_reference_point(link, inertial, settings.max_parallel_axis_share, findings);
     let d = [inertia.0[0][0], inertia.0[1][1], inertia.0[2][2]];
     let products = [inertia.0[0][1], inertia.0[0][2], inertia.0[1][2]];
     let power_of_ten = |x: f64| x > 0.0 && (x.log10() - x.log10().round()).abs() < 1e-9;
@@ -130,14 +123,15 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
 
 /// Reports an inertia that was computed about the link's origin but written as if about the centre of mass: without the
 /// parallel-axis term, which is most of the inertia, a consistent body remains.
-fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
+fn check_reference_point(link: &str, inertial: &InertialParameters, max_share: f64, findings: &mut Findings) {
+    let (Some(com), Some(inertia)) = (inertial.com_m(), inertial.inertia_at_com()) else { return };
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);
-    let share = trace(&shift) / trace(inertia);
-    if !(MOSTLY_SHIFT..1.0).contains(&share) {
+    let share = trace(&shift) / trace(&inertia);
+    if !(max_share..1.0).contains(&share) {
         return;
     }
-    let rest = *inertia - shift;
+    let rest = inertia - shift;
     let mut moments: [f64; 3] = Matrix3::from_fn(|a, b| rest.0[a][b]).symmetric_eigenvalues().into();
     moments.sort_by(f64::total_cmp);
     if moments[0] > 0.0 && moments[0] + moments[1] >= moments[2] {
@@ -150,8 +144,7 @@ fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &
     }
 }
 
-/// Reports bodies and links without an inertial.
-fn unknown(model: &Model, index: usize, findings: &mut Findings) {
+fn report_unknown(model: &Model, index: usize, findings: &mut Findings) {
     let body = &model.bodies()[index];
     let place = || format!("link {}", body.name());
     if body.prior().is_none() {
@@ -168,8 +161,7 @@ fn unknown(model: &Model, index: usize, findings: &mut Findings) {
     }
 }
 
-/// Reports joints that move no mass.
-fn massless(model: &Model, findings: &mut Findings) {
+fn report_massless(model: &Model, findings: &mut Findings) {
     let known: Vec<bool> = model.inertials().iter().map(|inertial| *inertial != InertialParameters::ZERO).collect();
     let moves_mass = |joint: usize| (0..known.len()).any(|body| known[body] && model.moves(joint, body));
     for (_, joint) in model.joints().iter().enumerate().filter(|(index, _)| !moves_mass(*index)) {
@@ -179,8 +171,7 @@ fn massless(model: &Model, findings: &mut Findings) {
     }
 }
 
-/// Reports that all links have the same inertial.
-fn equal(model: &Model, findings: &mut Findings) {
+fn report_equal(model: &Model, findings: &mut Findings) {
     let known: Vec<(&Link, &InertialParameters)> = model
         .bodies()
         .iter()

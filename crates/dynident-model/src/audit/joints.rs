@@ -1,30 +1,20 @@
 //! Checks of the joints: limits, offsets, friction, mimic joints.
 
 use super::AuditLevel::{Info, Problem, Warning};
-use super::{Findings, Lengths};
+use super::{AuditSettings, Findings, Lengths};
 use crate::joint::{Joint, JointKind};
 use crate::tree::Model;
 
-/// Largest plausible distance between two joints, m.
-const LARGEST_OFFSET_M: f64 = 10.0;
-/// Largest plausible position limit, rad: nearly five turns, more than common multi-turn joints and far below 180
-/// (degrees).
-const LARGEST_TURN_RAD: f64 = 30.0;
-/// Largest plausible stroke of a rail, m.
-const LARGEST_STROKE_M: f64 = 100.0;
-/// Largest plausible joint velocity, rad/s: twice that of small legged robots.
-const LARGEST_REVOLUTE_VELOCITY_RAD_S: f64 = 100.0;
-
-pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
+pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, findings: &mut Findings) {
     for joint in model.tree_joints() {
         let place = || format!("joint {}", joint.name);
         let offset = joint.placement.translation.norm();
-        if offset > LARGEST_OFFSET_M {
+        if offset > settings.max_joint_offset_m {
             let message = format!("stands {offset:.4} m from its parent joint: if that is millimetres, divide by 1000");
             findings.add(Problem, "length-unit", place(), message);
         }
         let follows = model.joint_index(&joint.name).is_none();
-        limits(joint, follows, findings);
+        check_limits(joint, follows, settings, findings);
         for (what, value) in [("damping", joint.damping), ("friction", joint.friction)] {
             if value.is_some_and(|value| value < 0.0) {
                 let message = format!("has a negative {what}, which would drive the joint: fix the sign");
@@ -47,7 +37,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     }
 }
 
-fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
+fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings: &mut Findings) {
     let mut add = |level, check, message: String| findings.add(level, check, format!("joint {}", joint.name), message);
     let limits = &joint.limits;
     let turns = joint.turns();
@@ -72,11 +62,11 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
             }
         }
         let largest = limits.lower.into_iter().chain(limits.upper).map(f64::abs).fold(0.0, f64::max);
-        if turns && largest > LARGEST_TURN_RAD {
+        if turns && largest > settings.max_position_limit_rad {
             let has = format!("has a limit of {largest} rad: if that is degrees, write {:.6}", largest.to_radians());
             add(Warning, "limit-unit", has);
         }
-        if !turns && largest > LARGEST_STROKE_M {
+        if !turns && largest > settings.max_position_limit_m {
             let has = format!("has a limit of {largest} m: if that is millimetres, write {}", largest / 1000.0);
             add(Warning, "limit-unit", has);
         }
@@ -87,7 +77,7 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
                 format!("has a velocity limit of {velocity} {unit}/s, so that it may not move: give the real one");
             add(Warning, "velocity-limit", has);
         }
-        Some(velocity) if turns && velocity > LARGEST_REVOLUTE_VELOCITY_RAD_S => {
+        Some(velocity) if turns && velocity > settings.max_velocity_limit_rad_s => {
             let degrees = velocity.to_radians();
             let has = format!("has a velocity limit of {velocity} rad/s: if that is degrees, write {degrees:.6}");
             add(Warning, "limit-unit", has);

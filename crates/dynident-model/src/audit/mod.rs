@@ -5,10 +5,13 @@
 
 mod inertials;
 mod joints;
+mod settings;
 mod slips;
 
-pub use slips::{Correction, Slip, SlipKind, Slips, slips};
+pub use settings::AuditSettings;
+pub use slips::{Correction, Slip, SlipKind, SlipSettings, Slips, slips, slips_with};
 
+use crate::error::ModelError;
 use crate::tree::Model;
 
 /// Severity of a finding.
@@ -54,6 +57,19 @@ pub struct AuditFinding {
 /// `placeholder`, `equal-inertials`, `inertial-unknown`, `massless-subtree`, `length-unit`, `limit-missing`,
 /// `limit-order`, `limit-range`, `limit-unit`, `velocity-limit`, `effort-limit`, `friction-negative`, `mimic`.
 pub fn audit(model: &Model) -> Vec<AuditFinding> {
+    findings(model, &AuditSettings::default())
+}
+
+/// As [`audit`], with other thresholds.
+///
+/// # Errors
+/// Invalid settings.
+pub fn audit_with(model: &Model, settings: &AuditSettings) -> Result<Vec<AuditFinding>, ModelError> {
+    settings.validate()?;
+    Ok(findings(model, settings))
+}
+
+fn findings(model: &Model, settings: &AuditSettings) -> Vec<AuditFinding> {
     let mass: f64 = model.inertials().iter().map(crate::InertialParameters::mass_kg).sum();
     let lengths = Lengths::of(model);
     let mut findings = Findings(Vec::new());
@@ -63,8 +79,8 @@ pub fn audit(model: &Model) -> Vec<AuditFinding> {
         lengths.reach
     );
     findings.add(AuditLevel::Info, "summary", "model".to_owned(), summary);
-    joints::check(model, &lengths, &mut findings);
-    inertials::check(model, &lengths, &mut findings);
+    joints::check(model, &lengths, settings, &mut findings);
+    inertials::check(model, &lengths, settings, &mut findings);
     findings.0
 }
 
@@ -76,7 +92,6 @@ impl Findings {
     }
 }
 
-/// Lengths of the robot, for comparison.
 struct Lengths {
     /// Largest sum of joint offsets from the base to a joint, m.
     reach: f64,

@@ -26,7 +26,6 @@ type Affine = [[f64; 4]; 3];
 
 const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// Triangles of all geometries in the scene, m.
 pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
     if flood(text).is_some() {
         return Err(MeshFault::Collada("thousands of attributes in one element, or of nested namespaces"));
@@ -82,7 +81,6 @@ struct Reader<'a, 'i> {
 }
 
 impl<'a, 'i> Reader<'a, 'i> {
-    /// Adds a scene node and its children; `placed` maps from the parent's frame.
     fn node(&mut self, node: Node<'a, 'i>, placed: &Affine, depth: usize) -> Result<(), MeshFault> {
         self.visits += 1;
         if self.visits > MAX_VISITS || depth > MAX_DEPTH {
@@ -206,7 +204,6 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 }
 
-/// Triangle fan of a convex polygon.
 fn fan(corners: &[Vec3]) -> impl Iterator<Item = [Vec3; 3]> {
     corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
@@ -277,12 +274,10 @@ fn children<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Ite
     node.children().filter(move |child| child.has_tag_name(name))
 }
 
-/// Element named by `url="#id"`.
 fn target<'a, 'i>(instance: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
     by_id.get(instance.attribute("url")?.trim().strip_prefix('#')?).copied()
 }
 
-/// Element named by `source="#id"`.
 fn source<'a, 'i>(input: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
     by_id.get(input.attribute("source")?.trim().strip_prefix('#')?).copied()
 }

@@ -12,7 +12,6 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// Merges equal vertices and drops degenerate triangles.
     pub(super) fn merged(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let bits: Vec<[u64; 3]> = vertices.iter().map(|v| v.0.map(|x| (x + 0.0).to_bits())).collect();
         let mut ordered = bits.clone();
@@ -26,7 +25,6 @@ impl TriangleMesh {
         }
     }
 
-    /// Mesh of separate triangles, three vertices each.
     pub(super) fn of_corners(corners: &[Vec3]) -> Self {
         let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         Self::merged(corners, &triangles)

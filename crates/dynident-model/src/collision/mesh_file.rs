@@ -14,7 +14,7 @@ const MAX_MESH_BYTES: u64 = 256 << 20;
 const MAX_COORDINATE: f64 = 1e9;
 
 /// Number of folders above the description that are searched for a package.
-const LEVELS: usize = 8;
+const MAX_PARENT_LEVELS: usize = 8;
 
 /// Why a collision shape cannot be used.
 #[derive(Debug, Error)]
@@ -85,7 +85,7 @@ pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
     };
     let (package, rest) = of_package.split_once('/')?;
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let above = || absolute.ancestors().take(LEVELS);
+    let above = || absolute.ancestors().take(MAX_PARENT_LEVELS);
     let named = |at: &Path| at.file_name().is_some_and(|name| name == package);
     above()
         .find_map(|at| there(at.join(package).join(rest)))
@@ -109,7 +109,6 @@ pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     parsed.map_err(|fault| MeshError::Content { path, fault })
 }
 
-/// Parses an STL, OBJ or COLLADA file, distinguished by content.
 fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
     if bytes.starts_with(b"version https://git-lfs.github.com/spec") {
         return Err(MeshFault::LfsPointer);
@@ -138,7 +137,6 @@ fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
 mod tests {
     use super::*;
 
-    /// Two triangles with four corners, two of them shared.
     const TEXT: &str = "solid part\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1e0 0\n  endloop\n endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 1 0 0\n   vertex 0 1 0\n   vertex 0 0 -2.5\n  endloop\n endfacet\nendsolid part\n";
 
     fn binary(head: &[u8; 80], corners: &[[f32; 3]]) -> Vec<u8> {

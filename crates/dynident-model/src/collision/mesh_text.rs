@@ -4,7 +4,6 @@ use super::MeshFault;
 use super::mesh::TriangleMesh;
 use crate::spatial::Vec3;
 
-/// Triangles of a text STL: three `vertex` lines each.
 pub(super) fn stl(text: &str) -> Result<TriangleMesh, MeshFault> {
     let mut corners = Vec::new();
     for line in text.lines() {

@@ -16,7 +16,7 @@ pub struct Solid {
 }
 
 /// Sides of the prism around a cylinder: 2 % wider at its corners.
-const SIDES: usize = 16;
+const PRISM_SIDES: usize = 16;
 
 impl CollisionShape {
     /// A solid in the link's frame that contains the shape: exact for boxes, spheres and capsules, a prism with 16
@@ -35,13 +35,18 @@ impl CollisionShape {
                 ((0..8).map(corner).collect(), 0.0)
             }
             CollisionGeometry::Cylinder { radius_m, length_m } => {
-                let outer = radius_m / (core::f64::consts::PI / SIDES as f64).cos();
+                let outer = radius_m / (core::f64::consts::PI / PRISM_SIDES as f64).cos();
                 let corner = |side: usize, z: f64| {
-                    let (sin, cos) = (core::f64::consts::TAU * side as f64 / SIDES as f64).sin_cos();
+                    let (sin, cos) = (core::f64::consts::TAU * side as f64 / PRISM_SIDES as f64).sin_cos();
                     Vec3([outer * cos, outer * sin, z])
                 };
                 let ends = [-0.5 * length_m, 0.5 * length_m];
-                (ends.into_iter().flat_map(|z| (0..SIDES).map(move |side| corner(side, z))).collect::<Vec<_>>(), 0.0)
+                (
+                    ends.into_iter()
+                        .flat_map(|z| (0..PRISM_SIDES).map(move |side| corner(side, z)))
+                        .collect::<Vec<_>>(),
+                    0.0,
+                )
             }
             CollisionGeometry::Sphere { radius_m } => (vec![Vec3::ZERO], *radius_m),
             CollisionGeometry::Capsule { radius_m, length_m } => {

@@ -80,7 +80,6 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
     model.and_then(|model| model.with_gravity(gravity)).map_err(|error| source.fault(0, DhFault::Model(error)))
 }
 
-/// Place of a link.
 #[derive(Clone, Copy)]
 struct LinkPlace {
     /// Body that the link belongs to; `None` for the base.
@@ -89,7 +88,6 @@ struct LinkPlace {
     body_from_dh: Transform,
 }
 
-/// Names of a row, and its D-H frame.
 pub(super) struct RowFrame {
     pub(super) joint: String,
     pub(super) link: String,
@@ -113,7 +111,6 @@ fn default_link(joint: &str) -> String {
     format!("{joint}_link")
 }
 
-/// Body frame and D-H frame of a row.
 struct Frames {
     /// Body frame at position zero, in the parent's D-H frame.
     placement: Transform,
@@ -277,7 +274,6 @@ impl Source<'_> {
         })
     }
 
-    /// The inertial in D-H frame i.
     fn inertial(&self, inertial: &Spanned<Inertial>) -> Result<InertialParameters, DhError> {
         let Inertial { mass_kg, com_m, inertia_at_com, inertia_at_origin, parameters } = inertial.get_ref();
         let matrix = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);

@@ -5,7 +5,6 @@ use crate::joint::JointKind;
 use serde::Deserialize;
 use toml::Spanned;
 
-/// A number with its place.
 pub(super) type Number = Option<Spanned<f64>>;
 
 #[derive(Clone, Copy, Default, Deserialize)]

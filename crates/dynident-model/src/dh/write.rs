@@ -11,7 +11,6 @@ use std::collections::HashSet;
 use thiserror::Error;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 
-/// The keys of an `inertial`.
 const KEYS: [&str; 5] = ["mass_kg", "com_m", "inertia_at_com", "inertia_at_origin", "parameters"];
 /// Prefix of comments written by Dynident; a new identification replaces them.
 const SIGNATURE: &str = "# identified: ";
@@ -146,7 +145,6 @@ fn set_inertial(row: &mut dyn TableLike, inertial: &InertialParameters) {
     }
 }
 
-/// Writes the note as a comment line before `inertial`.
 fn set_note(row: &mut dyn TableLike, note: &str) {
     let line = format!("{SIGNATURE}{}\n", dynident_text::comment(note));
     let with_note = |before: Option<&str>| -> String {

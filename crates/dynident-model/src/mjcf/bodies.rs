@@ -18,11 +18,10 @@ use crate::urdf::MAX_MOVING_JOINTS;
 use crate::xml::shortened;
 use std::collections::{HashMap, HashSet};
 
-/// Name of the fixed link.
 pub(super) const WORLD: &str = "world";
 
 /// Elements of a body without influence on its dynamics.
-const APART: [&str; 4] = ["site", "camera", "light", "plugin"];
+const NON_DYNAMIC_ELEMENTS: [&str; 4] = ["site", "camera", "light", "plugin"];
 const IN_BODY: [&str; 14] = [
     "name",
     "class",
@@ -69,7 +68,6 @@ const IN_JOINT: [&str; 25] = [
     "align",
 ];
 
-/// Place of a link in the document.
 #[derive(Clone, Debug)]
 pub(super) struct LinkPlace {
     pub(super) name: String,
@@ -79,7 +77,6 @@ pub(super) struct LinkPlace {
     pub(super) origin: Vec3,
 }
 
-/// The tree so far.
 pub(super) struct Tree {
     pub(super) joints: Vec<Joint>,
     /// Elements of the joints, in the same order.
@@ -89,13 +86,11 @@ pub(super) struct Tree {
     pub(super) bodies: Vec<Body>,
     pub(super) base: Body,
     pub(super) links: Vec<LinkPlace>,
-    /// Links with an unknown mass.
     pub(super) unknown: HashSet<String>,
 }
 
-/// A `<body>` to be visited.
 #[derive(Clone, Copy)]
-struct Ahead<'t> {
+struct PendingBody<'t> {
     element: &'t Element,
     /// Body of the model that carries the surrounding `<body>`.
     carrier: Option<usize>,
@@ -104,7 +99,6 @@ struct Ahead<'t> {
     childclass: ClassId,
 }
 
-/// Contents of a `<body>`.
 #[derive(Default)]
 struct Contents<'t> {
     inertial: Option<InertialParameters>,
@@ -114,7 +108,6 @@ struct Contents<'t> {
     bodies: Vec<(&'t Element, Transform, ClassId)>,
 }
 
-/// Reads `<worldbody>`.
 pub(super) struct Reader<'t> {
     pub(super) document: &'t Expanded,
     pub(super) classes: &'t Classes<'t>,
@@ -124,7 +117,6 @@ pub(super) struct Reader<'t> {
     body_count: usize,
     body_names: HashSet<String>,
     joint_names: HashSet<String>,
-    /// Links with an unknown mass, and the reason.
     unknown: HashMap<String, (&'static str, Place)>,
 }
 
@@ -155,11 +147,11 @@ impl<'t> Reader<'t> {
             unknown: HashSet::new(),
         };
         // A stack avoids recursion, because a chain may be as long as the file.
-        let mut ahead: Vec<Ahead<'t>> = Vec::new();
+        let mut ahead: Vec<PendingBody<'t>> = Vec::new();
         for world in self.document.sections("worldbody") {
             let contents = self.contents(world, WORLD, MAIN, true)?;
             tree.base.links[0].collision.extend(shapes(contents.geoms, Vec3::ZERO));
-            ahead.extend(contents.bodies.into_iter().map(|(element, carrier_from_parent, childclass)| Ahead {
+            ahead.extend(contents.bodies.into_iter().map(|(element, carrier_from_parent, childclass)| PendingBody {
                 element,
                 carrier: None,
                 carrier_from_parent,
@@ -175,8 +167,13 @@ impl<'t> Reader<'t> {
         Ok(tree)
     }
 
-    fn visit(&mut self, next: Ahead<'t>, tree: &mut Tree, ahead: &mut Vec<Ahead<'t>>) -> Result<(), MjcfError> {
-        let Ahead { element, carrier, carrier_from_parent, childclass } = next;
+    fn visit(
+        &mut self,
+        next: PendingBody<'t>,
+        tree: &mut Tree,
+        ahead: &mut Vec<PendingBody<'t>>,
+    ) -> Result<(), MjcfError> {
+        let PendingBody { element, carrier, carrier_from_parent, childclass } = next;
         let stated = Stated::own(self.document, element);
         let name = self.body_name(element)?;
         self.note_unread(&stated, &IN_BODY);
@@ -230,7 +227,7 @@ impl<'t> Reader<'t> {
             host.links.push(Link { name, placement, inertial, collision });
         }
         let carrier_from_body = placement.then(&shift);
-        ahead.extend(contents.bodies.into_iter().rev().map(|(element, body_from_frame, childclass)| Ahead {
+        ahead.extend(contents.bodies.into_iter().rev().map(|(element, body_from_frame, childclass)| PendingBody {
             element,
             carrier: at,
             carrier_from_parent: carrier_from_body.then(&body_from_frame),
@@ -342,7 +339,7 @@ impl<'t> Reader<'t> {
                     let what = format!("<{}>", element.tag);
                     return unsupported(&what, "save the model from MuJoCo (mj_saveLastXML), which writes it out");
                 }
-                tag if APART.contains(&tag) => {}
+                tag if NON_DYNAMIC_ELEMENTS.contains(&tag) => {}
                 tag => {
                     let loss = Loss::Unread { element: shortened(tag), attribute: None };
                     self.notices.note_at(self.document, element.place, loss);
@@ -372,7 +369,7 @@ impl<'t> Reader<'t> {
             }
             for mass in contents.geoms.iter().flatten().map(|geom| geom.mass) {
                 match mass {
-                    GeomMass::Nothing => {}
+                    GeomMass::Massless => {}
                     GeomMass::Known(inertial) => sum = Some(sum.map_or(inertial, |sum| sum.plus(&inertial))),
                     GeomMass::Unknown(why) => {
                         self.unknown.insert(name.to_owned(), (why, element.place));

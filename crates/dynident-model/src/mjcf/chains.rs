@@ -15,7 +15,7 @@ use crate::tree::Model;
 use std::collections::HashSet;
 
 /// Maximum number of chains; robots have few, and their sizes multiply.
-const MOST: usize = 16;
+const MAX_CHAINS: usize = 16;
 
 /// A `<connect>` that names a body and an anchor.
 pub(super) struct Connect<'t> {
@@ -25,13 +25,11 @@ pub(super) struct Connect<'t> {
     pub(super) anchor: Vec3,
 }
 
-/// Bodies and joints of the document.
-pub(super) struct Around<'a> {
+pub(super) struct ChainContext<'a> {
     pub(super) document: &'a Expanded,
     pub(super) links: &'a [LinkPlace],
     /// Positions in the drawn pose, in the order of the tree.
     pub(super) references: &'a [f64],
-    /// Joints with actuators.
     pub(super) driven: &'a HashSet<String>,
 }
 
@@ -39,7 +37,7 @@ pub(super) struct Around<'a> {
 pub(super) fn closed(
     model: Model,
     connects: &[Connect<'_>],
-    around: &Around<'_>,
+    around: &ChainContext<'_>,
     notices: &mut Notices,
 ) -> Result<Model, MjcfError> {
     let mut left = |connect: &Connect<'_>, why: String| {
@@ -48,8 +46,8 @@ pub(super) fn closed(
     };
     let mut held = Vec::new();
     for (number, connect) in connects.iter().enumerate() {
-        if number >= MOST {
-            left(connect, format!("more than {MOST} chains are not tried"));
+        if number >= MAX_CHAINS {
+            left(connect, format!("more than {MAX_CHAINS} chains are not tried"));
             continue;
         }
         match closure(&model, connect, around) {
@@ -84,8 +82,8 @@ fn blames(error: &LoopError, closure: &LoopClosure) -> bool {
 }
 
 /// Cut of a chain, or the reason why it cannot be closed.
-fn closure(model: &Model, connect: &Connect<'_>, around: &Around<'_>) -> Result<LoopClosure, String> {
-    let way = |link: &String| loops::way_to(model, link).ok_or_else(|| format!("there is no body `{link}`"));
+fn closure(model: &Model, connect: &Connect<'_>, around: &ChainContext<'_>) -> Result<LoopClosure, String> {
+    let way = |link: &String| loops::path_to(model, link).ok_or_else(|| format!("there is no body `{link}`"));
     let [(first, first_placement), (second, second_placement)] = [way(&connect.bodies[0])?, way(&connect.bodies[1])?];
     let drawn = |path: &[usize], placement: Transform| {
         let joints = path.iter().map(|&joint| model.tree_joints()[joint].transform(around.references[joint]));

@@ -20,7 +20,6 @@ const ACTUATORS: [&str; 11] = [
     "plugin",
 ];
 
-/// Index of a class.
 pub(super) type ClassId = usize;
 
 /// Class of elements that do not name one.
@@ -32,7 +31,6 @@ struct Class<'t> {
     attributes: HashMap<&'static str, Vec<&'t Attribute>>,
 }
 
-/// All classes of a document.
 pub(super) struct Classes<'t> {
     classes: Vec<Class<'t>>,
     by_name: HashMap<&'t str, ClassId>,
@@ -50,7 +48,6 @@ fn kind_of(tag: &str) -> Option<&'static str> {
 }
 
 impl<'t> Classes<'t> {
-    /// Reads all `<default>` sections.
     pub(super) fn new(document: &'t Expanded) -> Result<Self, MjcfError> {
         let main = Class { parent: None, attributes: HashMap::new() };
         let mut found = Self { classes: vec![main], by_name: HashMap::from([("main", MAIN)]) };
@@ -127,7 +124,6 @@ impl<'t> Classes<'t> {
     }
 }
 
-/// Effective attributes of an element, nearest statement first.
 pub(super) struct Stated<'t> {
     pub(super) document: &'t Expanded,
     pub(super) tag: &'t str,
@@ -136,18 +132,15 @@ pub(super) struct Stated<'t> {
 }
 
 impl<'t> Stated<'t> {
-    /// Attributes of an element without defaults.
     pub(super) fn own(document: &'t Expanded, element: &'t Element) -> Self {
         let levels = vec![element.attributes.iter().collect()];
         Self { document, tag: &element.tag, place: element.place, levels }
     }
 
-    /// Attributes that the element itself states.
     pub(super) fn own_attributes(&self) -> impl Iterator<Item = &'t Attribute> {
         self.levels[0].iter().copied()
     }
 
-    /// Nearest statement of an attribute.
     pub(super) fn get(&self, name: &str) -> Option<&'t Attribute> {
         self.levels.iter().flatten().find(|attribute| attribute.name == name).copied()
     }

@@ -87,7 +87,6 @@ impl Compiler {
         Ok(found)
     }
 
-    /// Converts an angle of the document to radians.
     pub(super) fn radians(&self, angle: f64) -> f64 {
         if self.degrees { angle.to_radians() } else { angle }
     }

@@ -6,10 +6,8 @@ use crate::xml::{MAX_NODES, Malformed, flood, malformed, root_name, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashSet;
 
-/// Size limit of all files together, bytes.
 pub(super) const MAX_BYTES: usize = 16 << 20;
 
-/// An attribute and the place of its value.
 #[derive(Debug)]
 pub(super) struct Attribute {
     pub(super) name: String,
@@ -17,7 +15,6 @@ pub(super) struct Attribute {
     pub(super) place: Place,
 }
 
-/// A byte position in one of the files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Place {
     /// Index of the file; 0 is the main file.
@@ -46,7 +43,6 @@ struct Source {
     included: Option<Place>,
 }
 
-/// All elements, the root first.
 pub(super) struct Expanded {
     elements: Vec<Element>,
     sources: Vec<Source>,
@@ -147,12 +143,10 @@ impl Expanded {
         Ok(first)
     }
 
-    /// `<mujoco>`.
     pub(super) fn root(&self) -> &Element {
         &self.elements[0]
     }
 
-    /// Children in the order of the document.
     pub(super) fn children<'t>(&'t self, of: &'t Element) -> impl DoubleEndedIterator<Item = &'t Element> {
         of.children.iter().map(|&child| &self.elements[child])
     }
@@ -183,7 +177,6 @@ impl Expanded {
     }
 }
 
-/// Whether the root element of a text is that of MJCF.
 pub(crate) fn is_mjcf(text: &str) -> bool {
     root_name(text) == Some("mujoco")
 }

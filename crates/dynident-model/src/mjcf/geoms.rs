@@ -13,13 +13,12 @@ use core::f64::consts::PI;
 use std::collections::HashMap;
 
 /// MuJoCo's default density of a geom, kg/m³ (water).
-const DENSITY: f64 = 1000.0;
+const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 
-/// Mass that a geom adds to its body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum GeomMass {
     /// No mass: a plane, a geom of mass zero, or a geom of a group that is not included.
-    Nothing,
+    Massless,
     /// Known inertial in the body's frame.
     Known(InertialParameters),
     /// Unknown, with the reason.
@@ -31,7 +30,6 @@ pub(super) struct Geom {
     pub(super) shape: Option<CollisionShape>,
 }
 
-/// Meshes of `<asset>`: file and scale by name.
 pub(super) type Meshes = HashMap<String, (String, [f64; 3])>;
 
 /// Solids, with half sizes, or radius and half length.
@@ -78,16 +76,16 @@ pub(super) fn geom(
     let (contype, conaffinity) = (stated.number("contype")?, stated.number("conaffinity")?);
     let collides = contype != Some(0.0) || conaffinity != Some(0.0);
     let mass = stated.size("mass")?;
-    let density = stated.size("density")?.unwrap_or(DENSITY);
+    let density = stated.size("density")?.unwrap_or(DEFAULT_DENSITY_KG_M3);
     let counts = compiler.groups[0] <= group && group <= compiler.groups[1];
     let weighs = counts && mass.unwrap_or(density) != 0.0;
-    let unknown = |why, shape| Geom { mass: if weighs { GeomMass::Unknown(why) } else { GeomMass::Nothing }, shape };
+    let unknown = |why, shape| Geom { mass: if weighs { GeomMass::Unknown(why) } else { GeomMass::Massless }, shape };
     let unsupported = |what: &str| {
         let geometry = CollisionGeometry::Unsupported { what: what.to_owned() };
         collides.then_some(CollisionShape { placement: Transform::IDENTITY, geometry })
     };
     let solid = match kind {
-        "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Nothing, shape: None }),
+        "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Massless, shape: None }),
         "mesh" => {
             let name = stated.get("mesh").map_or("", |mesh| &mesh.value);
             let shape = match meshes.get(name) {
@@ -129,7 +127,7 @@ pub(super) fn geom(
         return Ok(unknown("follows from a shell", shape));
     }
     if !weighs {
-        return Ok(Geom { mass: GeomMass::Nothing, shape });
+        return Ok(Geom { mass: GeomMass::Massless, shape });
     }
     let mass = mass.unwrap_or_else(|| density * volume(solid, size));
     let [x, y, z] = moments(solid, size, mass);
@@ -178,7 +176,6 @@ fn placed(stated: &Stated<'_>, compiler: &Compiler, solid: Solid) -> Result<(Tra
     Ok((transform, size))
 }
 
-/// Volume, m³.
 fn volume(solid: Solid, size: [f64; 3]) -> f64 {
     let [a, b, c] = size;
     match solid {

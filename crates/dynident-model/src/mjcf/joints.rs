@@ -95,7 +95,6 @@ pub(super) fn joint(
     })
 }
 
-/// Error for `free` and `<freejoint>`.
 pub(super) fn floating(label: &str) -> MjcfFault {
     MjcfFault::Unsupported {
         what: format!("a floating base (joint {label} of type free)"),

@@ -47,7 +47,7 @@ pub use write::{MjcfWriteError, rewrite_mjcf};
 
 use crate::tree::Model;
 use bodies::{LinkPlace, Reader, Tree};
-use chains::Around;
+use chains::ChainContext;
 use classes::Classes;
 use compiler::Compiler;
 use expanded::{Expanded, Place};
@@ -85,15 +85,12 @@ pub fn read_mjcf_with(
     Ok(MjcfRobot { model: found.model, notices: found.notices })
 }
 
-/// A document with the places of its bodies and joints.
 struct Found {
     model: Model,
     notices: Vec<MjcfNotice>,
     compiler: Compiler,
     links: Vec<LinkPlace>,
-    /// In the order of the model's joints.
     joint_places: Vec<Place>,
-    /// Links with an unknown mass.
     unknown: HashSet<String>,
 }
 
@@ -115,7 +112,7 @@ fn read(document: &Expanded) -> Result<Found, MjcfError> {
     let Tree { joints, bodies, base, links, joint_places, unknown, references } = tree;
     let model = Model::new(name, base, joints, bodies).and_then(|model| model.with_gravity(gravity));
     let model = model.map_err(|error| document.fault(root.place, MjcfFault::Model(error)))?;
-    let around = Around { document, links: &links, references: &references, driven: &driven };
+    let around = ChainContext { document, links: &links, references: &references, driven: &driven };
     let model = chains::closed(model, &connects, &around, &mut notices)?;
     Ok(Found { model, notices: notices.list, compiler, links, joint_places, unknown })
 }

@@ -141,15 +141,14 @@ pub(super) struct Notices {
 }
 
 impl Notices {
-    /// Maximum number of notices.
-    const MOST: usize = 200;
+    const MAX_NOTICES: usize = 200;
 
     pub(super) fn note(&mut self, stated: &Stated<'_>, loss: Loss) {
         self.note_at(stated.document, stated.place, loss);
     }
 
     pub(super) fn note_at(&mut self, document: &Expanded, place: Place, loss: Loss) {
-        if self.list.len() < Self::MOST {
+        if self.list.len() < Self::MAX_NOTICES {
             let (file, line) = document.line(place);
             self.list.push(MjcfNotice { file, line, loss });
         }

@@ -61,13 +61,11 @@ impl Stated<'_> {
         self.document.fault(attribute.place, MjcfFault::Count { element, attribute: name, expected, found })
     }
 
-    /// Exactly `N` numbers, each within the magnitude limit.
     pub(super) fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, MjcfError> {
         let found = self.numbers_between(name, N, N)?;
         Ok(found.map(|found| core::array::from_fn(|k| found[k])))
     }
 
-    /// Two numbers of any magnitude.
     pub(super) fn range(&self, name: &str) -> Result<Option<[f64; 2]>, MjcfError> {
         let Some(attribute) = self.get(name) else { return Ok(None) };
         match self.list(attribute)?[..] {
@@ -96,14 +94,12 @@ impl Stated<'_> {
         Ok(self.numbers::<3>(name)?.map(Vec3))
     }
 
-    /// A normalised vector.
     pub(super) fn direction(&self, name: &'static str) -> Result<Option<Vec3>, MjcfError> {
         let Some(vector) = self.vector(name)? else { return Ok(None) };
         let place = self.get(name).map_or(self.place, |attribute| attribute.place);
         self.unit(vector, name).map(Some).map_err(|fault| self.document.fault(place, fault))
     }
 
-    /// `vector` normalised.
     pub(super) fn unit(&self, vector: Vec3, attribute: &'static str) -> Result<Vec3, MjcfFault> {
         let norm = vector.norm();
         // Vectors shorter than 1e-9 are rounding errors of zero.
@@ -123,7 +119,6 @@ impl Stated<'_> {
         }
     }
 
-    /// One of the given keywords.
     pub(super) fn word(
         &self,
         name: &str,

@@ -172,7 +172,6 @@ fn node_at<'a, 'input>(
     found.ok_or_else(|| MjcfWriteError::Included { kind, name: name.to_owned() })
 }
 
-/// The `<inertial>` of a body, possibly inside `<frame>` elements.
 fn inertial_of<'a, 'input>(body: Node<'a, 'input>) -> Option<Node<'a, 'input>> {
     let mut ahead: Vec<Node<'a, 'input>> = body.children().collect();
     while let Some(node) = ahead.pop() {
@@ -185,7 +184,6 @@ fn inertial_of<'a, 'input>(body: Node<'a, 'input>) -> Option<Node<'a, 'input>> {
     None
 }
 
-/// `<inertial>` with a note as a comment in it.
 fn inertial_line(
     found: &Found,
     body: &str,
@@ -220,7 +218,6 @@ fn inertial_line(
     })
 }
 
-/// Changed attributes of one joint.
 fn drive(
     node: Node<'_, '_>,
     change: &JointChange,

@@ -12,7 +12,6 @@ use roxmltree::Node;
 /// Limits of at least this magnitude mean "unlimited".
 const UNLIMITED: f64 = 1e16;
 
-/// An axis with its limits, friction and mimic law.
 pub(super) struct Axis {
     pub(super) kind: JointKind,
     /// Unit vector in the model's frame.
@@ -24,7 +23,6 @@ pub(super) struct Axis {
     pub(super) mimic: Option<Mimic>,
 }
 
-/// Axis of a prismatic or revolute joint.
 pub(super) fn axis(joint: &Item<'_, '_>, slides: bool, version: Version, frames: &Frames) -> Result<Axis, SdfError> {
     let missing = || SdfFault::Missing { element: "joint".to_owned(), kind: "element", name: "axis" };
     let node = child(joint.node, "axis").ok_or_else(|| fault_at(joint.node, missing()))?;

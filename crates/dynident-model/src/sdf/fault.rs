@@ -97,13 +97,11 @@ pub enum SdfFault {
     Model(#[from] ModelError),
 }
 
-/// `fault` at the beginning of `node`.
 pub(super) fn fault_at(node: Node<'_, '_>, fault: SdfFault) -> SdfError {
     let at = node.document().text_pos_at(node.range().start);
     Located { line: at.row, column: at.col, fault }
 }
 
-/// Converts an error of the XML parser.
 pub(super) fn of_xml(text: &str, error: &roxmltree::Error) -> SdfError {
     let (at, why) = malformed(text, error);
     let fault = match why {

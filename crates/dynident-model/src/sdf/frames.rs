@@ -7,7 +7,6 @@ use crate::spatial::Transform;
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// Poses of frames by their full names.
 pub(super) struct Frames {
     model_from: HashMap<String, Transform>,
 }
@@ -50,10 +49,8 @@ impl Frames {
     }
 }
 
-/// The link that a frame is attached to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Carrier {
-    /// The fixed world.
     World,
     /// A link, by its index among the items.
     Link(usize),

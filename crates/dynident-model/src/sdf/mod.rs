@@ -61,7 +61,6 @@ pub struct SdfRobot {
     pub notices: Vec<SdfNotice>,
 }
 
-/// Whether the root element of `text` is that of SDF.
 pub(crate) fn is_sdf(text: &str) -> bool {
     root_name(text) == Some("sdf")
 }
@@ -130,7 +129,6 @@ fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Nod
     }
 }
 
-/// Hint for a model that is in another file.
 fn include_hint(around: Node<'_, '_>) -> &'static str {
     match children(around, "include").next() {
         Some(_) => "; <include> is not followed: write the whole out by `gz sdf -p`",
@@ -147,7 +145,6 @@ fn version(root: Node<'_, '_>) -> Result<Version, SdfError> {
     }
 }
 
-/// Line of a node, from 1.
 fn line(node: Node<'_, '_>) -> u32 {
     line_and_column(node.document().input_text(), node.range().start).0
 }

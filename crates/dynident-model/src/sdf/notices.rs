@@ -65,11 +65,10 @@ pub(super) struct Notices {
 }
 
 impl Notices {
-    /// Maximum number of notices.
-    const MOST: usize = 200;
+    const MAX_NOTICES: usize = 200;
 
     pub(super) fn note(&mut self, node: Node<'_, '_>, loss: SdfLoss) {
-        if self.list.len() < Self::MOST {
+        if self.list.len() < Self::MAX_NOTICES {
             self.list.push(SdfNotice { line: line(node), loss });
         }
     }

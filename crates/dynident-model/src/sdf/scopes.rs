@@ -6,16 +6,12 @@ use super::{Version, notices::Notices};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// The model's own frame.
 pub(super) const MODEL: &str = "__model__";
-/// The fixed world.
 pub(super) const WORLD: &str = "world";
 /// Maximum number of links, joints, frames and nested models: some steps are quadratic in it.
-const MOST_ITEMS: usize = 5000;
-/// Maximum nesting depth of models.
-const MOST_NESTED: usize = 20;
+const MAX_ITEMS: usize = 5000;
+const MAX_NESTING: usize = 20;
 
-/// Kinds of elements with a name and a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Link,
@@ -24,7 +20,6 @@ pub(super) enum Kind {
     Nested,
 }
 
-/// A link, joint, frame or nested model.
 pub(super) struct Item<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) kind: Kind,
@@ -39,7 +34,6 @@ pub(super) struct Item<'a, 'input> {
 /// All items in the order of the document, with their indices by name.
 pub(super) struct Scopes<'a, 'input> {
     pub(super) version: Version,
-    /// The outermost model.
     pub(super) model: Node<'a, 'input>,
     pub(super) items: Vec<Item<'a, 'input>>,
     pub(super) by_name: HashMap<String, usize>,
@@ -56,14 +50,13 @@ pub(super) fn full_name(scope: &str, name: &str) -> String {
     }
 }
 
-/// Collects the items of `model` and its nested models.
 pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> Result<Scopes<'a, 'input>, SdfError> {
     let mut found = Scopes { version, model, items: Vec::new(), by_name: HashMap::new() };
     // Models to be visited, innermost last, so that a nested model is visited before its successors.
     let mut ahead = vec![(model, String::new(), 0)];
     while let Some((model, scope, depth)) = ahead.pop() {
-        if depth > MOST_NESTED {
-            return Err(fault_at(model, SdfFault::TooDeep { limit: MOST_NESTED }));
+        if depth > MAX_NESTING {
+            return Err(fault_at(model, SdfFault::TooDeep { limit: MAX_NESTING }));
         }
         let mut nested = Vec::new();
         for node in model.children().filter(Node::is_element) {
@@ -74,8 +67,8 @@ pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> R
                 "model" => Kind::Nested,
                 _ => continue,
             };
-            if found.items.len() == MOST_ITEMS {
-                return Err(fault_at(node, SdfFault::TooMany { limit: MOST_ITEMS }));
+            if found.items.len() == MAX_ITEMS {
+                return Err(fault_at(node, SdfFault::TooMany { limit: MAX_ITEMS }));
             }
             let name = format!("{scope}{}", word_of(node, "name")?);
             let relative_to = full_name(&scope, relative_to(node, kind, version)?);

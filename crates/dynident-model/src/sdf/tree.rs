@@ -21,7 +21,6 @@ pub(super) struct Tree {
     pub(super) bodies: Vec<Body>,
 }
 
-/// A joint between two links, or the world and a link.
 struct Connection<'s, 'a, 'input> {
     item: &'s Item<'a, 'input>,
     parent: Carrier,
@@ -60,7 +59,6 @@ struct Carriers {
 }
 
 impl Carriers {
-    /// Collects all joints; rejects a link with two parent joints.
     fn of(found: &Scopes<'_, '_>, connections: &[Connection<'_, '_, '_>]) -> Result<Self, SdfError> {
         let (mut carried_by, mut under) = (HashMap::new(), HashMap::<Carrier, Vec<usize>>::new());
         for (number, connection) in connections.iter().enumerate() {
@@ -100,7 +98,6 @@ struct Walk<'s, 'a, 'input> {
     under: &'s HashMap<Carrier, Vec<usize>>,
 }
 
-/// Tree and links found by a walk.
 struct Walked {
     tree: Tree,
     reached: HashSet<usize>,
@@ -114,13 +111,12 @@ struct BodyPlace {
 }
 
 /// A joint to be visited, with the body that carries its parent link.
-struct Ahead {
+struct PendingJoint {
     connection: usize,
     parent: BodyPlace,
 }
 
 impl Walk<'_, '_, '_> {
-    /// Walks from the root (`None` for the world).
     fn walked(&self, root: Option<usize>, notices: &mut Notices) -> Result<Walked, SdfError> {
         let base = match root {
             // The base's own link has the frame of the model, to which it is fixed. The inertial of a fixed link may be
@@ -133,10 +129,10 @@ impl Walk<'_, '_, '_> {
         let mut tree = Tree { base: Body { links: vec![base] }, joints: Vec::new(), bodies: Vec::new() };
         let mut reached: HashSet<usize> = root.into_iter().collect();
         // A stack avoids recursion, because a chain may be as long as the file.
-        let mut ahead: Vec<Ahead> = Vec::new();
+        let mut ahead: Vec<PendingJoint> = Vec::new();
         let base_place = BodyPlace { body: None, model_from_body: Transform::IDENTITY };
         ahead.extend(self.below(root.map_or(Carrier::World, Carrier::Link), base_place));
-        while let Some(Ahead { connection, parent }) = ahead.pop() {
+        while let Some(PendingJoint { connection, parent }) = ahead.pop() {
             let Connection { child, axis, .. } = &self.connections[connection];
             reached.insert(*child);
             let place = match axis {
@@ -149,12 +145,11 @@ impl Walk<'_, '_, '_> {
     }
 
     /// The joints of a link or the world, the last one first.
-    fn below(&self, carrier: Carrier, parent: BodyPlace) -> impl Iterator<Item = Ahead> {
+    fn below(&self, carrier: Carrier, parent: BodyPlace) -> impl Iterator<Item = PendingJoint> {
         let joints = self.under.get(&carrier).map_or(&[][..], Vec::as_slice);
-        joints.iter().rev().map(move |&connection| Ahead { connection, parent })
+        joints.iter().rev().map(move |&connection| PendingJoint { connection, parent })
     }
 
-    /// Adds a moving joint and the body of its child link.
     fn add_moving(
         &self,
         connection: usize,
@@ -188,7 +183,6 @@ impl Walk<'_, '_, '_> {
         Ok(BodyPlace { body: Some(tree.bodies.len() - 1), model_from_body: place })
     }
 
-    /// Adds the child link of a fixed joint to the body of its parent link.
     fn add_fixed(
         &self,
         child: usize,
@@ -207,7 +201,6 @@ impl Walk<'_, '_, '_> {
         Ok(parent)
     }
 
-    /// Pose of a link in the model's frame.
     fn model_from_link(&self, index: usize) -> Transform {
         self.frames.of(&self.found.items[index].name).unwrap_or(Transform::IDENTITY)
     }
@@ -234,13 +227,11 @@ impl Walk<'_, '_, '_> {
     }
 }
 
-/// Error for more than one root.
 fn several(found: &Scopes<'_, '_>, first: &str, second: usize) -> SdfError {
     let item = &found.items[second];
     fault_at(item.node, SdfFault::SeveralRoots { first: first.to_owned(), second: item.name.clone() })
 }
 
-/// All joints of the document.
 fn connections<'s, 'a, 'input>(
     found: &'s Scopes<'a, 'input>,
     frames: &Frames,

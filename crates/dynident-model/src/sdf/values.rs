@@ -6,12 +6,10 @@ use crate::urdf::MAX_MAGNITUDE;
 use crate::xml::{parse_number, shortened};
 use roxmltree::Node;
 
-/// All children with this tag.
 pub(super) fn children<'a, 'input>(node: Node<'a, 'input>, element: &str) -> impl Iterator<Item = Node<'a, 'input>> {
     node.children().filter(move |child| child.has_tag_name(element))
 }
 
-/// The first child with this tag.
 pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option<Node<'a, 'input>> {
     node.children().find(|child| child.has_tag_name(element))
 }
@@ -20,18 +18,15 @@ fn tag(node: Node<'_, '_>) -> String {
     node.tag_name().name().to_owned()
 }
 
-/// Trimmed text of an element.
 pub(super) fn text<'a>(node: Node<'a, '_>) -> &'a str {
     node.text().unwrap_or("").trim()
 }
 
-/// Text of the required child `element`.
 pub(super) fn required_text<'a>(node: Node<'a, '_>, element: &'static str) -> Result<&'a str, SdfError> {
     let found = child(node, element).map(text).filter(|text| !text.is_empty());
     found.ok_or_else(|| fault_at(node, SdfFault::Missing { element: tag(node), kind: "element", name: element }))
 }
 
-/// A required, nonempty attribute.
 pub(super) fn word_of<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result<&'a str, SdfError> {
     let found = node.attribute(attribute).filter(|value| !value.trim().is_empty());
     found.ok_or_else(|| fault_at(node, SdfFault::Missing { element: tag(node), kind: "attribute", name: attribute }))
@@ -67,17 +62,14 @@ pub(super) fn numbers_in<const N: usize>(node: Node<'_, '_>) -> Result<[f64; N],
     Ok(core::array::from_fn(|k| found[k]))
 }
 
-/// `N` numbers of the child `element`.
 pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, element: &str) -> Result<Option<[f64; N]>, SdfError> {
     child(node, element).map(numbers_in).transpose()
 }
 
-/// One number of the child `element`.
 pub(super) fn number(node: Node<'_, '_>, element: &str) -> Result<Option<f64>, SdfError> {
     Ok(numbers::<1>(node, element)?.map(|[number]| number))
 }
 
-/// One number of any magnitude of the child `element`.
 pub(super) fn number_of_any_size(node: Node<'_, '_>, element: &str) -> Result<Option<f64>, SdfError> {
     let Some(node) = child(node, element) else { return Ok(None) };
     match list(node)?[..] {

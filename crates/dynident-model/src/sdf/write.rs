@@ -154,7 +154,6 @@ fn write_inertial(
     Ok(())
 }
 
-/// Writes damping and friction of one joint.
 fn write_dynamics(
     source: &Source<'_>,
     node: Node<'_, '_>,

@@ -20,7 +20,6 @@ pub struct CandidateLaw {
 }
 
 impl CandidateLaw {
-    /// A law without constants.
     pub(super) const fn new(
         name: &'static str,
         role: CandidateRole,
@@ -79,7 +78,6 @@ pub struct GridPoint {
 }
 
 impl GridPoint {
-    /// A term that is tried alone.
     pub(super) fn alone(term: TorqueTerm) -> Self {
         Self { terms: vec![term], step: None }
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 /// Step of the central differences, relative to the position or velocity (absolute around zero): cube root of the
 /// rounding error, which is optimal for central differences.
-const STEP: f64 = 6e-6;
+const DIFFERENCE_STEP: f64 = 6e-6;
 
 /// A function `f(q, q̇)` of positions and velocities of any joints, for a whole block of samples at once.
 ///
@@ -26,7 +26,6 @@ pub struct TorqueFunction {
     pub name: String,
     /// Joints whose motion it depends on, ascending.
     pub follows: Vec<usize>,
-    /// The code.
     #[serde(skip)]
     law: Option<Arc<dyn TorqueLaw>>,
 }
@@ -78,7 +77,7 @@ impl TorqueFunction {
             let own = joint * motion.samples..(joint + 1) * motion.samples;
             for is_velocity in [false, true] {
                 let state = if is_velocity { motion.dq } else { motion.q };
-                let step = |at: usize| STEP * (1.0 + state[at].abs());
+                let step = |at: usize| DIFFERENCE_STEP * (1.0 + state[at].abs());
                 for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
                     let moved = if is_velocity { &mut dq } else { &mut q };
                     own.clone().for_each(|at| moved[at] = state[at] + sign * step(at));

@@ -81,7 +81,6 @@ pub struct VelocityFriction<'a> {
 }
 
 impl<'a> VelocityFriction<'a> {
-    /// Friction of one joint with `curve` alone.
     pub(super) fn of(curve: VelocityCurve<'a>) -> Self {
         Self { ratios: [1.0, 0.0], curve, by_load: false, fading: None }
     }

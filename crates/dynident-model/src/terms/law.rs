@@ -16,7 +16,6 @@ pub(super) trait VelocityLaw: Debug {
     }
 }
 
-/// A law as a function over lanes.
 struct OnLanes<'a, L>(&'a L);
 
 impl<L: VelocityLaw> LaneFunction for OnLanes<'_, L> {

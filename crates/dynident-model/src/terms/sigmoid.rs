@@ -30,7 +30,7 @@ fn logistic(x: f64) -> f64 {
 }
 
 /// Candidate widths of half a Coulomb step, rad/s or m/s of a typical arm.
-const WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
+const CANDIDATE_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
 /// Largest shift of the step from zero velocity, in units of its width.
 const MAX_SHIFT: f64 = 2.0;
 
@@ -45,7 +45,7 @@ impl VelocityLaw for Sigmoid {
 
 impl Sigmoid {
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
-        let widths = WIDTHS.map(|width| width * own.velocity).into_iter().enumerate();
+        let widths = CANDIDATE_WIDTHS.map(|width| width * own.velocity).into_iter().enumerate();
         let of = |(step, width): (usize, f64)| {
             [-0.5 * width, 0.5 * width].map(|offset_speed| {
                 let term = Self { joint: own.joint, steepness: 2.0 / width, offset_speed };

@@ -28,7 +28,6 @@ pub struct MaxwellSlip {
 /// State of a term before a block of samples; [`Default`] is the start of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HysteresisState {
-    /// Last position and deflection.
     last: Option<[f64; 2]>,
 }
 
@@ -40,14 +39,14 @@ impl HysteresisState {
 }
 
 /// Candidate yield displacements, rad, or m of a typical arm.
-const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
+const CANDIDATE_YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
 /// Maximum number of elements of one joint; each is a column.
 const MAX_ELEMENTS: f64 = 50.0;
 
 impl MaxwellSlip {
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
         let of = |usual| Self { joint: own.joint, yield_displacement: usual * own.position };
-        YIELDS.map(|usual| GridPoint::alone(TorqueTerm::MaxwellSlip(of(usual)))).to_vec()
+        CANDIDATE_YIELDS.map(|usual| GridPoint::alone(TorqueTerm::MaxwellSlip(of(usual)))).to_vec()
     }
 }
 

@@ -67,7 +67,6 @@ pub(super) fn step_or(width: Option<f64>, joint: &StatedJoint) -> CoulombShape {
     width.map_or(joint.step, |width| CoulombShape::Smooth { width })
 }
 
-/// Width of a smooth step.
 pub(super) fn width_of(step: CoulombShape) -> Option<f64> {
     match step {
         CoulombShape::Sign { .. } => None,

@@ -26,13 +26,13 @@ pub struct Stribeck {
 }
 
 /// Candidate velocities, rad/s or m/s of a typical arm, and exponents.
-const SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
-const EXPONENTS: [f64; 2] = [1.0, 2.0];
+const CANDIDATE_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
+const CANDIDATE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 /// Bounds of the exponent.
 const EXPONENT_BOUNDS: [f64; 2] = [0.5, 3.0];
 /// Width of a smooth step relative to the Stribeck velocity during the friction selection: the step saturates at half
 /// that velocity.
-const STEP_SHARE: f64 = 0.25;
+const STEP_WIDTH_RATIO: f64 = 0.25;
 
 impl VelocityLaw for Stribeck {
     #[inline(always)]
@@ -44,10 +44,10 @@ impl VelocityLaw for Stribeck {
 
 impl Stribeck {
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
-        let speeds = SPEEDS.map(|speed| speed * own.velocity).into_iter().enumerate();
+        let speeds = CANDIDATE_SPEEDS.map(|speed| speed * own.velocity).into_iter().enumerate();
         let of = |(step, speed): (usize, f64)| {
-            EXPONENTS.map(|exponent| {
-                let shape = CoulombShape::Smooth { width: STEP_SHARE * speed };
+            CANDIDATE_EXPONENTS.map(|exponent| {
+                let shape = CoulombShape::Smooth { width: STEP_WIDTH_RATIO * speed };
                 GridPoint::at(step, TorqueTerm::Stribeck(Self { joint: own.joint, speed, exponent, shape }))
             })
         };
@@ -124,7 +124,7 @@ impl TermKind for Stribeck {
     }
 
     fn step_role(&self) -> StepRole {
-        StepRole::Own { width: STEP_SHARE * self.speed }
+        StepRole::Own { width: STEP_WIDTH_RATIO * self.speed }
     }
 
     fn coordinates(&self) -> Vec<f64> {
@@ -136,7 +136,7 @@ impl TermKind for Stribeck {
             self.speed = velocity_within(*speed, velocity);
             self.exponent = within(*exponent, EXPONENT_BOUNDS);
             if let CoulombShape::Smooth { width } = &mut self.shape {
-                *width = STEP_SHARE * self.speed;
+                *width = STEP_WIDTH_RATIO * self.speed;
             }
         }
     }

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Maximum number of points; each piece is several lines of an exported program.
-const MOST_POINTS: usize = 200;
+const MAX_POINTS: usize = 200;
 /// Largest magnitude of a position or torque.
-const LARGEST: f64 = 1e9;
+const MAX_VALUE: f64 = 1e9;
 
 /// Torque as a function of position, interpolated between points.
 ///
@@ -39,10 +39,10 @@ pub struct TorqueTable {
 #[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum TorqueTableError {
     /// Too few or too many points.
-    #[error("{found} points: give 2 to {MOST_POINTS}")]
+    #[error("{found} points: give 2 to {MAX_POINTS}")]
     Points { found: usize },
     /// A number that is not finite or too large.
-    #[error("point {number}: {value}: give numbers of at most {LARGEST:e} in size")]
+    #[error("point {number}: {value}: give numbers of at most {MAX_VALUE:e} in size")]
     Number { number: usize, value: f64 },
     /// Positions that do not ascend.
     #[error("point {number}: position {position} after {before}: sort the points by position, each once")]
@@ -68,11 +68,11 @@ impl TorqueTable {
     /// # Errors
     /// Fewer than 2 or more than 200 points, numbers that are not finite or above 1e9, positions that do not ascend.
     pub fn new(points: Vec<[f64; 2]>) -> Result<Self, TorqueTableError> {
-        if !(2..=MOST_POINTS).contains(&points.len()) {
+        if !(2..=MAX_POINTS).contains(&points.len()) {
             return Err(TorqueTableError::Points { found: points.len() });
         }
         for (place, point) in points.iter().enumerate() {
-            if let Some(&value) = point.iter().find(|value| value.is_nan() || value.abs() > LARGEST) {
+            if let Some(&value) = point.iter().find(|value| value.is_nan() || value.abs() > MAX_VALUE) {
                 return Err(TorqueTableError::Number { number: place + 1, value });
             }
             let before = place.checked_sub(1).map_or(f64::NEG_INFINITY, |before| points[before][0]);
@@ -136,7 +136,6 @@ impl TorqueTable {
     }
 }
 
-/// Slopes of the curve at the points.
 fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
     let count = points.len();
     let width: Vec<f64> = points.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();

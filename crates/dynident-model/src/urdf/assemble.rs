@@ -68,18 +68,13 @@ pub(super) fn model(
     Model::new(name, base, tree_joints, bodies).map_err(|error| robot_fault(UrdfFault::Model(error)))
 }
 
-/// A fault of the robot as a whole.
 fn robot_fault(fault: UrdfFault) -> UrdfError {
     Located { line: 1, column: 1, fault }
 }
 
-/// Connections of joints and links, as indices in the document.
 struct Connections {
-    /// Child link of each joint.
     child_of: Vec<usize>,
-    /// Parent joint of each link.
     parent_joint: Vec<Option<usize>>,
-    /// Child joints of each link.
     joints_under: Vec<Vec<usize>>,
 }
 
@@ -111,7 +106,6 @@ impl Connections {
         Ok(Self { child_of, parent_joint, joints_under })
     }
 
-    /// The only link without a parent joint.
     fn root(&self, links: &[LinkElement<'_, '_>]) -> Result<usize, UrdfError> {
         let mut roots = (0..links.len()).filter(|&link| self.parent_joint[link].is_none());
         match (roots.next(), roots.next()) {
@@ -128,7 +122,6 @@ impl Connections {
     }
 }
 
-/// Rejects joints that mimic themselves.
 fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
     match joints.iter().find(|joint| joint.mimic.as_ref().is_some_and(|mimic| mimic.sources[0].joint == joint.name)) {
         None => Ok(()),

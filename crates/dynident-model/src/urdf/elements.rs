@@ -12,7 +12,6 @@ use crate::spatial::{Mat3, Transform, Vec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// A `<link>`.
 pub(super) struct LinkElement<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) name: &'a str,
@@ -22,7 +21,6 @@ pub(super) struct LinkElement<'a, 'input> {
     pub(super) collision: Vec<CollisionShape>,
 }
 
-/// A `<joint>`.
 pub(super) struct JointElement<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) name: &'a str,

@@ -230,7 +230,6 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
     Ok(UrdfRobot { model, unread, irregularities })
 }
 
-/// Parses the XML tree; fails if it is not a URDF.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
     if let Some(at) = flood(text) {
         return Err(Located::at(text, at, UrdfFault::Flood));
@@ -273,7 +272,6 @@ fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
     Located::at(text, at, fault)
 }
 
-/// `fault` at the start of an element.
 fn fault_at(node: Node<'_, '_>, fault: UrdfFault) -> UrdfError {
     let at = node.document().text_pos_at(node.range().start);
     Located { line: at.row, column: at.col, fault }

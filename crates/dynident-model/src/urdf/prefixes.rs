@@ -9,7 +9,6 @@ use std::collections::HashSet;
 /// Maximum number of different prefixes that are replaced; a document with more is passed to the parser unchanged.
 const MAX_PREFIXES: usize = 100;
 
-/// An undeclared prefix.
 pub(super) struct Undeclared<'a> {
     /// Byte position of its first occurrence.
     pub(super) at: usize,
@@ -80,7 +79,6 @@ fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
     }
 }
 
-/// The name at the start of `text`.
 fn name(text: &str) -> &str {
     let end = text.find(|c: char| c.is_ascii_whitespace() || matches!(c, '=' | '>' | '/' | '"' | '\'' | '<'));
     &text[..end.unwrap_or(text.len())]

@@ -10,7 +10,6 @@ pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option
     node.children().find(|child| child.has_tag_name(element))
 }
 
-/// The required child `element`.
 pub(super) fn required_child<'a, 'input>(
     node: Node<'a, 'input>,
     owner: &str,
@@ -22,7 +21,6 @@ pub(super) fn required_child<'a, 'input>(
         .ok_or_else(|| fault_at(node, UrdfFault::MissingElement { parent, owner: owner.to_owned(), element, hint }))
 }
 
-/// A nonempty name.
 pub(super) fn name<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result<&'a str, UrdfError> {
     let element = || node.tag_name().name().to_owned();
     let found = node
@@ -69,7 +67,6 @@ pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>,
     parse_number(word).map(Some).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))
 }
 
-/// A required number.
 pub(super) fn required_number(node: Node<'_, '_>, attribute: &'static str) -> Result<f64, UrdfError> {
     numbers::<1>(node, attribute)?.map(|[number]| number).ok_or_else(|| {
         fault_at(node, UrdfFault::MissingAttribute { element: node.tag_name().name().to_owned(), attribute })

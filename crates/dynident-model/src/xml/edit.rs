@@ -26,14 +26,12 @@ pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> 
 /// A line of a new element, with its depth below the element's own indentation.
 pub(crate) type Line = (usize, String);
 
-/// Original text and its line ending.
 pub(crate) struct Source<'a> {
     pub(crate) text: &'a str,
     pub(crate) eol: &'a str,
 }
 
 impl<'a> Source<'a> {
-    /// Uses the line ending of the text.
     pub(crate) fn new(text: &'a str) -> Self {
         Self { text, eol: if text.contains("\r\n") { "\r\n" } else { "\n" } }
     }
@@ -47,7 +45,6 @@ impl Source<'_> {
         prefix.chars().all(|c| c == ' ' || c == '\t').then_some(prefix)
     }
 
-    /// Indentation of the children of `node` relative to `node`.
     fn step(&self, node: Node<'_, '_>) -> String {
         let own = self.indentation(node.range().start).unwrap_or("");
         let child = node.children().find(Node::is_element).and_then(|child| self.indentation(child.range().start));

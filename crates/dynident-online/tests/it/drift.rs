@@ -105,7 +105,7 @@ fn reference(seed: u64) -> (Vec<f64>, StartingPoint) {
 }
 
 fn learned(work: &mut AtWork, truth: &[f64], reference: StartingPoint, per_hour: f64) -> DriftMonitor {
-    let settings = DriftSettings { check_s: CHECK_S, false_alarms_per_hour: per_hour };
+    let settings = DriftSettings { false_alarms_per_hour: per_hour, ..DriftSettings::new(CHECK_S) };
     let mut monitor = DriftMonitor::new(settings, reference).unwrap();
     // The first check still depends on the start.
     work.work(truth);
@@ -185,7 +185,7 @@ fn friction_that_doubles_in_an_hour_is_seen_within_it_and_a_payload_at_once() {
 fn what_cannot_be_is_refused() {
     let (_, reference) = reference(1);
     assert!(DriftSettings::new(0.0).validate().is_err());
-    assert!(DriftSettings { check_s: 60.0, false_alarms_per_hour: 40.0 }.validate().is_err());
+    assert!(DriftSettings { false_alarms_per_hour: 40.0, ..DriftSettings::new(60.0) }.validate().is_err());
     let small = StartingPoint { values: vec![0.0; 2], covariance: DMatrix::identity(2, 2) };
     let mut monitor = DriftMonitor::new(DriftSettings::new(60.0), small).unwrap();
     assert!(matches!(monitor.learn(&AtWork::new(1).estimator), Err(OnlineError::Length { .. })));

@@ -5,8 +5,7 @@ use super::permission::PermittedProgram;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Polling interval while a process should end.
-const POLL: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Pipes to a program. Standard output and standard error are always pipes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +67,7 @@ impl ProcessGroup {
             if exit.is_some() || start.elapsed() >= limit {
                 return exit;
             }
-            std::thread::sleep(POLL);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 

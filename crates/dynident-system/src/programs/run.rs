@@ -7,14 +7,13 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Polling interval of a running program.
-const POLL: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// Time for a program to end after the request.
-const GRACE: Duration = Duration::from_millis(500);
+const END_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time for a pipe to close after all processes of the group have ended.
-const DRAIN: Duration = Duration::from_secs(1);
+const PIPE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Maximum length of the standard error in a message, bytes: its end, which shows the cause.
-const SHOWN_BYTES: usize = 400;
+const MAX_SHOWN_BYTES: usize = 400;
 /// Maximum size of the stored standard error, bytes.
 const MAX_ERROR_BYTES: u64 = 1 << 20;
 
@@ -72,8 +71,8 @@ pub fn run_to_end(
     })?;
     let child = group.program();
     // Both pipes are read concurrently, because a full pipe would block the program.
-    let output = child.stdout.take().map(|pipe| read_beside(pipe, limits.output_bytes.saturating_add(1)));
-    let errors = child.stderr.take().map(|pipe| read_beside(pipe, MAX_ERROR_BYTES));
+    let output = child.stdout.take().map(|pipe| read_in_thread(pipe, limits.output_bytes.saturating_add(1)));
+    let errors = child.stderr.take().map(|pipe| read_in_thread(pipe, MAX_ERROR_BYTES));
     let limit = Duration::try_from_secs_f64(limits.time_s).unwrap_or(Duration::MAX);
     let begin = Instant::now();
     let mut received = None;
@@ -95,14 +94,14 @@ pub fn run_to_end(
         if begin.elapsed() >= limit {
             break Err(RunError::TimedOut { program: name(), limit_s: limits.time_s });
         }
-        std::thread::sleep(POLL);
+        std::thread::sleep(POLL_INTERVAL);
     };
     // Child processes may keep the pipes open, so they are ended as well.
-    let is_success = group.end(if outcome.is_ok() { Duration::ZERO } else { GRACE });
+    let is_success = group.end(if outcome.is_ok() { Duration::ZERO } else { END_TIMEOUT });
     let exit = outcome?;
     let drained = |pipe: &Receiver<io::Result<Vec<u8>>>| {
         let late = || io::Error::new(ErrorKind::TimedOut, "another process keeps its pipe open");
-        pipe.recv_timeout(DRAIN).unwrap_or_else(|_| Err(late()))
+        pipe.recv_timeout(PIPE_TIMEOUT).unwrap_or_else(|_| Err(late()))
     };
     let bytes = match (received, &output) {
         (Some(bytes), _) => bytes,
@@ -121,7 +120,7 @@ pub fn run_to_end(
 }
 
 /// Reads a pipe to its end on a separate thread, at most `most_bytes`.
-fn read_beside(pipe: impl Read + Send + 'static, most_bytes: u64) -> Receiver<io::Result<Vec<u8>>> {
+fn read_in_thread(pipe: impl Read + Send + 'static, most_bytes: u64) -> Receiver<io::Result<Vec<u8>>> {
     let (send, receive) = channel();
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -132,10 +131,9 @@ fn read_beside(pipe: impl Read + Send + 'static, most_bytes: u64) -> Receiver<io
     receive
 }
 
-/// End of a message, on one line.
 fn end_of(message: &str) -> String {
     let message = message.trim();
-    let first = message.len().saturating_sub(SHOWN_BYTES);
+    let first = message.len().saturating_sub(MAX_SHOWN_BYTES);
     let start = (first..message.len()).find(|&at| message.is_char_boundary(at)).unwrap_or(0);
     message[start..].replace('\n', " ")
 }

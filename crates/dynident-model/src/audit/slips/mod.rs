@@ -7,10 +7,13 @@
 
 mod about_origin;
 mod defaults;
+mod settings;
 mod slots;
 mod total_mass;
 mod twins;
 mod units;
+
+pub use settings::SlipSettings;
 
 use super::Lengths;
 use crate::spatial::{Mat3, Vec3};
@@ -106,20 +109,33 @@ pub struct Slips {
 /// # Errors
 /// Invalid URDF.
 pub fn slips(text: &str, model: &Model, total_kg: Option<f64>) -> Result<Slips, UrdfError> {
+    slips_with(text, model, total_kg, &SlipSettings::default())
+}
+
+/// As [`slips`], with other thresholds, which have to be [valid](SlipSettings::validate).
+///
+/// # Errors
+/// Invalid URDF.
+pub fn slips_with(
+    text: &str,
+    model: &Model,
+    total_kg: Option<f64>,
+    settings: &SlipSettings,
+) -> Result<Slips, UrdfError> {
     let stated = stated_inertials(text)?;
-    let lengths = lengths_of(&stated, model);
-    let mut search = Search { now: stated.clone(), lengths, found: Vec::new() };
-    slots::look(&mut search);
-    defaults::look(&mut search);
-    units::look(&mut search);
-    about_origin::look(&mut search);
-    twins::look(&mut search);
-    total_mass::look(&mut search, text, total_kg);
+    let lengths = body_lengths(&stated, model, settings.max_joint_offset_m);
+    let mut search = Search { settings: settings.clone(), now: stated.clone(), lengths, found: Vec::new() };
+    slots::find(&mut search);
+    defaults::find(&mut search);
+    units::find(&mut search);
+    about_origin::find(&mut search);
+    twins::find(&mut search);
+    total_mass::find(&mut search, text, total_kg);
     Ok(Slips { found: search.found, stated, corrected: search.now })
 }
 
-/// State of the search: current numbers and mistakes found.
 struct Search {
+    settings: SlipSettings,
     now: Vec<StatedInertial>,
     /// Size of each link's body, m; `None` if all joints are implausibly far apart, so that no length is available for
     /// comparison.
@@ -139,16 +155,15 @@ impl Search {
         self.found.push(Slip { kind, links, message, evidence, corrections });
     }
 
-    /// Records a mistake without a known correction.
-    fn name(&mut self, kind: SlipKind, places: &[usize], message: String, evidence: String) {
+    fn note_uncorrected(&mut self, kind: SlipKind, places: &[usize], message: String, evidence: String) {
         let links = places.iter().map(|&place| self.now[place].link.clone()).collect();
         self.found.push(Slip { kind, links, message, evidence, corrections: Vec::new() });
     }
 
     /// Indices of the links with a nonzero inertial and a centre of mass.
     fn with_mass(&self) -> Vec<usize> {
-        let says = |stated: &StatedInertial| stated.mass_kg > 0.0 && trace(&stated.moments) > 0.0;
-        (0..self.now.len()).filter(|&place| says(&self.now[place])).collect()
+        let is_stated = |stated: &StatedInertial| stated.mass_kg > 0.0 && trace(&stated.moments) > 0.0;
+        (0..self.now.len()).filter(|&place| is_stated(&self.now[place])).collect()
     }
 
     /// Names of these links: `a, b, c, d and 4 more`.
@@ -169,11 +184,8 @@ fn differences(old: &StatedInertial, new: &StatedInertial) -> Vec<Correction> {
     pairs.map(|((number, from), (_, to))| Correction { link: old.link.clone(), number, from, to }).collect()
 }
 
-/// Largest plausible distance between two joints, m.
-const LARGEST_OFFSET_M: f64 = 10.0;
-
-fn lengths_of(stated: &[StatedInertial], model: &Model) -> Option<Vec<f64>> {
-    if model.tree_joints().iter().any(|joint| joint.placement.translation.norm() > LARGEST_OFFSET_M) {
+fn body_lengths(stated: &[StatedInertial], model: &Model, max_joint_offset_m: f64) -> Option<Vec<f64>> {
+    if model.tree_joints().iter().any(|joint| joint.placement.translation.norm() > max_joint_offset_m) {
         return None;
     }
     let lengths = Lengths::of(model);
@@ -190,15 +202,15 @@ fn lengths_of(stated: &[StatedInertial], model: &Model) -> Option<Vec<f64>> {
 }
 
 /// Tolerance of the triangle inequality, relative: rounding in the file.
-const ROUNDING: f64 = 1e-2;
+const TRIANGLE_TOLERANCE: f64 = 1e-2;
 
 /// Whether a body can have these moments about its centre of mass: none negative, none above the sum of the other two.
-fn possible(moments: &[f64; 6]) -> bool {
+fn is_possible(moments: &[f64; 6]) -> bool {
     let [least, middle, most] = principal(moments);
-    least >= -1e-9 * trace(moments).abs() && most - least - middle <= ROUNDING * most
+    least >= -1e-9 * trace(moments).abs() && most - least - middle <= TRIANGLE_TOLERANCE * most
 }
 
-/// Principal moments, ascending.
+/// Ascending.
 fn principal(inertia: &[f64; 6]) -> [f64; 3] {
     let [xx, xy, xz, yy, yz, zz] = inertia;
     let matrix = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
@@ -215,8 +227,7 @@ fn shown(moments: [f64; 3]) -> String {
     moments.map(|moment| format!("{moment:.3e}")).join(", ")
 }
 
-/// Upper triangle of a symmetric matrix.
-fn six(m: &Mat3) -> [f64; 6] {
+fn upper_triangle(m: &Mat3) -> [f64; 6] {
     [m.0[0][0], m.0[0][1], m.0[0][2], m.0[1][1], m.0[1][2], m.0[2][2]]
 }
 
@@ -227,7 +238,7 @@ fn parallel_axis(stated: &StatedInertial) -> Mat3 {
 }
 
 /// `value · 10^power`, computed on decimal digits so that 12.3 and -3 give exactly 0.0123.
-fn shifted(value: f64, power: i32) -> f64 {
+fn scaled_by_power(value: f64, power: i32) -> f64 {
     let text = format!("{value:e}");
     let exact = text.split_once('e').and_then(|(digits, exponent)| {
         format!("{digits}e{}", exponent.parse::<i32>().ok()? + power).parse::<f64>().ok()
@@ -237,19 +248,19 @@ fn shifted(value: f64, power: i32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{possible, shifted};
+    use super::{is_possible, scaled_by_power};
 
     #[test]
     fn digits_are_kept() {
         assert_eq!(
-            [shifted(12.3, -3), shifted(-0.7, -6), shifted(0.0, 9), shifted(1e-3, 3)],
+            [scaled_by_power(12.3, -3), scaled_by_power(-0.7, -6), scaled_by_power(0.0, 9), scaled_by_power(1e-3, 3)],
             [0.0123, -7e-7, 0.0, 1.0]
         );
     }
 
     #[test]
     fn bodies_are_possible() {
-        assert!(possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.0]) && possible(&[0.0; 6]));
-        assert!(!possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.1]) && !possible(&[1.0, 2.0, 0.0, 1.0, 0.0, 1.0]));
+        assert!(is_possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.0]) && is_possible(&[0.0; 6]));
+        assert!(!is_possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.1]) && !is_possible(&[1.0, 2.0, 0.0, 1.0, 0.0, 1.0]));
     }
 }

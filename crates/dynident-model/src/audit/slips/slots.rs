@@ -1,10 +1,9 @@
 //! Moments in the wrong slot or with the wrong sign.
 
-use super::{Search, SlipKind, possible, principal, shown};
+use super::{Search, SlipKind, is_possible, principal, shown};
 use crate::urdf::StatedInertial;
 
-/// One interpretation of the six moments that gives a possible body.
-struct Reading {
+struct Interpretation {
     kind: SlipKind,
     /// Corrected numbers; `None` if the file does not contain one of them.
     meant: Option<StatedInertial>,
@@ -13,14 +12,16 @@ struct Reading {
 
 /// Tries all interpretations for every impossible link. If several explain a link, the one that explains most links of
 /// the file is used, provided it is unique.
-pub(super) fn look(search: &mut Search) {
+pub(super) fn find(search: &mut Search) {
     let broken: Vec<usize> = (0..search.now.len()).filter(|&place| !is_body(&search.now[place])).collect();
-    let readings: Vec<Vec<Reading>> = broken.iter().map(|&place| readings(&search.now[place])).collect();
-    let explained = |kind: SlipKind| readings.iter().filter(|ways| ways.iter().any(|way| way.kind == kind)).count();
-    let mut of_kind: Vec<(SlipKind, Vec<(usize, &Reading)>)> = Vec::new();
+    let interpretations: Vec<Vec<Interpretation>> =
+        broken.iter().map(|&place| interpretations(&search.now[place])).collect();
+    let explained =
+        |kind: SlipKind| interpretations.iter().filter(|ways| ways.iter().any(|way| way.kind == kind)).count();
+    let mut of_kind: Vec<(SlipKind, Vec<(usize, &Interpretation)>)> = Vec::new();
     let mut open = Vec::new();
-    for (&place, ways) in broken.iter().zip(&readings) {
-        let mut ways: Vec<&Reading> = ways.iter().collect();
+    for (&place, ways) in broken.iter().zip(&interpretations) {
+        let mut ways: Vec<&Interpretation> = ways.iter().collect();
         let most = ways.iter().map(|way| explained(way.kind)).max().unwrap_or(0);
         if most > 1 && ways.iter().filter(|way| explained(way.kind) == most).count() == 1 {
             ways.retain(|way| explained(way.kind) == most);
@@ -48,16 +49,16 @@ pub(super) fn look(search: &mut Search) {
                 ways.join(", ")
             )
         };
-        search.name(SlipKind::Unexplained, &[place], message, evidence);
+        search.note_uncorrected(SlipKind::Unexplained, &[place], message, evidence);
     }
 }
 
 fn is_body(stated: &StatedInertial) -> bool {
     let nothing = stated.mass_kg == 0.0 && stated.moments == [0.0; 6];
-    nothing || stated.mass_kg > 0.0 && possible(&stated.moments)
+    nothing || stated.mass_kg > 0.0 && is_possible(&stated.moments)
 }
 
-fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Reading)]) {
+fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Interpretation)]) {
     let places: Vec<usize> = members.iter().map(|(place, _)| *place).collect();
     let evidence: Vec<String> =
         members.iter().take(3).map(|(place, way)| format!("{}: {}", search.now[*place].link, way.evidence)).collect();
@@ -80,14 +81,13 @@ fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Reading)]) {
     let changed: Vec<(usize, StatedInertial)> =
         members.iter().filter_map(|(place, way)| Some((*place, way.meant.clone()?))).collect();
     if changed.is_empty() {
-        search.name(kind, &places, message, evidence);
+        search.note_uncorrected(kind, &places, message, evidence);
     } else {
         search.note(kind, message, evidence, changed);
     }
 }
 
-/// All interpretations that make a possible body of one link's numbers.
-fn readings(stated: &StatedInertial) -> Vec<Reading> {
+fn interpretations(stated: &StatedInertial) -> Vec<Interpretation> {
     let [xx, xy, xz, yy, yz, zz] = stated.moments;
     let before = shown(principal(&stated.moments));
     let with = |mass_kg: f64, moments: [f64; 6]| StatedInertial { mass_kg, moments, ..stated.clone() };
@@ -96,21 +96,21 @@ fn readings(stated: &StatedInertial) -> Vec<Reading> {
         let evidence =
             format!("principal moments {before} kg m^2 become {}, which a body can have", shown(principal(&moments)));
         let meant = known.then(|| with(mass_kg, moments));
-        ways.push(Reading { kind, meant, evidence });
+        ways.push(Interpretation { kind, meant, evidence });
     };
     let negated = stated.moments.map(|moment| if moment == 0.0 { moment } else { -moment });
     let all_negative = [xx, yy, zz].iter().all(|moment| *moment <= 0.0) && xx + yy + zz < 0.0;
-    if all_negative && possible(&negated) {
+    if all_negative && is_possible(&negated) {
         way(SlipKind::NegatedMoments, stated.mass_kg.abs(), negated, stated.mass_kg != 0.0);
     }
-    if stated.mass_kg < 0.0 && possible(&stated.moments) && xx + yy + zz > 0.0 {
+    if stated.mass_kg < 0.0 && is_possible(&stated.moments) && xx + yy + zz > 0.0 {
         way(SlipKind::NegatedMoments, -stated.mass_kg, stated.moments, true);
     }
     if stated.mass_kg <= 0.0 {
         return ways;
     }
     let products = [xx, -xy, -xz, yy, -yz, zz];
-    if products.map(|x| x + 0.0) != stated.moments && possible(&products) {
+    if products.map(|x| x + 0.0) != stated.moments && is_possible(&products) {
         way(SlipKind::NegatedProducts, stated.mass_kg, products.map(|x| x + 0.0), true);
     }
     // In a matrix written row by row, ixy is repeated in the slot of iyy, and the true iyy (large) is in that of iyz.
@@ -118,9 +118,9 @@ fn readings(stated: &StatedInertial) -> Vec<Reading> {
         // Any izz between |xx - yy| and xx + yy is possible if the upper left block is positive definite.
         let middle = (xx * xx + yz * yz).sqrt();
         let moments = [xx, xy, xz, yz, zz, middle];
-        if possible(&moments) {
+        if is_possible(&moments) {
             let (least, most) = ((xx - yz).abs(), xx + yz);
-            ways.push(Reading {
+            ways.push(Interpretation {
                 kind: SlipKind::RowMajor,
                 meant: None,
                 evidence: format!("iyy = ixy = {xy}, and with iyy = {yz}, iyz = {zz} a body has an izz between {least:.3e} and {most:.3e}"),
@@ -129,10 +129,10 @@ fn readings(stated: &StatedInertial) -> Vec<Reading> {
         }
     }
     let lower = [xx, xy, yy, xz, yz, zz];
-    if xz > 0.0 && xz != yy && possible(&lower) {
+    if xz > 0.0 && xz != yy && is_possible(&lower) {
         let evidence =
             format!("principal moments {before} kg m^2 become {}, which a body can have", shown(principal(&lower)));
-        ways.push(Reading { kind: SlipKind::LowerTriangle, meant: Some(with(stated.mass_kg, lower)), evidence });
+        ways.push(Interpretation { kind: SlipKind::LowerTriangle, meant: Some(with(stated.mass_kg, lower)), evidence });
     }
     ways
 }

@@ -1,35 +1,30 @@
 //! Mirrored links with different values.
 
-use super::{Search, SlipKind, possible, principal, trace};
+use super::{Search, SlipKind, is_possible, principal, trace};
 use crate::urdf::{MOMENT_NAMES, StatedInertial};
 use std::collections::HashMap;
 
-/// Relative tolerance between twins: CAD programs differ by some tenths of a percent.
-const ALIKE: f64 = 0.02;
-/// Maximum number of differing values at which the remaining ones still identify the mirror plane.
-const FEW: usize = 3;
-
-/// Words in names for the two sides.
 const SIDES: [[&str; 2]; 6] = [["left", "right"], ["l", "r"], ["fl", "fr"], ["rl", "rr"], ["hl", "hr"], ["bl", "br"]];
 
 /// Reports pairs of left and right links with different masses, distances of the centre of mass or principal moments.
-pub(super) fn look(search: &mut Search) {
+pub(super) fn find(search: &mut Search) {
+    let tolerance = search.settings.twin_tolerance;
     for (left, right) in pairs(&search.now) {
         let [a, b] = [left, right].map(|place| search.now[place].clone());
-        if alike(&a, &b) {
+        if are_equal(&a, &b, tolerance) {
             continue;
         }
-        let (signs, differing) = mirror(&a, &b);
+        let (signs, differing) = mirror(&a, &b, tolerance);
         let list: Vec<String> =
             differing.iter().map(|&k| format!("{} {} and {}", NAMES[k], numbers(&a)[k], numbers(&b)[k])).collect();
         let evidence = format!("{} and {}: {}", a.link, b.link, list.join(", "));
         let bodies = [is_body(&a), is_body(&b)];
-        if differing.len() > FEW || bodies[0] == bodies[1] {
+        if differing.len() > search.settings.max_differing_values || bodies[0] == bodies[1] {
             let message = format!(
                 "{} and {} are mirror images by name but not by numbers, and nothing says which is right: compare with the drawing",
                 a.link, b.link
             );
-            search.name(SlipKind::Twins, &[left, right], message, evidence);
+            search.note_uncorrected(SlipKind::Twins, &[left, right], message, evidence);
             continue;
         }
         // The possible one of the two gives the values of the other.
@@ -50,7 +45,7 @@ pub(super) fn look(search: &mut Search) {
 }
 
 fn is_body(stated: &StatedInertial) -> bool {
-    stated.mass_kg > 0.0 && possible(&stated.moments)
+    stated.mass_kg > 0.0 && is_possible(&stated.moments)
 }
 
 fn pairs(stated: &[StatedInertial]) -> Vec<(usize, usize)> {
@@ -77,14 +72,14 @@ fn replaced(name: &str, left: &str, right: &str) -> Option<String> {
 }
 
 /// Whether two links have equal mass, centre-of-mass distance and principal moments, in any frame.
-fn alike(a: &StatedInertial, b: &StatedInertial) -> bool {
-    let near = |x: f64, y: f64, scale: f64| (x - y).abs() <= ALIKE * scale;
+fn are_equal(a: &StatedInertial, b: &StatedInertial, tolerance: f64) -> bool {
+    let near = |x: f64, y: f64, scale: f64| (x - y).abs() <= tolerance * scale;
     let distance = |one: &StatedInertial| one.com_m.iter().map(|x| x * x).sum::<f64>().sqrt();
     let (of_a, of_b) = (principal(&a.moments), principal(&b.moments));
     let size = of_a.iter().chain(&of_b).fold(0.0_f64, |most, moment| most.max(moment.abs()));
     near(a.mass_kg, b.mass_kg, a.mass_kg.abs().max(b.mass_kg.abs()))
         // Differences below 0.1 mm are ignored.
-        && (distance(a) - distance(b)).abs() <= ALIKE * distance(a).max(distance(b)) + 1e-4
+        && (distance(a) - distance(b)).abs() <= tolerance * distance(a).max(distance(b)) + 1e-4
         && of_a.iter().zip(&of_b).all(|(a, b)| near(*a, *b, size))
 }
 
@@ -103,7 +98,7 @@ fn with_numbers(of: &StatedInertial, numbers: [f64; 10]) -> StatedInertial {
 
 /// The reflection (signs of the axes) with the fewest differing numbers: sign of each number, and indices of the
 /// differing ones.
-fn mirror(a: &StatedInertial, b: &StatedInertial) -> ([f64; 10], Vec<usize>) {
+fn mirror(a: &StatedInertial, b: &StatedInertial, tolerance: f64) -> ([f64; 10], Vec<usize>) {
     let (of_a, of_b) = (numbers(a), numbers(b));
     let size = trace(&a.moments).abs().max(trace(&b.moments).abs());
     let length = of_a[1..4].iter().chain(&of_b[1..4]).fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -126,7 +121,7 @@ fn mirror(a: &StatedInertial, b: &StatedInertial) -> ([f64; 10], Vec<usize>) {
                 1..=3 => length + 0.005,
                 _ => size,
             };
-            (signs[k] * of_a[k] - of_b[k]).abs() > ALIKE * scale
+            (signs[k] * of_a[k] - of_b[k]).abs() > tolerance * scale
         };
         let differing: Vec<usize> = (0..10).filter(|&k| differs(k)).collect();
         if best.as_ref().is_none_or(|(_, least)| differing.len() < least.len()) {

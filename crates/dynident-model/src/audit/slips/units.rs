@@ -5,7 +5,7 @@
 //! and humanoids the medians are 0.26 to 0.44 (1.7 with many wheels and fingers), 10 to 500 kg/m³, and at most 0.5;
 //! single centres of mass are up to 4.5 L away.
 
-use super::{Search, SlipKind, shifted, trace};
+use super::{Search, SlipKind, SlipSettings, scaled_by_power, trace};
 use crate::urdf::StatedInertial;
 
 /// A hypothesis about units, as powers of ten to kg, m and kg m².
@@ -29,42 +29,29 @@ const CANDIDATES: [Units; 10] = [
     Units { what: "masses in g, centres of mass in mm and moments in g mm^2", mass: -3, com: -3, moments: -9 },
 ];
 
-/// Typical decimal logarithm of each figure in published descriptions, and its plausible range for all links together
-/// and for one link.
-const GYRATION: f64 = -0.45;
-const GYRATIONS: [[f64; 2]; 2] = [[-1.2, 0.8], [-1.7, 1.3]];
-const DENSITY: f64 = 2.2;
-const DENSITIES: [[f64; 2]; 2] = [[-0.7, 3.7], [-0.7, 4.2]];
-/// Largest plausible distance of a centre of mass over L (median of the nonzero ones), and smallest after a change of
-/// unit.
-const FARTHEST: f64 = 20.0;
-const NEAREST: f64 = 0.005;
-/// Misfit margin to the best hypothesis, decades; a second one within it makes the result ambiguous.
-const APART: f64 = 0.4;
-
 impl Units {
     fn of(&self, stated: &StatedInertial) -> StatedInertial {
         StatedInertial {
-            mass_kg: shifted(stated.mass_kg, self.mass),
-            com_m: stated.com_m.map(|x| shifted(x, self.com)),
-            moments: stated.moments.map(|moment| shifted(moment, self.moments)),
+            mass_kg: scaled_by_power(stated.mass_kg, self.mass),
+            com_m: stated.com_m.map(|x| scaled_by_power(x, self.com)),
+            moments: stated.moments.map(|moment| scaled_by_power(moment, self.moments)),
             ..stated.clone()
         }
     }
 }
 
 /// Tests all links together; if their figures are plausible, tests each link alone.
-pub(super) fn look(search: &mut Search) {
+pub(super) fn find(search: &mut Search) {
     let Some(lengths) = search.lengths.clone() else { return };
     let places: Vec<usize> =
-        search.with_mass().into_iter().filter(|&place| search.now[place].moments != DEFAULT).collect();
+        search.with_mass().into_iter().filter(|&place| search.now[place].moments != DEFAULT_MOMENTS).collect();
     if places.len() >= 2 && explain(search, &places, &lengths, false) {
         return;
     }
     for place in places {
         // Sensors and frames often have an arbitrary mass for the simulator.
         let one = Figures::of(core::iter::once((search.now[place].clone(), lengths[place])));
-        if one.density < DENSITIES[1][0] {
+        if one.density < search.settings.link_log10_density_range[0] {
             continue;
         }
         explain(search, &[place], &lengths, true);
@@ -72,26 +59,28 @@ pub(super) fn look(search: &mut Search) {
 }
 
 /// An exporter's default of 1 kg m², which is not a unit error.
-const DEFAULT: [f64; 6] = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
+const DEFAULT_MOMENTS: [f64; 6] = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
 
 /// Whether the figures of these links are implausible; if so, the matching units are recorded.
 fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool) -> bool {
     let as_stated = Figures::of(places.iter().map(|&place| (search.now[place].clone(), lengths[place])));
-    if as_stated.misfit(single, false).is_some() {
+    if as_stated.misfit(&search.settings, single, false).is_some() {
         return false;
     }
     let mut fits: Vec<(f64, &Units, Figures)> = CANDIDATES
         .iter()
         .filter_map(|units| {
             let figures = Figures::of(places.iter().map(|&place| (units.of(&search.now[place]), lengths[place])));
-            Some((figures.misfit(single, units.com != 0)?, units, figures))
+            Some((figures.misfit(&search.settings, single, units.com != 0)?, units, figures))
         })
         .collect();
     fits.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whose = search.names(places);
     let stated = format!("as they stand, {as_stated}");
     match &fits[..] {
-        [(_, units, figures), rest @ ..] if rest.first().is_none_or(|next| next.0 > fits[0].0 + APART) => {
+        [(_, units, figures), rest @ ..]
+            if rest.first().is_none_or(|next| next.0 > fits[0].0 + search.settings.min_misfit_margin) =>
+        {
             let message = format!("{whose}: {}: write kg, m and kg m^2", units.what);
             let evidence = format!("{stated}; in kg, m and kg m^2, {figures}");
             // If all links are tested, links without moments get the same units.
@@ -99,7 +88,7 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
             let changed = if single { places } else { &all };
             let changed: Vec<(usize, StatedInertial)> = changed
                 .iter()
-                .filter(|&&place| search.now[place].moments != DEFAULT)
+                .filter(|&&place| search.now[place].moments != DEFAULT_MOMENTS)
                 .map(|&place| (place, units.of(&search.now[place])))
                 .filter(|(place, new)| search.now[*place] != *new)
                 .collect();
@@ -109,7 +98,7 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
             let message = format!(
                 "{whose}: does not fit the distances between the joints, in no units that are known here: check it"
             );
-            search.name(SlipKind::Unexplained, places, message, stated);
+            search.note_uncorrected(SlipKind::Unexplained, places, message, stated);
         }
         several => {
             let names: Vec<&str> = several.iter().map(|(_, units, _)| units.what).collect();
@@ -117,7 +106,7 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
                 "{whose}: not in kg, m and kg m^2; several units would do ({}): look at where the numbers came from",
                 names.join("; or ")
             );
-            search.name(SlipKind::Unexplained, places, message, stated);
+            search.note_uncorrected(SlipKind::Unexplained, places, message, stated);
         }
     }
     true
@@ -145,15 +134,22 @@ impl Figures {
     }
 
     /// Distance to published robots, decades; `None` outside their range.
-    fn misfit(&self, single: bool, com_changed: bool) -> Option<f64> {
-        let window = usize::from(single);
+    fn misfit(&self, settings: &SlipSettings, single: bool, com_changed: bool) -> Option<f64> {
+        let (gyration_range, density_range) = if single {
+            (settings.link_log10_gyration_range, settings.link_log10_density_range)
+        } else {
+            (settings.log10_gyration_range, settings.log10_density_range)
+        };
         let within = |[least, most]: [f64; 2], value: f64| (least..=most).contains(&value);
-        let fits = within(GYRATIONS[window], self.gyration)
-            && within(DENSITIES[window], self.density)
-            && self.com <= FARTHEST
-            && (!com_changed || self.com >= NEAREST);
+        let fits = within(gyration_range, self.gyration)
+            && within(density_range, self.density)
+            && self.com <= settings.max_com_lengths
+            && (!com_changed || self.com >= settings.min_corrected_com_lengths);
         // Masses vary more than radii of gyration.
-        fits.then(|| (self.gyration - GYRATION).abs() + 0.3 * (self.density - DENSITY).abs())
+        fits.then(|| {
+            (self.gyration - settings.typical_log10_gyration).abs()
+                + 0.3 * (self.density - settings.typical_log10_density).abs()
+        })
     }
 }
 

@@ -14,10 +14,9 @@ pub use parse::{ExpressionError, ExpressionProblem, JointNames};
 use operations::{slopes, value};
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of operations.
-const MOST_NODES: usize = 256;
+const MAX_OPERATIONS: usize = 256;
 /// Largest valid magnitude, so that squares and sums stay within the range of numbers.
-pub(super) const LARGEST: f64 = 1e12;
+pub(super) const MAX_VALUE: f64 = 1e12;
 
 /// An expression of the joints' positions and velocities, SI units.
 ///
@@ -74,7 +73,7 @@ impl Expression {
     /// Value at positions `q(j)` and velocities `dq(j)` of the joints `j` (rad, rad/s; m, m/s). `None` if an operation
     /// has no finite value, or a magnitude beyond 1e12. Does not allocate.
     pub fn value(&self, q: impl Fn(usize) -> f64, dq: impl Fn(usize) -> f64) -> Option<f64> {
-        let mut values = [0.0; MOST_NODES];
+        let mut values = [0.0; MAX_OPERATIONS];
         self.values(q, dq, &mut values)
     }
 
@@ -82,7 +81,7 @@ impl Expression {
         &self,
         q: impl Fn(usize) -> f64,
         dq: impl Fn(usize) -> f64,
-        values: &mut [f64; MOST_NODES],
+        values: &mut [f64; MAX_OPERATIONS],
     ) -> Option<f64> {
         for (place, node) in self.nodes.iter().enumerate() {
             let of_node = match *node {
@@ -91,7 +90,7 @@ impl Expression {
                 operation => value(operation, values),
             };
             // NaN compares false, so it is checked first.
-            if of_node.is_nan() || of_node.abs() > LARGEST {
+            if of_node.is_nan() || of_node.abs() > MAX_VALUE {
                 return None;
             }
             values[place] = of_node;
@@ -103,11 +102,11 @@ impl Expression {
     /// a reverse sweep. Does nothing where the expression has no value, and skips slopes that are not finite (square
     /// root at zero).
     pub fn slopes(&self, q: impl Fn(usize) -> f64, dq: impl Fn(usize) -> f64, mut take: impl FnMut(usize, bool, f64)) {
-        let mut values = [0.0; MOST_NODES];
+        let mut values = [0.0; MAX_OPERATIONS];
         if self.values(q, dq, &mut values).is_none() {
             return;
         }
-        let mut pulls = [0.0_f64; MOST_NODES];
+        let mut pulls = [0.0_f64; MAX_OPERATIONS];
         pulls[self.nodes.len() - 1] = 1.0;
         for (place, node) in self.nodes.iter().enumerate().rev() {
             let pull = pulls[place];

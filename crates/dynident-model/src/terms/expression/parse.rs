@@ -1,17 +1,16 @@
 //! Recursive-descent parser of expressions. `-q^2` is `-(q^2)`, `2^-1` is 0.5, `a^b^c` is `a^(b^c)`.
 
 use super::operations::{ExpressionFunction, ExpressionFunction2, ExpressionNode, value};
-use super::{LARGEST, MOST_NODES};
+use super::{MAX_OPERATIONS, MAX_VALUE};
 use thiserror::Error;
 
 /// Maximum length, characters; longer than the maximum number of operations with all digits of their numbers.
-const MOST_CHARACTERS: usize = 10_000;
-/// Maximum number of characters of the text in a message.
-const MOST_SHOWN: usize = 2000;
+const MAX_CHARACTERS: usize = 10_000;
+const MAX_SHOWN_CHARACTERS: usize = 2000;
 /// Maximum nesting of parentheses, functions and signs, each of which uses a stack frame.
-const MOST_DEPTH: usize = 64;
+const MAX_DEPTH: usize = 64;
 /// Largest integer exponent that is computed by products; larger ones are powers with a nonnegative base.
-const MOST_PRODUCT: f64 = 64.0;
+const MAX_INTEGER_EXPONENT: f64 = 64.0;
 
 /// Names of joints in an expression.
 #[derive(Clone, Copy, Debug)]
@@ -71,10 +70,10 @@ fn functions() -> String {
 }
 
 pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<ExpressionNode>, ExpressionError> {
-    let shown: String = text.chars().take(MOST_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let mut parser = Parser { characters: text.chars().take(MOST_CHARACTERS + 1).collect(), ..Parser::new(joints) };
-    let parsed = if parser.characters.len() > MOST_CHARACTERS {
-        Err(ExpressionProblem::TooLong { most: MOST_CHARACTERS, of: "characters" })
+    let shown: String = text.chars().take(MAX_SHOWN_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let mut parser = Parser { characters: text.chars().take(MAX_CHARACTERS + 1).collect(), ..Parser::new(joints) };
+    let parsed = if parser.characters.len() > MAX_CHARACTERS {
+        Err(ExpressionProblem::TooLong { most: MAX_CHARACTERS, of: "characters" })
     } else {
         parser.whole()
     };
@@ -84,7 +83,6 @@ pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<Expressio
 
 struct Parser<'a> {
     characters: Vec<char>,
-    /// Index of the next character.
     at: usize,
     /// Start of the current word, which is the place of a fault.
     begin: usize,
@@ -133,16 +131,16 @@ impl<'a> Parser<'a> {
     }
 
     fn push(&mut self, node: ExpressionNode) -> Parsed {
-        if self.nodes.len() == MOST_NODES {
-            return Err(ExpressionProblem::TooLong { most: MOST_NODES, of: "operations" });
+        if self.nodes.len() == MAX_OPERATIONS {
+            return Err(ExpressionProblem::TooLong { most: MAX_OPERATIONS, of: "operations" });
         }
         self.nodes.push(node);
         Ok(self.nodes.len() - 1)
     }
 
     fn deeper<T>(&mut self, read: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {
-        if self.depth == MOST_DEPTH {
-            return Err(ExpressionProblem::TooLong { most: MOST_DEPTH, of: "parentheses and signs within each other" });
+        if self.depth == MAX_DEPTH {
+            return Err(ExpressionProblem::TooLong { most: MAX_DEPTH, of: "parentheses and signs within each other" });
         }
         self.depth += 1;
         let result = read(self);
@@ -206,10 +204,10 @@ impl<'a> Parser<'a> {
         self.nodes.truncate(first);
         self.begin = place;
         let exponent = exponent.ok_or(ExpressionProblem::Exponent)?;
-        if exponent.is_nan() || exponent.abs() > LARGEST {
+        if exponent.is_nan() || exponent.abs() > MAX_VALUE {
             return Err(ExpressionProblem::Value { what: "the exponent" });
         }
-        let is_product = exponent.fract() == 0.0 && exponent.abs() <= MOST_PRODUCT;
+        let is_product = exponent.fract() == 0.0 && exponent.abs() <= MAX_INTEGER_EXPONENT;
         self.push(if is_product {
             ExpressionNode::WholePower(base, exponent as i32)
         } else {
@@ -252,7 +250,7 @@ impl<'a> Parser<'a> {
         }
         let text: String = self.characters[begin..self.at].iter().collect();
         match text.parse::<f64>() {
-            Ok(number) if number <= LARGEST => self.push(ExpressionNode::Number(number)),
+            Ok(number) if number <= MAX_VALUE => self.push(ExpressionNode::Number(number)),
             _ => Err(ExpressionProblem::Value { what: "the number" }),
         }
     }
