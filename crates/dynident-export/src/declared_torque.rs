@@ -28,7 +28,7 @@ pub(crate) fn declared_torque(
             DeclaredLaw::Expression(expression) => of_expression(expression, q, dq),
             DeclaredLaw::Table(table) => of_table(table, q[term.joint]),
             DeclaredLaw::Function(_) => {
-                let needs = "the code of a function that was given to this program";
+                let needs = "the code of a function in the calling program";
                 return Err(ExportError::Term { symbol, kind: "declared", needs });
             }
         };

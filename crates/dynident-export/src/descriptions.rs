@@ -88,7 +88,7 @@ pub(crate) fn frictions(
                 ComparedOver::VelocityLimit => "for velocities",
             };
             notes.push(format!(
-                "Joint {}: {coulomb} and {viscous} are the nearest to its friction and offset {over} up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
+                "Joint {}: {coulomb} and {viscous} approximate its friction and offset {over} up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
                 joint.name,
                 found.most_speed,
                 if joint.turns() { "rad/s" } else { "m/s" },
@@ -109,7 +109,7 @@ pub(crate) fn omitted_terms(robot: &RobotModel, holds_springs: bool) -> Vec<Stri
         if term.own_joint().is_none() {
             let effect = if term.is_friction() { "friction" } else { "inertia" };
             notes.push(format!(
-                "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
+                "{effect} of a drive that is coupled to two joints, {symbol} = {value:?} {unit}, is left out."
             ));
         } else if let Some(law) = term.state_function() {
             if !(holds_springs && is_spring(term)) {
@@ -120,7 +120,7 @@ pub(crate) fn omitted_terms(robot: &RobotModel, holds_springs: bool) -> Vec<Stri
             notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
         } else if let Some(distance) = term.kind().sliding_distance() {
             notes.push(format!(
-                "{symbol} = {value:?} {unit} ({}) counts as the Coulomb friction that it is once the joint has moved on by {distance:?} rad (m).",
+                "{symbol} = {value:?} {unit} ({}) is replaced by the Coulomb friction that it reaches after a motion of {distance:?} rad (m).",
                 term.kind_name(),
             ));
         }

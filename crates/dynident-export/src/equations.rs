@@ -144,7 +144,7 @@ impl Values {
             ),
             function(
                 "forward_dynamics",
-                "Accelerations under torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
+                "Accelerations for given torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
                 &[Input::Position, Input::Velocity, Input::Torque],
                 "ddq",
                 self.forward,
@@ -153,7 +153,7 @@ impl Values {
         functions.extend(self.declared.map(|declared| {
             function(
                 "declared",
-                "Torque that the study declares, of springs and the like; inverse_dynamics and forward_dynamics have it in them.",
+                "Declared torque of the study (springs, counterbalances); included in inverse_dynamics and forward_dynamics.",
                 &[Input::Position, Input::Velocity],
                 "tau",
                 declared,

@@ -27,11 +27,11 @@ pub enum ExportError {
     Body { body: String, quantity: &'static str, value: f64 },
     /// The equations of motion overflow.
     #[error(
-        "the equations of motion hold the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
+        "the equations of motion contain the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
     )]
     Overflow { value: f64 },
     /// Recorded velocities for a different number of joints.
-    #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty where nothing is known")]
+    #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty if unknown")]
     Velocities { expected: usize, found: usize },
     /// An invalid recorded velocity.
     #[error(
@@ -58,7 +58,7 @@ pub enum ExportError {
     NoInertia { joint: String },
     /// A body that a simulator rejects.
     #[error(
-        "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so {reader} would refuse it: identify with physical consistency, which is the default"
+        "body `{body}` is not physically consistent (mass or moments not positive, or a moment larger than the sum of the others), so {reader} would refuse it: identify with physical consistency, which is the default"
     )]
     NotPhysical { body: String, reader: &'static str },
     /// A value that JSON cannot represent.

@@ -19,10 +19,10 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     let names: Vec<&str> = model.joints().iter().map(|joint| joint.name.as_str()).collect();
     let keys = parameter_names(&names);
     for (name, key) in names.iter().zip(&keys).filter(|(name, key)| *name != key) {
-        notes.push(format!("Joint {name} stands under dynamics.{key}."));
+        notes.push(format!("Joint {name} is under dynamics.{key}."));
     }
     for (_, joint) in model.followers() {
-        notes.push(format!("Joint {} follows others: what it carries is not here; see the format json.", joint.name));
+        notes.push(format!("Joint {} follows others: its body is omitted here; see the format json.", joint.name));
     }
     let mut text = String::new();
     for note in &notes {

@@ -21,12 +21,12 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
     }
     if model.gravity() != STANDARD_GRAVITY {
         notes.push(format!(
-            "A model of SDF has no gravity, which is the world's: it is {:?} m/s² in the base frame.",
+            "An SDF model has no gravity (it belongs to the world): it is {:?} m/s² in the base frame.",
             model.gravity().0
         ));
     }
     for (_, joint) in model.followers() {
-        notes.push(format!("SDF before 1.11 has no followers: joint {} is free in this file.", joint.name));
+        notes.push(format!("SDF before 1.11 has no mimic joints: joint {} is independent in this file.", joint.name));
     }
     let mut names = Names::default();
     let base = names.of(model.base().name());
@@ -143,7 +143,7 @@ impl Names {
     fn notes(&self) -> impl Iterator<Item = String> {
         let others = self.taken.iter().filter(|(original, name)| escaped(original) != *name);
         others.map(|(original, name)| {
-            format!("SDF allows no second part with the name {original}, or none at all: it is called {name} here.")
+            format!("The name {original} is duplicate or invalid in SDF: the part is called {name} here.")
         })
     }
 }

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`SimulatorFile`].
 pub const SIMULATOR_SCHEMA: &str = "dynident/simulator/1";
 
-const NO_DRIVE_INERTIA_NOTE: &str = "the study has no drive inertia, so that a part of it stands in the links' (drive.drive_inertia = true asks for it)";
+const NO_DRIVE_INERTIA_NOTE: &str = "the study has no drive inertia, so that a part of it is included in the links (drive.drive_inertia = true identifies it)";
 
-const NO_FRICTION_NOTE: &str = "not in the identified law, or held at zero, which is its limit";
+const NO_FRICTION_NOTE: &str = "not in the identified law, or at its bound of zero";
 
 /// Joint parameters of a simulator in addition to the bodies: `τ = armature q̈ + damping q̇ + frictionloss sign(q̇)`,
 /// delay and gain of the drive.
@@ -218,7 +218,7 @@ impl SimulatorFile {
             let said = values.into_iter().filter_map(|(what, value)| Some((what, value?.note.as_ref()?)));
             remarks.extend(said.map(|(what, note)| (format!("{what}: {}", markdown(note)), name.clone())));
         }
-        text += "\nBars are half the widths of 95 % intervals; `?` where the logs tell none.\n";
+        text += "\nError bars are half the widths of 95 % intervals; `?` if the logs do not determine them.\n";
         if let Some(delay) = &self.common_delay {
             let _ = writeln!(text, "Delay of all joints together: {}.", with_bar(delay));
         }

@@ -79,7 +79,7 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
     let temperatures = reference_temperatures(robot);
     let at_reference = temperatures
         .iter()
-        .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."));
+        .map(|(symbol, reference)| format!("{symbol} is left out: the drive is assumed to be at {reference} °C."));
     let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
     // Additional safety: shows invisible characters that a format did not escape.
     let finished = |exported: Exported| Exported { text: visible(&exported.text).into_owned(), ..exported };

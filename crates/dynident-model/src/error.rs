@@ -8,7 +8,7 @@ use thiserror::Error;
 #[allow(missing_docs, reason = "fields are named as in the messages")]
 pub enum ModelError {
     /// Joints and bodies do not pair up.
-    #[error("{joints} joints but {bodies} bodies: every joint moves exactly one body")]
+    #[error("{joints} joints but {bodies} bodies: give one body per joint")]
     Counts { joints: usize, bodies: usize },
     /// Two joints with one name.
     #[error("joint `{joint}` is named twice: joint names must be unique")]
@@ -20,10 +20,10 @@ pub enum ModelError {
     #[error("the axis of joint `{joint}` is not a unit vector: normalise it")]
     AxisNotUnit { joint: String },
     /// Joints that follow each other in a cycle.
-    #[error("joint `{joint}` follows joints that follow it: one of them has to move by itself")]
+    #[error("joint `{joint}` is in a cycle of mimic joints: make one of them independent")]
     MimicCircle { joint: String },
     /// A mimic joint whose source is not in the model.
-    #[error("joint `{joint}` follows `{source_joint}`, which is dropped: drop both, or neither")]
+    #[error("joint `{joint}` follows `{source_joint}`, which is removed: remove both, or neither")]
     LostSource { joint: String, source_joint: String },
     /// A link that does not exist.
     #[error("there is no link `{link}`; the links are: {}", known.join(", "))]

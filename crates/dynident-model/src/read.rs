@@ -57,7 +57,7 @@ pub enum ReadError {
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File { path: PathBuf, source: std::io::Error },
     /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
-    #[error("{}: larger than {} MiB: this is no robot description, name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
+    #[error("{}: larger than {} MiB, too large for a robot description: name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
     TooLarge { path: PathBuf },
     /// The file is empty.
     #[error("{}:1:1: the file is empty: name a URDF, an MJCF, an SDF or a D-H table", path.display())]

@@ -56,11 +56,11 @@ impl WatchSettings {
 /// let model = dynident_model::read_urdf(text)?.model;
 /// let friction = terms_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 /// let pendulum = ParametricModel::new(model, friction)?;
-/// // What an identification has found, with its covariance; the residual has 0.1 Nm.
+/// // An identified estimate with its covariance; the residual has a standard deviation of 0.1 Nm.
 /// let values = pendulum.nominal_base().unwrap().to_vec();
 /// let reference = StartingPoint { covariance: DMatrix::identity(4, 4) * 1e-4, values };
 /// let mut watch = Watch::new(pendulum, reference, &[0.1], &WatchSettings::new(500.0))?;
-/// // In the loop that controls: nothing is allocated. The pendulum hangs; a hand pushes with 2 Nm from 1 s on.
+/// // Control loop, without allocation. The pendulum hangs; a hand pushes with 2 Nm from 1 s on.
 /// let mut seen_s = None;
 /// for sample in 0..1000 {
 ///     let time_s = f64::from(sample) / 500.0;

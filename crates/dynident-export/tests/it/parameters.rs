@@ -144,7 +144,7 @@ fn parameters_of_ros() {
     let dotted = robot_named("arm.1/joint");
     let exported = export(&dotted, Target::Ros2Yaml, &[]).unwrap();
     assert!(exported.text.contains("      arm_1_joint:\n") && exported.text.contains("joints: [\"arm.1/joint\"]"));
-    assert!(exported.notes.iter().any(|note| note == "Joint arm.1/joint stands under dynamics.arm_1_joint."));
+    assert!(exported.notes.iter().any(|note| note == "Joint arm.1/joint is under dynamics.arm_1_joint."));
 }
 
 /// One link on one joint, both with this name.

@@ -44,7 +44,7 @@ fn a_joint_that_moves_nothing() {
 #[test]
 fn a_term_by_temperature_is_noted() {
     let exported = export(&all_terms("ur10.urdf"), Target::Python, &[]).unwrap();
-    let note = "fvT1 is left out: the drive counts as being at 25 °C.";
+    let note = "fvT1 is left out: the drive is assumed to be at 25 °C.";
     assert_eq!(exported.notes, [note]);
     assert!(exported.text.contains(note));
 }

@@ -36,7 +36,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditS
         return;
     }
     let Some(moments) = inertial.principal_moments().filter(|_| mass > 0.0) else {
-        let message = format!("has mass {mass} kg but moments: no body is like that, measure or weigh it");
+        let message = format!("has mass {mass} kg but nonzero moments, which is impossible: weigh the link");
         findings.add(Problem, "mass-not-positive", place(), message);
         return;
     };
@@ -45,7 +45,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditS
     let rounding = EIGENVALUE_ROUNDING * trace(&inertial.inertia_at_origin()).abs();
     if least < -rounding {
         let message = format!(
-            "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: none may be negative; \
+            "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: negative moments are impossible; \
              check signs, products of inertia, and the point that the inertia is about"
         );
         findings.add(Problem, "inertia-not-positive", place(), message);
@@ -54,7 +54,7 @@ fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditS
         let level = if excess < settings.moment_rounding { Warning } else { Problem };
         let message = format!(
             "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2: the largest may not exceed the sum of the others \
-             (by {:.2} % here); no mass distribution has them, check the moments",
+             (by {:.2} % here), which is impossible: check the moments",
             100.0 * excess
         );
         findings.add(level, "triangle-inequality", place(), message);
@@ -94,7 +94,7 @@ fn check_plausible(
             "inertia-too-large",
             place(),
             format!(
-                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: check \
+                "has a radius of gyration of {:.3} m with its {mass} kg, on a body of about {length_m:.3} m: check \
                  its unit (kg mm^2: divide by 1e6, g mm^2: by 1e9)",
                 square.sqrt()
             ),
@@ -103,7 +103,7 @@ fn check_plausible(
     let ball_radius = (3.0 * mass / (4.0 * core::f64::consts::PI * OSMIUM_DENSITY_KG_M3)).cbrt();
     if square >= 0.0 && square < 0.6 * ball_radius.powi(2) {
         let message = format!(
-            "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): it is a point mass or a placeholder, or the unit slipped",
+            "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): point mass, placeholder or wrong unit; check the moments",
             0.4 * mass * ball_radius.powi(2)
         );
         findings.add(Warning, "inertia-too-small", place(), message);
@@ -114,7 +114,7 @@ fn check_plausible(
     let power_of_ten = |x: f64| x > 0.0 && (x.log10() - x.log10().round()).abs() < 1e-9;
     if com == Vec3::ZERO && products == [0.0; 3] && d[0] == d[1] && d[1] == d[2] && power_of_ten(d[0]) {
         let message = format!(
-            "has the inertia {} kg m^2 about all axes and its centre of mass at the frame: that looks like a placeholder",
+            "has the inertia {} kg m^2 about all axes and its centre of mass at the frame, probably a placeholder: measure it",
             d[0]
         );
         findings.add(Warning, "placeholder", place(), message);
@@ -136,7 +136,7 @@ fn check_reference_point(link: &str, inertial: &InertialParameters, max_share: f
     moments.sort_by(f64::total_cmp);
     if moments[0] > 0.0 && moments[0] + moments[1] >= moments[2] {
         let message = format!(
-            "has an inertia of which {:.0} % could be the parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
+            "has an inertia that could contain {:.0} % parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
              origin, move it to the centre of mass",
             100.0 * share
         );
@@ -148,7 +148,9 @@ fn report_unknown(model: &Model, index: usize, findings: &mut Findings) {
     let body = &model.bodies()[index];
     let place = || format!("link {}", body.name());
     if body.prior().is_none() {
-        let message = "moves but has no inertial (nor a link fixed to it): its prior is unknown and counts as zero in predictions".to_owned();
+        let message =
+            "moves but has no inertial (nor a link fixed to it): its prior is unknown and is zero in predictions"
+                .to_owned();
         findings.add(Warning, "inertial-unknown", place(), message);
     } else {
         let names: Vec<&str> =
@@ -166,7 +168,7 @@ fn report_massless(model: &Model, findings: &mut Findings) {
     let moves_mass = |joint: usize| (0..known.len()).any(|body| known[body] && model.moves(joint, body));
     for (_, joint) in model.joints().iter().enumerate().filter(|(index, _)| !moves_mass(*index)) {
         let message =
-            "moves no mass that is known: the mass matrix is singular; give an inertial, or lock the joint".to_owned();
+            "moves no known mass, so that the mass matrix is singular: give an inertial, or lock the joint".to_owned();
         findings.add(Problem, "massless-subtree", format!("joint {}", joint.name), message);
     }
 }
@@ -179,7 +181,7 @@ fn report_equal(model: &Model, findings: &mut Findings) {
         .filter(|(_, inertial)| **inertial != InertialParameters::ZERO)
         .collect();
     if known.len() >= 3 && known.iter().all(|(_, inertial)| *inertial == known[0].1) {
-        let message = format!("all {} inertials are the same: that looks like placeholders", known.len());
+        let message = format!("all {} inertials are equal, probably placeholders: measure them", known.len());
         findings.add(Warning, "equal-inertials", "model".to_owned(), message);
     }
 }

@@ -10,7 +10,8 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
         let place = || format!("joint {}", joint.name);
         let offset = joint.placement.translation.norm();
         if offset > settings.max_joint_offset_m {
-            let message = format!("stands {offset:.4} m from its parent joint: if that is millimetres, divide by 1000");
+            let message =
+                format!("is {offset:.4} m away from its parent joint: if that is millimetres, divide by 1000");
             findings.add(Problem, "length-unit", place(), message);
         }
         let follows = model.joint_index(&joint.name).is_none();
@@ -23,9 +24,9 @@ pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, 
         }
         if let Some(mimic) = &joint.mimic {
             let rest = if follows {
-                ": it is no degree of freedom, and what it carries is felt by what it follows"
+                ": it is not a degree of freedom, and its load acts on these joints"
             } else {
-                ", which does not move here, and counts as a free joint: lock it if the log does not hold it"
+                ", which is not a degree of freedom here, so that this joint is independent: lock it if the log does not contain it"
             };
             findings.add(Info, "mimic", place(), format!("follows {}{rest}", mimic.source_names()));
         }
@@ -46,18 +47,18 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
         match (limits.lower, limits.upper) {
             (Some(lower), Some(upper)) if lower > upper => {
                 let has =
-                    format!("has its lower limit {lower} {unit} above the upper one {upper} {unit}: exchange them");
+                    format!("has its lower limit {lower} {unit} above the upper limit {upper} {unit}: exchange them");
                 add(Problem, "limit-order", has);
             }
             (Some(lower), Some(upper)) if lower == upper => {
-                let cannot = format!("may not move: both limits are {lower} {unit}; give its range or lock it");
+                let cannot = format!("cannot move: both limits are {lower} {unit}; give its range or lock it");
                 add(Warning, "limit-range", cannot);
             }
             (Some(_), Some(_)) => {}
             // The limits of a mimic joint follow from its sources.
             _ if follows => {}
             _ => {
-                let has = "has no position limits: no excitation can be designed until they are given";
+                let has = "has no position limits: give them before designing an excitation";
                 add(Warning, "limit-missing", has.to_owned());
             }
         }
@@ -74,7 +75,7 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
     match limits.velocity {
         Some(velocity) if velocity <= 0.0 => {
             let has =
-                format!("has a velocity limit of {velocity} {unit}/s, so that it may not move: give the real one");
+                format!("has a velocity limit of {velocity} {unit}/s, so that it cannot move: give the real limit");
             add(Warning, "velocity-limit", has);
         }
         Some(velocity) if turns && velocity > settings.max_velocity_limit_rad_s => {
@@ -93,12 +94,12 @@ fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings
         // A mimic joint has no drive.
         _ if follows => {}
         Some(effort) if effort <= 0.0 => {
-            let has = format!("has an effort limit of {effort}, so that it could carry nothing: give the real one");
+            let has = format!("has an effort limit of {effort}, so that it cannot move: give the real limit");
             add(Warning, "effort-limit", has);
         }
         Some(_) => {}
         None => {
-            let has = "has no effort limit: saturated torque in a log cannot be recognised by it";
+            let has = "has no effort limit: saturated torque in a log cannot be detected with it";
             add(Info, "effort-limit", has.to_owned());
         }
     }

@@ -74,7 +74,7 @@ fn findings(model: &Model, settings: &AuditSettings) -> Vec<AuditFinding> {
     let lengths = Lengths::of(model);
     let mut findings = Findings(Vec::new());
     let summary = format!(
-        "{} joints; the bodies that move have {mass:.4} kg in all; joint origins reach {:.3} m from the base",
+        "{} joints; the moving bodies have {mass:.4} kg in total; joint origins reach {:.3} m from the base",
         model.dof(),
         lengths.reach
     );

@@ -28,7 +28,7 @@ const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0,
 
 pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
     if flood(text).is_some() {
-        return Err(MeshFault::Collada("thousands of attributes in one element, or of nested namespaces"));
+        return Err(MeshFault::Collada("too many attributes in one element, or too many nested namespaces"));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document =

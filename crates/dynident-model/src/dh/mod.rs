@@ -8,7 +8,7 @@
 //!
 //! [base]                             # all optional
 //! link = "base"                      # name of the fixed link
-//! xyz_m = [0.0, 0.0, 0.0]            # where D-H frame 0 stands in the base frame
+//! xyz_m = [0.0, 0.0, 0.0]            # origin of D-H frame 0 in the base frame
 //! rpy_deg = [0.0, 0.0, 0.0]          # or rpy_rad; fixed axes, as in URDF
 //!
 //! [[joint]]
@@ -77,7 +77,7 @@ pub enum DhFault {
     #[error("`{key}` is {value:e}: write a finite number below 1e9")]
     Number { key: &'static str, value: f64 },
     /// One quantity given in two units.
-    #[error("`{first}` and `{second}` say the same thing: keep one")]
+    #[error("`{first}` and `{second}` are the same quantity: keep one")]
     BothUnits { first: &'static str, second: &'static str },
     /// A key that does not fit the kind of joint.
     #[error("`{key}` does not fit a {kind} joint: use {fix}")]
@@ -89,7 +89,7 @@ pub enum DhFault {
     #[error("a {what} has an empty name: give it one")]
     EmptyName { what: &'static str },
     /// Two joints or two links with one name.
-    #[error("{what} `{name}` stands twice: rename one")]
+    #[error("duplicate {what} `{name}`: rename one")]
     DuplicateName { what: &'static str, name: String },
     /// A parent link that no earlier row defines.
     #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
@@ -102,7 +102,7 @@ pub enum DhFault {
     TooManyJoints { limit: usize },
     /// An inertial that is incomplete or overdetermined.
     #[error(
-        "the inertial is not complete or says things twice: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
+        "the inertial is incomplete or redundant: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
     )]
     Inertial,
     /// The parts do not form a valid model.

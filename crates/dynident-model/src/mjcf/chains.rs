@@ -47,7 +47,7 @@ pub(super) fn closed(
     let mut held = Vec::new();
     for (number, connect) in connects.iter().enumerate() {
         if number >= MAX_CHAINS {
-            left(connect, format!("more than {MAX_CHAINS} chains are not tried"));
+            left(connect, format!("more than {MAX_CHAINS} chains are not supported"));
             continue;
         }
         match closure(&model, connect, around) {
@@ -83,7 +83,7 @@ fn blames(error: &LoopError, closure: &LoopClosure) -> bool {
 
 /// Cut of a chain, or the reason why it cannot be closed.
 fn closure(model: &Model, connect: &Connect<'_>, around: &ChainContext<'_>) -> Result<LoopClosure, String> {
-    let way = |link: &String| loops::path_to(model, link).ok_or_else(|| format!("there is no body `{link}`"));
+    let way = |link: &String| loops::path_to(model, link).ok_or_else(|| format!("unknown body `{link}`"));
     let [(first, first_placement), (second, second_placement)] = [way(&connect.bodies[0])?, way(&connect.bodies[1])?];
     let drawn = |path: &[usize], placement: Transform| {
         let joints = path.iter().map(|&joint| model.tree_joints()[joint].transform(around.references[joint]));
@@ -95,7 +95,7 @@ fn closure(model: &Model, connect: &Connect<'_>, around: &ChainContext<'_>) -> R
     let meets = drawn(&first, first_placement).point(point);
     let other = drawn(&second, second_placement).inverse().point(meets);
     if around.driven.is_empty() {
-        return Err("no actuator says which joints have a drive; name the others in [[robot.loop]]".to_owned());
+        return Err("no joint has an actuator; name the passive joints in [[robot.loop]]".to_owned());
     }
     let moves = |joint: &usize| first.contains(joint) != second.contains(joint);
     let free = |joint: &usize| {

@@ -28,7 +28,7 @@ pub enum MjcfFault {
     #[error("the document has more than {limit} {what}: give the MJCF of one robot")]
     TooLarge { limit: usize, what: &'static str },
     /// Thousands of attributes in one tag, or of namespaces.
-    #[error("more attributes in a tag, or namespaces in the document, than any robot has: give the MJCF of one robot")]
+    #[error("too many attributes in a tag, or namespaces in the document: give the MJCF of one robot")]
     Flood,
     /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
@@ -85,7 +85,7 @@ pub enum MjcfFault {
     #[error("the model has no joint of type hinge or slide: give the MJCF of a robot that moves")]
     NoMovingJoint,
     /// More moving joints than allowed.
-    #[error("the model has more than {limit} joints: fix those that the log does not hold")]
+    #[error("the model has more than {limit} joints: fix those that the log does not contain")]
     TooManyJoints { limit: usize },
     /// The parts do not form a valid model.
     #[error("{0}; fix the description")]

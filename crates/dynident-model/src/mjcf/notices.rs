@@ -79,53 +79,44 @@ impl fmt::Display for Loss {
             Self::UnknownMass { body, why } => {
                 write!(
                     f,
-                    "the mass of body `{body}` {why}, which is not computed: it counts as unknown; give the body an <inertial>"
+                    "the mass of body `{body}` {why}, which is not supported, so that it is unknown: give the body an <inertial>"
                 )
             }
             Self::SpringPolynomial { joint } => {
-                write!(
-                    f,
-                    "joint {joint} has a spring (`stiffness`) that is no straight line: its first factor counts alone"
-                )
+                write!(f, "joint {joint} has a nonlinear spring (`stiffness`): only its linear coefficient is used")
             }
             Self::DampingPolynomial { joint } => {
-                write!(
-                    f,
-                    "the damping of joint {joint} is a polynomial, of which only the part in proportion to velocity is read"
-                )
+                write!(f, "the damping of joint {joint} is a polynomial: only its linear coefficient is used")
             }
             Self::OneSidedEffort { joint, low, high } => {
-                write!(
-                    f,
-                    "joint {joint} has the effort limits {low:?} and {high:?}: a limit is read where it is the same both ways"
-                )
+                write!(f, "joint {joint} has the effort limits {low:?} and {high:?}: an asymmetric limit is ignored")
             }
             Self::GravityCompensation { body } => {
-                write!(f, "body `{body}` has `gravcomp`, which the model does not hold: its weight counts in full")
+                write!(f, "body `{body}` has `gravcomp`, which is not supported: its full weight is used")
             }
             Self::Constraint { element, between } => {
                 write!(
                     f,
-                    "<{element}> under <equality> joins {between}, which the model does not hold: torques are those of the tree without it"
+                    "<{element}> under <equality> connects {between}, which is not supported: torques are those of the tree without it"
                 )
             }
             Self::Chain { between, why } => {
                 write!(
                     f,
-                    "<connect> under <equality> closes a chain at {between}, which the model does not hold ({why}): torques are those of the tree without it"
+                    "<connect> under <equality> closes a chain at {between}, which is not supported ({why}): torques are those of the tree without it"
                 )
             }
             Self::CouplingPolynomial { joint } => {
                 write!(
                     f,
-                    "joint `{joint}` follows another by a polynomial, which the model does not hold: it counts as free"
+                    "joint `{joint}` follows another by a polynomial, which is not supported: it is treated as independent"
                 )
             }
             Self::Tendon { tendon } => {
-                write!(f, "tendon {tendon} has a spring, damping, friction or inertia, which the model does not hold")
+                write!(f, "tendon {tendon} has a spring, damping, friction or inertia, which is not supported")
             }
             Self::Medium => {
-                write!(f, "<option> has a medium (`density`, `viscosity`), whose forces the model does not hold")
+                write!(f, "<option> has a medium (`density`, `viscosity`), whose forces are not supported")
             }
             Self::Unread { element, attribute: None } => write!(f, "<{element}> was not read: misspelt?"),
             Self::Unread { element, attribute: Some(attribute) } => {

@@ -36,7 +36,7 @@ pub enum MjcfWriteError {
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
     /// A body or joint in an included file.
-    #[error("{kind} `{name}` stands in an included file, which is not rewritten: put the robot into one file")]
+    #[error("{kind} `{name}` is in an included file, which is not rewritten: put the robot into one file")]
     Included { kind: &'static str, name: String },
     /// A value that is not finite or exceeds the magnitude limit.
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
@@ -48,7 +48,7 @@ pub enum MjcfWriteError {
     NotPhysical { body: String },
     /// Mass between two joints of one body.
     #[error(
-        "`{link}` stands between two joints of one MJCF body and cannot hold mass there: write the joints into bodies of their own"
+        "`{link}` is between two joints of one MJCF body and cannot have mass there: write the joints into separate bodies"
     )]
     Between { link: String },
     /// A setting of `<compiler>` that would change the written values.

@@ -21,7 +21,7 @@ pub enum SdfFault {
     #[error("the document has more than {limit} nodes: give the SDF of one robot")]
     TooLarge { limit: u32 },
     /// Thousands of attributes in one tag, or of namespaces.
-    #[error("more attributes in a tag, or namespaces in the document, than any robot has: give the SDF of one robot")]
+    #[error("too many attributes in a tag, or namespaces in the document: give the SDF of one robot")]
     Flood,
     /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
@@ -30,7 +30,7 @@ pub enum SdfFault {
     #[error("the root element is <{root}>, not <sdf>: give an SDF file")]
     NotSdf { root: String },
     /// An invalid `version`.
-    #[error("`version` of <sdf> is `{text}`: write one such as 1.9, by which frames are understood")]
+    #[error("`version` of <sdf> is `{text}`: write a version such as 1.9, which determines the meaning of frames")]
     Version { text: String },
     /// No model.
     #[error("there is no <model> here: give the SDF of one robot{hint}")]
@@ -54,7 +54,7 @@ pub enum SdfFault {
     #[error("<{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count { element: String, expected: usize, found: usize },
     /// An invalid keyword.
-    #[error("`{text}` of <{element}> is not known: write {expected}")]
+    #[error("`{text}` of <{element}> is unknown: write {expected}")]
     Word { element: String, text: String, expected: &'static str },
     /// A repeated name in one scope.
     #[error("`{name}` is defined a second time: rename or delete one")]
@@ -69,10 +69,10 @@ pub enum SdfFault {
     #[error("link `{link}` is the child of joints `{first}` and `{second}`: delete one, closed chains are not read")]
     TwoParents { link: String, first: String, second: String },
     /// Links that are not connected by a joint.
-    #[error("links `{first}` and `{second}` are both carried by no joint: fix one of them to the other, or to `world`")]
+    #[error("links `{first}` and `{second}` both have no parent joint: fix one of them to the other, or to `world`")]
     SeveralRoots { first: String, second: String },
     /// Links that carry each other.
-    #[error("link `{link}` is carried by itself through its joints: delete one joint of the loop")]
+    #[error("link `{link}` is its own ancestor through its joints: delete one joint of the loop")]
     Loop { link: String },
     /// A joint that joins a link with itself.
     #[error("joint `{joint}` joins `{link}` with itself: fix <parent> or <child>")]
@@ -90,7 +90,7 @@ pub enum SdfFault {
     #[error("the model has no joint of type revolute, continuous or prismatic: give the SDF of a robot that moves")]
     NoMovingJoint,
     /// More moving joints than allowed.
-    #[error("the model has more than {limit} joints: fix those that the log does not hold")]
+    #[error("the model has more than {limit} joints: fix those that the log does not contain")]
     TooManyJoints { limit: usize },
     /// The parts do not form a valid model.
     #[error("{0}; fix the description")]

@@ -131,7 +131,7 @@ fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Nod
 
 fn include_hint(around: Node<'_, '_>) -> &'static str {
     match children(around, "include").next() {
-        Some(_) => "; <include> is not followed: write the whole out by `gz sdf -p`",
+        Some(_) => "; <include> is not supported: expand the file with `gz sdf -p`",
         None => "",
     }
 }

@@ -44,16 +44,16 @@ impl fmt::Display for SdfLoss {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownMass { link, why } => {
-                write!(f, "the mass of link `{link}` {why}: it counts as unknown; give the link an <inertial>")
+                write!(f, "the mass of link `{link}` {why}, so that it is unknown: give the link an <inertial>")
             }
             Self::Weightless { link } => {
-                write!(f, "link `{link}` has no gravity, which the model does not hold: its weight counts in full")
+                write!(f, "link `{link}` has no gravity, which is not supported: its full weight is used")
             }
             Self::AddedMass { link } => {
-                write!(f, "link `{link}` has `fluid_added_mass`, which the model does not hold")
+                write!(f, "link `{link}` has `fluid_added_mass`, which is not supported")
             }
             Self::Include { uri } => {
-                write!(f, "the model at `{uri}` is not read: write the whole out by `gz sdf -p`")
+                write!(f, "the model at `{uri}` is not read: expand the file with `gz sdf -p`")
             }
         }
     }

@@ -160,7 +160,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
 
 /// `<inertial>`: mass, centre of mass, and inertia about it in axes rotated by the origin's rpy.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
-    const HINT: &str = ", or delete <inertial> so that the link counts as unknown";
+    const HINT: &str = ", or delete <inertial> so that the link is treated as unknown";
     let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;

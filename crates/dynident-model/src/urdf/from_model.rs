@@ -19,7 +19,7 @@ pub fn write_urdf(model: &Model) -> String {
     if model.gravity() != STANDARD_GRAVITY {
         let [x, y, z] = model.gravity().0;
         let _ =
-            writeln!(text, "  <!-- gravity in the base frame, which URDF does not hold: {x:?} {y:?} {z:?} m/s² -->");
+            writeln!(text, "  <!-- gravity in the base frame, which URDF does not support: {x:?} {y:?} {z:?} m/s² -->");
     }
     write_links(&mut text, model.base(), true);
     for (joint, body) in model.tree_joints().iter().zip(model.bodies()) {
@@ -109,7 +109,7 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
         Some((sources, offset)) => {
             let shares = sources.iter().map(|s| format!("{:?} {} + ", s.multiplier, s.joint));
             let law = comment(&format!("{}{offset:?}", shares.collect::<String>()));
-            let _ = writeln!(text, "    <!-- follows {law}, which URDF does not hold -->");
+            let _ = writeln!(text, "    <!-- follows {law}, which URDF does not support -->");
         }
     }
     *text += "  </joint>\n";

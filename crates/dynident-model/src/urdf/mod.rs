@@ -116,7 +116,7 @@ pub enum UrdfFault {
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
     TooLarge { limit: u32 },
     /// Thousands of attributes in one tag, or of namespaces.
-    #[error("more attributes in a tag, or namespaces in the document, than any robot has: name the URDF of one robot")]
+    #[error("too many attributes in a tag, or namespaces in the document: name the URDF of one robot")]
     Flood,
     /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
@@ -186,7 +186,7 @@ pub enum UrdfFault {
     #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
     SeveralRoots { first: String, second: String },
     /// More moving joints than [`MAX_MOVING_JOINTS`].
-    #[error("the robot has more than {limit} moving joints: fix those that the log does not hold")]
+    #[error("the robot has more than {limit} moving joints: fix those that the log does not contain")]
     TooManyJoints { limit: usize },
     /// The parts do not form a valid model.
     #[error("{0}; fix the description")]

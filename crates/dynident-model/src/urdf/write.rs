@@ -80,7 +80,7 @@ pub enum UrdfWriteError {
     NoMass { link: String },
     /// A value that exceeds the magnitude limit.
     #[error(
-        "the new values of link `{link}` hold {value:e}, beyond the {MAX_MAGNITUDE:e} that a description may hold: check its lengths and masses"
+        "the new values of link `{link}` contain {value:e}, more than the limit of {MAX_MAGNITUDE:e}: check its lengths and masses"
     )]
     TooLarge { link: String, value: f64 },
     /// The number of parameter sets differs from the number of moving bodies.

@@ -167,10 +167,10 @@ fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
     assert_eq!(followers, [Mimic::of("drive", -1.0, 0.0), Mimic::of("drive", 1.0, 0.0)]);
     let all = r#"<motor joint="drive"/><motor joint="rod_joint"/><motor joint="rocker_joint"/>"#;
     for (text, words) in [
-        (linkage("", "2 0 0"), "no actuator says which joints have a drive; name the others in [[robot.loop]]"),
+        (linkage("", "2 0 0"), "no joint has an actuator; name the passive joints in [[robot.loop]]"),
         (linkage(all, "2 0 0"), "every joint of the chain has an actuator"),
-        (linkage(drive, "2 0 0.3"), "no parallelogram"),
-        (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "there is no body `rokcer`"),
+        (linkage(drive, "2 0 0.3"), "not a parallelogram"),
+        (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "unknown body `rokcer`"),
     ] {
         let robot = read_mjcf(&text).unwrap();
         let said: Vec<String> = robot.notices.iter().map(|notice| notice.loss.to_string()).collect();

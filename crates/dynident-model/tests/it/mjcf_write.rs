@@ -75,7 +75,7 @@ fn published_models_take_new_bodies_and_drives() {
             // Two joints in one body, or a compiler setting that changes masses.
             Err(error) => {
                 let message = error.to_string();
-                let known = ["stands between two joints", "of <compiler> changes the masses"];
+                let known = ["is between two joints", "of <compiler> changes the masses"];
                 assert!(known.iter().any(|known| message.contains(known)), "{}: {message}", path.display());
             }
         }
@@ -167,7 +167,7 @@ fn what_mujoco_would_refuse_or_change_is_refused() {
         assert!(message.starts_with(&format!("`{setting}` of <compiler> changes the masses")), "{message}");
     }
     let two = ARM.replace("<joint ", "<joint name=\"i\"/><joint ");
-    assert!(refused(&two, set("a/i", ball)).contains("`a/i` stands between two joints"));
+    assert!(refused(&two, set("a/i", ball)).contains("`a/i` is between two joints"));
     let joint = |joint: &str, damping| JointChange {
         joint: joint.to_owned(),
         damping: Some(damping),
@@ -184,5 +184,5 @@ fn what_mujoco_would_refuse_or_change_is_refused() {
     let main = "<mujoco><include file=\"arm.xml\"/></mujoco>";
     let mut arm = |_: &str| Ok(ARM.to_owned());
     let error = rewrite_mjcf(main, &mut arm, &[set("a", ball)], &[]).unwrap_err().to_string();
-    assert!(error.contains("body `a` stands in an included file"), "{error}");
+    assert!(error.contains("body `a` is in an included file"), "{error}");
 }

@@ -53,7 +53,7 @@ fn faults_name_the_place_and_the_fix() {
         (&changed("0 0 -0.5 0 0 0", "0 0 -0.5"), "<pose> holds 3 numbers: write 6"),
         (&changed("<pose>", "<pose rotation_format=\"euler\">"), "write euler_rpy or quat_xyzw"),
         (&changed("name=\"rod\"", "name=\"base\""), "`base` is defined a second time"),
-        (&pendulum(INERTIAL, AXIS, "<link name=\"loose\"/>"), "links `world` and `loose` are both carried by no joint"),
+        (&pendulum(INERTIAL, AXIS, "<link name=\"loose\"/>"), "links `world` and `loose` both have no parent joint"),
         (
             &pendulum(
                 INERTIAL,
@@ -84,7 +84,7 @@ fn faults_name_the_place_and_the_fix() {
 <joint name="j" type="fixed"><parent>a</parent><child>b</child></joint>
 <joint name="k" type="fixed"><parent>b</parent><child>a</child></joint></model></sdf>"#;
     // Each joint's pose is relative to its child, so only the tree shows the loop.
-    assert!(read_sdf(loop_of_two).unwrap_err().to_string().contains("carried by itself"));
+    assert!(read_sdf(loop_of_two).unwrap_err().to_string().contains("is its own ancestor"));
 }
 
 #[test]

@@ -133,7 +133,7 @@ fn false_alarms_come_no_more_often_than_was_allowed() {
         }
     }
     // Upper bound: fifty plus three standard deviations of seven; a threshold far too high would give no alarm.
-    println!("{alarms} false alarms in {checks} checks, of which 50 were allowed");
+    println!("{alarms} false alarms in {checks} checks; 50 were allowed");
     assert!((1..=71).contains(&alarms), "{alarms} of {checks}");
 }
 

@@ -37,14 +37,14 @@ pub(super) fn find(search: &mut Search) {
     let least =
         if all { search.settings.min_parallel_axis_share } else { search.settings.sufficient_parallel_axis_share };
     let evidence = format!(
-        "without the parallel-axis term m (r^2 1 - r r^T), which is {:.0} % of the moments or more, a body remains on {} of {} links where the term is large; \
-         of moments about the centre of mass it hardly ever does",
+        "without the parallel-axis term m (r^2 1 - r r^T), which is {:.0} % of the moments or more, {} of {} links with a large term remain possible bodies; \
+         this is rare for moments about the centre of mass",
         100.0 * least,
         leave,
         of
     );
     let message = format!(
-        "moments of {} are about the link's origin, but a URDF means those about the centre of mass: take the parallel-axis term away",
+        "moments of {} are about the link's origin, but URDF requires moments about the centre of mass: subtract the parallel-axis term",
         search.names(&places)
     );
     let changed = members.into_iter().filter_map(|(place, _, rest)| Some((*place, rest.clone()?))).collect();

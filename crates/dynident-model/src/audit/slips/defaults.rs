@@ -15,7 +15,7 @@ pub(super) fn find(search: &mut Search) {
         search.now.len()
     );
     let message = format!(
-        "moments of {} are an exporter's default: the true ones are not in the file; measure them, or delete <inertial> so that the link counts as unknown",
+        "moments of {} are an exporter's default, and the file does not contain the true ones: measure them, or delete <inertial> so that the link is treated as unknown",
         search.names(&places)
     );
     search.note_uncorrected(SlipKind::Defaults, &places, message, evidence);

@@ -42,10 +42,10 @@ pub(super) fn find(search: &mut Search) {
         let evidence =
             format!("principal moments {} kg m^2, mass {} kg", shown(principal(&stated.moments)), stated.mass_kg);
         let message = if ways.is_empty() {
-            "no body is like that, and no slip that is known here (signs, order of the numbers) makes one of it: measure it, or delete <inertial>".to_owned()
+            "impossible body, which no known mistake (signs, order of the numbers) explains: measure it, or delete <inertial>".to_owned()
         } else {
             format!(
-                "no body is like that, and several slips would explain it ({}): look at where the numbers came from",
+                "impossible body, which several mistakes explain ({}): check the source of the numbers",
                 ways.join(", ")
             )
         };
@@ -65,13 +65,13 @@ fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Interpretation)
     let evidence = evidence.join("; ");
     let whose = search.names(&places);
     let message = match kind {
-        SlipKind::NegatedMoments => format!("mass or moments of {whose} have the wrong sign: turn it"),
+        SlipKind::NegatedMoments => format!("mass or moments of {whose} have the wrong sign: change it"),
         SlipKind::NegatedProducts => format!(
-            "products of inertia of {whose} have the other convention's sign (URDF has ixy = -∫ x y dm): turn ixy, ixz and iyz"
+            "products of inertia of {whose} have the sign of the other convention (URDF has ixy = -∫ x y dm): change the signs of ixy, ixz and iyz"
         ),
         SlipKind::RowMajor => format!(
             "moments of {whose} are a 3 x 3 matrix read row by row into the slots ixx ixy ixz iyy iyz izz: iyy repeats ixy, iyz is iyy and izz is iyz; \
-             the true izz is not in the file, take it from where the numbers came from"
+             the true izz is not in the file, take it from the source of the numbers"
         ),
         SlipKind::LowerTriangle => format!(
             "moments of {whose} are a lower triangle read row by row (xx, xy, yy, xz, yz, zz) into the slots of an upper one: exchange ixz and iyy"
@@ -94,7 +94,7 @@ fn interpretations(stated: &StatedInertial) -> Vec<Interpretation> {
     let mut ways = Vec::new();
     let mut way = |kind, mass_kg: f64, moments: [f64; 6], known: bool| {
         let evidence =
-            format!("principal moments {before} kg m^2 become {}, which a body can have", shown(principal(&moments)));
+            format!("principal moments {before} kg m^2 become {}, which is possible", shown(principal(&moments)));
         let meant = known.then(|| with(mass_kg, moments));
         ways.push(Interpretation { kind, meant, evidence });
     };
@@ -123,7 +123,7 @@ fn interpretations(stated: &StatedInertial) -> Vec<Interpretation> {
             ways.push(Interpretation {
                 kind: SlipKind::RowMajor,
                 meant: None,
-                evidence: format!("iyy = ixy = {xy}, and with iyy = {yz}, iyz = {zz} a body has an izz between {least:.3e} and {most:.3e}"),
+                evidence: format!("iyy = ixy = {xy}, and with iyy = {yz}, iyz = {zz} a possible izz is between {least:.3e} and {most:.3e}"),
             });
             return ways.into_iter().filter(|way| way.kind == SlipKind::RowMajor).collect();
         }
@@ -131,7 +131,7 @@ fn interpretations(stated: &StatedInertial) -> Vec<Interpretation> {
     let lower = [xx, xy, yy, xz, yz, zz];
     if xz > 0.0 && xz != yy && is_possible(&lower) {
         let evidence =
-            format!("principal moments {before} kg m^2 become {}, which a body can have", shown(principal(&lower)));
+            format!("principal moments {before} kg m^2 become {}, which is possible", shown(principal(&lower)));
         ways.push(Interpretation { kind: SlipKind::LowerTriangle, meant: Some(with(stated.mass_kg, lower)), evidence });
     }
     ways

@@ -59,21 +59,25 @@ pub(super) fn find(search: &mut Search, text: &str, total_kg: Option<f64>) {
         (&[(place, power)], []) => {
             let new = scaled(&search.now[place], power);
             let message = format!(
-                "the mass of {} has its decimal point in the wrong place: {} kg instead of {} kg makes the total",
+                "the mass of {} has its decimal point in the wrong place: {} kg instead of {} kg gives the total",
                 new.link, new.mass_kg, search.now[place].mass_kg
             );
             search.note(SlipKind::TotalMass, message, evidence, vec![(place, new)]);
         }
         ([], &[place]) => {
             let message = format!(
-                "{} has the mass and moments of another link, and without it the masses make the total: it seems to be counted twice; delete its <inertial> if so",
+                "{} has the mass and moments of another link, and without it the masses give the total: if the link is a duplicate, delete its <inertial>",
                 search.now[place].link
             );
             search.note_uncorrected(SlipKind::TotalMass, &[place], message, evidence);
         }
         _ => {
             let several = ways.len() + twice.len();
-            let why = if several == 0 { "no single mass explains it" } else { "several masses would explain it" };
+            let why = if several == 0 {
+                "no change of a single mass explains it"
+            } else {
+                "changes of several single masses explain it"
+            };
             let message = format!("masses do not add up to the stated total, and {why}: weigh the parts");
             search.note_uncorrected(SlipKind::TotalMass, &[], message, evidence);
         }

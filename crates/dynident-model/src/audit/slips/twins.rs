@@ -21,7 +21,7 @@ pub(super) fn find(search: &mut Search) {
         let bodies = [is_body(&a), is_body(&b)];
         if differing.len() > search.settings.max_differing_values || bodies[0] == bodies[1] {
             let message = format!(
-                "{} and {} are mirror images by name but not by numbers, and nothing says which is right: compare with the drawing",
+                "{} and {} are mirror images by name, but their numbers differ: compare both with the drawing",
                 a.link, b.link
             );
             search.note_uncorrected(SlipKind::Twins, &[left, right], message, evidence);
@@ -34,7 +34,7 @@ pub(super) fn find(search: &mut Search) {
             meant[k] = signs[k] * numbers(good)[k] + 0.0;
         }
         let message = format!(
-            "{} differs from its mirror image {}, and only the latter can be a body: take over its numbers",
+            "{} is impossible and differs from its mirror image {}: use the numbers of the mirror image",
             wrong.link, good.link
         );
         let new = with_numbers(wrong, meant);

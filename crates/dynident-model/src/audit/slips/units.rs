@@ -76,7 +76,7 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
         .collect();
     fits.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whose = search.names(places);
-    let stated = format!("as they stand, {as_stated}");
+    let stated = format!("in the file, {as_stated}");
     match &fits[..] {
         [(_, units, figures), rest @ ..]
             if rest.first().is_none_or(|next| next.0 > fits[0].0 + search.settings.min_misfit_margin) =>
@@ -95,15 +95,13 @@ fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool)
             search.note(SlipKind::Units, message, evidence, changed);
         }
         [] => {
-            let message = format!(
-                "{whose}: does not fit the distances between the joints, in no units that are known here: check it"
-            );
+            let message = format!("{whose}: does not fit the distances between the joints in any known unit: check it");
             search.note_uncorrected(SlipKind::Unexplained, places, message, stated);
         }
         several => {
             let names: Vec<&str> = several.iter().map(|(_, units, _)| units.what).collect();
             let message = format!(
-                "{whose}: not in kg, m and kg m^2; several units would do ({}): look at where the numbers came from",
+                "{whose}: not in kg, m and kg m^2; several units fit ({}): check the source of the numbers",
                 names.join("; or ")
             );
             search.note_uncorrected(SlipKind::Unexplained, places, message, stated);
@@ -157,7 +155,7 @@ impl core::fmt::Display for Figures {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             f,
-            "radii of gyration are {:.2e} of the links' lengths, masses {:.2e} kg per cubed length, centres of mass {:.2e} lengths away",
+            "radii of gyration are {:.2e} link lengths, masses {:.2e} kg per cubed link length in m, distances of centres of mass {:.2e} link lengths",
             10_f64.powf(self.gyration),
             10_f64.powf(self.density),
             self.com

@@ -46,7 +46,7 @@ pub enum ExpressionProblem {
     Expected { expected: &'static str, found: String },
     /// An unknown name.
     #[error(
-        "nothing is called `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
+        "unknown name `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
         functions()
     )]
     Name { name: String },
@@ -54,13 +54,13 @@ pub enum ExpressionProblem {
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
     Joint { joint: String, known: Vec<String> },
     /// `q` without a default joint.
-    #[error("whose {name} is not said: write {name}1, {name}2, ..")]
+    #[error("the joint of {name} is missing: write {name}1, {name}2, ..")]
     WhichJoint { name: &'static str },
     /// An exponent that is not constant.
-    #[error("the exponent is no number: write exp(exponent * ln(base))")]
+    #[error("the exponent is not a constant: write exp(exponent * ln(base))")]
     Exponent,
     /// A number that is not finite, or exceeds 1e12.
-    #[error("{what} has no value of at most 1e12 in size")]
+    #[error("{what} is not finite or exceeds 1e12 in magnitude")]
     Value { what: &'static str },
 }
 
