@@ -36,26 +36,20 @@ pub struct LoopClosure {
 /// Why the mimic law of passive joints could not be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum LoopError {
-    /// An unknown link.
     #[error("there is no link `{link}`, which closes a loop: fix its name")]
     UnknownLink { link: String },
-    /// An unknown joint.
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
     UnknownJoint { joint: String, known: Vec<String> },
-    /// A point that is not finite.
     #[error("points_m of the loop at `{link}`: give finite numbers, m")]
     NotFinite { link: String },
-    /// A loop that does not close near the description's zero position.
     #[error(
         "the loop between `{first}` and `{second}` does not close: with the other joints at zero its gap is at least {gap_m:.3e} m; check links, points_m and which joints are passive"
     )]
     Open { first: String, second: String, gap_m: f64 },
-    /// Passive joints that the loops do not determine.
     #[error("the loops do not determine the passive joints {}: name only joints of a loop", joints.join(", "))]
     Undetermined { joints: Vec<String> },
-    /// A loop whose passive joints do not follow linearly.
     #[error(
         "the loop between `{first}` and `{second}` is not a parallelogram: passive joints that follow linearly give a gap of {gap_m:.3e} m; model it as a tree"
     )]
@@ -185,8 +179,8 @@ impl<'a> Loops<'a> {
     }
 }
 
-/// Tree joints on the path to a link, and the pose of the link in the frame of the last joint's body, or in the base frame if
-/// the path is empty.
+/// Tree joints on the path to a link, and the pose of the link in the frame of the last joint's body, or in the base
+/// frame if the path is empty.
 pub(crate) fn path_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
     let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
     let mut all = core::iter::once((None, model.base())).chain(bodies);

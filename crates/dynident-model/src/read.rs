@@ -51,36 +51,26 @@ pub struct Robot {
 /// Why a file could not be read as a robot. Every message begins with the file, and with line and column if known.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum ReadError {
-    /// The file cannot be opened or read.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
     File { path: PathBuf, source: std::io::Error },
-    /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
     #[error("{}: larger than {} MiB, too large for a robot description: name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
     TooLarge { path: PathBuf },
-    /// The file is empty.
     #[error("{}:1:1: the file is empty: name a URDF, an MJCF, an SDF or a D-H table", path.display())]
     Empty { path: PathBuf },
-    /// The file is not UTF-8 text.
     #[error("{}:{line}:{column}: not UTF-8 text{hint}: save the description as UTF-8", path.display())]
     Encoding { path: PathBuf, line: u32, column: u32, hint: &'static str },
-    /// A file of another kind.
     #[error("{}:1:1: {what}, not a robot description: {fix}", path.display())]
     NoDescription { path: PathBuf, what: &'static str, fix: &'static str },
-    /// The file contains xacro macros. xacro evaluates Python expressions in the file, so this crate does not run it.
     #[error("{}: the file contains xacro macros: expand it first (`xacro robot.urdf.xacro > robot.urdf`)", path.display())]
     Macros { path: PathBuf },
-    /// The URDF is faulty.
     #[error("{}:{source}", path.display())]
     Urdf { path: PathBuf, source: Box<UrdfError> },
-    /// The MJCF is faulty.
     #[error("{}:{source}", path.display())]
     Mjcf { path: PathBuf, source: Box<MjcfError> },
-    /// The SDF is faulty.
     #[error("{}:{source}", path.display())]
     Sdf { path: PathBuf, source: Box<SdfError> },
-    /// The D-H table is faulty.
     #[error("{}:{source}", path.display())]
     Dh { path: PathBuf, source: Box<DhError> },
 }

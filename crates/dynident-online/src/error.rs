@@ -7,18 +7,14 @@ use thiserror::Error;
 /// Why a sample or a setting is invalid. An invalid sample changes nothing.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum OnlineError {
-    /// A vector of a different length.
     #[error("{what}: {found} entries where {expected} are needed")]
     Length { what: &'static str, expected: usize, found: usize },
-    /// An invalid value.
     #[error("{what} = {value}: {fix}")]
     Number { what: &'static str, value: f64, fix: &'static str },
-    /// A covariance that is not positive definite.
     #[error("the covariance of the start is not positive definite: give that of an identified model")]
     Covariance,
-    /// Temperature-dependent friction.
     #[error("joint {joint}: its friction follows its temperature, which samples do not have: identify without it")]
     Temperature { joint: String },
     /// No consistent parameters were found.

@@ -123,7 +123,7 @@ impl OnlineEstimator {
         };
         // Buffers that grow with the first sample are allocated before it.
         let rest = vec![0.0; dof];
-        made.see(&rest, &rest, &rest);
+        made.update_regressor(&rest, &rest, &rest);
         made.restart();
         Ok(made)
     }

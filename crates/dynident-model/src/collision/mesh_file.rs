@@ -19,22 +19,18 @@ const MAX_PARENT_LEVELS: usize = 8;
 /// Why a collision shape cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MeshError {
-    /// No such file.
     #[error("mesh `{name}` is missing (searched next to and above {})", folder.display())]
     Missing {
         name: String,
         /// Folder of the description.
         folder: PathBuf,
     },
-    /// The file cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
-    /// The file contains no usable mesh.
     #[error("{}: {fault}", path.display())]
     Content { path: PathBuf, fault: MeshFault },
-    /// The reader of the description does not support the shape.
     #[error("{what}")]
     Unsupported {
         /// The element and what is wrong with it.

@@ -68,44 +68,32 @@ pub type DhError = Located<DhFault>;
 /// A fault in a D-H table, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum DhFault {
-    /// Not TOML, a key that does not exist, or a value of the wrong kind.
     #[error("{reason}; fix this entry of the D-H table")]
     Toml { reason: String },
-    /// A number that is not finite, or beyond [`MAX_MAGNITUDE`](crate::urdf::MAX_MAGNITUDE).
     #[error("`{key}` is {value:e}: write a finite number below 1e9")]
     Number { key: &'static str, value: f64 },
-    /// One quantity given in two units.
     #[error("`{first}` and `{second}` are the same quantity: keep one")]
     BothUnits { first: &'static str, second: &'static str },
-    /// A key that does not fit the kind of joint.
     #[error("`{key}` does not fit a {kind} joint: use {fix}")]
     WrongUnit { key: &'static str, kind: &'static str, fix: &'static str },
-    /// A sign that is neither 1 nor -1.
     #[error("`sign` is {sign}: write 1 or -1")]
     Sign { sign: f64 },
-    /// An empty name.
     #[error("a {what} has an empty name: give it one")]
     EmptyName { what: &'static str },
-    /// Two joints or two links with one name.
     #[error("duplicate {what} `{name}`: rename one")]
     DuplicateName { what: &'static str, name: String },
-    /// A parent link that no earlier row defines.
     #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
     UnknownParent { parent: String, known: Vec<String> },
-    /// No joint.
     #[error("the table has no joint: add [[joint]] entries")]
     NoJoint,
-    /// More joints than [`MAX_MOVING_JOINTS`](crate::urdf::MAX_MOVING_JOINTS).
     #[error("the table has more than {limit} joints: remove some")]
     TooManyJoints { limit: usize },
-    /// An inertial that is incomplete or overdetermined.
     #[error(
         "the inertial is incomplete or redundant: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
     )]
     Inertial,
-    /// The parts do not form a valid model.
     #[error("{0}; fix the table")]
     Model(#[from] ModelError),
 }

@@ -18,18 +18,15 @@ const SIGNATURE: &str = "# identified: ";
 /// Why values could not be written into a D-H table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum DhWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] DhError),
-    /// A change to a link or joint that the original does not contain.
     #[error("the D-H table has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// Two changes to one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
-    /// A value that is not finite.
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
     NotFinite { kind: &'static str, name: String },
 }

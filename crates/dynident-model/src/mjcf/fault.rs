@@ -10,84 +10,58 @@ pub type MjcfError = Located<MjcfFault>;
 /// A fault in an MJCF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfFault {
-    /// A fault in a file that is included here.
     #[error("in the included `{file}`, {line}:{column}: {fault}")]
     Included { file: String, line: u32, column: u32, fault: Box<MjcfFault> },
-    /// A file of an `<include>` that cannot be read.
     #[error("the included `{file}` cannot be read: {reason}; give its path from the folder of the main file")]
     Include { file: String, reason: String },
-    /// A file that is included twice, possibly by itself.
     #[error("`{file}` is included a second time: delete one <include>, MuJoCo takes each file once")]
     IncludedTwice { file: String },
-    /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml { reason: String },
-    /// More elements or bytes than allowed.
     #[error("the document has more than {limit} {what}: give the MJCF of one robot")]
     TooLarge { limit: usize, what: &'static str },
-    /// Thousands of attributes in one tag, or of namespaces.
     #[error("too many attributes in a tag, or namespaces in the document: give the MJCF of one robot")]
     Flood,
-    /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
-    /// The root element is not `<mujoco>`.
     #[error("the root element is <{root}>, not <mujoco>: give an MJCF file")]
     NotMjcf { root: String },
-    /// An attribute is missing.
     #[error("<{element}> has no attribute `{attribute}`: add it")]
     MissingAttribute { element: String, attribute: &'static str },
-    /// An invalid number.
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number { element: String, attribute: String, text: String, fault: &'static str, fix: &'static str },
-    /// Too many or too few numbers.
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count { element: String, attribute: String, expected: usize, found: usize },
-    /// An invalid keyword.
     #[error("`{attribute}` of <{element}> is `{text}`: write {expected}")]
     Word { element: String, attribute: String, text: String, expected: &'static str },
-    /// Two bodies, two joints or two classes with the same name.
     #[error("{kind} `{name}` is defined a second time: rename or delete one")]
     DuplicateName { kind: &'static str, name: String },
-    /// A class that no `<default>` defines.
     #[error("class `{class}` is not defined: add its <default class=\"{class}\"> or fix the name")]
     UnknownClass { class: String },
-    /// An actuator or an equality names an unknown joint.
     #[error("<{element}> names joint `{joint}`, which is not defined: add the joint or fix the name")]
     UnknownJoint { element: String, joint: String },
-    /// Two attributes that exclude each other.
     #[error("<{element}> has both `{first}` and `{second}`: keep one of them")]
     Both { element: String, first: &'static str, second: &'static str },
-    /// A vector without a direction.
     #[error("`{attribute}` of <{element}> gives no direction: write a vector with a length, such as `0 0 1`")]
     NoDirection { element: String, attribute: &'static str },
-    /// A body with two inertials.
     #[error("body `{body}` has a second <inertial>: keep one")]
     RepeatedInertial { body: String },
-    /// `<inertial>` outside a body.
     #[error("the world has no inertia: delete this <inertial>, or put it into a <body>")]
     WorldInertial,
-    /// A joint or body that is impossible for a robot on a fixed base.
     #[error("{what} is not supported: {fix}")]
     Unsupported { what: String, fix: &'static str },
-    /// A geom without the sizes of its type.
     #[error("a geom of type `{kind}` needs {needed} positive numbers in `size`: write them")]
     Size { kind: &'static str, needed: usize },
-    /// A negative mass, density, moment or bound.
     #[error("`{attribute}` of <{element}> is negative: write a value of zero or more")]
     Negative { element: String, attribute: &'static str },
-    /// `settotalmass` with unknown masses.
     #[error("`settotalmass` needs all masses, and that of body `{body}` {why}: give the body an <inertial>")]
     TotalMass { body: String, why: &'static str },
-    /// No moving joint.
     #[error("the model has no joint of type hinge or slide: give the MJCF of a robot that moves")]
     NoMovingJoint,
-    /// More moving joints than allowed.
     #[error("the model has more than {limit} joints: fix those that the log does not contain")]
     TooManyJoints { limit: usize },
-    /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }

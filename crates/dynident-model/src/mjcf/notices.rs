@@ -18,7 +18,7 @@ pub struct MjcfNotice {
 /// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum Loss {
     /// The mass of a body is unknown, because one of its geoms is not a simple solid.
     UnknownMass { body: String, why: &'static str },

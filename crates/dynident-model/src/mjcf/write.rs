@@ -24,34 +24,27 @@ use thiserror::Error;
 /// Why values could not be written into an MJCF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] MjcfError),
-    /// A change to a body or joint that the original does not contain.
     #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// Two changes to one body or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
-    /// A body or joint in an included file.
     #[error("{kind} `{name}` is in an included file, which is not rewritten: put the robot into one file")]
     Included { kind: &'static str, name: String },
-    /// A value that is not finite or exceeds the magnitude limit.
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },
-    /// Values that MuJoCo rejects.
     #[error(
         "the new values of body `{body}` are those of no body with mass, which MuJoCo refuses: use physically consistent parameters"
     )]
     NotPhysical { body: String },
-    /// Mass between two joints of one body.
     #[error(
         "`{link}` is between two joints of one MJCF body and cannot have mass there: write the joints into separate bodies"
     )]
     Between { link: String },
-    /// A setting of `<compiler>` that would change the written values.
     #[error("`{setting}` of <compiler> changes the masses that are written: {fix}")]
     Compiler { setting: &'static str, fix: &'static str },
 }

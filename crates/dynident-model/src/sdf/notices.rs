@@ -16,7 +16,7 @@ pub struct SdfNotice {
 /// Kind of the part that is not represented.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfLoss {
     /// The mass of a link is not stated.
     UnknownMass { link: String, why: &'static str },

@@ -23,24 +23,19 @@ use thiserror::Error;
 /// Why values could not be written into an SDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] SdfError),
-    /// A change to a link or joint that the original does not contain.
     #[error("the SDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// Two changes to one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
-    /// A removed inertial.
     #[error("link `{link}` cannot be without <inertial>, which SDF takes for 1 kg: leave it as it is")]
     Removed { link: String },
-    /// A value that is not finite or exceeds the magnitude limit.
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },
-    /// Values that simulators reject.
     #[error(
         "the new values of link `{link}` are those of no body with mass, which simulators refuse: use physically consistent parameters"
     )]

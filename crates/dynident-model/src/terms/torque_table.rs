@@ -36,15 +36,12 @@ pub struct TorqueTable {
 /// Error of a torque table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum TorqueTableError {
-    /// Too few or too many points.
     #[error("{found} points: give 2 to {MAX_POINTS}")]
     Points { found: usize },
-    /// A number that is not finite or too large.
     #[error("point {number}: {value}: give numbers of at most {MAX_VALUE:e} in size")]
     Number { number: usize, value: f64 },
-    /// Positions that do not ascend.
     #[error("point {number}: position {position} after {before}: sort the points by position, each once")]
     Order { number: usize, position: f64, before: f64 },
 }

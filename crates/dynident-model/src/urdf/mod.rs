@@ -84,7 +84,7 @@ pub struct UnreadElement {
 
 /// A violation of the rules that does not make the robot ambiguous; other URDF readers ignore it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfIrregularity {
     /// Names with an undeclared namespace prefix.
     UndeclaredPrefix {
@@ -107,88 +107,62 @@ pub type UrdfError = Located<UrdfFault>;
 /// A fault in a URDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfFault {
-    /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml { reason: String },
-    /// More nodes than allowed.
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
     TooLarge { limit: u32 },
-    /// Thousands of attributes in one tag, or of namespaces.
     #[error("too many attributes in a tag, or namespaces in the document: name the URDF of one robot")]
     Flood,
-    /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
-    /// The root element is not `<robot>`.
     #[error("the root element is <{root}>, not <robot>: give a URDF file{hint}")]
     NotUrdf { root: String, hint: &'static str },
-    /// Unexpanded macros.
     #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
     Xacro { what: String },
-    /// An element is missing.
     #[error("<{parent}> of `{owner}` has no <{element}>: add it{hint}")]
     MissingElement { parent: &'static str, owner: String, element: &'static str, hint: &'static str },
-    /// A link with two inertials.
     #[error("link `{link}` has a second <inertial>: keep one")]
     RepeatedInertial { link: String },
-    /// An attribute is missing.
     #[error("<{element}> has no attribute `{attribute}`: add it")]
     MissingAttribute { element: String, attribute: &'static str },
-    /// An empty name.
     #[error("<{element}> has an empty `{attribute}`: fill it in")]
     EmptyName { element: String, attribute: &'static str },
-    /// An invalid number.
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number { element: String, attribute: String, text: String, fault: &'static str, fix: &'static str },
-    /// Too many or too few numbers.
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count { element: String, attribute: String, expected: usize, found: usize },
-    /// Two links or two joints with one name.
     #[error("{kind} `{name}` is defined a second time (first in line {first_line}): rename or delete one")]
     DuplicateName { kind: &'static str, name: String, first_line: u32 },
-    /// A joint names a link that does not exist.
     #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or fix the name")]
     UnknownLink { joint: String, link: String },
-    /// A joint that mimics itself.
     #[error("joint `{joint}` mimics itself: fix the name or delete <mimic>")]
     OwnMimic { joint: String },
-    /// A rotation in two forms.
     #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
     TwoRotations { owner: String },
-    /// An invalid quaternion.
     #[error(
         "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
     )]
     NoRotation { owner: String, norm: f64 },
-    /// A link that is the child of two joints.
     #[error(
         "link `{link}` is the child of joint `{first}` and of joint `{second}`: a link has one parent, delete one joint"
     )]
     TwoParents { link: String, first: String, second: String },
-    /// An unsupported joint type.
     #[error("joint `{joint}` is of type `{kind}`: use revolute, continuous, prismatic or fixed{hint}")]
     JointType { joint: String, kind: String, hint: &'static str },
-    /// An axis of length zero.
     #[error("the axis of joint `{joint}` has length zero: give its direction, such as `0 0 1`")]
     ZeroAxis { joint: String },
-    /// No link.
     #[error("the robot has no <link>: add its links and joints")]
     NoLinks,
-    /// No moving joint.
     #[error("the robot has no moving joint: give at least one of type revolute, continuous or prismatic")]
     NoMovingJoint,
-    /// A closed chain of joints.
     #[error("link `{link}` is its own ancestor: the joints form a loop; cut it at one joint")]
     Loop { link: String },
-    /// More than one link without a parent.
     #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
     SeveralRoots { first: String, second: String },
-    /// More moving joints than [`MAX_MOVING_JOINTS`].
     #[error("the robot has more than {limit} moving joints: fix those that the log does not contain")]
     TooManyJoints { limit: usize },
-    /// The parts do not form a valid model.
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }

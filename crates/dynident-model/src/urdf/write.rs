@@ -61,29 +61,23 @@ pub struct JointChange {
 /// Why values could not be written into a URDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] UrdfError),
-    /// A change to a link or joint that the original does not contain.
     #[error("the URDF has no {kind} `{name}`: write into the file that the model was read from")]
     Unknown { kind: &'static str, name: String },
-    /// Two changes to one link or joint.
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
-    /// A value that is not finite.
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
     NotFinite { kind: &'static str, name: String },
-    /// Moments without mass, which URDF cannot represent.
     #[error("link `{link}` has moments but no mass, which URDF cannot express: use physically consistent parameters")]
     NoMass { link: String },
-    /// A value that exceeds the magnitude limit.
     #[error(
         "the new values of link `{link}` contain {value:e}, more than the limit of {MAX_MAGNITUDE:e}: check its lengths and masses"
     )]
     TooLarge { link: String, value: f64 },
-    /// The number of parameter sets differs from the number of moving bodies.
     #[error("{found} parameter sets for {expected} moving bodies")]
     Counts { expected: usize, found: usize },
 }

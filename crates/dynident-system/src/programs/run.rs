@@ -29,27 +29,20 @@ pub struct RunLimits {
 /// Why a program gave no output. The program and all its child processes have been stopped.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum RunError {
-    /// An unknown program.
     #[error("the program {program} is not installed, or not in a folder of PATH")]
     NotFound { program: String },
-    /// The system could not start the program.
     #[error("the program {program} cannot be started: {source}")]
     NotStarted { program: String, source: io::Error },
-    /// The time limit was exceeded.
     #[error("the program {program} did not end within {limit_s} s and was stopped")]
     TimedOut { program: String, limit_s: f64 },
-    /// A stop was requested while it ran.
     #[error("the program {program} was stopped on request")]
     Stopped { program: String },
-    /// The output limit was exceeded.
     #[error("the program {program} wrote more than {} MiB and was stopped", most_bytes >> 20)]
     TooLarge { program: String, most_bytes: u64 },
-    /// The program failed.
     #[error("the program {program} failed ({exit}): {message}")]
     Failed { program: String, exit: String, message: String },
-    /// The output could not be read.
     #[error("the output of the program {program} cannot be read: {source}")]
     Output { program: String, source: io::Error },
 }

@@ -36,30 +36,23 @@ pub struct ExpressionError {
 /// Kind of a parse error.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "fields are named as in the messages")]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum ExpressionProblem {
-    /// Too long.
     #[error("more than {most} {of}: write a shorter expression, or a table")]
     TooLong { most: usize, of: &'static str },
-    /// Unexpected text.
     #[error("{found} where {expected} is expected")]
     Expected { expected: &'static str, found: String },
-    /// An unknown name.
     #[error(
         "unknown name `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
         functions()
     )]
     Name { name: String },
-    /// An unknown joint.
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
     Joint { joint: String, known: Vec<String> },
-    /// `q` without a default joint.
     #[error("the joint of {name} is missing: write {name}1, {name}2, ..")]
     WhichJoint { name: &'static str },
-    /// An exponent that is not constant.
     #[error("the exponent is not a constant: write exp(exponent * ln(base))")]
     Exponent,
-    /// A number that is not finite, or exceeds 1e12.
     #[error("{what} is not finite or exceeds 1e12 in magnitude")]
     Value { what: &'static str },
 }
