@@ -1,6 +1,7 @@
 //! The ten inertial parameters of a body.
 
 use crate::spatial::{Mat3, Transform, Vec3};
+use crate::urdf::MAX_MAGNITUDE;
 use nalgebra::{Matrix3, Matrix4};
 
 /// Names of the ten parameters in the project's order (order `p_i` of the paper, with its misprint corrected).
@@ -57,6 +58,14 @@ impl InertialParameters {
         let com = self.com_m()?;
         let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(self.0[0]);
         Some(self.inertia_at_origin() - shift)
+    }
+
+    /// Mass, centre of mass and inertia about it, if the body is physically consistent and within the magnitude limit.
+    pub(crate) fn consistent_about_com(&self) -> Option<(f64, Vec3, Mat3)> {
+        let (com, inertia, [a, b, c]) = (self.com_m()?, self.inertia_at_com()?, self.principal_moments()?);
+        let mass = self.mass_kg();
+        let is_small = com.0.iter().all(|x| x.abs() <= MAX_MAGNITUDE || x.is_nan());
+        (is_small && mass > 0.0 && a > 0.0 && a + b >= c).then_some((mass, com, inertia))
     }
 
     /// The same body in another frame; `frame_from_body` maps from the current frame to the new one.

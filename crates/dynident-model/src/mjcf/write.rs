@@ -186,18 +186,12 @@ fn inertial_line(
     if inertial.0.iter().any(|x| x.abs().is_nan() || x.abs() > MAX_MAGNITUDE) {
         return Err(MjcfWriteError::NotFinite { kind: "body", name: body.to_owned() });
     }
-    let not_physical = || MjcfWriteError::NotPhysical { body: body.to_owned() };
-    let (Some(com), Some(inertia), Some([a, b, c])) =
-        (inertial.com_m(), inertial.inertia_at_com(), inertial.principal_moments())
-    else {
-        return Err(not_physical());
-    };
-    let mass = inertial.mass_kg();
-    if com.0.iter().any(|x| x.abs() > MAX_MAGNITUDE) || !(mass > 0.0 && a > 0.0 && a + b >= c) {
-        return Err(not_physical());
-    }
-    if mass < found.compiler.bound_mass || a < found.compiler.bound_inertia {
-        let setting = if mass < found.compiler.bound_mass { "boundmass" } else { "boundinertia" };
+    let (mass, com, inertia) =
+        inertial.consistent_about_com().ok_or_else(|| MjcfWriteError::NotPhysical { body: body.to_owned() })?;
+    let is_small = |[a, ..]: [f64; 3]| a < found.compiler.bound_inertia;
+    let is_light = mass < found.compiler.bound_mass;
+    if is_light || inertial.principal_moments().is_some_and(is_small) {
+        let setting = if is_light { "boundmass" } else { "boundinertia" };
         return Err(MjcfWriteError::Compiler { setting, fix: "lower or delete it" });
     }
     let ([x, y, z], i) = (com.0, inertia.0);

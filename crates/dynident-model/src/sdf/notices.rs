@@ -1,8 +1,8 @@
 //! Contents of a document that the model cannot represent.
 
 use super::line;
-use core::fmt;
 use roxmltree::Node;
+use thiserror::Error;
 
 /// A part of an SDF that the model does not represent.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,17 +14,17 @@ pub struct SdfNotice {
 }
 
 /// Kind of the part that is not represented.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfLoss {
-    /// The mass of a link is not stated.
+    #[error("the mass of link `{link}` {why}, so that it is unknown: give the link an <inertial>")]
     UnknownMass { link: String, why: &'static str },
-    /// A link without gravity.
+    #[error("link `{link}` has no gravity, which is not supported: its full weight is used")]
     Weightless { link: String },
-    /// Added mass of a fluid around a link.
+    #[error("link `{link}` has `fluid_added_mass`, which is not supported")]
     AddedMass { link: String },
-    /// A model in another file.
+    #[error("the model at `{uri}` is not read: expand the file with `gz sdf -p`")]
     Include { uri: String },
 }
 
@@ -36,25 +36,6 @@ impl SdfLoss {
             Self::Weightless { .. } => "weightless",
             Self::AddedMass { .. } => "added-mass",
             Self::Include { .. } => "include",
-        }
-    }
-}
-
-impl fmt::Display for SdfLoss {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::UnknownMass { link, why } => {
-                write!(f, "the mass of link `{link}` {why}, so that it is unknown: give the link an <inertial>")
-            }
-            Self::Weightless { link } => {
-                write!(f, "link `{link}` has no gravity, which is not supported: its full weight is used")
-            }
-            Self::AddedMass { link } => {
-                write!(f, "link `{link}` has `fluid_added_mass`, which is not supported")
-            }
-            Self::Include { uri } => {
-                write!(f, "the model at `{uri}` is not read: expand the file with `gz sdf -p`")
-            }
         }
     }
 }

@@ -118,16 +118,8 @@ fn write_inertial(
     if inertial.0.iter().any(|x| x.abs().is_nan() || x.abs() > MAX_MAGNITUDE) {
         return Err(SdfWriteError::NotFinite { kind: "link", name: link.to_owned() });
     }
-    let not_physical = || SdfWriteError::NotPhysical { link: link.to_owned() };
-    let (Some(com), Some(inertia), Some([a, b, c])) =
-        (inertial.com_m(), inertial.inertia_at_com(), inertial.principal_moments())
-    else {
-        return Err(not_physical());
-    };
-    let mass = inertial.mass_kg();
-    if com.0.iter().any(|x| x.abs() > MAX_MAGNITUDE) || !(mass > 0.0 && a > 0.0 && a + b >= c) {
-        return Err(not_physical());
-    }
+    let (mass, com, inertia) =
+        inertial.consistent_about_com().ok_or_else(|| SdfWriteError::NotPhysical { link: link.to_owned() })?;
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines: Vec<Line> = vec![(0, "<inertial>".to_owned())];
     lines.extend(note.map(|note| (1, format!("<!-- {} -->", xml::comment(note)))));

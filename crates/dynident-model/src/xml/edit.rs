@@ -1,5 +1,6 @@
 //! Edits of a text that keep all other bytes: replaced and inserted elements, with the surrounding indentation.
 
+use super::tags::start_tag_length;
 use roxmltree::Node;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -117,18 +118,4 @@ impl Source<'_> {
         }
         start..range.end
     }
-}
-
-/// Length of the start tag of `element`: up to the first `>` outside quotes.
-pub(crate) fn start_tag_length(element: &str) -> usize {
-    let mut quote = None;
-    for (at, byte) in element.bytes().enumerate() {
-        match (quote, byte) {
-            (None, b'>') => return at + 1,
-            (None, b'"' | b'\'') => quote = Some(byte),
-            (Some(open), byte) if open == byte => quote = None,
-            _ => {}
-        }
-    }
-    element.len()
 }

@@ -4,10 +4,14 @@ pub(crate) mod edit;
 mod flood;
 mod malformed;
 mod number;
+mod tags;
 
-pub(crate) use flood::{flood, length_beside_elements};
+pub(crate) use flood::flood;
 pub(crate) use malformed::{Malformed, malformed};
 pub(crate) use number::{parse_number, shortened};
+pub(crate) use tags::{outside_quotes, start_tag_length, tags};
+
+use tags::length_beside_elements;
 
 /// Maximum number of elements, texts and comments in a document: a hundred times the largest known robot.
 pub(crate) const MAX_NODES: u32 = 2_000_000;
