@@ -51,7 +51,7 @@ pub enum LoopError {
     #[error("the loops do not determine the passive joints {}: name only joints of a loop", joints.join(", "))]
     Undetermined { joints: Vec<String> },
     #[error(
-        "the loop between `{first}` and `{second}` is not a parallelogram: passive joints that follow linearly give a gap of {gap_m:.3e} m; model it as a tree"
+        "the loop between `{first}` and `{second}` is no parallelogram: passive joints that follow linearly give a gap of {gap_m:.3e} m; model it as a tree"
     )]
     NotLinear { first: String, second: String, gap_m: f64 },
 }

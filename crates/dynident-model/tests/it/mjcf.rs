@@ -169,7 +169,7 @@ fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
     for (text, words) in [
         (linkage("", "2 0 0"), "no joint has an actuator; name the passive joints in [[robot.loop]]"),
         (linkage(all, "2 0 0"), "every joint of the chain has an actuator"),
-        (linkage(drive, "2 0 0.3"), "not a parallelogram"),
+        (linkage(drive, "2 0 0.3"), "no parallelogram"),
         (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "unknown body `rokcer`"),
     ] {
         let robot = read_mjcf(&text).unwrap();

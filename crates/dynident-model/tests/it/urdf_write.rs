@@ -190,7 +190,7 @@ fn what_urdf_cannot_say_is_refused() {
 fn what_could_not_be_read_again_is_refused() {
     let model = read_urdf(&ARM.replace("<origin xyz=\"0.3 0 0\"", "<origin xyz=\"65536 0 0\"")).unwrap().model;
     let error = rewrite_urdf(ARM, &link_changes(&model, model.inertials()).unwrap(), &[]).unwrap_err();
-    assert!(error.to_string().contains("beyond the 1e9"), "{error}");
+    assert!(error.to_string().contains("more than the limit of 1e9"), "{error}");
 }
 
 #[test]
