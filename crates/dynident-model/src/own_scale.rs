@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_of_usual_length_on_earth_has_seconds_and_metres() {
+    fn typical_arm_has_unit_scale() {
         let usual = arm(TYPICAL_ARM_M);
         assert_eq!(usual.arm_m(), TYPICAL_ARM_M);
         assert_eq!(usual.own_scale(), OwnScale::USUAL);
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_states_scales_with_length_and_time() {
+    fn defaults_scale_with_length_and_time() {
         let (usual, long) = (arm(1.5).own_scale(), arm(1.5 * 1024.0));
         let gravity = |times: f64| long.clone().with_gravity(STANDARD_GRAVITY.scale(times)).unwrap().own_scale();
         // Gravity scaled like the length changes only lengths.
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_without_lengths_is_usual_and_none_gives_numbers_that_are_none() {
+    fn scale_is_typical_without_lengths_and_always_finite() {
         assert_eq!(arm(0.0).own_scale(), OwnScale::USUAL);
         let heavy = arm(1e-300).with_gravity(STANDARD_GRAVITY.scale(1e200)).unwrap().own_scale();
         assert!(heavy.seconds(1.0).is_normal() && heavy.metres(1.0).is_normal());

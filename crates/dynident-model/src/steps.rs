@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn inner_frames_stand_on_the_joints() {
+    fn inner_frames_are_on_the_joint_axes() {
         let mut random = Random::new(5);
         for seed in 0..40 {
             assert_same_axes(&random_tree(seed, 1 + seed as usize % 10), &mut random);
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_on_an_axis_goes_to_the_parent() {
+    fn moments_on_an_axis_move_to_the_parent() {
         for seed in 0..20 {
             let model = random_tree(seed, 8);
             for step in model.steps().iter().filter(|step| step.turns) {

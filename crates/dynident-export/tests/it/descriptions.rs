@@ -6,7 +6,7 @@ use dynident_model::read_urdf;
 use dynident_model::terms::{Coulomb, CoulombShape, Offset, Stribeck, TorqueTerm, Viscous};
 
 #[test]
-fn a_law_of_the_simulator_comes_back() {
+fn simulator_friction_is_reproduced_exactly() {
     let model = tree().model().clone();
     let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: CoulombShape::Sign { dead_band: 0.0 } });
     let terms = vec![coulomb, TorqueTerm::Viscous(Viscous { joint: 0 })];
@@ -20,7 +20,7 @@ fn a_law_of_the_simulator_comes_back() {
 }
 
 #[test]
-fn what_is_left_of_another_law_is_its_error() {
+fn error_of_another_law_is_reported() {
     let model = tree().model().clone();
     let robot = RobotModel::new(model.clone(), vec![TorqueTerm::Offset(Offset { joint: 0 })], vec![1.5]).unwrap();
     let found = NearestFriction::of(&robot, 0);
@@ -60,7 +60,7 @@ fn a_urdf_reads_back_with_the_robots_bodies() {
 }
 
 #[test]
-fn mjcf_says_what_it_does_not_hold() {
+fn mjcf_notes_unsupported_contents() {
     let exported = export(&tree(), Target::Mjcf, &[]).unwrap();
     assert!(exported.text.contains("type=\"slide\"") && exported.text.contains("armature=\"0.7\""));
     assert_eq!(exported.text.matches("<body").count(), exported.text.matches("</body>").count());

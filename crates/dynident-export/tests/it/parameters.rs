@@ -58,7 +58,7 @@ fn coupled(term: &Value, dq: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn the_json_holds_the_friction_that_the_core_computes() {
+fn json_friction_equals_the_core() {
     for robot in [all_terms("ur10.urdf"), tree()] {
         let text = export(&robot, Target::Json, &["From here.".to_owned()]).unwrap().text;
         let file: Value = serde_json::from_str(&text).unwrap();
@@ -86,7 +86,7 @@ fn the_json_holds_the_friction_that_the_core_computes() {
 }
 
 #[test]
-fn the_json_holds_the_robot_to_the_last_bit() {
+fn json_keeps_every_bit_of_the_robot() {
     let robot = tree();
     let text = export(&robot, Target::Json, &[]).unwrap().text;
     let back: ModelFile = serde_json::from_str(&text).unwrap();
@@ -109,7 +109,7 @@ fn the_json_holds_the_robot_to_the_last_bit() {
 }
 
 #[test]
-fn what_code_cannot_hold_stands_in_json_and_yaml() {
+fn json_and_yaml_contain_terms_that_code_cannot() {
     let load = TorqueTerm::Load(LoadFriction { joint: 1, shape: CoulombShape::Smooth { width: 0.1 } });
     let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
     let robot = RobotModel::new(tree().model().clone(), vec![load, slip], vec![0.2, 3.0]).unwrap();
@@ -158,7 +158,7 @@ fn robot_named(name: &str) -> RobotModel {
 }
 
 #[test]
-fn sdf_says_what_it_does_not_hold() {
+fn sdf_notes_unsupported_contents() {
     let exported = export(&tree(), Target::Sdf, &[]).unwrap();
     for said in ["SDF has no drive inertia: Ia1 = 0.7 kg m² is left out.", "Ia_a = 0.2", "off by"] {
         assert!(exported.notes.iter().any(|note| note.contains(said)), "{said}: {:#?}", exported.notes);

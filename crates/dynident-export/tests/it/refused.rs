@@ -20,7 +20,7 @@ fn terms_that_need_more_than_the_motion() {
 }
 
 #[test]
-fn values_that_are_none() {
+fn invalid_values_are_refused() {
     let model = tree().model().clone();
     let offset = || vec![TorqueTerm::Offset(Offset { joint: 0 })];
     let error = RobotModel::new(model.clone(), offset(), Vec::new()).unwrap_err();
@@ -42,7 +42,7 @@ fn a_joint_that_moves_nothing() {
 }
 
 #[test]
-fn a_term_by_temperature_is_noted() {
+fn temperature_terms_are_noted() {
     let exported = export(&all_terms("ur10.urdf"), Target::Python, &[]).unwrap();
     let note = "fvT1 is left out: the drive is assumed to be at 25 °C.";
     assert_eq!(exported.notes, [note]);

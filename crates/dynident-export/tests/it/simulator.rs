@@ -31,7 +31,7 @@ fn robot(terms: Vec<TorqueTerm>, values: &[f64], velocities: &[(f64, f64)]) -> R
 }
 
 #[test]
-fn the_line_goes_through_the_two_speeds_that_were_recorded() {
+fn nearest_friction_fits_two_recorded_speeds() {
     let law = |v: f64| 2.0 + 3.0 * (-v / 0.5).exp() + 0.4 * v;
     let motion = [(0.1, 50.0), (-0.1, 7.0), (1.5, 3.0), (-1.5, 900.0)];
     let robot = robot(vec![coulomb(), stribeck(), viscous()], &[2.0, 3.0, 4.0], &motion);
@@ -60,7 +60,7 @@ fn samples_weigh() {
 }
 
 #[test]
-fn slip_counts_as_coulomb_friction() {
+fn maxwell_slip_is_approximated_by_coulomb_friction() {
     let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
     let found = NearestFriction::of(&robot(vec![slip, viscous()], &[1.5, 0.2], &[(0.2, 1.0), (-0.9, 2.0)]), 0);
     assert!((found.coulomb - 1.5).abs() < 1e-12 && (found.viscous - 0.2).abs() < 1e-12, "{found:?}");

@@ -106,14 +106,14 @@ pub struct CandidateJoint {
 }
 
 /// Bounds of the velocity constants, rad/s (m/s) of a typical arm.
-const VELOCITIES: [f64; 2] = [1.0e-4, 10.0];
+const VELOCITY_BOUNDS: [f64; 2] = [1.0e-4, 10.0];
 
 /// The constant with this logarithm, clamped to its bounds.
-pub(super) fn within(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
+pub(super) fn clamped_exp(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
     logarithm.clamp(least.ln(), most.ln()).exp()
 }
 
 /// The velocity with this logarithm, clamped; `velocity` corresponds to 1 rad/s (m/s) of a typical arm.
-pub(super) fn velocity_within(logarithm: f64, velocity: f64) -> f64 {
-    within(logarithm, VELOCITIES.map(|usual| usual * velocity))
+pub(super) fn clamped_velocity(logarithm: f64, velocity: f64) -> f64 {
+    clamped_exp(logarithm, VELOCITY_BOUNDS.map(|usual| usual * velocity))
 }

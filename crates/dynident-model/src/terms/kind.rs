@@ -1,7 +1,7 @@
 //! Interface of the kinds of torque terms. A kind is one type in one file that implements [`TermKind`];
 //! [`TorqueTerm`](super::TorqueTerm) delegates to it, so that other code does not depend on the kinds.
 
-use super::candidate::velocity_within;
+use super::candidate::clamped_velocity;
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use core::fmt::Debug;
 
@@ -290,7 +290,7 @@ pub trait TermKind: VelocityFunction {
     fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
         let is_joints = matches!(self.step_role(), StepRole::Joint | StepRole::AsJointIfSmooth);
         if let (true, [to, ..], Some(CoulombShape::Smooth { width })) = (is_joints, coordinates, self.step_mut()) {
-            *width = velocity_within(*to, velocity);
+            *width = clamped_velocity(*to, velocity);
         }
     }
 }

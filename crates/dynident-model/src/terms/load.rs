@@ -7,7 +7,7 @@
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, VALID_VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,7 @@ impl StatedLaw for StatedLoad {
     }
 
     fn check(&self) -> Result<(), StatedFault> {
-        self.width.map_or(Ok(()), |width| check("width", width, VELOCITIES))
+        self.width.map_or(Ok(()), |width| check("width", width, VALID_VELOCITIES))
     }
 }
 

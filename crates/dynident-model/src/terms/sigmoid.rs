@@ -4,7 +4,7 @@
 //! half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4
 //! (2019) 4147.
 
-use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within};
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_velocity};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
@@ -131,7 +131,7 @@ impl TermKind for Sigmoid {
 
     fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
         if let [steepness, shift] = coordinates {
-            self.steepness = 2.0 / velocity_within((2.0 / steepness.exp()).ln(), velocity);
+            self.steepness = 2.0 / clamped_velocity((2.0 / steepness.exp()).ln(), velocity);
             self.offset_speed = 2.0 * shift.clamp(-MAX_SHIFT, MAX_SHIFT) / self.steepness;
         }
     }

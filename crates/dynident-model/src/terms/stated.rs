@@ -30,7 +30,7 @@ pub enum StatedFault {
 }
 
 /// Valid range of velocities, rad/s or m/s.
-pub(super) const VELOCITIES: [f64; 2] = [1.0e-9, 1.0e6];
+pub(super) const VALID_VELOCITIES: [f64; 2] = [1.0e-9, 1.0e6];
 
 /// Checks that `value` is in `range` and not NaN.
 pub(super) fn check(key: &'static str, value: f64, range: [f64; 2]) -> Result<(), StatedFault> {

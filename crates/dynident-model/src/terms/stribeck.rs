@@ -3,10 +3,10 @@
 //! `F_s` is the static friction in excess of Coulomb friction `F_c`. Linear in `F_s` at given `v_s` and `δ`. Source:
 //! Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
-use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within, within};
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_exp, clamped_velocity};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, VALID_VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -84,9 +84,9 @@ impl StatedLaw for StatedStribeck {
     }
 
     fn check(&self) -> Result<(), StatedFault> {
-        check("speed", self.speed, VELOCITIES)?;
+        check("speed", self.speed, VALID_VELOCITIES)?;
         check("exponent", self.exponent, [0.1, 10.0])?;
-        self.width.map_or(Ok(()), |width| check("width", width, VELOCITIES))
+        self.width.map_or(Ok(()), |width| check("width", width, VALID_VELOCITIES))
     }
 }
 
@@ -133,8 +133,8 @@ impl TermKind for Stribeck {
 
     fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
         if let [speed, exponent] = coordinates {
-            self.speed = velocity_within(*speed, velocity);
-            self.exponent = within(*exponent, EXPONENT_BOUNDS);
+            self.speed = clamped_velocity(*speed, velocity);
+            self.exponent = clamped_exp(*exponent, EXPONENT_BOUNDS);
             if let CoulombShape::Smooth { width } = &mut self.shape {
                 *width = STEP_WIDTH_RATIO * self.speed;
             }

@@ -38,7 +38,7 @@ mod tests {
     use super::root_name;
 
     #[test]
-    fn the_root_stands_behind_comments_and_instructions() {
+    fn root_is_found_after_comments_and_instructions() {
         assert_eq!(root_name("\u{feff}<?xml version='1.0'?>\n<!-- <robot> -->\n<mujoco model=\"a\">"), Some("mujoco"));
         assert_eq!(root_name("<robot>"), Some("robot"));
         assert_eq!(root_name("<mujoco/>"), Some("mujoco"));

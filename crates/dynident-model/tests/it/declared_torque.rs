@@ -82,7 +82,7 @@ fn broken_expressions_name_the_place() {
 }
 
 #[test]
-fn what_has_no_value_is_none() {
+fn undefined_values_are_none() {
     for text in ["sqrt(q - 4)", "1 / (q - 3)", "ln(0 * q)", "asin(q)", "(q - 4)^0.5", "exp(exp(q * 20))", "1e12 * q"] {
         assert_eq!(at(text, [3.0, 7.0], [5.0, 11.0]), None, "{text}");
     }
@@ -199,7 +199,7 @@ fn broken_tables_name_the_point() {
 }
 
 #[test]
-fn declared_torques_stand_behind_all_other_terms() {
+fn declared_torques_follow_all_other_terms() {
     use dynident_model::terms::{Coupling, CouplingEffect, Offset};
     let coupling =
         Coupling { name: "m".into(), first: 0, second: 1, ratios: [1.0; 2], effect: CouplingEffect::Inertia };
@@ -254,7 +254,7 @@ fn written(choices: &mut impl Iterator<Item = u32>, depth: usize) -> (String, Me
 
 proptest! {
     #[test]
-    fn expressions_mean_what_is_written(
+    fn expressions_have_the_expected_values(
         choices in proptest::collection::vec(any::<u32>(), 1..60), state in proptest::array::uniform4(-3.0..3.0_f64)
     ) {
         let (text, meaning) = written(&mut choices.into_iter(), 5);

@@ -99,7 +99,7 @@ fn rows_on_one_line_and_a_byte_order_mark_stay() {
 }
 
 #[test]
-fn what_the_table_does_not_hold_is_refused() {
+fn unknown_parts_are_refused() {
     let link = LinkChange::Set { link: "d".to_owned(), inertial: inertial(1.0), note: None };
     assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("no link `d`"));
     let twice =

@@ -64,7 +64,7 @@ fn terms_of_all_kinds() -> Vec<TorqueTerm> {
 
 /// The simulated torque of a law equals its regressor column.
 #[test]
-fn columns_are_what_the_action_says() {
+fn columns_equal_the_simulated_torque() {
     let (q, dq, ddq) = ([0.3, -0.2], [0.07, 0.4], [2.0, -3.0]);
     let motion = JointMotion { samples: 1, q: &q, dq: &dq, ddq: &ddq };
     let load = 7.0;
@@ -128,7 +128,7 @@ fn slopes_equal_central_differences() {
 }
 
 #[test]
-fn at_rest_and_at_any_speed_all_is_finite_and_friction_takes_power() {
+fn friction_is_finite_and_dissipative() {
     let speeds = [0.0, 1e-300, -1e-300, 1e-9, 1.0, -1.0, 1e6, -1e6];
     let zeros = [0.0; 8];
     for term in terms_of_velocity() {
@@ -191,7 +191,7 @@ fn friction_by_load() {
 }
 
 #[test]
-fn a_slipping_spring_makes_the_loop_of_masing_and_remembers_across_blocks() {
+fn maxwell_slip_follows_masing_loops_across_blocks() {
     let limit = 0.1;
     let term = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: limit });
     // Forward by three yield displacements, back by one, back by three, forward again.
@@ -245,7 +245,7 @@ fn friction_changes_with_the_temperature_about_its_reference() {
 }
 
 #[test]
-fn a_term_is_where_its_coordinates_say() {
+fn coordinates_set_the_constants() {
     const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
     let stribeck = |shape| TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 1.5, shape });
     let sigmoid = TorqueTerm::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.01 });

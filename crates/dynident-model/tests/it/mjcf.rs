@@ -97,7 +97,7 @@ fn faults_are_named_at_their_place() {
 }
 
 #[test]
-fn included_files_stand_in_their_place_and_are_named_in_faults() {
+fn included_files_are_expanded_and_named_in_faults() {
     let main = "<mujoco>\n  <include file=\"a.xml\"/>\n</mujoco>";
     let mut files = |name: &str| match name {
         "a.xml" => Ok("<mujocoinclude><worldbody>\n<include file=\"b.xml\"/></worldbody></mujocoinclude>".to_owned()),
@@ -122,7 +122,7 @@ fn included_files_stand_in_their_place_and_are_named_in_faults() {
 }
 
 #[test]
-fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
+fn symmetric_effort_limits_are_read() {
     let text = r#"<mujoco><default><motor ctrlrange="-2 2"/></default><worldbody>
       <body><joint name="motor"/><joint name="joint" actuatorfrcrange="-5 5"/><joint name="one-sided"/>
         <joint name="servo"/><joint name="none"/><joint name="both"/><joint name="two"/></body></worldbody>
@@ -159,7 +159,7 @@ fn linkage(actuator: &str, anchor: &str) -> String {
 }
 
 #[test]
-fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
+fn parallelograms_are_closed_and_other_chains_give_notices() {
     let drive = r#"<motor joint="drive"/>"#;
     let robot = read_mjcf(&linkage(drive, "2 0 0")).unwrap();
     assert!(robot.notices.is_empty() && robot.model.dof() == 1, "{:?}", robot.notices);
@@ -179,7 +179,7 @@ fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
 }
 
 #[test]
-fn a_line_of_equality_is_a_follower_and_more_is_said() {
+fn linear_equalities_are_mimics_and_others_give_notices() {
     let text = r#"<mujoco><compiler angle="radian"/><worldbody>
       <body gravcomp="1"><joint name="a" ref="0.5"/><joint name="b" ref="-1"/><joint name="c" stiffness="3"/></body>
       </worldbody>
@@ -203,7 +203,7 @@ fn a_line_of_equality_is_a_follower_and_more_is_said() {
 }
 
 #[test]
-fn a_mass_by_a_mesh_is_unknown_and_said() {
+fn mesh_mass_is_unknown_with_a_notice() {
     let text =
         with_body("<geom type=\"mesh\" mesh=\"m\"/><geom size=\"1\"/><body name=\"tip\"><geom size=\"0.1\"/></body>");
     let robot = read_mjcf(&text).unwrap();
@@ -221,7 +221,7 @@ fn a_mass_by_a_mesh_is_unknown_and_said() {
 }
 
 #[test]
-fn several_joints_of_a_body_are_a_chain_and_misspelt_words_are_said() {
+fn several_joints_form_a_chain_and_misspelt_words_give_notices() {
     let text = r#"<mujoco model="m"><worldbody><body name="b"><joint name="x" type="slide" axis="1 0 0"/><joint rang="0 1"/>
       <joint range="-90 90"/><geom size="1"/></body></worldbody></mujoco>"#;
     let robot = read_mjcf(text).unwrap();

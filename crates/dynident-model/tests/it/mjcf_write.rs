@@ -138,7 +138,7 @@ fn only_inertials_and_drives_change() {
 }
 
 #[test]
-fn what_mujoco_would_refuse_or_change_is_refused() {
+fn values_that_mujoco_rejects_or_changes_are_refused() {
     let set = |link: &str, inertial| LinkChange::Set { link: link.to_owned(), inertial, note: None };
     let ball = InertialParameters::from_centre_of_mass(1.0, Vec3::ZERO, &Mat3::IDENTITY);
     let refused =

@@ -88,7 +88,7 @@ fn faults_name_the_place_and_the_fix() {
 }
 
 #[test]
-fn what_the_model_does_not_hold_is_said() {
+fn unsupported_contents_give_notices() {
     let spring = "<axis><xyz>0 1 0</xyz><dynamics><spring_stiffness>3</spring_stiffness></dynamics></axis>";
     let robot = read_sdf(&pendulum("<gravity>0</gravity>", spring, "<include><uri>hand</uri></include>")).unwrap();
     let mut said: Vec<&str> = robot.notices.iter().map(|notice| notice.loss.name()).collect();

@@ -98,7 +98,7 @@ fn only_inertials_and_drives_change() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused() {
+fn invalid_changes_are_refused() {
     let good = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
     let refused =
         |links: &[LinkChange], joints: &[JointChange]| rewrite_sdf(ARM, links, joints).unwrap_err().to_string();

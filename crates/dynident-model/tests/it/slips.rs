@@ -82,7 +82,7 @@ fn digits_of_a_turned_number_stay() {
 }
 
 #[test]
-fn a_row_major_walk_is_named() {
+fn row_major_moments_are_found() {
     let walk = |one: &mut StatedInertial| {
         let [xx, xy, xz, yy, yz, _] = one.moments;
         one.moments = [xx, xy, xz, xy, yy, yz];
@@ -166,7 +166,7 @@ fn millimetres_and_grams_are_converted_back() {
 }
 
 #[test]
-fn defaults_are_named_and_not_replaced() {
+fn defaults_are_reported_and_not_corrected() {
     let default = |one: &mut StatedInertial| one.moments = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
     let found = look(&spoilt(&text("iiwa14"), |_| true, default)).found;
     assert_eq!(found.len(), 1, "{found:#?}");
@@ -204,7 +204,7 @@ fn a_stated_total_finds_the_wrong_mass() {
 }
 
 #[test]
-fn twins_that_differ_are_named() {
+fn different_twins_are_reported() {
     let original = text("g1_29dof");
     let knee = |one: &StatedInertial| one.link == "left_knee_link";
     // One wrong number makes the body impossible; its twin gives the correction.
@@ -224,7 +224,7 @@ fn twins_that_differ_are_named() {
 }
 
 #[test]
-fn what_nothing_explains_is_said_to_be_so() {
+fn unexplained_inertials_are_reported() {
     let wrong =
         spoilt(&text("ur10"), |one| one.link == "forearm_link", |one| one.moments = [1.0, 0.1, 0.2, 5.0, 0.1, 1.0]);
     let found = look(&wrong).found;

@@ -29,7 +29,7 @@ fn totals_agree_with_pinocchio() {
 }
 
 #[test]
-fn every_description_at_hand_is_read_and_kept_by_an_empty_rewrite() {
+fn every_description_is_unchanged_by_an_empty_rewrite() {
     for path in foreign_urdfs() {
         let robot = load_robot(&path).unwrap();
         assert!(robot.model.dof() > 0, "{}", path.display());
@@ -39,7 +39,7 @@ fn every_description_at_hand_is_read_and_kept_by_an_empty_rewrite() {
 }
 
 #[test]
-fn the_arm_is_read_as_it_stands() {
+fn arm_is_read_completely() {
     let robot = read_urdf(ARM).unwrap();
     let model = &robot.model;
     assert!(robot.unread.is_empty(), "{:?}", robot.unread);
@@ -67,7 +67,7 @@ fn the_arm_is_read_as_it_stands() {
 }
 
 #[test]
-fn a_turned_inertial_is_that_of_a_rod_laid_along_the_turned_axis() {
+fn rotated_inertial_is_that_of_a_rotated_rod() {
     // A slender rod along x of the inertial frame, rotated by 0.7 about y: its direction is u = (cos, 0, -sin), and its
     // inertia about the centre of mass is J (1 - u uᵀ).
     let text = r#"<robot name="r"><link name="b"/><joint name="j" type="continuous"><parent link="b"/><child link="l"/></joint>
@@ -85,7 +85,7 @@ fn a_turned_inertial_is_that_of_a_rod_laid_along_the_turned_axis() {
 }
 
 #[test]
-fn branches_stand_depth_first_in_document_order_wherever_links_stand() {
+fn branches_are_depth_first_in_document_order() {
     let text = r#"<robot name="r">
         <joint name="b1" type="continuous"><parent link="root"/><child link="b"/></joint>
         <joint name="a2" type="continuous"><parent link="a"/><child link="aa"/></joint>

@@ -164,7 +164,7 @@ fn friction_keeps_other_attributes() {
 }
 
 #[test]
-fn what_urdf_cannot_say_is_refused() {
+fn unrepresentable_inertials_are_refused() {
     let change = |link: &str, parameters: [f64; 10]| {
         let inertial = InertialParameters(parameters);
         rewrite_urdf(ARM, &[LinkChange::Set { link: link.to_owned(), inertial, note: None }], &[])
@@ -187,7 +187,7 @@ fn what_urdf_cannot_say_is_refused() {
 
 /// Found by mutated descriptions: a tool at a distance of 65 km gives moments that exceed the limit.
 #[test]
-fn what_could_not_be_read_again_is_refused() {
+fn unreadable_values_are_refused() {
     let model = read_urdf(&ARM.replace("<origin xyz=\"0.3 0 0\"", "<origin xyz=\"65536 0 0\"")).unwrap().model;
     let error = rewrite_urdf(ARM, &link_changes(&model, model.inertials()).unwrap(), &[]).unwrap_err();
     assert!(error.to_string().contains("more than the limit of 1e9"), "{error}");

@@ -12,7 +12,7 @@ use dynident_testing::repository;
 const STD: [f64; 2] = [0.3, 0.1];
 
 #[test]
-fn what_was_seen_so_far_gives_bodies_that_can_be_real() {
+fn online_rows_give_consistent_bodies() {
     let model = load_robot(repository("robots/planar2r.urdf")).unwrap().model;
     let terms = terms_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
     let robot = ParametricModel::new(model, terms).unwrap();

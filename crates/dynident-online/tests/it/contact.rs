@@ -43,7 +43,7 @@ fn calibration(seed: u64, seconds: f64) -> Residuals {
 }
 
 #[test]
-fn false_alarms_come_as_often_as_was_allowed() {
+fn false_alarm_rate_is_as_allowed() {
     // One per minute for an hour: sixty are expected, with a standard deviation of eight.
     let settings = ContactSettings { false_alarms_per_hour: 60.0, ..ContactSettings::new(RATE_HZ) };
     let mut monitor = ContactMonitor::new(settings, &calibration(1, 600.0)).unwrap();
@@ -222,7 +222,7 @@ fn the_band_of_a_model_gives_the_thresholds_of_its_noise() {
 }
 
 #[test]
-fn noise_that_a_filter_hid_is_reckoned_with() {
+fn thresholds_include_filtered_noise() {
     // White noise of 1 Nm at 125 Hz has a standard deviation of √(4/62.5) after a 4 Hz filter, as used by the model.
     let settings = ContactSettings { false_alarms_per_hour: 10.0, ..ContactSettings::new(RATE_HZ) };
     let mut random = Random::new(11);
@@ -239,7 +239,7 @@ fn noise_that_a_filter_hid_is_reckoned_with() {
 }
 
 #[test]
-fn a_calibration_that_says_nothing_is_refused() {
+fn unusable_calibration_is_refused() {
     let settings = ContactSettings::new(RATE_HZ);
     let refused = ContactMonitor::new(settings.clone(), &calibration(1, 1.0));
     assert!(matches!(refused, Err(OnlineError::Number { .. })));

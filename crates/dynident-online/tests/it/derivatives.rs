@@ -36,7 +36,7 @@ fn cubics_come_back_exactly_in_the_middle_of_the_window() {
 
 /// The variance of a slope of a quadratic over 2m + 1 white samples is a lower bound for that of the cubic.
 #[test]
-fn noise_comes_through_as_much_as_weights_say() {
+fn noise_variance_follows_from_the_weights() {
     let (rate_hz, half, sigma) = (500.0, 10, 1e-4);
     let mut derivatives = DelayedDerivatives::new(1, rate_hz, half).unwrap();
     let mut random = Random::new(3);
@@ -57,7 +57,7 @@ fn noise_comes_through_as_much_as_weights_say() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_input_is_refused() {
     assert!(matches!(DelayedDerivatives::new(2, 0.0, 5), Err(OnlineError::Number { .. })));
     assert!(matches!(DelayedDerivatives::new(2, 100.0, 1), Err(OnlineError::Number { .. })));
     let mut derivatives = DelayedDerivatives::new(2, 100.0, 2).unwrap();

@@ -118,7 +118,7 @@ fn learned(work: &mut AtWork, truth: &[f64], reference: StartingPoint, per_hour:
 }
 
 #[test]
-fn false_alarms_come_no_more_often_than_was_allowed() {
+fn false_alarm_rate_is_at_most_as_allowed() {
     // Nine per hour are one in twenty checks, for ten arms with a reference and thirty learned checks each: fifty of
     // 1000 checks are allowed. The uncertainty of the scatter reduces alarms, but zero alarms would not test anything.
     let (mut alarms, mut checks) = (0, 0);
@@ -182,7 +182,7 @@ fn friction_that_doubles_in_an_hour_is_seen_within_it_and_a_payload_at_once() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_input_is_refused() {
     let (_, reference) = reference(1);
     assert!(DriftSettings::new(0.0).validate().is_err());
     assert!(DriftSettings { false_alarms_per_hour: 40.0, ..DriftSettings::new(60.0) }.validate().is_err());

@@ -85,7 +85,7 @@ fn compare(estimator: &OnlineEstimator, rows: &DMatrix<f64>) {
 }
 
 #[test]
-fn after_n_samples_it_is_the_batch() {
+fn recursive_estimate_equals_the_batch() {
     let robot = robot();
     assert!(robot.layout().columns().len() >= 55);
     let samples = samples(&robot, 600, 1);
@@ -95,7 +95,7 @@ fn after_n_samples_it_is_the_batch() {
 }
 
 #[test]
-fn old_samples_count_less_and_the_start_counts() {
+fn forgetting_weights_equal_those_of_a_batch() {
     let robot = robot();
     let (samples, columns, dof) = (samples(&robot, 800, 2), robot.layout().columns().len(), robot.dof());
     let start = StartingPoint {
@@ -120,7 +120,7 @@ fn old_samples_count_less_and_the_start_counts() {
 }
 
 #[test]
-fn for_ever_is_no_longer_than_a_day() {
+fn rescaling_keeps_the_estimate_over_a_long_run() {
     // A half-life of five samples: weights overflow many times without rescaling.
     let robot = robot();
     let samples = samples(&robot, 400, 3);
@@ -157,7 +157,7 @@ fn too_few_samples_determine_nothing_and_bad_ones_change_nothing() {
 }
 
 #[test]
-fn what_was_held_stays_and_the_rest_goes_on() {
+fn fixed_parameters_stay_while_others_change() {
     let robot = robot();
     let (samples, columns) = (samples(&robot, 300, 6), robot.layout().columns().len());
     let held = [3, 20];
