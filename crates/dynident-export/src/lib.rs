@@ -5,16 +5,16 @@
 //! minimise their number), without zeros and with shared common values. Every language prints that graph as
 //! straight-line code:
 //!
-//! | target | what it is |
+//! | target | output |
 //! | --- | --- |
 //! | [`Target::C`] | one header, C99, nothing but math.h |
 //! | [`Target::Cpp`] | one header, C++17, a namespace, `std::array` |
 //! | [`Target::Rust`] | one module, no `std`, no dependency |
 //! | [`Target::Python`] | one module over NumPy, many states at once |
 //! | [`Target::Matlab`] | one function file for MATLAB and Octave |
-//! | [`Target::Mjcf`], [`Target::Urdf`], [`Target::Sdf`] | descriptions for simulators, with the nearest friction that they know |
+//! | [`Target::Mjcf`], [`Target::Urdf`], [`Target::Sdf`] | descriptions for simulators, with the nearest friction that they support |
 //! | [`Target::Ros2Yaml`] | parameters of a ROS 2 node |
-//! | [`Target::Json`] | all numbers, a [`ModelFile`] |
+//! | [`Target::Json`] | all numbers, as a [`ModelFile`] |
 //!
 //! The error bars of armature, damping, friction, delay and gain of every joint are in a [`SimulatorFile`].
 //!

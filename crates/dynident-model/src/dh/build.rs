@@ -12,7 +12,7 @@ use crate::urdf::{MAX_MAGNITUDE, MAX_MOVING_JOINTS};
 use std::collections::{HashMap, HashSet};
 use toml::Spanned;
 
-/// Builds the model of `table`, read from `text`. If the table is meant in the other convention, the model says so.
+/// Builds the model of `table`, read from `text`, and stores the model of the other convention in it.
 pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
     let stated = model_in(text, table, table.convention)?;
     let other = table.convention.other();

@@ -21,13 +21,13 @@ pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Opt
     };
     // A link that is only a frame has no inertial either.
     let Some(node) = child(link.node, "inertial") else {
-        return unknown(link.node, "is not stated, which SDF takes for 1 kg");
+        return unknown(link.node, "is not stated (SDF default: 1 kg)");
     };
     if matches!(node.attribute("auto"), Some("true" | "1")) {
-        return unknown(node, "follows from its collision shapes (`auto`), which is not computed");
+        return unknown(node, "depends on its collision shapes (`auto`), which is not supported");
     }
     let Some(mass) = number(node, "mass")? else {
-        return unknown(node, "is not stated, which SDF takes for 1 kg");
+        return unknown(node, "is not stated (SDF default: 1 kg)");
     };
     if mass < 0.0 {
         return Err(fault_at(node, SdfFault::NegativeMass { link: link.name.clone() }));

@@ -32,7 +32,7 @@ pub enum SdfWriteError {
     Unknown { kind: &'static str, name: String },
     #[error("two changes to {kind} `{name}`: give one")]
     Repeated { kind: &'static str, name: String },
-    #[error("link `{link}` cannot be without <inertial>, which SDF takes for 1 kg: leave it as it is")]
+    #[error("link `{link}` needs an <inertial>, because SDF's default is 1 kg: keep it")]
     Removed { link: String },
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
     NotFinite { kind: &'static str, name: String },

@@ -1,6 +1,6 @@
 //! Broken descriptions: each is rejected with file, line, column and the fix, and nothing panics.
 
-use crate::common::{ARM, mutate, mutations};
+use crate::common::{ARM, assert_truncations_are_refused, mutate, mutations};
 use dynident_model::{
     ReadError, audit, has_xacro_macros, link_changes, load_robot, load_robot_with, read_dh, read_urdf, rewrite_urdf,
 };
@@ -191,9 +191,8 @@ proptest! {
 /// Every prefix of a valid file is rejected or read without a panic; an incomplete URDF is always rejected.
 #[test]
 fn every_truncation_is_survived() {
-    let root_end = ARM.trim_end().len();
-    for end in (0..root_end).filter(|&end| ARM.is_char_boundary(end)) {
-        assert!(read_urdf(&ARM[..end]).is_err());
+    assert_truncations_are_refused(ARM, |text| read_urdf(text).is_err());
+    for end in 0..TABLE.len() {
         let _ = TABLE.get(..end).map(read_dh);
     }
     assert!(read_dh(TABLE).is_ok() && read_urdf(ARM).is_ok());

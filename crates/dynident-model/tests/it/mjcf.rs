@@ -1,7 +1,7 @@
 //! MJCF: rules of the format, errors and notices. Torques of whole models are compared with MuJoCo in the tests of
 //! `dynident-dynamics`.
 
-use crate::common::{mutate, mutations};
+use crate::common::{assert_truncations_are_refused, mutate, mutations};
 use dynident_model::mjcf::Loss;
 use dynident_model::{
     DescriptionFormat, JointKind, JointSpring, Mimic, audit, load_robot, read_mjcf, read_mjcf_with, rewrite_mjcf,
@@ -269,11 +269,7 @@ fn included(file: &str) -> Result<String, String> {
 #[test]
 fn every_truncation_is_refused() {
     for name in FILES {
-        let text = text_of(name);
-        let end = text.trim_end().len();
-        for end in (0..end).filter(|&end| text.is_char_boundary(end)) {
-            assert!(read_mjcf_with(&text[..end], included).is_err(), "{name} to {end}");
-        }
+        assert_truncations_are_refused(&text_of(name), |text| read_mjcf_with(text, included).is_err());
     }
 }
 

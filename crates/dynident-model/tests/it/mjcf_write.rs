@@ -1,5 +1,6 @@
 //! Writing into an MJCF: the new values can be read, and all other bytes stay.
 
+use crate::common::assert_same_inertials;
 use dynident_model::mjcf::included_from;
 use dynident_model::{
     DescriptionFormat, InertialParameters, JointChange, LinkChange, Mat3, Model, Vec3, link_changes, load_robot,
@@ -19,17 +20,6 @@ fn other_bodies(model: &Model) -> Vec<InertialParameters> {
         inertial.plus(&InertialParameters::from_centre_of_mass(0.25 + 0.125 * k as f64, place, &ball))
     };
     model.inertials().iter().enumerate().map(beside).collect()
-}
-
-/// Tolerance relative to the largest parameter of a body: about ten roundings of the transform to the centre of mass
-/// and back.
-fn assert_same_inertials(model: &Model, expected: &[InertialParameters], what: &str) {
-    for (found, expected) in model.inertials().iter().zip(expected) {
-        let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        for k in 0..10 {
-            assert!((found.0[k] - expected.0[k]).abs() <= 1e-12 * scale, "{what}: {found:?} {expected:?}");
-        }
-    }
 }
 
 /// Every model of `golden/mjcf` accepts new bodies and drives or is rejected with a known reason; without a change all

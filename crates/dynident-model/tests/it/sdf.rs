@@ -1,6 +1,6 @@
 //! SDF: errors with place and fix, and notices. Dynamics are compared with Drake in dynident-dynamics.
 
-use crate::common::{mutate, mutations};
+use crate::common::{assert_truncations_are_refused, mutate, mutations};
 use dynident_model::{DescriptionFormat, JointSpring, SdfLoss, audit, load_robot, read_sdf, write_urdf};
 use dynident_testing::{count, repository};
 use proptest::prelude::*;
@@ -127,11 +127,7 @@ fn text_of(name: &str) -> String {
 #[test]
 fn every_truncation_is_refused() {
     for name in FILES {
-        let text = text_of(name);
-        let end = text.trim_end().len();
-        for end in (0..end).filter(|&end| text.is_char_boundary(end)) {
-            assert!(read_sdf(&text[..end]).is_err(), "{name} to {end}");
-        }
+        assert_truncations_are_refused(&text_of(name), |text| read_sdf(text).is_err());
     }
 }
 

@@ -115,7 +115,7 @@ fn invalid_changes_are_refused() {
     assert!(refused(&[set(broken)], &[]).contains("link `rod` are not all finite"));
     assert!(refused(&[set(good), set(good)], &[]).contains("two changes to link `rod`"));
     let remove = LinkChange::Remove { link: "rod".to_owned() };
-    assert!(refused(&[remove], &[]).contains("takes for 1 kg"));
+    assert!(refused(&[remove], &[]).contains("default is 1 kg"));
     let ghost = LinkChange::Set { link: "j".to_owned(), inertial: good, note: None };
     assert!(refused(&[ghost], &[]).contains("no link `j`"));
     assert!(refused(&[], &[joint("rod", 1.0)]).contains("no joint `rod`"));

@@ -32,12 +32,12 @@ fn undone(robot: &str, wrong: &str, kind: SlipKind) {
     let kinds: Vec<&str> = found.found.iter().map(|slip| slip.kind.name()).collect();
     assert_eq!(kinds, [kind.name()], "{robot}: {:#?}", found.found);
     assert!(!found.found[0].corrections.is_empty() && !found.found[0].evidence.is_empty());
-    let mended = rewrite_inertials(wrong, &found.stated, &found.corrected).unwrap();
+    let repaired = rewrite_inertials(wrong, &found.stated, &found.corrected).unwrap();
     let numbers = |text: &str| -> Vec<Vec<f64>> {
         let stated = stated_inertials(text).unwrap();
         stated.iter().map(|one| one.com_m.into_iter().chain(one.moments).chain([one.mass_kg]).collect()).collect()
     };
-    for (ours, theirs) in numbers(&mended).iter().zip(numbers(&original)) {
+    for (ours, theirs) in numbers(&repaired).iter().zip(numbers(&original)) {
         let size = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         for (ours, theirs) in ours.iter().zip(&theirs) {
             assert!((ours - theirs).abs() <= 1e-12 * size, "{robot}, {}: {ours} {theirs}", kind.name());
@@ -47,8 +47,8 @@ fn undone(robot: &str, wrong: &str, kind: SlipKind) {
     let frame = |text: &str| -> String {
         text.chars().filter(|c| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E'))).collect()
     };
-    assert_eq!(frame(&mended), frame(&original), "{robot}");
-    assert_eq!(mended.lines().count(), original.lines().count());
+    assert_eq!(frame(&repaired), frame(&original), "{robot}");
+    assert_eq!(repaired.lines().count(), original.lines().count());
 }
 
 #[test]
@@ -76,9 +76,9 @@ fn digits_of_a_turned_number_stay() {
     let turned = |one: &mut StatedInertial| one.moments = one.moments.map(|moment| 0.0 - moment);
     let wrong = spoilt(&original, |one| one.link == "iiwa_link_2", turned);
     let found = look(&wrong);
-    let mended = rewrite_inertials(&wrong, &found.stated, &found.corrected).unwrap();
+    let repaired = rewrite_inertials(&wrong, &found.stated, &found.corrected).unwrap();
     // Zeros of the file stay zeros, so that all bytes are equal.
-    assert_eq!(mended, original);
+    assert_eq!(repaired, original);
 }
 
 #[test]

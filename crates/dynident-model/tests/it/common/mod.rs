@@ -1,5 +1,6 @@
 //! Robot descriptions for tests, and a small arm.
 
+use dynident_model::{InertialParameters, Model};
 use dynident_testing::{recordings, repository};
 use proptest::prelude::*;
 use std::path::PathBuf;
@@ -52,4 +53,22 @@ pub(crate) fn mutate(text: &str, mutations: &[Mutation], pieces: &[&str]) -> Str
         }
     }
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Tolerance relative to the largest parameter of a body: about ten roundings of the transform to the centre of mass
+/// and back.
+pub(crate) fn assert_same_inertials(model: &Model, expected: &[InertialParameters], what: &str) {
+    for (found, expected) in model.inertials().iter().zip(expected) {
+        let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        for k in 0..10 {
+            assert!((found.0[k] - expected.0[k]).abs() <= 1e-12 * scale, "{what}: {found:?} {expected:?}");
+        }
+    }
+}
+
+/// Every truncation of `text` within its root element is refused.
+pub(crate) fn assert_truncations_are_refused(text: &str, is_refused: impl Fn(&str) -> bool) {
+    for end in (0..text.trim_end().len()).filter(|&end| text.is_char_boundary(end)) {
+        assert!(is_refused(&text[..end]), "{}", &text[..end]);
+    }
 }
