@@ -13,12 +13,14 @@ pub struct ContactSettings {
     pub payload_s: f64,
     /// Allowed false alarms per hour, for all joints and both time scales together.
     pub false_alarms_per_hour: f64,
+    /// Minimum duration of the calibration, in payload time constants; shorter ones give inaccurate thresholds.
+    pub min_calibration_ratio: f64,
 }
 
 impl ContactSettings {
-    /// Time constants of 20 ms and 2 s; one false alarm in twenty hours.
+    /// Time constants of 20 ms and 2 s, one false alarm in twenty hours, calibration of at least ten time constants.
     pub fn new(rate_hz: f64) -> Self {
-        Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.05 }
+        Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.05, min_calibration_ratio: 10.0 }
     }
 
     /// Checks the settings.
@@ -29,7 +31,8 @@ impl ContactSettings {
         check_positive("rate_hz", &[self.rate_hz])?;
         check_positive("collision_s", &[self.collision_s])?;
         check_positive("payload_s", &[self.payload_s])?;
-        check_positive("false_alarms_per_hour", &[self.false_alarms_per_hour])
+        check_positive("false_alarms_per_hour", &[self.false_alarms_per_hour])?;
+        check_positive("min_calibration_ratio", &[self.min_calibration_ratio])
     }
 }
 
@@ -55,7 +58,7 @@ pub enum Look {
 pub struct Contact {
     /// The joint.
     pub joint: usize,
-    /// By which look.
+    /// Time scale of the detection.
     pub look: Look,
     /// Mean residual over the time constant, minus its level on undisturbed motion, Nm (N).
     pub residual_nm: f64,
@@ -86,14 +89,13 @@ pub struct ContactMonitor {
 }
 
 impl ContactMonitor {
-    /// A monitor calibrated with residuals of an undisturbed motion; at least ten times the longest time constant,
-    /// preferably of the motion that will be monitored.
+    /// A monitor calibrated with residuals of an undisturbed motion, preferably of the motion that will be monitored.
     ///
     /// # Errors
     /// Invalid settings; residuals that are too short, not finite, or zero.
     pub fn new(settings: ContactSettings, calibration: &Residuals) -> Result<Self, OnlineError> {
         settings.validate()?;
-        let least = (10.0 * settings.payload_s * settings.rate_hz).ceil();
+        let least = (settings.min_calibration_ratio * settings.payload_s * settings.rate_hz).ceil();
         let joints = calibration.joints.len();
         // The allowed false alarms are divided among two time scales of each joint.
         let each = settings.false_alarms_per_hour / (2.0 * joints.max(1) as f64);
@@ -101,7 +103,7 @@ impl ContactMonitor {
         for residuals in &calibration.joints {
             check("residuals of a joint", residuals, residuals.len())?;
             if (residuals.len() as f64) < least {
-                let fix = "give at least ten times the longest time constant";
+                let fix = "give a longer recording (min_calibration_ratio payload time constants)";
                 return Err(OnlineError::Number {
                     what: "samples of the calibration",
                     value: residuals.len() as f64,
