@@ -2,7 +2,7 @@
 
 use crate::common::{ARM, assert_same_inertials, foreign_urdfs};
 use dynident_model::{
-    InertialParameters, JointChange, LinkChange, Mat3, Model, Vec3, link_changes, load_robot, read_urdf, rewrite_urdf,
+    InertialParameters, JointChange, LinkChange, Mat3, Vec3, link_changes, load_robot, read_urdf, rewrite_urdf,
 };
 use proptest::prelude::*;
 
