@@ -1,4 +1,4 @@
-//! A robot description as code, with the numbers that it has and without friction:
+//! Writes a robot description as code, with the inertial parameters of the description and without friction:
 //!
 //! ```sh
 //! cargo run -p dynident-export --example description robots/iiwa14.urdf c > iiwa14.h

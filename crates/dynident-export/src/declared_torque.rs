@@ -1,4 +1,4 @@
-//! Declared torques as symbols: expressions operation by operation, tables piece by piece.
+//! Declared torques as symbols: expressions by operation, tables by piece.
 
 use crate::error::ExportError;
 use crate::graph::{Function, Function2};
@@ -9,10 +9,10 @@ use dynident_model::terms::{
     DeclaredLaw, Expression, ExpressionFunction, ExpressionFunction2, ExpressionNode, TorqueTable, TorqueTerm,
 };
 
-/// Torque of every joint by what the user declared; none if nothing was.
+/// Declared torque of every joint; `None` if there is none.
 ///
 /// # Errors
-/// [`ExportError::Term`] for a caller's own code.
+/// [`ExportError::Term`] for the caller's code.
 pub(crate) fn declared_torque(
     robot: &RobotModel,
     q: &[Symbol],
@@ -28,7 +28,7 @@ pub(crate) fn declared_torque(
             DeclaredLaw::Expression(expression) => of_expression(expression, q, dq),
             DeclaredLaw::Table(table) => of_table(table, q[term.joint]),
             DeclaredLaw::Function(_) => {
-                let needs = "the code of a function that was given to this program";
+                let needs = "the code of a function in the calling program";
                 return Err(ExportError::Term { symbol, kind: "declared", needs });
             }
         };
@@ -85,7 +85,6 @@ fn call(function: ExpressionFunction, x: Symbol) -> Symbol {
     x.call(function)
 }
 
-/// `x^p` by squaring.
 fn whole_power(x: Symbol, exponent: i32) -> Symbol {
     let (mut left, mut square, mut power) = (exponent.unsigned_abs(), x, Symbol::ONE);
     while left > 0 {
@@ -98,8 +97,8 @@ fn whole_power(x: Symbol, exponent: i32) -> Symbol {
     if exponent < 0 { power.recip() } else { power }
 }
 
-/// Every piece adds what its cubic gains as far as the position has come through it, so that no language needs a
-/// branch, and beyond the ends the torque stays.
+/// Sums the increments of all pieces up to the position, so that no language needs a branch. Beyond the ends the torque
+/// is constant.
 fn of_table(table: &TorqueTable, q: Symbol) -> Symbol {
     let mut torque = Symbol::splat(table.points()[0][1]);
     for piece in table.pieces() {

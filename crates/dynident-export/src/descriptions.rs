@@ -1,4 +1,4 @@
-//! Descriptions for simulators: MJCF and URDF, with what they cannot hold said.
+//! Robot descriptions for simulators (MJCF and URDF), with notes on unsupported contents.
 
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
@@ -12,16 +12,16 @@ use dynident_model::{Joint, Mat3, Model, STANDARD_GRAVITY, Transform, Vec3, writ
 use dynident_text::xml::{self, escaped};
 use std::borrow::Cow;
 
-/// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
-/// leaves rounding, a narrow smooth step in place of a sign some thousandth.
-const WORTH_SAYING: f64 = 1e-3;
+/// Friction errors below this share of the friction are not reported: rounding errors, or about 0.1 % for a narrow
+/// smooth step in place of a sign.
+const MIN_REPORTED_ERROR_RATIO: f64 = 1e-3;
 
-/// MuJoCo's MJCF: bodies with their inertials, joints with limits, `armature`, `damping` and `frictionloss`, a motor
-/// for each joint. No shapes.
+/// MuJoCo's MJCF: bodies with inertials, joints with limits, `armature`, `damping` and `frictionloss`, one motor per
+/// joint. Without shapes.
 pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let (model, bodies) = (robot.model(), robot.model().body_count());
     let friction = frictions(robot, "frictionloss", "damping", &mut notes);
-    notes.extend(left_out(robot, true));
+    notes.extend(omitted_terms(robot, true));
     notes.push("MJCF has no velocity limits; shapes are left out.".to_owned());
     let rotors = drive_inertia(robot);
     let [gx, gy, gz] = model.gravity().0;
@@ -47,11 +47,11 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     Ok(Exported { text, notes })
 }
 
-/// URDF: links with their inertials, joints with limits, damping and friction. No shapes.
+/// URDF: links with inertials, joints with limits, damping and friction. Without shapes.
 pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
-    notes.extend(left_out(robot, false));
+    notes.extend(omitted_terms(robot, false));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("URDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
     }
@@ -72,7 +72,7 @@ pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     Ok(Exported { text: format!("{head}\n{}{rest}", comment(&notes)), notes })
 }
 
-/// The nearest friction of every joint, and a sentence on each that is not the law itself.
+/// The nearest friction of every joint, with a note for each approximation.
 pub(crate) fn frictions(
     robot: &RobotModel,
     coulomb: &str,
@@ -82,13 +82,13 @@ pub(crate) fn frictions(
     let joints = robot.model().joints();
     let nearest: Vec<_> = (0..joints.len()).map(|joint| NearestFriction::of(robot, joint)).collect();
     for (joint, found) in joints.iter().zip(&nearest) {
-        if found.most_error > WORTH_SAYING * (found.coulomb + found.viscous * found.most_speed) {
+        if found.most_error > MIN_REPORTED_ERROR_RATIO * (found.coulomb + found.viscous * found.most_speed) {
             let over = match found.over {
                 ComparedOver::RecordedMotion => "over the recorded motion, velocities",
                 ComparedOver::VelocityLimit => "for velocities",
             };
             notes.push(format!(
-                "Joint {}: {coulomb} and {viscous} are the nearest to its friction and offset {over} up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
+                "Joint {}: {coulomb} and {viscous} approximate its friction and offset {over} up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
                 joint.name,
                 found.most_speed,
                 if joint.turns() { "rad/s" } else { "m/s" },
@@ -101,15 +101,15 @@ pub(crate) fn frictions(
     nearest
 }
 
-/// Terms that no joint of a description has; springs of joints where the format does not hold them.
-pub(crate) fn left_out(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
+/// Notes on terms that a robot description cannot represent; springs only if the format has none.
+pub(crate) fn omitted_terms(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for (term, value) in robot.terms() {
         let (symbol, unit) = (term.symbol(), term.unit());
         if term.own_joint().is_none() {
             let effect = if term.is_friction() { "friction" } else { "inertia" };
             notes.push(format!(
-                "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
+                "{effect} of a drive that is coupled to two joints, {symbol} = {value:?} {unit}, is left out."
             ));
         } else if let Some(law) = term.state_function() {
             if !(holds_springs && is_spring(term)) {
@@ -120,7 +120,7 @@ pub(crate) fn left_out(robot: &RobotModel, holds_springs: bool) -> Vec<String> {
             notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
         } else if let Some(distance) = term.kind().sliding_distance() {
             notes.push(format!(
-                "{symbol} = {value:?} {unit} ({}) counts as the Coulomb friction that it is once the joint has moved on by {distance:?} rad (m).",
+                "{symbol} = {value:?} {unit} ({}) is replaced by the Coulomb friction that it reaches after a motion of {distance:?} rad (m).",
                 term.kind_name(),
             ));
         }
@@ -132,7 +132,6 @@ fn joint_name<'a>(robot: &'a RobotModel, term: &TorqueTerm) -> &'a str {
     term.own_joint().map_or("", |joint| &robot.model().joints()[joint].name)
 }
 
-/// Whether it is the spring of its joint in the robot's description.
 fn is_spring(term: &TorqueTerm) -> bool {
     term.property() == Some(JointProperty::Stiffness)
 }
@@ -185,7 +184,7 @@ fn write_body(
     Ok(())
 }
 
-/// The joints that follow others: an equality of joints, or of a tendon whose length their law keeps.
+/// Writes mimic joints: an equality of joints, or of a tendon whose length is constant under the mimic law.
 fn write_followers(text: &mut String, model: &Model) {
     let Some(coupling) = model.coupling() else { return };
     let (mut tendons, mut equalities) = (String::new(), String::new());
@@ -214,13 +213,13 @@ fn write_followers(text: &mut String, model: &Model) {
     let _ = write!(text, "  <equality>\n{equalities}  </equality>\n");
 }
 
-/// A link's name, unless it is the one that MuJoCo keeps for what does not move.
+/// Name of a link; renamed if it is the reserved name of the fixed body in MuJoCo.
 fn body_name(link: &str) -> Cow<'_, str> {
     if link == "world" { Cow::Borrowed("world_link") } else { escaped(link) }
 }
 
-/// Mass, centre of mass and inertia about it of a body, which simulators read only of one that can be real.
-pub(crate) fn real_inertial(
+/// Mass, centre of mass and inertia about it of a body; simulators accept only physically consistent bodies.
+pub(crate) fn consistent_inertial(
     model: &Model,
     index: usize,
     reader: &'static str,
@@ -235,7 +234,7 @@ pub(crate) fn real_inertial(
 }
 
 fn inertial(model: &Model, index: usize) -> Result<String, ExportError> {
-    let (mass, com, inertia) = real_inertial(model, index, "MuJoCo")?;
+    let (mass, com, inertia) = consistent_inertial(model, index, "MuJoCo")?;
     let ([x, y, z], i) = (com.0, inertia.0);
     Ok(format!(
         "<inertial mass=\"{mass:?}\" pos=\"{x:?} {y:?} {z:?}\" fullinertia=\"{:?} {:?} {:?} {:?} {:?} {:?}\"/>",
@@ -248,7 +247,6 @@ fn placement(placement: &Transform) -> String {
     format!(" pos=\"{x:?} {y:?} {z:?}\" quat=\"{a:?} {b:?} {c:?} {d:?}\"")
 }
 
-/// Notes as a comment of XML.
 pub(crate) fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();

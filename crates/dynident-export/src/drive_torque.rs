@@ -1,4 +1,4 @@
-//! Torque terms as symbols: friction, offsets and the inertia of drives.
+//! Torque terms as symbols: friction, offsets and drive inertia.
 
 use crate::error::ExportError;
 use crate::robot_model::RobotModel;
@@ -6,8 +6,8 @@ use crate::symbol::Symbol;
 use dynident_lanes::Scalar;
 use dynident_model::terms::{JointMotion, TermConstant, TorqueTerm};
 
-/// Torque of friction and offsets of every joint at the velocities `dq`: what the terms add that does not follow
-/// accelerations. Terms that change with temperature count as being at their reference.
+/// Friction and offset torque of every joint at the velocities `dq`. Temperature-dependent terms are at their
+/// reference temperature.
 ///
 /// # Errors
 /// A term that needs more than the velocity.
@@ -24,7 +24,7 @@ pub(crate) fn friction(robot: &RobotModel, dq: &[Symbol]) -> Result<Vec<Symbol>,
     Ok(torque)
 }
 
-/// What the drives add to the mass matrix: constants, row-major.
+/// Constant contribution of the drives to the mass matrix, row-major.
 pub(crate) fn drive_inertia(robot: &RobotModel) -> Vec<f64> {
     let dof = robot.model().dof();
     let mut matrix = vec![0.0; dof * dof];
@@ -38,7 +38,8 @@ pub(crate) fn drive_inertia(robot: &RobotModel) -> Vec<f64> {
     matrix
 }
 
-/// Temperatures at which terms are written, with their symbols: a function of the motion cannot hold more.
+/// Reference temperatures of the temperature-dependent terms, with their symbols; the exported functions apply at these
+/// temperatures.
 pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
     let reference = |(term, _): (&TorqueTerm, f64)| {
         let constants = term.constants().into_iter().filter(|_| term.needs_temperature());
@@ -51,14 +52,13 @@ pub(crate) fn reference_temperatures(robot: &RobotModel) -> Vec<(String, f64)> {
     robot.terms().filter_map(reference).collect()
 }
 
-/// Friction and offset of a joint at the velocity `dq`, by its own terms alone: couplings, load and changes with
-/// temperature are left out; Maxwell slip is the Coulomb friction that it is once the joint has moved on by twice its
-/// yield displacement.
+/// Friction and offset of a joint at the velocity `dq`. Couplings, load and temperature dependence are omitted; Maxwell
+/// slip is replaced by the Coulomb friction that it reaches after a motion of twice its yield displacement.
 pub(crate) fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
     own_friction_terms(robot, joint, dq, None)
 }
 
-/// The same by all of these terms, or by the term at the place `only` for a value of one.
+/// As [`own_friction`]; if `only` is given, for one term with a value of one.
 pub(crate) fn own_friction_terms(robot: &RobotModel, joint: usize, dq: f64, only: Option<usize>) -> f64 {
     let zeros = vec![0.0; robot.model().dof()];
     let mut velocities = zeros.clone();

@@ -1,5 +1,5 @@
-//! The functions that every language gets, as graphs: the recursive Newton-Euler and composite-rigid-body algorithms
-//! run over symbols.
+//! The functions of all languages as graphs: runs the recursive Newton-Euler and composite-rigid-body algorithms over
+//! symbols.
 
 use crate::declared_torque::declared_torque;
 use crate::drive_torque::{drive_inertia, friction};
@@ -11,11 +11,10 @@ use dynident_dynamics::{inverse_dynamics_over, mass_matrix_over};
 use dynident_lanes::Scalar;
 use dynident_model::{Model, Vec3};
 
-/// One function: inputs are joint vectors, the output is a joint vector or a square matrix by rows.
+/// One function: inputs are joint vectors, the output is a joint vector or a row-major square matrix.
 #[derive(Debug)]
 pub(crate) struct Equation {
     pub(crate) name: &'static str,
-    /// What it computes, in a line.
     pub(crate) about: &'static str,
     pub(crate) inputs: &'static [Input],
     pub(crate) output: &'static str,
@@ -24,13 +23,11 @@ pub(crate) struct Equation {
 }
 
 impl Equation {
-    /// The names of its inputs, as arguments stand.
     pub(crate) fn arguments(&self) -> String {
         self.inputs.iter().map(|input| input.name()).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// All functions of a robot over one graph.
 #[derive(Debug)]
 pub(crate) struct Equations {
     pub(crate) dof: usize,
@@ -40,7 +37,7 @@ pub(crate) struct Equations {
 
 impl Equations {
     /// # Errors
-    /// A torque term that is no function of the motion, a joint that moves no inertia, numbers that overflow.
+    /// A torque term that is not a function of the motion, a joint without inertia, or an overflow.
     pub(crate) fn of(robot: &RobotModel) -> Result<Self, ExportError> {
         let reduced = robot.reduced()?;
         let weightless = reduced.clone().with_gravity(Vec3::ZERO)?;
@@ -53,18 +50,15 @@ impl Equations {
     }
 }
 
-/// Symbols of the inputs.
 struct Inputs {
     q: Vec<Symbol>,
     dq: Vec<Symbol>,
     ddq: Vec<Symbol>,
     tau: Vec<Symbol>,
-    /// Zero velocities or accelerations.
     rest: Vec<Symbol>,
 }
 
 impl Inputs {
-    /// Of a robot with `dof` joints.
     fn new(dof: usize) -> Self {
         let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
             .map(|input| Symbol::inputs(input, dof));
@@ -72,7 +66,6 @@ impl Inputs {
     }
 }
 
-/// Symbols of the outputs of all functions.
 struct Values {
     inverse: Vec<Symbol>,
     gravity: Vec<Symbol>,
@@ -91,7 +84,7 @@ impl Values {
         let rotors = drive_inertia(robot);
         let friction = friction(robot, dq)?;
         let declared = declared_torque(robot, q, dq)?;
-        // Torque other than that of rigid bodies and inertia of drives.
+        // Torques other than those of rigid bodies and drive inertia.
         let other: Vec<Symbol> = match &declared {
             Some(declared) => friction.iter().zip(declared).map(|(&friction, &declared)| friction + declared).collect(),
             None => friction.clone(),
@@ -110,7 +103,6 @@ impl Values {
         })
     }
 
-    /// The functions with these outputs.
     fn functions(self) -> Vec<Equation> {
         let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
             name,
@@ -152,7 +144,7 @@ impl Values {
             ),
             function(
                 "forward_dynamics",
-                "Accelerations under torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
+                "Accelerations for given torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
                 &[Input::Position, Input::Velocity, Input::Torque],
                 "ddq",
                 self.forward,
@@ -161,7 +153,7 @@ impl Values {
         functions.extend(self.declared.map(|declared| {
             function(
                 "declared",
-                "Torque that the study declares, of springs and the like; inverse_dynamics and forward_dynamics have it in them.",
+                "Declared torque of the study (springs, counterbalances); included in inverse_dynamics and forward_dynamics.",
                 &[Input::Position, Input::Velocity],
                 "tau",
                 declared,
@@ -171,7 +163,6 @@ impl Values {
     }
 }
 
-/// `M(q)` with the inertia of the drives.
 fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
     let mut mass_matrix = mass_matrix_over(reduced, q);
     for (entry, &rotor) in mass_matrix.iter_mut().zip(rotors) {
@@ -180,7 +171,6 @@ fn mass_matrix(reduced: &Model, q: &[Symbol], rotors: &[f64]) -> Vec<Symbol> {
     mass_matrix
 }
 
-/// The torque of a motion, with the inertia of the drives and `other` torques.
 fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -> Vec<Symbol> {
     let Inputs { q, dq, ddq, .. } = inputs;
     let mut inverse = inverse_dynamics_over(reduced, q, dq, ddq);
@@ -193,7 +183,6 @@ fn inverse(reduced: &Model, inputs: &Inputs, rotors: &[f64], other: &[Symbol]) -
     inverse
 }
 
-/// The accelerations under torques.
 fn forward(
     reduced: &Model,
     inputs: &Inputs,
@@ -207,9 +196,9 @@ fn forward(
         .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })
 }
 
-/// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that branches that do not see each other stay zero
-/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5). The number of the joint whose pivot is no
-/// positive number, if one is a number at all.
+/// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that the zeros between independent branches are kept
+/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5). Fails with the index of a joint whose pivot is
+/// constant and not positive.
 fn solved(mut m: Vec<Symbol>, mut b: Vec<Symbol>) -> Result<Vec<Symbol>, usize> {
     let dof = b.len();
     let mut inverses = vec![Symbol::ZERO; dof];

@@ -1,4 +1,4 @@
-//! What cannot be exported, and why.
+//! Errors of the export.
 
 use dynident_dynamics::ParametricModelError;
 use dynident_model::ModelError;
@@ -8,115 +8,48 @@ use thiserror::Error;
 /// Why a model could not be written.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum ExportError {
-    /// Values of another number than there are terms.
     #[error("{found} values for {expected} torque terms: give one for each")]
-    Values {
-        /// Number of terms.
-        expected: usize,
-        /// Number of values.
-        found: usize,
-    },
-    /// A model file that does not describe a robot.
+    Values { expected: usize, found: usize },
     #[error("the model file is damaged: {what}")]
-    File {
-        /// What is wrong.
-        what: String,
-    },
-    /// A value that is no number.
+    File { what: String },
     #[error("the value of {symbol} is {value}, not a finite number")]
-    NotFinite {
-        /// The term's symbol.
-        symbol: String,
-        /// Its value.
-        value: f64,
-    },
-    /// A body with a number that no simulator takes, or from which one follows.
+    NotFinite { symbol: String, value: f64 },
     #[error(
         "body `{body}`: {quantity} is {value:e}; all numbers of a body have to be finite and at most {MAX_MAGNITUDE:e}: identify the model again"
     )]
-    Body {
-        /// The body.
-        body: String,
-        /// Which of its numbers.
-        quantity: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// The equations of motion overflow.
+    Body { body: String, quantity: &'static str, value: f64 },
     #[error(
-        "the equations of motion hold the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
+        "the equations of motion contain the number {value}: a parameter or a constant of a torque term is too large or too small; identify the model again"
     )]
-    Overflow {
-        /// The number.
-        value: f64,
-    },
-    /// Recorded velocities of another number of joints.
-    #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty where nothing is known")]
-    Velocities {
-        /// Number of joints.
-        expected: usize,
-        /// Number of lists.
-        found: usize,
-    },
-    /// A recorded velocity that is none.
+    Overflow { value: f64 },
+    #[error("recorded velocities of {found} joints for {expected}: give a list for each, empty if unknown")]
+    Velocities { expected: usize, found: usize },
     #[error(
         "joint `{joint}`: {samples} samples of the velocity {velocity}: it has to be finite and not zero, with a positive number of samples"
     )]
-    Velocity {
-        /// The joint.
-        joint: String,
-        /// The velocity.
-        velocity: f64,
-        /// Its weight.
-        samples: f64,
-    },
-    /// Bodies whose dynamics are unknown.
+    Velocity { joint: String, velocity: f64, samples: f64 },
     #[error("the bodies {} have no inertial: their dynamics are unknown", bodies.join(", "))]
-    Unknown {
-        /// Their names.
-        bodies: Vec<String>,
-    },
-    /// A torque term that needs more than the motion of this moment.
+    Unknown { bodies: Vec<String> },
     #[error(
         "{symbol} ({kind}) cannot be written as a function of q, dq and ddq: it needs {needs}; identify with another friction law ([drive] of the study) to export"
     )]
-    Term {
-        /// The term's symbol.
-        symbol: String,
-        /// Its kind.
-        kind: &'static str,
-        /// What it needs beside.
-        needs: &'static str,
-    },
-    /// A joint that moves nothing.
+    Term { symbol: String, kind: &'static str, needs: &'static str },
     #[error(
         "joint `{joint}` moves no inertia, so it has no acceleration under a torque: give its body a mass, or lock it"
     )]
-    NoInertia {
-        /// The joint.
-        joint: String,
-    },
-    /// A body that a simulator refuses.
+    NoInertia { joint: String },
     #[error(
-        "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so {reader} would refuse it: identify with physical consistency, which is the default"
+        "body `{body}` is not physically consistent (mass or moments not positive, or a moment larger than the sum of the others), so {reader} would refuse it: identify with physical consistency, which is the default"
     )]
-    NotPhysical {
-        /// The body.
-        body: String,
-        /// Who would refuse it.
-        reader: &'static str,
-    },
-    /// What JSON cannot hold.
+    NotPhysical { body: String, reader: &'static str },
     #[error("the model cannot be written as JSON: {message}")]
-    Json {
-        /// Why.
-        message: String,
-    },
+    Json { message: String },
     /// Terms that do not belong to the model.
     #[error(transparent)]
     Terms(#[from] ParametricModelError),
-    /// Numbers that are no model.
+    /// Numbers that do not form a valid model.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

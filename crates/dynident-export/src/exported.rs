@@ -1,10 +1,11 @@
-//! A model in a form.
+//! An exported model.
 
-/// A model in a form.
+/// An exported model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exported {
-    /// The file's text.
+    /// Text of the file.
     pub text: String,
-    /// What the form does not hold, or holds differently, a sentence each; the text has them as comments.
+    /// Contents that the format cannot represent or represents differently, one sentence each; the text contains them
+    /// as comments.
     pub notes: Vec<String>,
 }

@@ -1,15 +1,14 @@
-//! The expression graph: every value once, constants folded, zeros gone.
+//! Expression graph with unique values, folded constants and without zeros.
 //!
-//! A node is made only where the algebra leaves one: `x + 0`, `x · 0`, `x · 1` and sums of constants are folded, signs
-//! are moved outward so that `a b` and `-a b` share their product, and equal nodes are the same node. Adding zero and
-//! moving a sign change no bit of a finite result; two constant factors in a row become one, which rounds once less.
+//! Nodes are simplified when they are created: `x + 0`, `x · 0`, `x · 1` and sums of constants are folded, signs are
+//! moved outward so that `a b` and `-a b` share their product, and equal nodes are merged. Adding zero and moving a
+//! sign keep every bit of a finite result; two consecutive constant factors are merged, which rounds once less.
 
 use std::collections::HashMap;
 
-/// Place of a node in its graph. Smaller places never depend on larger ones.
+/// Index of a node in its graph. A node depends only on smaller indices.
 pub(crate) type Id = u32;
 
-/// What a generated function is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Input {
     Position,
@@ -19,7 +18,7 @@ pub(crate) enum Input {
 }
 
 impl Input {
-    /// Its name in every language.
+    /// Name in all languages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Position => "q",
@@ -30,7 +29,6 @@ impl Input {
     }
 }
 
-/// Functions of one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Function {
     Sin,
@@ -47,7 +45,6 @@ pub(crate) enum Function {
     Abs,
 }
 
-/// Functions of two values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Function2 {
     Atan2,
@@ -56,7 +53,7 @@ pub(crate) enum Function2 {
 }
 
 impl Function {
-    /// What nearly every language calls it.
+    /// Name in most languages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Sin => "sin",
@@ -75,7 +72,7 @@ impl Function {
     }
 }
 
-/// One value. Numbers are kept as bits, so that equal ones are found.
+/// One value. Numbers are stored as bits for comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {
     Constant(u64),
@@ -84,18 +81,16 @@ pub(crate) enum Node {
     Sub(Id, Id),
     Mul(Id, Id),
     Neg(Id),
-    /// `1 / x`.
     Recip(Id),
     Call(Function, Id),
     Call2(Function2, Id, Id),
-    /// `x^p` of a positive x.
+    /// `x^p` for positive x.
     Power(Id, u64),
-    /// The sign of x, zero while `|x|` is at most the band.
+    /// Sign of x; zero if `|x|` is at most the band.
     Step(Id, u64),
 }
 
 impl Node {
-    /// The nodes that it is made of.
     pub(crate) fn parts(self) -> impl Iterator<Item = Id> {
         let (a, b) = match self {
             Self::Constant(_) | Self::Input(..) => (None, None),
@@ -106,7 +101,7 @@ impl Node {
     }
 }
 
-/// The graph of one robot. Zero and one stand at the first two places.
+/// The graph of one robot. Zero and one have the first two indices.
 #[derive(Debug)]
 pub(crate) struct Graph {
     nodes: Vec<Node>,
@@ -124,7 +119,6 @@ impl Graph {
         graph
     }
 
-    /// Whether a function of this kind is in it.
     pub(crate) fn has(&self, kind: impl Fn(Node) -> bool) -> bool {
         self.nodes.iter().any(|&node| kind(node))
     }
@@ -146,7 +140,6 @@ impl Graph {
         place
     }
 
-    /// The first constant that is not finite.
     pub(crate) fn not_finite(&self) -> Option<f64> {
         self.nodes.iter().find_map(|node| match node {
             Node::Constant(bits) => Some(f64::from_bits(*bits)).filter(|value| !value.is_finite()),
@@ -154,7 +147,6 @@ impl Graph {
         })
     }
 
-    /// The value of a constant.
     pub(crate) fn number(&self, id: Id) -> Option<f64> {
         match self.node(id) {
             Node::Constant(bits) => Some(f64::from_bits(bits)),
@@ -163,7 +155,7 @@ impl Graph {
     }
 
     pub(crate) fn constant(&mut self, value: f64) -> Id {
-        // Minus zero is zero: the two differ in no sum.
+        // Negative zero becomes zero, which changes no sum.
         self.place(Node::Constant((value + 0.0).to_bits()))
     }
 
@@ -179,7 +171,7 @@ impl Graph {
         }
     }
 
-    /// The value without its sign, and whether it had one.
+    /// The value without its sign, and whether it was negative.
     fn sign(&mut self, a: Id) -> (Id, bool) {
         match self.node(a) {
             Node::Neg(inner) => (inner, true),
@@ -208,7 +200,7 @@ impl Graph {
         self.add(a, b)
     }
 
-    /// `a - b` of values without a sign: always with the earlier one first, so that `b - a` shares it.
+    /// `a - b` of values without a sign, always with the smaller index first, so that `b - a` shares the node.
     fn difference(&mut self, a: Id, b: Id) -> Id {
         match a.cmp(&b) {
             core::cmp::Ordering::Less => self.place(Node::Sub(a, b)),
@@ -235,7 +227,7 @@ impl Graph {
         if minus_a == minus_b { product } else { self.neg(product) }
     }
 
-    /// Of values without a sign, neither zero nor one.
+    /// Product of values without a sign, neither zero nor one.
     fn product(&mut self, a: Id, b: Id) -> Id {
         let (constant, other) = match (self.number(a), self.number(b)) {
             (Some(value), _) => (Some(value), b),

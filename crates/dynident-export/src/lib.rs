@@ -1,24 +1,24 @@
-//! **In which form does a controller or a simulator read the model?** A [`RobotModel`] in, text out.
+//! Exports identified models to controllers and simulators: a [`RobotModel`] in, text out.
 //!
-//! The recursive Newton-Euler and composite-rigid-body algorithms of `dynident-dynamics` run over symbols in place of
-//! numbers. What they leave is an expression graph with the constants of this one robot folded in (its base parameters,
-//! so that as few of them as possible are left), zeros gone and equal values shared. Every language prints that graph
-//! as straight-line code:
+//! The recursive Newton-Euler and composite-rigid-body algorithms of `dynident-dynamics` run over symbols instead of
+//! numbers. The result is an expression graph with the constants of this robot folded in (as base parameters, to
+//! minimise their number), without zeros and with shared common values. Every language prints that graph as
+//! straight-line code:
 //!
-//! | target | what it is |
+//! | target | output |
 //! | --- | --- |
 //! | [`Target::C`] | one header, C99, nothing but math.h |
 //! | [`Target::Cpp`] | one header, C++17, a namespace, `std::array` |
 //! | [`Target::Rust`] | one module, no `std`, no dependency |
 //! | [`Target::Python`] | one module over NumPy, many states at once |
 //! | [`Target::Matlab`] | one function file for MATLAB and Octave |
-//! | [`Target::Mjcf`], [`Target::Urdf`], [`Target::Sdf`] | descriptions for simulators, with the nearest friction that they know |
+//! | [`Target::Mjcf`], [`Target::Urdf`], [`Target::Sdf`] | descriptions for simulators, with the nearest friction that they support |
 //! | [`Target::Ros2Yaml`] | parameters of a ROS 2 node |
-//! | [`Target::Json`] | all numbers, a [`ModelFile`] |
+//! | [`Target::Json`] | all numbers, as a [`ModelFile`] |
 //!
-//! Armature, damping, friction, delay and gain of every joint with their error bars are a [`SimulatorFile`].
+//! The error bars of armature, damping, friction, delay and gain of every joint are in a [`SimulatorFile`].
 //!
-//! A payload by itself becomes the command of a controller: [`payload_command`].
+//! [`payload_command`] writes a payload as the command of a controller.
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +

@@ -1,4 +1,4 @@
-//! The model as JSON, for programs that nobody has written a form for.
+//! The model as JSON, for other programs.
 
 use crate::error::ExportError;
 use crate::exported::Exported;
@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 /// Name and version of the schema of [`ModelFile`].
 pub const MODEL_SCHEMA: &str = "dynident/model/1";
 
-/// The whole model: `tau = M(q) ddq + C(q, dq) dq + g(q)` and the torque of all terms. A joint that slides has m, N and
-/// kg in place of rad, Nm and kg m²; units and the names of constants say which.
+/// The whole model: `tau = M(q) ddq + C(q, dq) dq + g(q)` and the torque of all terms. Prismatic joints have m, N and
+/// kg in place of rad, Nm and kg m²; units and the names of constants show this.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelFile {
@@ -22,52 +22,52 @@ pub struct ModelFile {
     pub name: String,
     /// Program and version.
     pub written_by: String,
-    /// Where the model comes from and what speaks against it, a sentence each.
+    /// Origin of the model and objections to it, one sentence each.
     pub notes: Vec<String>,
-    /// Gravity in the frame of the base, m/s².
+    /// Gravity in the base frame, m/s².
     pub gravity_m_s2: [f64; 3],
-    /// Links that do not move; the first has the frame of the base.
+    /// Fixed links; the first has the frame of the base.
     pub base_links: Vec<ModelLink>,
-    /// Joints with the body that each moves, parents before children. Those that do not follow others, in this order,
-    /// are what positions, velocities and torques are given for.
+    /// Joints with the body that each moves, parents before children. Positions, velocities and torques are vectors
+    /// over the independent joints, in this order.
     pub joints: Vec<ModelJoint>,
-    /// Inertia and friction of drives that turn with two joints.
+    /// Inertia and friction of drives that are coupled to two joints.
     pub couplings: Vec<ModelTerm>,
 }
 
-/// A joint and what moves with it.
+/// A joint and its body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelJoint {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
     /// `revolute`, `continuous` or `prismatic`.
     #[serde(rename = "type")]
     pub kind: String,
-    /// The joint that moves the body it stands on; null for the base.
+    /// Joint that moves the parent body; null for the base.
     pub parent: Option<String>,
-    /// Where the body stands in the parent's frame at position zero.
+    /// Pose of the body in the parent's frame at position zero.
     pub placement: ModelPlacement,
-    /// The axis in the frame of the body, of length one.
+    /// Unit vector of the axis in the frame of the body.
     pub axis: [f64; 3],
-    /// Limits as described; null where the description has none.
+    /// Limits in the robot description; null if the description has none.
     pub limits: ModelLimits,
-    /// What it moves.
+    /// Body moved by the joint.
     pub body: ModelBody,
     /// Friction, offset and drive inertia.
     pub terms: Vec<ModelTerm>,
-    /// What it follows; not there for a joint that moves by itself.
+    /// Mimic law; absent for an independent joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub follows: Option<ModelFollower>,
 }
 
-/// How a joint follows others: its position is the sum of theirs times the multipliers, and the offset.
+/// Mimic law of a joint: its position is the sum of multipliers times source positions, plus the offset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelFollower {
-    /// Joints that move by themselves, and the velocity of this joint per velocity of each.
+    /// Independent source joints, and the velocity of this joint per velocity of each.
     pub multipliers: BTreeMap<String, f64>,
-    /// Its position where those stand at zero, rad (m).
+    /// Position while all sources are at zero, rad (m).
     pub offset: f64,
 }
 
@@ -94,11 +94,11 @@ pub struct ModelLimits {
     pub effort: Option<f64>,
 }
 
-/// A body: the links that move with a joint, as one.
+/// A body: all links that move together with a joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelBody {
-    /// Name of the joint's own link, whose frame the numbers are in.
+    /// Name of the joint's own link, whose frame is the frame of the numbers.
     pub name: String,
     /// Mass, kg.
     pub mass_kg: f64,
@@ -106,9 +106,10 @@ pub struct ModelBody {
     pub com_m: Option<[f64; 3]>,
     /// Inertia about the centre of mass, kg m²: xx, xy, xz, yy, yz, zz; null for a body without mass.
     pub inertia_at_com_kgm2: Option<[f64; 6]>,
-    /// The ten numbers in which torque is linear: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin.
+    /// The ten parameters in which torque is linear: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the
+    /// origin.
     pub parameters: [f64; 10],
-    /// Links fixed to it and its own.
+    /// All links of the body.
     pub links: Vec<ModelLink>,
 }
 
@@ -116,39 +117,39 @@ pub struct ModelBody {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelLink {
-    /// Its name.
+    /// Name of the link.
     pub name: String,
-    /// Where it stands in the frame of its body.
+    /// Pose of the link in the frame of its body.
     pub placement: ModelPlacement,
 }
 
-/// A frame in another one: `p_other = rotation p + translation_m`.
+/// Pose of a frame in another one: `p_other = rotation p + translation_m`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelPlacement {
-    /// Its origin, m.
+    /// Origin, m.
     pub translation_m: [f64; 3],
-    /// Its axes as columns, written row by row.
+    /// Rotation matrix, row by row; its columns are the axes of the frame.
     pub rotation: [[f64; 3]; 3],
 }
 
-/// A torque term: the value times the function of the motion that the kind names.
+/// A torque term: value times the function of its kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ModelTerm {
-    /// Its symbol, as in `result.json`.
+    /// Symbol, as in `result.json`.
     pub symbol: String,
     /// `viscous`, `coulomb`, `directional-viscous`, `directional-coulomb`, `stribeck`, `sigmoid`, `power`, `load`,
-    /// `maxwell-slip`, `temperature-viscous`, `temperature-coulomb`, `offset`, `drive-inertia` or `coupling`; the page
-    /// on export of the book has their functions.
+    /// `maxwell-slip`, `temperature-viscous`, `temperature-coulomb`, `offset`, `drive-inertia` or `coupling`; the
+    /// functions are listed in the chapter on export of the book.
     pub kind: String,
-    /// The joints that feel it: one, or two of a coupling.
+    /// Joints that the term acts on: one, or two for a coupling.
     pub joints: Vec<String>,
-    /// Its value.
+    /// Value of the parameter.
     pub value: f64,
-    /// The unit of the value.
+    /// Unit of the value.
     pub unit: String,
-    /// What the function needs beside the motion, by names with units.
+    /// Constants of the function, by names with units.
     pub constants: BTreeMap<String, ModelConstant>,
 }
 
@@ -159,11 +160,11 @@ pub struct ModelTerm {
 pub enum ModelConstant {
     /// A number.
     Number(f64),
-    /// A number for each joint.
+    /// One number per joint.
     Numbers([f64; 2]),
-    /// Numbers.
+    /// A list of numbers.
     List(Vec<f64>),
-    /// A word, or an expression.
+    /// A keyword, or an expression.
     Word(String),
 }
 
@@ -208,7 +209,6 @@ impl ModelFile {
     }
 }
 
-/// The model as JSON.
 pub(crate) fn model_json(robot: &RobotModel, notes: Vec<String>) -> Result<Exported, ExportError> {
     let text = dynident_text::json::to_string_pretty(&ModelFile::of(robot, &notes));
     Ok(Exported { text: text.map_err(|error| ExportError::Json { message: error.to_string() })? + "\n", notes })
@@ -221,14 +221,13 @@ impl ModelPlacement {
 }
 
 impl ModelTerm {
-    /// The terms of a robot that are wanted.
     pub(crate) fn of(robot: &RobotModel, wanted: impl Fn(&TorqueTerm) -> bool) -> Vec<Self> {
         let joints = robot.model().joints();
         let terms = robot.terms().filter(|(term, _)| wanted(term));
         terms
             .map(|(term, value)| {
                 let felt: Vec<&Joint> = term.joints().into_iter().map(|joint| &joints[joint]).collect();
-                // A coupling of a joint that turns with one that slides has both in its ratios.
+                // The ratios of a coupling of a revolute and a prismatic joint have both units.
                 let turns = felt.iter().any(|joint| joint.turns());
                 Self {
                     symbol: term.symbol(),
@@ -243,7 +242,7 @@ impl ModelTerm {
     }
 }
 
-/// A unit at a joint that turns, or in its place that of one that slides.
+/// Unit at a revolute joint, or the corresponding unit at a prismatic joint.
 fn unit(revolute: &str, turns: bool) -> String {
     if turns {
         return revolute.to_owned();
@@ -251,7 +250,7 @@ fn unit(revolute: &str, turns: bool) -> String {
     revolute.replace("kg m^2", "kg").replace("Nm", "N").replace("rad", "m")
 }
 
-/// A constant with its unit in its name; a step is its shape and its width.
+/// A constant with its unit in its name; a step becomes shape and width.
 fn constants(name: &'static str, value: TermConstant, turns: bool) -> Vec<(String, ModelConstant)> {
     let with_unit = |name: &str, at_revolute: &str| {
         let unit = if turns { at_revolute.to_owned() } else { at_revolute.replace("rad", "m") };
@@ -289,7 +288,6 @@ fn links(body: &Body) -> Vec<ModelLink> {
     body.links.iter().map(link).collect()
 }
 
-/// xx, xy, xz, yy, yz, zz.
 pub(crate) fn upper_triangle(m: &[[f64; 3]; 3]) -> [f64; 6] {
     [m[0][0], m[0][1], m[0][2], m[1][1], m[1][2], m[2][2]]
 }

@@ -1,35 +1,34 @@
-//! The friction of a simulator, `τ = c sign(q̇) + d q̇`, that is nearest to a fitted law.
+//! Approximation of a friction law by that of a simulator, `τ = c sign(q̇) + d q̇`.
 
 use crate::drive_torque::{own_friction, own_friction_terms};
 use crate::recorded_velocity::RecordedVelocity;
 use crate::robot_model::RobotModel;
 
-/// Velocities on either side of rest at which laws are compared where no motion was recorded: even steps, more than a
-/// law has bends.
-const SPEEDS: u32 = 200;
+/// Number of equally spaced speeds for the comparison without a recorded motion; enough to resolve the shape of a law.
+const SPEED_COUNT: u32 = 200;
 
-/// Range of joints whose description has no velocity limit, rad/s or m/s.
-const DEFAULT_SPEED: f64 = 1.0;
+/// Speed range of joints without a velocity limit, rad/s or m/s.
+const DEFAULT_MAX_SPEED: f64 = 1.0;
 
-/// What a nearest friction is nearest over.
+/// Velocities over which the nearest friction is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ComparedOver {
     /// The velocities of the recorded motion.
     RecordedMotion,
-    /// Even velocities up to the joint's limit, for no motion of it was recorded.
+    /// Equally spaced velocities up to the joint's limit, if no motion of the joint was recorded.
     VelocityLimit,
 }
 
-/// Coulomb and viscous friction of one joint in place of its law.
+/// Coulomb and viscous friction that approximate the law of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestFriction {
-    /// `c`, Nm (N), not negative.
+    /// `c`, Nm (N), nonnegative.
     pub coulomb: f64,
-    /// `d`, Nm s/rad (N s/m), not negative.
+    /// `d`, Nm s/rad (N s/m), nonnegative.
     pub viscous: f64,
-    /// What the two were compared over.
+    /// Velocities of the fit.
     pub over: ComparedOver,
-    /// Largest velocity at which they were, rad/s (m/s): the recorded one, or the joint's limit, 1 where there is none.
+    /// Largest speed of the fit, rad/s (m/s): the recorded one, or the joint's limit, or 1 without a limit.
     pub most_speed: f64,
     /// Root mean square of the difference over these velocities, Nm (N).
     pub rms_error: f64,
@@ -37,19 +36,19 @@ pub struct NearestFriction {
     pub most_error: f64,
 }
 
-/// What a term of the law does to the nearest friction.
+/// Sensitivity of the nearest friction to the value of a term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TermShare {
-    /// Place of the term among the robot's terms.
+    /// Index of the term among the robot's terms.
     pub term: usize,
-    /// `∂c/∂value`; zero where c is held at zero.
+    /// `∂c/∂value`; zero if c is at its bound zero.
     pub coulomb: f64,
-    /// `∂d/∂value`; zero where d is held at zero.
+    /// `∂d/∂value`; zero if d is at its bound zero.
     pub viscous: f64,
 }
 
 impl NearestFriction {
-    /// None at all: of a joint that follows others, whose drives are theirs.
+    /// No friction, for a mimic joint, which has no drive.
     pub(crate) const NONE: Self = Self {
         coulomb: 0.0,
         viscous: 0.0,
@@ -59,10 +58,10 @@ impl NearestFriction {
         most_error: 0.0,
     };
 
-    /// Least squares over the joint's recorded velocities, each with its samples, or without them over even velocities
-    /// from minus to plus its limit without rest; neither value negative. The law is the joint's own friction and
-    /// offset (at equal velocities of both sides what is even in the velocity, an offset or a difference of directions,
-    /// falls out of the fit and stands in the error).
+    /// Weighted least squares over the joint's recorded velocities; without them, over equally spaced velocities from
+    /// minus to plus its limit, except zero. Both values are nonnegative. The law consists of friction and offset of
+    /// the joint. With symmetric velocities, the even part (an offset or a difference between directions) has no
+    /// influence on the fit and is included in the error.
     ///
     /// # Panics
     /// If the model does not have the joint.
@@ -85,8 +84,8 @@ impl NearestFriction {
         }
     }
 
-    /// How the nearest friction of a joint follows the values of its law's terms: it is linear in them as long as none
-    /// of the two changes between zero and not.
+    /// Sensitivities of the nearest friction of a joint to the values of its terms. The dependence is linear as long as
+    /// the same bounds are active.
     ///
     /// # Panics
     /// If the model does not have the joint.
@@ -110,13 +109,13 @@ fn velocities(robot: &RobotModel, joint: usize) -> (ComparedOver, Vec<RecordedVe
         return (ComparedOver::RecordedMotion, recorded.to_vec());
     }
     let limit = robot.model().joints()[joint].limits.velocity;
-    let most = limit.filter(|speed| speed.is_finite() && *speed > 0.0).unwrap_or(DEFAULT_SPEED);
-    let speeds = (1..=SPEEDS).map(|k| most * f64::from(k) / f64::from(SPEEDS));
+    let most = limit.filter(|speed| speed.is_finite() && *speed > 0.0).unwrap_or(DEFAULT_MAX_SPEED);
+    let speeds = (1..=SPEED_COUNT).map(|k| most * f64::from(k) / f64::from(SPEED_COUNT));
     let even = speeds.flat_map(|dq| [dq, -dq]).map(|velocity| RecordedVelocity { velocity, samples: 1.0 });
     (ComparedOver::VelocityLimit, even.collect())
 }
 
-/// Which of the two the fit leaves at zero.
+/// Which of the two values are free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fit {
     Both,
@@ -125,9 +124,9 @@ enum Fit {
     Neither,
 }
 
-/// Below this share of `Σw Σw q̇²` the determinant of the normal equations is rounding: one speed only was recorded,
-/// at which sign and velocity say the same.
-const ONE_SPEED: f64 = 1e-9;
+/// Determinant of the normal equations, relative to `Σw Σw q̇²`, below which only one speed was recorded, so that
+/// Coulomb and viscous friction are indistinguishable.
+const MIN_DETERMINANT_RATIO: f64 = 1e-9;
 
 /// `Σw`, `Σw |q̇|`, `Σw q̇²`, `Σw sign(q̇) τ`, `Σw q̇ τ`.
 fn sums(samples: &[RecordedVelocity], tau: &[f64]) -> [f64; 5] {
@@ -145,10 +144,10 @@ fn sums(samples: &[RecordedVelocity], tau: &[f64]) -> [f64; 5] {
 impl Fit {
     fn of(samples: &[RecordedVelocity], tau: &[f64]) -> Self {
         let [count, size, square, by_sign, by_speed] = sums(samples, tau);
-        if count * square - size * size <= ONE_SPEED * count * square {
+        if count * square - size * size <= MIN_DETERMINANT_RATIO * count * square {
             return if by_sign > 0.0 { Self::CoulombOnly } else { Self::Neither };
         }
-        // On the boundary one value is zero and the other its own least squares.
+        // On the boundary one value is zero and the other is its separate least-squares estimate.
         match Self::Both.values(samples, tau) {
             (coulomb, viscous) if coulomb >= 0.0 && viscous >= 0.0 => Self::Both,
             (coulomb, _) if coulomb < 0.0 && by_speed > 0.0 => Self::ViscousOnly,

@@ -1,14 +1,13 @@
-//! A payload as the controllers of four makers read it.
+//! A payload in the formats of four controller manufacturers.
 
 use crate::rotation::{quaternion, z_y_x_angles};
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use dynident_text::identifier;
 use nalgebra::Matrix3;
 
-/// Longest identifier of RAPID.
-const RAPID_LENGTH: usize = 32;
+const MAX_RAPID_NAME_LENGTH: usize = 32;
 
-/// Whose controller.
+/// Manufacturer of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PayloadReader {
     /// Universal Robots: `set_target_payload` of URScript.
@@ -21,26 +20,27 @@ pub enum PayloadReader {
     Abb,
 }
 
-/// A payload that can be real, in the frame of the flange (or of the link that carries it).
+/// A physically consistent payload, in the frame of the flange (or of the link that carries it).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PayloadBody {
-    /// Its name.
+    /// Name of the payload.
     pub name: String,
     /// Mass, centre of mass and inertia in the frame of the link.
     pub inertial: InertialParameters,
 }
 
-/// The command, declaration or JSON that tells a controller of the payload. None for a body without mass
-/// or with numbers that are not finite.
+/// The command, declaration or JSON that sets the payload of a controller; `None` for a body without mass or with
+/// numbers that are not finite.
 ///
-/// Units and axes are the reader's: UR and Franka take the inertia about the centre of mass in kg m² along the axes of
-/// the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine); KUKA and ABB take the centre of mass in mm,
-/// principal moments, and their axes, as angles A, B, C in degrees about Z, Y', X'' (KUKA) or a quaternion (ABB).
+/// Units and axes depend on the controller. UR and Franka use the inertia about the centre of mass in kg m² along the
+/// axes of the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine entries). KUKA and ABB use the centre of
+/// mass in mm, principal moments, and their axes as angles A, B, C in degrees about Z, Y', X'' (KUKA) or as a
+/// quaternion (ABB).
 pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;
     let ([x, y, z], mut name) = (com, identifier(&payload.name));
-    name.truncate(RAPID_LENGTH);
+    name.truncate(MAX_RAPID_NAME_LENGTH);
     if ![mass].iter().chain(&com).chain(i.as_flattened()).all(|x| x.is_finite()) {
         return None;
     }
@@ -73,7 +73,7 @@ pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<S
     })
 }
 
-/// Principal moments, and the rotation whose columns are their axes, a right-handed frame.
+/// Principal moments, and the rotation whose columns are their axes (right-handed).
 fn principal(inertia: &[[f64; 3]; 3]) -> ([f64; 3], Mat3) {
     let eigen = Matrix3::from_fn(|a, b| inertia[a][b]).symmetric_eigen();
     let v = eigen.eigenvectors;
@@ -95,7 +95,7 @@ mod tests {
         PayloadBody { name: "box 1".to_owned(), inertial }
     }
 
-    /// All numbers of a text that names hold no digits of.
+    /// All numbers of a text whose names contain no digits.
     fn numbers(text: &str) -> Vec<f64> {
         text.split(|c: char| !(c.is_ascii_digit() || "+-.e".contains(c))).filter_map(|word| word.parse().ok()).collect()
     }
@@ -105,7 +105,7 @@ mod tests {
         let close = |text: &str, expected: &[f64]| {
             let found = numbers(text);
             assert_eq!(found.len(), expected.len(), "{text}");
-            // Parallel axes there and back.
+            // Rounding error of the parallel-axis theorem in both directions.
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{text}");
         };
         let ur = payload_command(&box_(), PayloadReader::UniversalRobots).unwrap();
@@ -138,7 +138,7 @@ mod tests {
                     Mat3(core::array::from_fn(|a| core::array::from_fn(|b| if a == b { moments[a] } else { 0.0 })));
                 let back = axes.mul_mat(&diagonal).mul_mat(&axes.transpose());
                 let off = (back - inertia).0.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
-                // Nine decimals of moments below one, six of degrees.
+                // Moments below one have nine decimals, degrees have six.
                 assert!(off < 1e-7, "{off}");
                 assert!((numbers[0] - body.mass_kg()).abs() < 1e-6);
                 assert!((0..3).all(|k| (numbers[1 + k] - 1e3 * com[k]).abs() < 1e-6));

@@ -1,10 +1,10 @@
-//! What is known of a recorded motion when friction is simplified.
+//! Recorded velocities for the simplification of friction.
 
-/// A velocity of a joint, and how often it was recorded.
+/// A velocity of a joint, with its number of samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedVelocity {
-    /// rad/s (m/s), not zero.
+    /// Velocity, rad/s (m/s), not zero.
     pub velocity: f64,
-    /// Its weight: samples.
+    /// Number of samples (weight).
     pub samples: f64,
 }

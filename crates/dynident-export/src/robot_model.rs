@@ -1,4 +1,4 @@
-//! What is exported: a robot with all its numbers.
+//! A complete robot model for export.
 
 use crate::error::ExportError;
 use crate::recorded_velocity::RecordedVelocity;
@@ -7,11 +7,11 @@ use dynident_model::terms::TorqueTerm;
 use dynident_model::urdf::MAX_MAGNITUDE;
 use dynident_model::{InertialParameters, Joint, Mat3, Model, Transform, Vec3};
 
-/// Entries of rotations closer than this to 0 or ±1 are that number: what rounding leaves of a right angle written as
-/// 1.5707963267948966, some units of the last place. It moves a link of one metre by a femtometre.
-const DUST: f64 = 1e-15;
+/// Tolerance for rotation entries near 0 or ±1: rounding error of a right angle written as 1.5707963267948966. It
+/// moves a link of one metre by a femtometre.
+const RIGHT_ANGLE_TOLERANCE: f64 = 1e-15;
 
-/// A robot with inertial parameters for every body and a value for every torque term.
+/// A robot with inertial parameters of every body and a value of every torque term.
 #[derive(Clone, Debug)]
 pub struct RobotModel {
     model: Model,
@@ -21,12 +21,12 @@ pub struct RobotModel {
 }
 
 impl RobotModel {
-    /// A robot whose bodies have the inertial parameters of `model`, with torque terms and a value for each (Nm,
-    /// Nm s/rad, kg m², as the terms say).
+    /// A robot with the inertial parameters of `model`, torque terms, and one value per term (Nm, Nm s/rad, kg m²,
+    /// depending on the term).
     ///
     /// # Errors
-    /// If a body has no inertial parameters or too large ones, values are not finite or not one for each term, or a
-    /// term acts on a joint that is not there.
+    /// A body without or with too large inertial parameters, values that are not finite or do not match the terms, or a
+    /// term of an unknown joint.
     pub fn new(model: Model, terms: Vec<TorqueTerm>, values: Vec<f64>) -> Result<Self, ExportError> {
         if values.len() != terms.len() {
             return Err(ExportError::Values { expected: terms.len(), found: values.len() });
@@ -41,17 +41,15 @@ impl RobotModel {
         for (body, inertial) in model.bodies().iter().zip(model.inertials()) {
             check_numbers(body.name(), inertial)?;
         }
-        // Says what is wrong with terms.
+        // Validates the terms.
         let checked = ParametricModel::new(model, terms)?;
         Ok(Self { model: checked.model().clone(), terms: checked.terms().to_vec(), values, velocities: Vec::new() })
     }
 
-    /// The same with the velocities at which its joints were recorded, joint by joint (none for a joint of which
-    /// nothing is known): what the friction of simulators is fitted over.
+    /// Adds the recorded velocities of each joint (empty if unknown), over which the friction of simulators is fitted.
     ///
     /// # Errors
-    /// Velocities of another number of joints; a velocity of zero, weights that are not positive, numbers that are not
-    /// finite.
+    /// A different number of joints, a velocity of zero, weights that are not positive, or numbers that are not finite.
     pub fn with_velocities(self, velocities: Vec<Vec<RecordedVelocity>>) -> Result<Self, ExportError> {
         if velocities.len() != self.model.dof() {
             return Err(ExportError::Velocities { expected: self.model.dof(), found: velocities.len() });
@@ -67,7 +65,6 @@ impl RobotModel {
         Ok(Self { velocities, ..self })
     }
 
-    /// The velocities at which a joint was recorded; none where there are none.
     pub(crate) fn recorded_velocities(&self, joint: usize) -> Option<&[RecordedVelocity]> {
         self.velocities.get(joint).map(Vec::as_slice).filter(|velocities| !velocities.is_empty())
     }
@@ -82,32 +79,32 @@ impl RobotModel {
         self.terms.iter().zip(self.values.iter().copied())
     }
 
-    /// Its name as an identifier of any language: letters, digits and `_`, not beginning with a digit.
+    /// Name as an identifier of any language: letters, digits and `_`, not starting with a digit.
     pub fn identifier(&self) -> String {
         dynident_text::identifier(self.model.name())
     }
 
-    /// A robot with the same torques and fewer numbers: the base parameters stand at the places of their own columns,
-    /// all other inertial parameters are zero; dust of right angles is swept out of placements.
+    /// An equivalent robot with fewer numbers: base parameters at the places of their columns, all other inertial
+    /// parameters zero, and exact right angles.
     ///
-    /// Its bodies are no real bodies, but `M(q)`, `C(q, q̇) q̇` and `g(q)` are the robot's, for `Y π = Y_b θ` at every
-    /// motion.
+    /// Its bodies are not physically consistent, but `M(q)`, `C(q, q̇) q̇` and `g(q)` are those of the robot, because
+    /// `Y π = Y_b θ` for every motion.
     pub(crate) fn reduced(&self) -> Result<Model, ExportError> {
-        let swept = swept(&self.model)?;
-        let rigid = ParametricModel::new(swept.clone(), Vec::new())?;
+        let with_exact_right_angles = with_exact_right_angles(&self.model)?;
+        let rigid = ParametricModel::new(with_exact_right_angles.clone(), Vec::new())?;
         let values = rigid.base().values(&self.model.parameter_vector());
-        let mut inertials = vec![InertialParameters::ZERO; swept.body_count()];
+        let mut inertials = vec![InertialParameters::ZERO; with_exact_right_angles.body_count()];
         for (column, value) in rigid.base().base_columns().into_iter().zip(values) {
             match column {
                 Column::Body { body, parameter } => inertials[body].0[parameter] = value,
                 Column::Term(_) => {}
             }
         }
-        Ok(swept.with_inertials(&inertials)?)
+        Ok(with_exact_right_angles.with_inertials(&inertials)?)
     }
 }
 
-/// That a body's parameters, and what descriptions hold of them, are numbers that a reader takes.
+/// Checks that a body's parameters and the derived numbers in robot descriptions are within the magnitude limit.
 fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), ExportError> {
     let com = inertial.com_m().map_or([0.0; 3], |com| com.0);
     let inertia = inertial.inertia_at_com().map_or([[0.0; 3]; 3], |inertia| inertia.0);
@@ -124,9 +121,8 @@ fn check_numbers(body: &str, inertial: &InertialParameters) -> Result<(), Export
     Ok(())
 }
 
-/// The same model with exact right angles.
-fn swept(model: &Model) -> Result<Model, ExportError> {
-    let sweep = |x: f64| if (x - x.round()).abs() < DUST && x.abs() < 1.5 { x.round() } else { x };
+fn with_exact_right_angles(model: &Model) -> Result<Model, ExportError> {
+    let sweep = |x: f64| if (x - x.round()).abs() < RIGHT_ANGLE_TOLERANCE && x.abs() < 1.5 { x.round() } else { x };
     let joint = |joint: &Joint| Joint {
         placement: Transform {
             rotation: Mat3(joint.placement.rotation.0.map(|row| row.map(sweep))),

@@ -1,4 +1,4 @@
-//! Parameters of a ROS 2 node: what a controller adds to the `robot_description` that it has.
+//! Parameters of a ROS 2 node, in addition to `robot_description`.
 
 use crate::descriptions::frictions;
 use crate::error::ExportError;
@@ -9,9 +9,9 @@ use core::fmt::Write;
 use dynident_model::InertialParameters;
 use dynident_text::quoted;
 
-/// YAML of parameters: for each joint mass, centre of mass and inertia of what it moves, drive inertia, the nearest
-/// Coulomb and viscous friction, and all torque terms as they are; gravity; couplings. Arrays hold numbers only, and
-/// names are letters, digits and `_`, for ROS divides names at dots.
+/// YAML of parameters: for each joint mass, centre of mass and inertia of its body, drive inertia, nearest Coulomb and
+/// viscous friction, and all torque terms; gravity; couplings. Arrays contain only numbers, and names only letters,
+/// digits and `_`, because ROS splits names at dots.
 pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     notes.push("Placements and axes of joints are those of robot_description.".to_owned());
@@ -19,10 +19,10 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     let names: Vec<&str> = model.joints().iter().map(|joint| joint.name.as_str()).collect();
     let keys = parameter_names(&names);
     for (name, key) in names.iter().zip(&keys).filter(|(name, key)| *name != key) {
-        notes.push(format!("Joint {name} stands under dynamics.{key}."));
+        notes.push(format!("Joint {name} is under dynamics.{key}."));
     }
     for (_, joint) in model.followers() {
-        notes.push(format!("Joint {} follows others: what it carries is not here; see the format json.", joint.name));
+        notes.push(format!("Joint {} follows others: its body is omitted here; see the format json.", joint.name));
     }
     let mut text = String::new();
     for note in &notes {
@@ -64,7 +64,7 @@ pub(crate) fn ros2_parameters(robot: &RobotModel, mut notes: Vec<String>) -> Res
     Ok(Exported { text, notes })
 }
 
-/// Terms by their symbols; nothing where there are none, for a parameter cannot be an empty map.
+/// Writes terms by their symbols; omitted if empty, because a parameter cannot be an empty map.
 fn write_terms(text: &mut String, key: &str, terms: &[ModelTerm], depth: usize) {
     if terms.is_empty() {
         return;
@@ -95,7 +95,7 @@ fn write_terms(text: &mut String, key: &str, terms: &[ModelTerm], depth: usize) 
     }
 }
 
-/// Centre of mass and inertia about it; of a body without mass the origin, for a parameter cannot be null.
+/// Centre of mass and inertia about it. A body without mass has the origin, because a parameter cannot be null.
 fn about_centre(inertial: &InertialParameters, body: &str) -> Result<([f64; 3], [f64; 6]), ExportError> {
     match (inertial.com_m(), inertial.inertia_at_com()) {
         (Some(com), Some(inertia)) => Ok((com.0, upper_triangle(&inertia.0))),
@@ -104,24 +104,24 @@ fn about_centre(inertial: &InertialParameters, body: &str) -> Result<([f64; 3], 
     }
 }
 
-/// Words that YAML 1.1 takes for something else than text.
-const NO_TEXT: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
+/// Words that YAML 1.1 does not parse as text.
+const RESERVED_WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
 
-/// Longest key: YAML allows 1024 characters before the colon.
-const KEY_LENGTH: usize = 200;
+/// Maximum key length; YAML allows 1024 characters before the colon.
+const MAX_KEY_LENGTH: usize = 200;
 
-/// Letters, digits and `_` of each name, not beginning with a digit, no word of YAML, all different.
+/// Unique parameter names of letters, digits and `_`, not starting with a digit, and not reserved in YAML.
 fn parameter_names(names: &[&str]) -> Vec<String> {
     let mut taken: Vec<String> = Vec::new();
     for name in names {
         let safe = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-        let mut key: String = name.chars().take(KEY_LENGTH).map(safe).collect();
-        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || NO_TEXT.contains(&&*key.to_ascii_lowercase()) {
+        let mut key: String = name.chars().take(MAX_KEY_LENGTH).map(safe).collect();
+        if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || RESERVED_WORDS.contains(&&*key.to_ascii_lowercase()) {
             key.insert_str(0, "joint_");
         }
         let mut free = key.clone();
         let mut number = 2;
-        // Another name may be what this one becomes.
+        // The changed name may be the original name of another joint.
         while taken.contains(&free) || names.contains(&free.as_str()) && free != *name {
             free = format!("{key}_{number}");
             number += 1;
@@ -131,7 +131,7 @@ fn parameter_names(names: &[&str]) -> Vec<String> {
     taken
 }
 
-/// A number that YAML 1.1 as well as 1.2 takes for one with a fraction: with a point, and with a sign of the exponent.
+/// A number that YAML 1.1 and 1.2 parse as floating point: with a decimal point, and with a sign of the exponent.
 fn number(value: f64) -> String {
     let text = format!("{value:?}");
     let Some((digits, exponent)) = text.split_once('e') else { return text };

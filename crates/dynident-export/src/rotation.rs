@@ -1,4 +1,4 @@
-//! Rotations as other programs write them: quaternions and Z-Y-X angles.
+//! Conversion of rotations to quaternions and Z-Y-X angles.
 
 use dynident_model::Mat3;
 
@@ -23,12 +23,12 @@ pub(crate) fn quaternion(r: &Mat3) -> [f64; 4] {
     q.map(|x| x / norm)
 }
 
-/// Angles A, B, C in rad with `R = Rz(A) Ry(B) Rx(C)`; where B is a right angle, C is zero.
+/// Angles A, B, C in rad with `R = Rz(A) Ry(B) Rx(C)`; C is zero if B is ±90°.
 pub(crate) fn z_y_x_angles(r: &Mat3) -> [f64; 3] {
     let r = &r.0;
     let level = r[0][0].hypot(r[1][0]);
     let b = (-r[2][0]).atan2(level);
-    // Below this the sines of the two others are rounding.
+    // Below this limit the sines of the other two angles are rounding errors.
     if level < 1e-12 {
         return [(-r[0][1]).atan2(r[1][1]), b, 0.0];
     }

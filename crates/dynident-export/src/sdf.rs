@@ -1,6 +1,6 @@
-//! SDF, which Gazebo and Drake read.
+//! SDF for Gazebo and Drake.
 
-use crate::descriptions::{comment, frictions, left_out, real_inertial, spring};
+use crate::descriptions::{comment, consistent_inertial, frictions, omitted_terms, spring};
 use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::nearest_friction::NearestFriction;
@@ -10,24 +10,23 @@ use core::fmt::Write;
 use dynident_model::{Body, Joint, JointKind, STANDARD_GRAVITY, Transform};
 use dynident_text::xml::escaped;
 
-/// A model of SDF 1.7, the first version whose poses may be relative to other frames: links with their inertials,
-/// joints with limits, damping and friction, links fixed to others as frames, and the base fixed to the world. No
-/// shapes.
+/// A model in SDF 1.7, the first version with poses relative to other frames: links with inertials, joints with limits,
+/// damping and friction, fixed links as frames, and the base fixed to the world. Without shapes.
 pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
     let model = robot.model();
     let friction = frictions(robot, "friction", "damping", &mut notes);
-    notes.extend(left_out(robot, true));
+    notes.extend(omitted_terms(robot, true));
     for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
         notes.push(format!("SDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
     }
     if model.gravity() != STANDARD_GRAVITY {
         notes.push(format!(
-            "A model of SDF has no gravity, which is the world's: it is {:?} m/s² in the base frame.",
+            "An SDF model has no gravity (it belongs to the world): it is {:?} m/s² in the base frame.",
             model.gravity().0
         ));
     }
     for (_, joint) in model.followers() {
-        notes.push(format!("SDF before 1.11 has no followers: joint {} is free in this file.", joint.name));
+        notes.push(format!("SDF before 1.11 has no mimic joints: joint {} is independent in this file.", joint.name));
     }
     let mut names = Names::default();
     let base = names.of(model.base().name());
@@ -42,7 +41,7 @@ pub(crate) fn sdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported
     );
     write_frames(&mut text, model.base(), &base, &mut names);
     for (index, (joint, body)) in model.tree_joints().iter().zip(model.bodies()).enumerate() {
-        let (mass, com, inertia) = real_inertial(model, index, "libsdformat")?;
+        let (mass, com, inertia) = consistent_inertial(model, index, "libsdformat")?;
         let (link, parent) = (&links[index], joint.parent.map_or(&base, |parent| &links[parent]));
         let [x, y, z] = com.0;
         let i = inertia.0;
@@ -85,7 +84,7 @@ fn write_joint(
         write_limit("lower", lower);
         write_limit("upper", upper);
     }
-    // Zero is how descriptions say that nobody knows; here a negative number does, which is the default.
+    // In robot descriptions zero means unknown; in SDF a negative number, the default, does.
     for (element, value) in [("effort", limits.effort), ("velocity", limits.velocity)] {
         if let Some(value) = value.filter(|value| *value > 0.0) {
             write_limit(element, value);
@@ -107,7 +106,7 @@ fn write_joint(
     );
 }
 
-/// The links that are fixed to a body's own, which has the name `link`.
+/// Writes the links that are fixed to a body's own link, which has the name `link`.
 fn write_frames(text: &mut String, body: &Body, link: &str, names: &mut Names) {
     for fixed in &body.links[1..] {
         let name = names.of(&fixed.name);
@@ -124,14 +123,14 @@ fn pose(placement: &Transform, relative_to: &str) -> String {
     format!("<pose relative_to=\"{relative_to}\">{x:?} {y:?} {z:?} {roll:?} {pitch:?} {yaw:?}</pose>")
 }
 
-/// Names inside of a model: links, joints and frames share them.
+/// Names in a model; links, joints and frames share one namespace.
 #[derive(Default)]
 struct Names {
     taken: Vec<(String, String)>,
 }
 
 impl Names {
-    /// The name as the text of XML, with an underscore behind it while another part of the robot has it.
+    /// The name as XML text, with an underscore appended while it is taken.
     fn of(&mut self, original: &str) -> String {
         let mut free = name(original);
         while self.taken.iter().any(|(_, taken)| *taken == free) {
@@ -141,16 +140,15 @@ impl Names {
         free
     }
 
-    /// What is called otherwise than in the description.
     fn notes(&self) -> impl Iterator<Item = String> {
         let others = self.taken.iter().filter(|(original, name)| escaped(original) != *name);
         others.map(|(original, name)| {
-            format!("SDF allows no second part with the name {original}, or none at all: it is called {name} here.")
+            format!("The name {original} is duplicate or invalid in SDF: the part is called {name} here.")
         })
     }
 }
 
-/// A name that SDF allows: not `world`, no `__` around it, no `::` in it.
+/// A valid SDF name: not `world`, no leading `__`, no `::`.
 fn name(original: &str) -> String {
     let text = escaped(original).replace("::", "_");
     if text.is_empty() || text == "world" || text.starts_with("__") { format!("robot_{text}") } else { text }

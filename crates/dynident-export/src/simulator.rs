@@ -1,6 +1,6 @@
-//! Joint parameters as simulators ask for them, with their error bars.
+//! Joint parameters of simulators, with error bars.
 
-use crate::descriptions::left_out;
+use crate::descriptions::omitted_terms;
 use crate::drive_torque::drive_inertia;
 use crate::error::ExportError;
 use crate::exported::Exported;
@@ -13,14 +13,12 @@ use serde::{Deserialize, Serialize};
 /// Name and version of the schema of [`SimulatorFile`].
 pub const SIMULATOR_SCHEMA: &str = "dynident/simulator/1";
 
-/// Why a joint without drive inertia has no bar of it.
-const NO_DRIVE_INERTIA: &str = "the study has no drive inertia, so that a part of it stands in the links' (drive.drive_inertia = true asks for it)";
+const NO_DRIVE_INERTIA_NOTE: &str = "the study has no drive inertia, so that a part of it is included in the links (drive.drive_inertia = true identifies it)";
 
-/// Why friction that is zero has no bar.
-const NO_FRICTION: &str = "not in the identified law, or held at zero, which is its limit";
+const NO_FRICTION_NOTE: &str = "not in the identified law, or at its bound of zero";
 
-/// What a simulator needs of every joint beside the bodies: `τ = armature q̈ + damping q̇ + frictionloss sign(q̇)`, the
-/// delay and the gain of the drive.
+/// Joint parameters of a simulator in addition to the bodies: `τ = armature q̈ + damping q̇ + frictionloss sign(q̇)`,
+/// delay and gain of the drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatorFile {
@@ -30,89 +28,88 @@ pub struct SimulatorFile {
     pub name: String,
     /// Program and version.
     pub written_by: String,
-    /// Where the values come from, what no simulator's joint holds, and what speaks against them; a sentence each.
+    /// Origin of the values, contents that simulators cannot represent, and objections to the values, one sentence
+    /// each.
     pub notes: Vec<String>,
-    /// The delay of all joints together, ms, as [`SimulatorJoint::delay`]; null where the logs determine none.
+    /// Common delay of all joints, ms, as [`SimulatorJoint::delay`]; null if the logs do not determine it.
     pub common_delay: Option<SimulatorValue>,
     /// Joints in the order of the robot.
     pub joints: Vec<SimulatorJoint>,
 }
 
-/// The parameters of one joint.
+/// Parameters of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatorJoint {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
-    /// Inertia of the drive, kg m² (kg at a joint that slides): MuJoCo's `armature`, PhysX's `armature`.
+    /// Drive inertia, kg m² (kg at a prismatic joint): MuJoCo's `armature`, PhysX's `armature`.
     pub armature: SimulatorValue,
     /// Nm s/rad (N s/m): MuJoCo's `damping`, PhysX's `viscousFrictionCoefficient`.
     pub damping: SimulatorValue,
     /// Nm (N): MuJoCo's `frictionloss`, PhysX's `staticFrictionEffort` and `dynamicFrictionEffort`.
     pub frictionloss: SimulatorValue,
-    /// What damping and frictionloss leave of the identified friction.
+    /// Difference between the identified friction and its approximation by damping and frictionloss.
     pub friction_error: FrictionError,
-    /// By how much the logged torque comes after the motion that it makes, ms. Of logs of a measured torque that is the
-    /// delay of the measurement; of logs of a commanded torque an actuator's delay is its negative. Null where the logs
-    /// determine none.
+    /// Delay of the logged torque relative to the resulting motion, ms. For measured torque it is the delay of the
+    /// measurement; for commanded torque it is minus the delay of the actuator. Null if the logs do not determine it.
     pub delay: Option<SimulatorValue>,
-    /// Nm (N) of joint torque for each unit of what was logged as torque.
+    /// Joint torque per unit of the logged torque, Nm (N).
     pub actuator_gain: SimulatorValue,
 }
 
-/// A number with what is known of its error.
+/// A value with its error bar.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatorValue {
-    /// The number.
+    /// The value.
     pub value: f64,
-    /// Half the width of its 95 % interval; null where the logs do not tell one, and `note` says why.
+    /// Half width of its 95 % interval; null if the logs do not determine it, with the reason in `note`.
     pub half_width_95: Option<f64>,
-    /// Its unit.
+    /// Unit of the value.
     pub unit: String,
-    /// What has to be known of it; null where there is nothing.
+    /// Remark on the value; absent if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
 }
 
-/// How far simplified friction is from the identified law and offset of a joint.
+/// Error of the simplified friction relative to the identified friction and offset of a joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionError {
     /// Root mean square, Nm (N).
     pub rms_nm: f64,
-    /// Largest, Nm (N).
+    /// Largest error, Nm (N).
     pub most_nm: f64,
-    /// Largest velocity that was compared, rad/s (m/s).
+    /// Largest velocity of the comparison, rad/s (m/s).
     pub most_speed_rad_s: f64,
-    /// `recorded-motion`: by the velocities of the logs that were fitted to, those beside rest left out;
-    /// `velocity-limit`: by even velocities up to the joint's limit, for a result without recorded ones.
+    /// `recorded-motion`: velocities of the fitted logs, except near rest; `velocity-limit`: equally spaced velocities
+    /// up to the joint's limit, if no velocities were recorded.
     pub over: String,
 }
 
-/// What is known of the drives beside a robot's values.
+/// Error bars, delays and gains of the drives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveKnowledge {
-    /// For each pair of the robot's terms the covariance of their values in units in which one is half of a 95 %
-    /// interval; none for terms that the logs do not tell by themselves.
+    /// Covariance of the values of each pair of terms, normalised so that the square root of the variance is half a 95
+    /// % interval; `None` for terms without an individual interval.
     pub term_products: Vec<Vec<Option<f64>>>,
-    /// For each term what keeps it from having an interval of its own; none where there is nothing to say.
+    /// Reason why a term has no individual interval, for each term; `None` if there is none.
     pub term_notes: Vec<Option<String>>,
-    /// The common delay.
+    /// Common delay of all joints.
     pub common_delay: Option<SimulatorValue>,
-    /// Joint by joint.
+    /// Delay of each joint.
     pub delays: Vec<Option<SimulatorValue>>,
-    /// Joint by joint.
+    /// Actuator gain of each joint.
     pub actuator_gains: Vec<SimulatorValue>,
 }
 
 impl SimulatorFile {
-    /// The parameters of `robot`, whose friction is fitted over its recorded velocities, with the error bars that
-    /// follow from `knowledge`: `h² = aᵀ H a` for a value that is `a` times the terms' values and H
-    /// [`DriveKnowledge::term_products`].
+    /// The parameters of `robot`, whose friction is fitted over its recorded velocities. Error bars are `h² = aᵀ H a`
+    /// for a value that is `a` times the terms' values, with H = [`DriveKnowledge::term_products`].
     ///
     /// # Errors
-    /// [`ExportError::Values`] if `knowledge` is not of this robot.
+    /// [`ExportError::Values`] if `knowledge` does not match the robot.
     pub fn of(robot: &RobotModel, knowledge: &DriveKnowledge, further: &[String]) -> Result<Self, ExportError> {
         let (model, terms) = (robot.model(), robot.terms().count());
         let DriveKnowledge { term_products, term_notes, common_delay, delays, actuator_gains } = knowledge;
@@ -142,9 +139,19 @@ impl SimulatorFile {
             };
             SimulatorJoint {
                 name: model.joints()[joint].name.clone(),
-                armature: value(rotors[joint * model.dof() + joint], &drives, NO_DRIVE_INERTIA, unit("kg m^2", "kg")),
-                damping: value(nearest.viscous, &of_shares(|one| one.viscous), NO_FRICTION, unit("Nm s/rad", "N s/m")),
-                frictionloss: value(nearest.coulomb, &of_shares(|one| one.coulomb), NO_FRICTION, unit("Nm", "N")),
+                armature: value(
+                    rotors[joint * model.dof() + joint],
+                    &drives,
+                    NO_DRIVE_INERTIA_NOTE,
+                    unit("kg m^2", "kg"),
+                ),
+                damping: value(
+                    nearest.viscous,
+                    &of_shares(|one| one.viscous),
+                    NO_FRICTION_NOTE,
+                    unit("Nm s/rad", "N s/m"),
+                ),
+                frictionloss: value(nearest.coulomb, &of_shares(|one| one.coulomb), NO_FRICTION_NOTE, unit("Nm", "N")),
                 friction_error: FrictionError {
                     rms_nm: nearest.rms_error,
                     most_nm: nearest.most_error,
@@ -159,7 +166,7 @@ impl SimulatorFile {
             }
         });
         let joints = joints.collect();
-        let notes = further.iter().cloned().chain(left_out(robot, true)).collect();
+        let notes = further.iter().cloned().chain(omitted_terms(robot, true)).collect();
         Ok(Self {
             schema: SIMULATOR_SCHEMA.to_owned(),
             name: model.name().to_owned(),
@@ -173,14 +180,14 @@ impl SimulatorFile {
     /// As JSON.
     ///
     /// # Errors
-    /// [`ExportError::Json`], for numbers that are none.
+    /// [`ExportError::Json`] for values that are not finite.
     pub fn json(&self) -> Result<Exported, ExportError> {
         let text = dynident_text::json::to_string_pretty(self)
             .map_err(|error| ExportError::Json { message: error.to_string() });
         Ok(Exported { text: text? + "\n", notes: self.notes.clone() })
     }
 
-    /// As a table of Markdown with the notes below.
+    /// A Markdown table with the notes below.
     pub fn table(&self) -> Exported {
         let mut text = format!(
             "# {}\n\n| joint | armature | damping | frictionloss | friction off by, rms (most) | delay | gain |\n| --- | --- | --- | --- | --- | --- | --- |\n",
@@ -211,11 +218,11 @@ impl SimulatorFile {
             let said = values.into_iter().filter_map(|(what, value)| Some((what, value?.note.as_ref()?)));
             remarks.extend(said.map(|(what, note)| (format!("{what}: {}", markdown(note)), name.clone())));
         }
-        text += "\nBars are half the widths of 95 % intervals; `?` where the logs tell none.\n";
+        text += "\nError bars are half the widths of 95 % intervals; `?` if the logs do not determine them.\n";
         if let Some(delay) = &self.common_delay {
             let _ = writeln!(text, "Delay of all joints together: {}.", with_bar(delay));
         }
-        // What holds for several joints is said once.
+        // Equal remarks of several joints are merged.
         let mut said: Vec<(String, Vec<String>)> = Vec::new();
         for (remark, joint) in remarks {
             match said.iter_mut().find(|(earlier, _)| *earlier == remark) {
@@ -233,7 +240,7 @@ impl SimulatorFile {
 }
 
 impl DriveKnowledge {
-    /// Half the width of the interval of `Σ share value` over the terms, or why there is none.
+    /// Half width of the interval of `Σ share value` over the terms, or the reason why there is none.
     fn bar(&self, parts: &[(usize, f64)], none: &str) -> (Option<f64>, Option<String>) {
         let notes: Vec<&str> = parts.iter().filter_map(|(term, _)| self.term_notes[*term].as_deref()).collect();
         let note = (!notes.is_empty()).then(|| notes.join("; "));
@@ -246,7 +253,7 @@ impl DriveKnowledge {
     }
 }
 
-/// A value with its bar to the bar's second digit.
+/// A value with its error bar, rounded to two significant digits of the bar.
 fn with_bar(value: &SimulatorValue) -> String {
     let unit = &value.unit;
     match value.half_width_95.filter(|half| *half > 0.0 && half.is_finite()) {

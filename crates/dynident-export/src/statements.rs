@@ -1,55 +1,44 @@
-//! From a graph to the lines of a function: only what its outputs need, each value in a line of its own or, if it is
-//! short and used once, where it is used.
+//! Converts a graph to the lines of a function. It contains only values that its outputs need; short values that are
+//! used once are inlined.
 
 use crate::graph::{Function, Function2, Graph, Id, Input, Node};
 use crate::symbol::Symbol;
 
-/// Longest text that is written where it is used, in characters.
-const LONGEST_INLINE: usize = 48;
+const MAX_INLINE_CHARACTERS: usize = 48;
 
-/// What languages write differently.
 pub(crate) trait Syntax {
-    /// An entry of a joint vector; joints are counted from zero.
+    /// An entry of a joint vector; joints are numbered from zero.
     fn input(&self, input: Input, joint: usize) -> String;
 
-    /// A function of one value.
     fn call(&self, function: Function, of: &str) -> String;
 
-    /// A function of two values.
     fn call2(&self, function: Function2, first: &str, second: &str) -> String;
 
-    /// `of^exponent`.
     fn power(&self, of: &str, exponent: f64) -> String;
 
-    /// The sign of `of`, zero while its size is at most `dead_band`.
+    /// Sign of `of`; zero if its magnitude is at most `dead_band`.
     fn step(&self, of: &str, dead_band: f64) -> String;
 
-    /// A number, so that it reads back to the last bit.
+    /// A number that parses to the same bits.
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
 }
 
-/// The lines of a function.
 #[derive(Debug)]
 pub(crate) struct Statements {
-    /// Name and expression, in order.
     pub(crate) lines: Vec<(String, String)>,
-    /// The expression of every output.
     pub(crate) outputs: Vec<String>,
-    /// The inputs that are used.
     pub(crate) used: Vec<Input>,
 }
 
-/// How tightly a text holds together.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
-enum Strength {
+enum Precedence {
     Sum,
     Product,
     Atom,
 }
 
-/// Writes the values `outputs` of a graph.
 pub(crate) fn statements(graph: &Graph, outputs: &[Symbol], syntax: &dyn Syntax) -> Statements {
     let mut uses = vec![0_u32; graph.len()];
     for output in outputs {
@@ -60,7 +49,7 @@ pub(crate) fn statements(graph: &Graph, outputs: &[Symbol], syntax: &dyn Syntax)
             graph.node(id as Id).parts().for_each(|part| uses[part as usize] += 1);
         }
     }
-    let mut texts: Vec<Option<(String, Strength)>> = vec![None; graph.len()];
+    let mut texts: Vec<Option<(String, Precedence)>> = vec![None; graph.len()];
     let (mut lines, mut used) = (Vec::new(), Vec::new());
     for id in 0..graph.len() {
         if uses[id] == 0 {
@@ -74,41 +63,43 @@ pub(crate) fn statements(graph: &Graph, outputs: &[Symbol], syntax: &dyn Syntax)
         }
         let (text, strength) = written(node, &texts, syntax);
         let is_leaf = matches!(node, Node::Constant(_) | Node::Input(..) | Node::Neg(_));
-        texts[id] = Some(if is_leaf || uses[id] == 1 && text.len() <= LONGEST_INLINE {
+        texts[id] = Some(if is_leaf || uses[id] == 1 && text.len() <= MAX_INLINE_CHARACTERS {
             (text, strength)
         } else {
             let name = format!("x{}", lines.len() + 1);
             lines.push((name.clone(), text));
-            (name, Strength::Atom)
+            (name, Precedence::Atom)
         });
     }
     let text = |id: Id| texts[id as usize].as_ref().map_or(String::new(), |(text, _)| text.clone());
     Statements { lines, outputs: outputs.iter().map(|output| text(output.id())).collect(), used }
 }
 
-/// A node in terms of the texts of its parts. Right operands keep parentheses, so that sums are made in the order of
-/// the graph.
-fn written(node: Node, texts: &[Option<(String, Strength)>], syntax: &dyn Syntax) -> (String, Strength) {
-    let part = |id: Id, least: Strength| match &texts[id as usize] {
+/// Text of a node from the texts of its operands. Right operands keep parentheses, so that the order of summation is
+/// that of the graph.
+fn written(node: Node, texts: &[Option<(String, Precedence)>], syntax: &dyn Syntax) -> (String, Precedence) {
+    let part = |id: Id, least: Precedence| match &texts[id as usize] {
         Some((text, strength)) if *strength >= least => text.clone(),
         Some((text, _)) => format!("({text})"),
         None => String::new(),
     };
-    let whole = |id: Id| part(id, Strength::Sum);
+    let whole = |id: Id| part(id, Precedence::Sum);
     match node {
         Node::Constant(bits) => {
             let value = f64::from_bits(bits);
-            (syntax.number(value), if value < 0.0 { Strength::Sum } else { Strength::Atom })
+            (syntax.number(value), if value < 0.0 { Precedence::Sum } else { Precedence::Atom })
         }
-        Node::Input(input, joint) => (syntax.input(input, joint as usize), Strength::Atom),
-        Node::Add(a, b) => (format!("{} + {}", whole(a), part(b, Strength::Product)), Strength::Sum),
-        Node::Sub(a, b) => (format!("{} - {}", whole(a), part(b, Strength::Product)), Strength::Sum),
-        Node::Mul(a, b) => (format!("{} * {}", part(a, Strength::Product), part(b, Strength::Atom)), Strength::Product),
-        Node::Neg(a) => (format!("-{}", part(a, Strength::Atom)), Strength::Sum),
-        Node::Recip(a) => (format!("{} / {}", syntax.number(1.0), part(a, Strength::Atom)), Strength::Product),
-        Node::Call(function, a) => (syntax.call(function, &whole(a)), Strength::Atom),
-        Node::Call2(function, a, b) => (syntax.call2(function, &whole(a), &whole(b)), Strength::Atom),
-        Node::Power(a, exponent) => (syntax.power(&whole(a), f64::from_bits(exponent)), Strength::Atom),
-        Node::Step(a, dead_band) => (syntax.step(&whole(a), f64::from_bits(dead_band)), Strength::Atom),
+        Node::Input(input, joint) => (syntax.input(input, joint as usize), Precedence::Atom),
+        Node::Add(a, b) => (format!("{} + {}", whole(a), part(b, Precedence::Product)), Precedence::Sum),
+        Node::Sub(a, b) => (format!("{} - {}", whole(a), part(b, Precedence::Product)), Precedence::Sum),
+        Node::Mul(a, b) => {
+            (format!("{} * {}", part(a, Precedence::Product), part(b, Precedence::Atom)), Precedence::Product)
+        }
+        Node::Neg(a) => (format!("-{}", part(a, Precedence::Atom)), Precedence::Sum),
+        Node::Recip(a) => (format!("{} / {}", syntax.number(1.0), part(a, Precedence::Atom)), Precedence::Product),
+        Node::Call(function, a) => (syntax.call(function, &whole(a)), Precedence::Atom),
+        Node::Call2(function, a, b) => (syntax.call2(function, &whole(a), &whole(b)), Precedence::Atom),
+        Node::Power(a, exponent) => (syntax.power(&whole(a), f64::from_bits(exponent)), Precedence::Atom),
+        Node::Step(a, dead_band) => (syntax.step(&whole(a), f64::from_bits(dead_band)), Precedence::Atom),
     }
 }

@@ -1,4 +1,4 @@
-//! A number that is not known yet: the scalar with which the algorithms of dynamics write the graph of their result.
+//! Symbolic scalar with which the dynamics algorithms build the graph of their result.
 
 use crate::graph::{Function, Function2, Graph, Id, Input};
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
@@ -6,15 +6,14 @@ use dynident_lanes::{Real, Scalar};
 use std::cell::RefCell;
 
 thread_local! {
-    /// The graph that is being written: scalars are copied by value, so they cannot carry it.
+    /// Graph of the current thread: scalars are copied by value, so they cannot carry it.
     static GRAPH: RefCell<Graph> = RefCell::new(Graph::new());
 }
 
-/// A node of this thread's graph.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Symbol(Id);
 
-/// Runs `write` on an empty graph; gives the graph with what `write` returns.
+/// Runs `write` on an empty graph; returns the graph and the result of `write`.
 pub(crate) fn record<R>(write: impl FnOnce() -> R) -> (Graph, R) {
     let before = GRAPH.replace(Graph::new());
     let written = write();
@@ -30,7 +29,6 @@ impl Symbol {
         self.0
     }
 
-    /// One input of every joint.
     pub(crate) fn inputs(input: Input, dof: usize) -> Vec<Self> {
         (0..dof).map(|joint| in_graph(|graph| graph.input(input, joint))).collect()
     }
@@ -39,7 +37,6 @@ impl Symbol {
         self == Self::ZERO
     }
 
-    /// Its value, if it is a constant.
     pub(crate) fn number(self) -> Option<f64> {
         GRAPH.with_borrow(|graph| graph.number(self.0))
     }
@@ -87,7 +84,7 @@ impl Real for Symbol {
         Self::splat(0.5) * (self + other - (self - other).abs())
     }
 
-    /// Exact where `other` is zero: halves and doubles do not round.
+    /// Exact if `other` is zero, because halving and doubling do not round.
     fn max(self, other: Self) -> Self {
         Self::splat(0.5) * (self + other + (self - other).abs())
     }
@@ -108,7 +105,7 @@ impl Real for Symbol {
         self.call(Function::Ln)
     }
 
-    /// A square, which is usual, without a call.
+    /// A square, the most common power, needs no call.
     fn power(self, exponent: f64) -> Self {
         if exponent == 2.0 { self * self } else { in_graph(|graph| graph.power(self.0, exponent)) }
     }

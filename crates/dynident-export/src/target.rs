@@ -1,4 +1,4 @@
-//! What can be written, and the one function that writes it.
+//! Export formats, and the function that writes them.
 
 use crate::descriptions::{mjcf, urdf};
 use crate::drive_torque::reference_temperatures;
@@ -13,7 +13,7 @@ use crate::sdf::sdf;
 use dynident_model::terms::TermClass;
 use dynident_text::visible;
 
-/// A form of the model.
+/// An export format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// One C99 header with `static inline` functions.
@@ -39,7 +39,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; 10] = [
         Self::C,
         Self::Cpp,
@@ -63,7 +63,7 @@ impl Target {
         }
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::C => "c",
@@ -80,18 +80,19 @@ impl Target {
     }
 }
 
-/// Writes the robot in the form `target`; `further` are notes of the caller's own, that is where the model comes from.
+/// Writes the robot in the format `target`; `further` are additional notes of the caller, such as the origin of the
+/// model.
 ///
 /// # Errors
-/// A torque term that is no function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint that moves no inertia;
-/// numbers that overflow.
+/// A torque term that is not a function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint without inertia; or an
+/// overflow.
 pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<Exported, ExportError> {
     let temperatures = reference_temperatures(robot);
     let at_reference = temperatures
         .iter()
-        .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."));
+        .map(|(symbol, reference)| format!("{symbol} is left out: the drive is assumed to be at {reference} °C."));
     let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
-    // A second line of defence: shows invisible characters that a form did not escape.
+    // Additional safety: shows invisible characters that a format did not escape.
     let finished = |exported: Exported| Exported { text: visible(&exported.text).into_owned(), ..exported };
     let code = |write: fn(&Source<'_>) -> String, notes: Vec<String>| {
         let equations = Equations::of(robot)?;
@@ -107,7 +108,7 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
         Target::Mjcf => mjcf(robot, notes),
         Target::Urdf => urdf(robot, notes),
         Target::Sdf => sdf(robot, notes),
-        // Temperature is not left out here.
+        // YAML contains the temperature terms.
         Target::Ros2Yaml => ros2_parameters(robot, further.to_vec()),
         Target::Json => model_json(robot, further.to_vec()),
     };

@@ -1,36 +1,34 @@
-//! Joints that follow others: a mimic of URDF, an equality of MJCF, the passive joints of a parallelogram.
+//! Joints that follow others: URDF `mimic`, MJCF joint equalities, passive joints of a parallelogram.
 
 use crate::error::ModelError;
 use crate::joint::Joint;
 use dynident_lanes::Scalar;
 
-/// Joints that are followed, with their multipliers, and an offset.
+/// Source joints with multipliers, and an offset.
 type Law = (Vec<(usize, f64)>, f64);
 
-/// How the joints of the tree follow the degrees of freedom: `q_tree = G q + q_0`, so `dq_tree = G dq`,
+/// Linear map from the degrees of freedom to the joints of the tree: `q_tree = G q + q_0`, so `dq_tree = G dq`,
 /// `ddq_tree = G ddq`, and by virtual power `tau = Gᵀ tau_tree`.
 ///
-/// `G` has one row per joint of the tree; that of a joint which moves by itself has a single 1. Constant, so a closed
-/// chain is held exactly where its passive joints follow linearly: parallelograms.
+/// `G` has one row per joint of the tree; the row of an independent joint has a single 1. `G` is constant, so a closed
+/// chain is represented exactly only if its passive joints follow linearly (parallelograms).
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointCoupling {
-    /// Of each degree of freedom, the joint of the tree that it is.
+    /// Tree joint of each degree of freedom.
     driving: Vec<usize>,
-    /// Of each joint of the tree, its entries of `G` that are not zero: degree of freedom, multiplier.
+    /// Nonzero entries of `G` by tree joint: degree of freedom, multiplier.
     rows: Vec<Vec<(usize, f64)>>,
-    /// `q_0`, rad or m.
     offsets: Vec<f64>,
 }
 
 impl JointCoupling {
-    /// The coupling of the joints of a tree, by what [`Joint::mimic`] says; `None` where all move by themselves. A
-    /// joint that follows one which is not in the tree moves by itself.
+    /// Builds the coupling from [`Joint::mimic`]; `None` if all joints are independent. A joint whose source is not in
+    /// the tree is independent.
     ///
     /// # Errors
-    /// Joints that follow each other in a circle, or a multiplier or offset that is not finite.
+    /// A cycle of mimic joints, or a multiplier or offset that is not finite.
     pub(crate) fn of(tree: &[Joint]) -> Result<Option<Self>, ModelError> {
         let place = |name: &str| tree.iter().position(|joint| joint.name == name);
-        // Of each joint that follows.
         let mut follows: Vec<Option<Law>> = Vec::with_capacity(tree.len());
         for joint in tree {
             let Some(mimic) = &joint.mimic else {
@@ -54,7 +52,7 @@ impl JointCoupling {
         for (dof, &joint) in driving.iter().enumerate() {
             rows[joint] = Some(vec![(dof, 1.0)]);
         }
-        // A follower is settled as soon as its sources are; one round settles at least one, or there is a circle.
+        // Each round resolves at least one follower whose sources are known; otherwise there is a cycle.
         while let Some(first) = rows.iter().position(Option::is_none) {
             let mut settled = false;
             for joint in 0..tree.len() {
@@ -90,22 +88,22 @@ impl JointCoupling {
         self.rows.len()
     }
 
-    /// Of each degree of freedom, the joint of the tree that it is; ascending.
+    /// Tree joint of each degree of freedom, ascending.
     pub fn driving(&self) -> &[usize] {
         &self.driving
     }
 
-    /// The entries of `G` in the row of a joint of the tree that are not zero: degree of freedom, multiplier.
+    /// Nonzero entries of `G` in the row of a tree joint: degree of freedom, multiplier.
     pub fn row(&self, tree_joint: usize) -> &[(usize, f64)] {
         &self.rows[tree_joint]
     }
 
-    /// `q_0` of a joint of the tree, rad or m.
+    /// `q_0` of a tree joint, rad or m.
     pub fn offset(&self, tree_joint: usize) -> f64 {
         self.offsets[tree_joint]
     }
 
-    /// `q_tree = G q + q_0`, of `samples` samples, joint-major.
+    /// Computes `q_tree = G q + q_0` for `samples` samples, joint-major.
     ///
     /// # Panics
     /// If a length is not joints × samples.
@@ -113,7 +111,7 @@ impl JointCoupling {
         self.expand(q, samples, q_tree, |joint| T::splat(self.offsets[joint]));
     }
 
-    /// `dq_tree = G dq` or `ddq_tree = G ddq`, of `samples` samples, joint-major.
+    /// Computes `dq_tree = G dq` or `ddq_tree = G ddq` for `samples` samples, joint-major.
     ///
     /// # Panics
     /// If a length is not joints × samples.
@@ -134,7 +132,7 @@ impl JointCoupling {
         }
     }
 
-    /// Adds `Gᵀ tau_tree` to `tau`, of `samples` samples, joint-major: torques, and derivatives by positions and rates.
+    /// Adds `Gᵀ tau_tree` to `tau` for `samples` samples, joint-major: torques, or their derivatives.
     ///
     /// # Panics
     /// If a length is not joints × samples.
@@ -150,7 +148,7 @@ impl JointCoupling {
         }
     }
 
-    /// [`project_matrix`](Self::project_matrix) of a symmetric matrix: exactly symmetric again.
+    /// [`project_matrix`](Self::project_matrix) of a symmetric matrix; the result is exactly symmetric.
     ///
     /// # Panics
     /// If a matrix is not square over its joints.
@@ -163,7 +161,7 @@ impl JointCoupling {
         }
     }
 
-    /// `Gᵀ A G` of a square matrix over the joints of the tree, row-major.
+    /// Computes `Gᵀ A G` for a square matrix over the joints of the tree, row-major.
     ///
     /// # Panics
     /// If a matrix is not square over its joints.

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-/// The frames that the rows of a D-H table are of.
+/// Convention of the frames of a D-H table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DhConvention {
@@ -13,7 +13,7 @@ pub enum DhConvention {
 }
 
 impl DhConvention {
-    /// The one that is not this.
+    /// The other convention.
     #[must_use]
     pub fn other(self) -> Self {
         match self {
@@ -22,7 +22,7 @@ impl DhConvention {
         }
     }
 
-    /// As tables have it.
+    /// Name in D-H tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Standard => "standard",

@@ -1,74 +1,32 @@
-//! What can be wrong with a model's parts.
+//! Errors in the parts of a model.
 
 use thiserror::Error;
 
 /// Why a [`Model`](crate::Model) could not be built.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum ModelError {
-    /// Joints and bodies do not pair up.
-    #[error("{joints} joints but {bodies} bodies: every joint moves exactly one body")]
-    Counts {
-        /// Number of joints.
-        joints: usize,
-        /// Number of bodies.
-        bodies: usize,
-    },
-    /// Two joints with one name.
+    #[error("{joints} joints but {bodies} bodies: give one body per joint")]
+    Counts { joints: usize, bodies: usize },
     #[error("joint `{joint}` is named twice: joint names must be unique")]
-    DuplicateJoint {
-        /// The name.
-        joint: String,
-    },
-    /// A joint whose parent body comes after it.
+    DuplicateJoint { joint: String },
     #[error("joint `{joint}` comes before its parent: order joints from base to tip")]
-    ParentAfterChild {
-        /// The joint.
-        joint: String,
-    },
-    /// An axis that is not a unit vector.
+    ParentAfterChild { joint: String },
     #[error("the axis of joint `{joint}` is not a unit vector: normalise it")]
-    AxisNotUnit {
-        /// The joint.
-        joint: String,
-    },
-    /// Joints that follow each other.
-    #[error("joint `{joint}` follows joints that follow it: one of them has to move by itself")]
-    MimicCircle {
-        /// One of them.
-        joint: String,
-    },
-    /// A joint that is left without the one that it follows.
-    #[error("joint `{joint}` follows `{source_joint}`, which is dropped: drop both, or neither")]
-    LostSource {
-        /// The joint.
-        joint: String,
-        /// What it follows.
-        source_joint: String,
-    },
-    /// A link that does not exist.
+    AxisNotUnit { joint: String },
+    #[error("joint `{joint}` is in a cycle of mimic joints: make one of them independent")]
+    MimicCircle { joint: String },
+    #[error("joint `{joint}` follows `{source_joint}`, which is removed: remove both, or neither")]
+    LostSource { joint: String, source_joint: String },
     #[error("there is no link `{link}`; the links are: {}", known.join(", "))]
-    UnknownLink {
-        /// The name asked for.
-        link: String,
-        /// The names that exist.
-        known: Vec<String>,
-    },
-    /// A body with no link at all.
+    UnknownLink { link: String, known: Vec<String> },
     #[error("a body has no link: every body needs the link that its joint moves")]
     BodyWithoutLink,
-    /// An infinite or undefined number.
     #[error("{what} is not a finite number")]
-    NotFinite {
-        /// What it was.
-        what: String,
-    },
-    /// A joint that does not exist.
+    NotFinite { what: String },
+    #[error("setting `{setting}` is {value}: give a positive number")]
+    NotPositive { setting: &'static str, value: f64 },
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
-    UnknownJoint {
-        /// The name asked for.
-        joint: String,
-        /// The names that exist.
-        known: Vec<String>,
-    },
+    UnknownJoint { joint: String, known: Vec<String> },
 }

@@ -1,9 +1,10 @@
-//! The ten inertial parameters of a body: one order, one convention.
+//! The ten inertial parameters of a body.
 
 use crate::spatial::{Mat3, Transform, Vec3};
+use crate::urdf::MAX_MAGNITUDE;
 use nalgebra::{Matrix3, Matrix4};
 
-/// Names of the ten parameters in the project's order (the paper's `p_i` with its misprint fixed).
+/// Names of the ten parameters in the project's order (order `p_i` of the paper, with its misprint corrected).
 pub const INERTIAL_NAMES: [&str; 10] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
 
 /// `[m, m r_x, m r_y, m r_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz]` of one rigid body: mass in kg, first moment in kg m,
@@ -17,51 +18,59 @@ impl InertialParameters {
     /// A body without mass.
     pub const ZERO: Self = Self([0.0; 10]);
 
-    /// From mass, centre of mass, and inertia about the centre of mass (all in the body frame): parallel axes,
-    /// `I = I_c + m (rᵀr 1 - r rᵀ)`.
+    /// Inertial parameters from mass, centre of mass, and inertia about the centre of mass, all in the body frame: `I =
+    /// I_c + m (rᵀr 1 - r rᵀ)` (parallel-axis theorem).
     pub fn from_centre_of_mass(mass_kg: f64, com_m: Vec3, inertia_at_com: &Mat3) -> Self {
         let r2 = com_m.dot(com_m);
         let inertia = *inertia_at_com + (Mat3::IDENTITY.scale(r2) - Mat3::outer(com_m, com_m)).scale(mass_kg);
         Self::from_moments(mass_kg, com_m.scale(mass_kg), &inertia)
     }
 
-    /// From mass, first moment `m r`, and inertia about the frame origin.
+    /// Inertial parameters from mass, first moment `m r`, and inertia about the frame origin.
     pub fn from_moments(mass_kg: f64, first_moment: Vec3, inertia_at_origin: &Mat3) -> Self {
         let (h, i) = (first_moment.0, &inertia_at_origin.0);
         Self([mass_kg, h[0], h[1], h[2], i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]])
     }
 
-    /// The mass in kg.
+    /// Mass, kg.
     pub fn mass_kg(&self) -> f64 {
         self.0[0]
     }
 
-    /// The first moment `m r` in kg m.
+    /// First moment `m r`, kg m.
     pub fn first_moment(&self) -> Vec3 {
         Vec3([self.0[1], self.0[2], self.0[3]])
     }
 
-    /// The inertia about the frame origin in kg m².
+    /// Inertia about the frame origin, kg m².
     pub fn inertia_at_origin(&self) -> Mat3 {
         let p = &self.0;
         Mat3([[p[4], p[5], p[6]], [p[5], p[7], p[8]], [p[6], p[8], p[9]]])
     }
 
-    /// The centre of mass in metres, or `None` for a body without mass.
+    /// Centre of mass, m, or `None` for a body without mass.
     pub fn com_m(&self) -> Option<Vec3> {
         (self.0[0] != 0.0).then(|| self.first_moment().scale(1.0 / self.0[0]))
     }
 
-    /// The inertia about the centre of mass in kg m², or `None` for a body without mass.
+    /// Inertia about the centre of mass, kg m², or `None` for a body without mass.
     pub fn inertia_at_com(&self) -> Option<Mat3> {
         let com = self.com_m()?;
         let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(self.0[0]);
         Some(self.inertia_at_origin() - shift)
     }
 
-    /// The same body described in another frame: `frame_from_body` leads from this body frame to the new one.
+    /// Mass, centre of mass and inertia about it, if the body is physically consistent and within the magnitude limit.
+    pub(crate) fn consistent_about_com(&self) -> Option<(f64, Vec3, Mat3)> {
+        let (com, inertia, [a, b, c]) = (self.com_m()?, self.inertia_at_com()?, self.principal_moments()?);
+        let mass = self.mass_kg();
+        let is_small = com.0.iter().all(|x| x.abs() <= MAX_MAGNITUDE || x.is_nan());
+        (is_small && mass > 0.0 && a > 0.0 && a + b >= c).then_some((mass, com, inertia))
+    }
+
+    /// The same body in another frame; `frame_from_body` maps from the current frame to the new one.
     pub fn expressed_in(&self, frame_from_body: &Transform) -> Self {
-        // Second moments Σ = ∫ p pᵀ dm transform like outer products, which needs no detour over the centre of mass.
+        // Second moments Σ = ∫ p pᵀ dm transform like outer products, so that the centre of mass is not needed.
         let (r, t, m) = (&frame_from_body.rotation, frame_from_body.translation, self.0[0]);
         let h = r.mul_vec(self.first_moment());
         let inertia = self.inertia_at_origin();
@@ -72,7 +81,7 @@ impl InertialParameters {
         Self::from_moments(m, h + t.scale(m), &(Mat3::IDENTITY.scale(trace) - second))
     }
 
-    /// The sum of two bodies that move as one, both described in the same frame.
+    /// Sum of two rigidly connected bodies in the same frame.
     pub fn plus(&self, other: &Self) -> Self {
         Self(core::array::from_fn(|k| self.0[k] + other.0[k]))
     }
@@ -89,7 +98,7 @@ impl InertialParameters {
         })
     }
 
-    /// The principal moments of inertia about the centre of mass in kg m², ascending; `None` for a body without mass.
+    /// Principal moments of inertia about the centre of mass, kg m², ascending; `None` for a body without mass.
     pub fn principal_moments(&self) -> Option<[f64; 3]> {
         let i = self.inertia_at_com()?.0;
         let mut moments: [f64; 3] = Matrix3::from_fn(|a, b| i[a][b]).symmetric_eigenvalues().into();
@@ -103,7 +112,7 @@ mod tests {
     use super::*;
 
     fn two_points(frame: &Transform) -> InertialParameters {
-        // Two point masses: an oracle that needs no inertia formula but I = Σ m (pᵀp 1 - p pᵀ).
+        // Reference: point masses with I = Σ m (pᵀp 1 - p pᵀ).
         let mut total = InertialParameters::ZERO;
         for (mass, p) in [(1.5, Vec3([0.3, -0.2, 0.9])), (0.7, Vec3([-0.4, 0.1, 0.2]))] {
             let p = frame.point(p);
@@ -119,7 +128,7 @@ mod tests {
         let moved = two_points(&Transform::IDENTITY).expressed_in(&frame);
         let expected = two_points(&frame);
         for k in 0..10 {
-            // Rounding of some twenty products of order one.
+            // Rounding error of about twenty products of order one.
             assert!((moved.0[k] - expected.0[k]).abs() < 1e-14, "{}", INERTIAL_NAMES[k]);
         }
     }

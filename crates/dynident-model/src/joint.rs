@@ -1,7 +1,7 @@
-//! One joint: how a body may move against its parent.
+//! A joint between a body and its parent.
 
 use crate::spatial::{Mat3, Transform, Vec3};
-use crate::structure::{EXACT, Shift};
+use crate::structure::{PARALLEL_TOLERANCE_RAD, Shift};
 
 /// The kinds of joint with a degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ impl JointKind {
     }
 }
 
-/// Limits of a joint, where the description gives them: radians or metres, per second, Nm or N.
+/// Limits of a joint, as far as the robot description states them: rad or m, rad/s or m/s, Nm or N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointLimits {
     /// Lowest position, rad or m.
@@ -38,48 +38,48 @@ pub struct JointLimits {
     pub effort: Option<f64>,
 }
 
-/// A spring about (along) a joint: the drive has to give `τ = stiffness (q - reference)`.
+/// A spring at a joint; the drive has to give the torque `τ = stiffness (q - reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSpring {
-    /// Nm/rad (N/m).
+    /// Stiffness, Nm/rad (N/m).
     pub stiffness: f64,
-    /// Where it pulls to, rad or m.
+    /// Position of zero torque, rad or m.
     pub reference: f64,
 }
 
-/// A joint that follows others: `q = Σ multiplier · q_source + offset`. One source in URDF's `mimic`; the passive
+/// A joint that follows others: `q = Σ multiplier · q_source + offset`. URDF's `mimic` has one source; the passive
 /// joints of a parallelogram may have two.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
-    /// The joints that are followed.
+    /// Source joints.
     pub sources: Vec<MimicSource>,
-    /// Position (rad or m) while the sources stand at zero.
+    /// Position while all sources are at zero, rad or m.
     pub offset: f64,
 }
 
-/// A joint that another follows.
+/// One source of a mimic joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MimicSource {
-    /// Its name.
+    /// Name of the source joint.
     pub joint: String,
-    /// Velocity of the follower per velocity of this joint.
+    /// Velocity of the follower divided by velocity of the source.
     pub multiplier: f64,
 }
 
 impl Mimic {
-    /// Following one joint: `q = multiplier · q_source + offset`.
+    /// A mimic joint with one source: `q = multiplier · q_source + offset`.
     pub fn of(source: &str, multiplier: f64, offset: f64) -> Self {
         Self { sources: vec![MimicSource { joint: source.to_owned(), multiplier }], offset }
     }
 
-    /// The followed joints' names for people: `a and b`.
+    /// Names of the sources for messages: `a and b`.
     pub fn source_names(&self) -> String {
         self.sources.iter().map(|source| source.joint.as_str()).collect::<Vec<_>>().join(" and ")
     }
 }
 
-/// A joint of the tree. Its child body's frame is the joint frame: at position zero it stands at `placement` in the
-/// parent body's frame, and it moves by `q` about (along) `axis`.
+/// A joint of the tree. The frame of its child body is the joint frame. At position zero its pose in the parent body's
+/// frame is `placement`; it moves by `q` about (along) `axis`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.
@@ -94,22 +94,22 @@ pub struct Joint {
     pub axis: Vec3,
     /// Limits, where known.
     pub limits: JointLimits,
-    /// Viscous friction of the description, Nm s/rad (N s/m).
+    /// Viscous friction in the robot description, Nm s/rad (N s/m).
     pub damping: Option<f64>,
-    /// Coulomb friction of the description, Nm (N).
+    /// Coulomb friction in the robot description, Nm (N).
     pub friction: Option<f64>,
-    /// Inertia of rotor and gear, reflected to the joint, kg m² (kg), where the description gives it.
+    /// Inertia of rotor and gear, reflected to the joint, in the robot description, kg m² (kg).
     pub drive_inertia: Option<f64>,
-    /// The spring of the description. Rigid-body dynamics know nothing of it: it is a torque term,
+    /// Spring in the robot description. The rigid-body dynamics do not include it; it is a torque term,
     /// [`Declared::springs`](crate::terms::Declared::springs).
     pub spring: Option<JointSpring>,
-    /// What it follows, if it does not move by itself; see [`JointCoupling`](crate::JointCoupling). A joint that
-    /// follows one which is not in the model moves by itself.
+    /// Sources, if the joint is a mimic joint; see [`JointCoupling`](crate::JointCoupling). A joint whose source is not
+    /// in the model is independent.
     pub mimic: Option<Mimic>,
 }
 
-/// The numbers of one joint in the form that algorithms use: `parent_from_child` of a revolute joint is
-/// `R(q) = constant + cosine · cos q + sine · sin q` with a fixed translation; of a prismatic joint `R = constant` and
+/// The numbers of one joint in the form that algorithms use. A revolute joint has `parent_from_child` with `R(q) =
+/// constant + cosine · cos q + sine · sin q` and a fixed translation; a prismatic joint has `R = constant` and
 /// `translation + slide · q`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMap {
@@ -119,34 +119,34 @@ pub struct JointMap {
     pub turns: bool,
     /// Unit axis in the child frame.
     pub axis: Vec3,
-    /// The part of the rotation that does not change with `q`.
+    /// Part of the rotation that does not depend on `q`.
     pub constant: Mat3,
-    /// The part in proportion to `cos q` (zero for a prismatic joint).
+    /// Part of the rotation proportional to `cos q` (zero for a prismatic joint).
     pub cosine: Mat3,
-    /// The part in proportion to `sin q` (zero for a prismatic joint).
+    /// Part of the rotation proportional to `sin q` (zero for a prismatic joint).
     pub sine: Mat3,
     /// Translation at `q = 0`, in metres.
     pub translation: Vec3,
     /// Axis in the parent frame for a prismatic joint, zero for a revolute one.
     pub slide: Vec3,
-    /// Of a revolute joint about an axis of its frame that stands along an axis of the parent's: these axes, of the
-    /// parent and of the child (0, 1, 2 for x, y, z). The rotation then has five entries that are not zero. Right
-    /// angles count within 1e-15 rad, which is what rounding leaves of them: below the rounding of any result.
+    /// Axes of parent and child (0, 1, 2 for x, y, z) along which the axis of a revolute joint is aligned, if it is
+    /// aligned in both frames. The rotation then has five nonzero entries. The tolerance is 1e-15 rad, below the
+    /// rounding error of any result.
     pub along: Option<(usize, usize)>,
-    /// Which entries of the origin are not zero.
+    /// Nonzero entries of the origin.
     pub shift: Shift,
 }
 
-/// The axes of parent and child which a joint about `axis` at `placement` leaves on one another.
+/// Axes of parent and child along which `axis` is aligned, for a joint with the rotation `placement`.
 fn axes_along(placement: &Mat3, axis: Vec3) -> Option<(usize, usize)> {
-    let only = |v: Vec3| (0..3).find(|&k| (0..3).all(|i| i == k || v[i].abs() <= EXACT));
+    let only = |v: Vec3| (0..3).find(|&k| (0..3).all(|i| i == k || v[i].abs() <= PARALLEL_TOLERANCE_RAD));
     let child = only(axis)?;
     let row = |k: usize| placement.0[k][child];
     Some((only(Vec3([row(0), row(1), row(2)]))?, child))
 }
 
 impl Joint {
-    /// The joint's numbers, prepared for the algorithms.
+    /// Precomputes the joint's numbers for the algorithms.
     pub fn map(&self) -> JointMap {
         let placement = &self.placement.rotation;
         let (parent, axis, translation) = (self.parent, self.axis, self.placement.translation);

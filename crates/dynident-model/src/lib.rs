@@ -1,23 +1,22 @@
-//! **What is this robot?** Spatial algebra, joints, the link tree, the ten inertial parameters of a body, torque
-//! terms of friction, drives and couplings; readers and writers of robot descriptions; the audit of a model's
-//! physics.
+//! Robot models: spatial algebra, joints, the link tree, the ten inertial parameters of a body, torque terms of
+//! friction, drives and couplings; readers and writers of robot descriptions; the audit of a model's physics.
 //!
-//! One convention everywhere: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's
-//! origin; SI units and radians; joints by name.
+//! Conventions: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's origin, SI units
+//! and radians, joints by name.
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
-//! | read a robot from a file | [`load_robot`]: URDF, MJCF or Denavit-Hartenberg table |
-//! | read it from a text | [`read_urdf`], [`read_mjcf`], [`read_sdf`], [`read_dh`] |
-//! | make one in code | [`Model::new`] of [`Joint`]s and [`Body`]s |
+//! | read a robot from a file | [`load_robot`]: URDF, MJCF, SDF or Denavit-Hartenberg table |
+//! | read a robot from a text | [`read_urdf`], [`read_mjcf`], [`read_sdf`], [`read_dh`] |
+//! | build it in code | [`Model::new`] with [`Joint`]s and [`Body`]s |
 //! | gravity, mounting, locked joints | [`Model::with_gravity`], [`Model::with_base_orientation`], [`Model::locked`] |
 //! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
-//! | other ones in their place | [`Model::with_inertials`] |
-//! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; one by one: [`terms::TorqueTerm`] |
-//! | what a second and a metre of a usual arm are to this robot | [`Model::own_scale`] |
-//! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
-//! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_sdf`], [`rewrite_dh`] |
-//! | a URDF of any model | [`write_urdf`] |
+//! | replace the inertials | [`Model::with_inertials`] |
+//! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; single terms: [`terms::TorqueTerm`] |
+//! | characteristic time and length of the robot | [`Model::own_scale`] |
+//! | check physical consistency | [`audit()`], [`InertialParameters::pseudo_inertia`] |
+//! | write inertials into the user's robot description | [`link_changes`], [`rewrite_urdf`], [`rewrite_mjcf`], [`rewrite_sdf`], [`rewrite_dh`] |
+//! | write any model as URDF | [`write_urdf`] |
 //!
 //! ```
 //! use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
@@ -42,7 +41,7 @@
 //! assert_eq!((rod.mass_kg(), rod.first_moment().0[2]), (2.0, -1.0));
 //! assert!(audit(&pendulum).iter().all(|finding| finding.level != AuditLevel::Problem));
 //!
-//! // What acts on its joint beside the rigid bodies, each with one parameter.
+//! // Torque terms in addition to the rigid-body dynamics, one parameter each.
 //! let coulomb = Some(CoulombShape::Smooth { width: 0.01 });
 //! let terms = terms_per_joint(&pendulum, |_| DriveChoice { viscous: true, coulomb, ..DriveChoice::default() });
 //! assert_eq!(terms.iter().map(|term| term.symbol()).collect::<Vec<_>>(), ["fv1", "fc1"]);
@@ -75,7 +74,10 @@ pub mod urdf;
 mod xacro;
 mod xml;
 
-pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
+pub use audit::{
+    AuditFinding, AuditLevel, AuditSettings, Correction, Slip, SlipKind, SlipSettings, Slips, audit, audit_with, slips,
+    slips_with,
+};
 pub use coupling::JointCoupling;
 pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use dh_convention::DhConvention;

@@ -1,9 +1,9 @@
-//! Closed chains of the parallelogram kind, as palletising arms have them: what the joints without drives follow.
+//! Closed chains of the parallelogram kind, as in palletising arms: finds the mimic law of the passive joints.
 //!
-//! A description is a tree, so one joint of every loop is cut. There two links meet in a point, `p_1(q) = p_2(q)`. In a
-//! parallelogram the passive joints that keep them together follow linearly, `q_p = C q_a + c`, with `C` the same in
-//! every posture: `C = -J_p⁺ J_a` of the distance's Jacobian (Khalil and Dombre, *Modeling, Identification and Control
-//! of Robots*, 2004, section 7.3). [`followers`] finds `C` and `c`, and refuses what is no parallelogram.
+//! A robot description is a tree, so every loop is cut at one point of two links, with `p_1(q) = p_2(q)`. In a
+//! parallelogram the passive joints follow linearly, `q_p = C q_a + c`, with the same `C` in every posture: `C = -J_p⁺
+//! J_a` of the Jacobians of the gap (Khalil and Dombre, *Modeling, Identification and Control of Robots*, 2004, section
+//! 7.3). [`followers`] computes `C` and `c`, and rejects other loops.
 
 use crate::joint::{Mimic, MimicSource};
 use crate::sample::Random;
@@ -12,88 +12,56 @@ use crate::tree::Model;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
-/// How well loops have to close, as a share of their size: lengths of descriptions have seven digits and more.
-const CLOSES: f64 = 1e-6;
-/// Postures at which a loop is tried: `±TRIED_RAD` about zero (a fifth of that in metres).
-const POSTURES: usize = 50;
-const TRIED_RAD: f64 = 1.5;
-/// Steps of Newton's method from the description's zero: it halves the number of wrong digits, or the loop is open.
-const STEPS: usize = 30;
-/// Multipliers this near to an integer are that integer: those of parallelograms are.
-const WHOLE: f64 = 1e-7;
+/// Largest gap of a closed loop relative to its size: lengths in descriptions have at least seven digits.
+const GAP_TOLERANCE: f64 = 1e-6;
+/// Number of random postures that are tested, and their range about zero, rad (a fifth of it in metres).
+const POSTURE_COUNT: usize = 50;
+const POSTURE_RANGE_RAD: f64 = 1.5;
+/// Newton iterations from the description's zero position.
+const NEWTON_STEPS: usize = 30;
+/// Multipliers within this distance of an integer are rounded to it: those of parallelograms are integers.
+const INTEGER_TOLERANCE: f64 = 1e-7;
 
-/// Where a loop is cut: a point of one link that stays on a point of another.
+/// The cut of a loop: a point of one link that coincides with a point of another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopClosure {
     /// The two links.
     pub links: [String; 2],
     /// The points in the frames of the links, m.
     pub points_m: [[f64; 3]; 2],
-    /// The joints of the tree that the loop moves: those without drives.
+    /// Joints of the tree that have no drive and are moved by the loop.
     pub passive: Vec<String>,
 }
 
-/// Why the passive joints of loops could not be found to follow others.
+/// Why the mimic law of passive joints could not be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum LoopError {
-    /// A link that is not there.
-    #[error("there is no link `{link}` to close a loop at")]
-    UnknownLink {
-        /// The name.
-        link: String,
-    },
-    /// A joint that is not there.
+    #[error("there is no link `{link}`, which closes a loop: fix its name")]
+    UnknownLink { link: String },
     #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
-    UnknownJoint {
-        /// The name.
-        joint: String,
-        /// Those that are.
-        known: Vec<String>,
-    },
-    /// A point that is not finite.
+    UnknownJoint { joint: String, known: Vec<String> },
     #[error("points_m of the loop at `{link}`: give finite numbers, m")]
-    NotFinite {
-        /// The link.
-        link: String,
-    },
-    /// A loop that stays open near the description's zero.
+    NotFinite { link: String },
     #[error(
-        "the loop between `{first}` and `{second}` does not close: with the other joints at zero its points stay {gap_m:.3e} m apart; check links, points_m and which joints are passive"
+        "the loop between `{first}` and `{second}` does not close: with the other joints at zero its gap is at least {gap_m:.3e} m; check links, points_m and which joints are passive"
     )]
-    Open {
-        /// One link.
-        first: String,
-        /// The other link.
-        second: String,
-        /// The distance, m.
-        gap_m: f64,
-    },
-    /// Passive joints that the loops do not hold.
-    #[error("the loops leave the passive joints {} free to move: name only joints that a loop holds", joints.join(", "))]
-    Undetermined {
-        /// The joints.
-        joints: Vec<String>,
-    },
-    /// A loop whose passive joints do not follow linearly.
+    Open { first: String, second: String, gap_m: f64 },
+    #[error("the loops do not determine the passive joints {}: name only joints of a loop", joints.join(", "))]
+    Undetermined { joints: Vec<String> },
     #[error(
-        "the loop between `{first}` and `{second}` is no parallelogram: passive joints that follow linearly leave a gap of {gap_m:.3e} m in some posture"
+        "the loop between `{first}` and `{second}` is no parallelogram: passive joints that follow linearly give a gap of {gap_m:.3e} m; model it as a tree"
     )]
-    NotLinear {
-        /// One link.
-        first: String,
-        /// The other link.
-        second: String,
-        /// The largest distance, m.
-        gap_m: f64,
-    },
+    NotLinear { first: String, second: String, gap_m: f64 },
 }
 
-/// What the passive joints of the loops follow: for [`Model::with_followers`]. Joints that already follow others count
-/// as the loops' own where they are passive, and as what they are elsewhere.
+/// Mimic laws of the passive joints, for [`Model::with_followers`]. Existing mimic laws of passive joints are replaced;
+/// those of other joints are kept.
 ///
 /// # Errors
-/// Names that are not there, a loop that does not close or is no parallelogram, passive joints that it does not hold.
+/// Unknown names, a loop that does not close or is not a parallelogram, or passive joints that the loops do not
+/// determine.
 pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mimic)>, LoopError> {
     let loops = Loops::of(model, loops)?;
     if loops.passive.is_empty() {
@@ -105,26 +73,20 @@ pub fn followers(model: &Model, loops: &[LoopClosure]) -> Result<Vec<(String, Mi
     Ok(loops.mimics(&law))
 }
 
-/// The loops of a model, and the joints of its tree that move them.
 struct Loops<'a> {
     model: &'a Model,
     cuts: Vec<Cut>,
-    /// Joints without drives, which the loops move.
     passive: Vec<usize>,
-    /// The other joints on the loops.
     active: Vec<usize>,
 }
 
-/// `q_p = C q_a + c`.
 struct Law {
-    /// `C`: a row for each passive joint, a column for each active joint.
+    /// `C`: one row per passive joint, one column per active joint.
     multipliers: DMatrix<f64>,
-    /// `c`.
     offsets: Vec<f64>,
 }
 
 impl<'a> Loops<'a> {
-    /// Looks up links and joints.
     fn of(model: &'a Model, loops: &[LoopClosure]) -> Result<Self, LoopError> {
         let tree = model.tree_joints();
         let known = || tree.iter().map(|joint| joint.name.clone()).collect();
@@ -136,17 +98,17 @@ impl<'a> Loops<'a> {
         passive.sort_unstable();
         passive.dedup();
         let cuts = loops.iter().map(|one| Cut::of(model, one)).collect::<Result<Vec<Cut>, _>>()?;
-        // Only joints that move the points of a loop are followed.
+        // Only joints that move the points of a loop can be sources.
         let on_loop = |joint: usize| cuts.iter().any(|cut| cut.ends.iter().any(|(path, _)| path.contains(&joint)));
         let active = (0..tree.len()).filter(|joint| !passive.contains(joint) && on_loop(*joint)).collect();
         Ok(Self { model, cuts, passive, active })
     }
 
-    /// The positions that close all loops at the zero of the robot description, or near it.
+    /// Positions near the zero of the robot description that close all loops.
     fn closed(&self) -> Result<Vec<f64>, LoopError> {
         let Self { model, cuts, passive, .. } = self;
         let mut q = vec![0.0; model.tree_joints().len()];
-        for _ in 0..STEPS {
+        for _ in 0..NEWTON_STEPS {
             let (gap, jacobian) = (gaps(model, cuts, &q), jacobian(model, cuts, &q, passive));
             let Ok(step) = jacobian.svd(true, true).solve(&gap, 1e-9) else { break };
             for (&joint, step) in passive.iter().zip(step.iter()) {
@@ -154,14 +116,14 @@ impl<'a> Loops<'a> {
             }
         }
         let (gap_m, cut) = worst(model, cuts, &q);
-        if gap_m.is_nan() || gap_m > CLOSES * cut.size_m {
+        if gap_m.is_nan() || gap_m > GAP_TOLERANCE * cut.size_m {
             let [first, second] = cut.links.clone();
             return Err(LoopError::Open { first, second, gap_m });
         }
         Ok(q)
     }
 
-    /// `C` and `c`, from the Jacobians at the positions that close the loops.
+    /// `C` and `c` from the Jacobians at positions that close the loops.
     fn law(&self, q: &[f64]) -> Result<Law, LoopError> {
         let Self { model, cuts, passive, active } = self;
         let of_passive = jacobian(model, cuts, q, passive).svd(true, true);
@@ -172,18 +134,19 @@ impl<'a> Loops<'a> {
         }
         let of_active = jacobian(model, cuts, q, active);
         let solved = of_passive.solve(&of_active, 1e-9 * largest).unwrap_or_else(|_| of_active.map(|_| f64::NAN));
-        let whole = |x: f64| if (x - x.round()).abs() < WHOLE { x.round() + 0.0 } else { x };
+        let whole = |x: f64| if (x - x.round()).abs() < INTEGER_TOLERANCE { x.round() + 0.0 } else { x };
         let offsets = passive.iter().map(|&joint| whole(q[joint])).collect();
         Ok(Law { multipliers: (-solved).map(whole), offsets })
     }
 
-    /// Checks that the law closes all loops in random postures, from the positions `q` on.
+    /// Checks that the law closes all loops in random postures, starting from `q`.
     fn check(&self, law: &Law, mut q: Vec<f64>) -> Result<(), LoopError> {
         let Self { model, cuts, passive, active } = self;
         let mut random = Random::new(1);
-        for _ in 0..POSTURES {
+        for _ in 0..POSTURE_COUNT {
             for &joint in active {
-                let reach = if model.tree_joints()[joint].turns() { TRIED_RAD } else { 0.2 * TRIED_RAD };
+                let reach =
+                    if model.tree_joints()[joint].turns() { POSTURE_RANGE_RAD } else { 0.2 * POSTURE_RANGE_RAD };
                 q[joint] = random.uniform(-reach, reach);
             }
             for (row, &joint) in passive.iter().enumerate() {
@@ -192,9 +155,9 @@ impl<'a> Loops<'a> {
                 q[joint] = law.offsets[row] + followed.sum::<f64>();
             }
             let (gap_m, cut) = worst(model, cuts, &q);
-            // The multipliers are as exact as the lengths of the description, and postures far from zero amplify their
-            // errors.
-            if gap_m.is_nan() || gap_m > 10.0 * CLOSES * cut.size_m {
+            // The multipliers are only as exact as the lengths of the description, and postures far from zero amplify
+            // their errors.
+            if gap_m.is_nan() || gap_m > 10.0 * GAP_TOLERANCE * cut.size_m {
                 let [first, second] = cut.links.clone();
                 return Err(LoopError::NotLinear { first, second, gap_m });
             }
@@ -202,7 +165,6 @@ impl<'a> Loops<'a> {
         Ok(())
     }
 
-    /// The law by the names of the joints.
     fn mimics(&self, law: &Law) -> Vec<(String, Mimic)> {
         let tree = self.model.tree_joints();
         let follower = |(row, &joint): (usize, &usize)| {
@@ -217,20 +179,18 @@ impl<'a> Loops<'a> {
     }
 }
 
-/// The joints of the tree on the way to a link, and the place of the link in the frame of the last joint's body, or of
-/// the base if there is no joint.
-pub(crate) fn way_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
+/// Tree joints on the path to a link, and the pose of the link in the frame of the last joint's body, or in the base
+/// frame if the path is empty.
+pub(crate) fn path_to(model: &Model, link: &str) -> Option<(Vec<usize>, Transform)> {
     let bodies = model.bodies().iter().enumerate().map(|(body, of)| (Some(body), of));
     let mut all = core::iter::once((None, model.base())).chain(bodies);
     let (body, own) = all.find_map(|(body, of)| Some((body, of.links.iter().find(|own| own.name == *link)?)))?;
     Some((body.map_or_else(Vec::new, |body| model.path(body)), own.placement))
 }
 
-/// A loop with its names looked up.
 struct Cut {
     links: [String; 2],
-    /// Of both ends: the joints of the tree on the way to it, and the point in the frame of the last one's body (of the
-    /// base where there is none).
+    /// Both ends: tree joints on the path, and the point in the frame of the last joint's body (or of the base).
     ends: [(Vec<usize>, Vec3); 2],
     size_m: f64,
 }
@@ -242,7 +202,8 @@ impl Cut {
             if closure.points_m[k].iter().any(|x| !x.is_finite()) {
                 return Err(LoopError::NotFinite { link: link.clone() });
             }
-            let (path, placement) = way_to(model, link).ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
+            let (path, placement) =
+                path_to(model, link).ok_or_else(|| LoopError::UnknownLink { link: link.clone() })?;
             Ok((path, placement.point(Vec3(closure.points_m[k]))))
         };
         let ends = [end(0)?, end(1)?];
@@ -254,7 +215,7 @@ impl Cut {
         Ok(Self { links: closure.links.clone(), ends, size_m })
     }
 
-    /// Where an end stands in the base frame, and the place and axis of every joint on the way.
+    /// Position of an end in the base frame, with the pose of every joint on the path.
     fn end(&self, model: &Model, k: usize, q: &[f64]) -> (Vec3, Vec<(usize, Transform)>) {
         let (path, point) = &self.ends[k];
         let mut placement = Transform::IDENTITY;
@@ -267,13 +228,12 @@ impl Cut {
     }
 }
 
-/// `p_1 - p_2` of every loop, m.
+/// Gaps `p_1 - p_2` of all loops, m.
 fn gaps(model: &Model, cuts: &[Cut], q: &[f64]) -> DVector<f64> {
     let gap = |cut: &Cut| cut.end(model, 0, q).0 - cut.end(model, 1, q).0;
     DVector::from_iterator(3 * cuts.len(), cuts.iter().flat_map(|cut| gap(cut).0))
 }
 
-/// The loop with the largest gap compared with its size.
 fn worst<'c>(model: &Model, cuts: &'c [Cut], q: &[f64]) -> (f64, &'c Cut) {
     let gap = |cut: &Cut| (cut.end(model, 0, q).0 - cut.end(model, 1, q).0).norm();
     let of_size = |cut: &&Cut| gap(cut) / cut.size_m;
@@ -281,7 +241,7 @@ fn worst<'c>(model: &Model, cuts: &'c [Cut], q: &[f64]) -> (f64, &'c Cut) {
     (gap(widest), widest)
 }
 
-/// Derivatives of the gaps by some joints of the tree.
+/// Jacobian of the gaps with respect to the joints `by`.
 fn jacobian(model: &Model, cuts: &[Cut], q: &[f64], by: &[usize]) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(3 * cuts.len(), by.len());
     for (number, cut) in cuts.iter().enumerate() {

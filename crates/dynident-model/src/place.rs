@@ -1,8 +1,8 @@
-//! Where in a text something is wrong.
+//! Line and column of a fault in a text.
 
 use core::error::Error;
 
-/// A fault with its place in the text: line and column count from 1, columns in characters.
+/// A fault with its place in the text: 1-based line and column, columns in characters.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{line}:{column}: {fault}")]
 pub struct Located<F: Error> {
@@ -10,20 +10,19 @@ pub struct Located<F: Error> {
     pub line: u32,
     /// Column, from 1, in characters.
     pub column: u32,
-    /// What is wrong, and the fix.
+    /// The fault, with the fix.
     pub fault: F,
 }
 
 impl<F: Error> Located<F> {
-    /// `fault` at byte `offset` of `text`.
     pub(crate) fn at(text: &str, offset: usize, fault: F) -> Self {
         let (line, column) = line_and_column(text, offset);
         Self { line, column, fault }
     }
 }
 
-/// Line and column (from 1, in characters) of byte `offset`; an offset beyond the text or inside a character counts as
-/// the place before.
+/// Line and column (1-based, in characters) of byte `offset`. An offset beyond the text or inside a character gives the
+/// last place before it.
 pub fn line_and_column(text: &str, offset: usize) -> (u32, u32) {
     let mut end = offset.min(text.len());
     while !text.is_char_boundary(end) {

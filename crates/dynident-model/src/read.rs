@@ -1,4 +1,4 @@
-//! From a file to a robot: URDF, MJCF, SDF or D-H table, distinguished by the file's name or its content.
+//! Reads a robot from a URDF, MJCF, SDF or D-H table, distinguished by file name or content.
 
 use crate::dh::{DhError, read_dh};
 use crate::mjcf::{MjcfError, MjcfNotice, included_from, is_mjcf, read_mjcf_with};
@@ -11,10 +11,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Largest robot description that is read, bytes. The largest known humanoids stay below one megabyte.
+/// Size limit of a robot description, bytes. The largest known humanoids are below one megabyte.
 pub const MAX_DESCRIPTION_BYTES: u64 = 16 << 20;
 
-/// What a description is written in.
+/// Format of a robot description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DescriptionFormat {
     /// URDF.
@@ -27,128 +27,68 @@ pub enum DescriptionFormat {
     Dh,
 }
 
-/// A robot and where it came from.
+/// A robot and its source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
     /// The robot.
     pub model: Model,
-    /// What the file is written in.
+    /// Format of the file.
     pub format: DescriptionFormat,
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes; of a file with xacro macros the expanded
-    /// text.
+    /// Text of the file, for [`rewrite_urdf`](crate::rewrite_urdf); for a file with xacro macros, the expanded text.
     pub text: String,
-    /// Elements of a URDF that were not read.
+    /// Elements of a URDF that were ignored.
     pub unread: Vec<UnreadElement>,
-    /// What of a URDF is against the rules and leaves no doubt about the robot.
+    /// Violations of the URDF rules that do not make the robot ambiguous.
     pub irregularities: Vec<UrdfIrregularity>,
-    /// What an MJCF says and the model does not hold.
+    /// Contents of an MJCF that the model cannot represent.
     pub notices: Vec<MjcfNotice>,
-    /// What an SDF says and the model does not hold.
+    /// Contents of an SDF that the model cannot represent.
     pub sdf_notices: Vec<SdfNotice>,
 }
 
-/// Why a file gave no robot. Every message begins with the file, and with line and column where there are any.
+/// Why a file could not be read as a robot. Every message begins with the file, and with line and column if known.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum ReadError {
-    /// The file cannot be opened or read.
     #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
-    #[error("{}: larger than {} MiB: this is no robot description, name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file is empty.
+    File { path: PathBuf, source: std::io::Error },
+    #[error("{}: larger than {} MiB, too large for a robot description: name the URDF, MJCF, SDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
+    TooLarge { path: PathBuf },
     #[error("{}:1:1: the file is empty: name a URDF, an MJCF, an SDF or a D-H table", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file is no UTF-8 text.
+    Empty { path: PathBuf },
     #[error("{}:{line}:{column}: not UTF-8 text{hint}: save the description as UTF-8", path.display())]
-    Encoding {
-        /// The file.
-        path: PathBuf,
-        /// Line of the first bad byte.
-        line: u32,
-        /// Column of the first bad byte.
-        column: u32,
-        /// What it may be.
-        hint: &'static str,
-    },
-    /// A file of another kind.
+    Encoding { path: PathBuf, line: u32, column: u32, hint: &'static str },
     #[error("{}:1:1: {what}, not a robot description: {fix}", path.display())]
-    NoDescription {
-        /// The file.
-        path: PathBuf,
-        /// What it seems to be.
-        what: &'static str,
-        /// What to do.
-        fix: &'static str,
-    },
-    /// The file contains xacro macros. xacro evaluates Python expressions of the file, so that this crate does not
-    /// start it.
+    NoDescription { path: PathBuf, what: &'static str, fix: &'static str },
     #[error("{}: the file contains xacro macros: expand it first (`xacro robot.urdf.xacro > robot.urdf`)", path.display())]
-    Macros {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The URDF is faulty.
+    Macros { path: PathBuf },
     #[error("{}:{source}", path.display())]
-    Urdf {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<UrdfError>,
-    },
-    /// The MJCF is faulty.
+    Urdf { path: PathBuf, source: Box<UrdfError> },
     #[error("{}:{source}", path.display())]
-    Mjcf {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<MjcfError>,
-    },
-    /// The SDF is faulty.
+    Mjcf { path: PathBuf, source: Box<MjcfError> },
     #[error("{}:{source}", path.display())]
-    Sdf {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<SdfError>,
-    },
-    /// The D-H table is faulty.
+    Sdf { path: PathBuf, source: Box<SdfError> },
     #[error("{}:{source}", path.display())]
-    Dh {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        source: Box<DhError>,
-    },
+    Dh { path: PathBuf, source: Box<DhError> },
 }
 
-/// Reads a robot description: `.toml` as D-H table, `.urdf`, `.xml` and any other text that begins with `<` as MJCF
-/// if its root element is `<mujoco>`, as SDF if it is `<sdf>`, else as URDF. Files that an MJCF includes are looked for
-/// from its folder. No program is started: a file with xacro macros is refused.
+/// Reads a robot description. `.toml` is a D-H table; `.urdf`, `.xml` and any other text that begins with `<` is an
+/// MJCF, SDF or URDF, depending on its root element. Files included by an MJCF are searched relative to its folder. No
+/// program is run: a file with xacro macros is rejected.
 ///
 /// # Errors
-/// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty or contains xacro macros;
-/// every message names the file.
+/// File not readable, too large, empty, not UTF-8, with invalid content or with xacro macros; every message names the
+/// file.
 #[doc(alias("urdf", "mjcf", "mujoco", "denavit-hartenberg"))]
 pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     load_robot_with(path.as_ref(), |path| Err(ReadError::Macros { path: path.to_owned() }))
 }
 
-/// As [`load_robot`]; `expand` gives the expanded text of a file with xacro macros, and is called for no other.
+/// As [`load_robot`]; `expand` returns the expanded text of a file with xacro macros, and is called only for such
+/// files.
 ///
 /// # Errors
 /// As [`load_robot`], and those of `expand`.
@@ -161,15 +101,14 @@ pub fn load_robot_with<E: From<ReadError>>(
     Ok(read_robot(text, path)?)
 }
 
-/// Whether a robot file contains xacro macros, so that only the program `xacro` can expand it.
+/// Whether a robot file contains xacro macros, which only the program `xacro` can expand.
 ///
 /// # Errors
-/// If the file cannot be read, is too large, no UTF-8, or another kind of file.
+/// File not readable, too large, not UTF-8, or not a robot description.
 pub fn has_xacro_macros(path: &Path) -> Result<bool, ReadError> {
     Ok(has_macros(&description_text(path)?))
 }
 
-/// The text of a robot file.
 fn description_text(path: &Path) -> Result<String, ReadError> {
     let named = || path.to_owned();
     let bytes = bounded(path)?;
@@ -180,12 +119,12 @@ fn description_text(path: &Path) -> Result<String, ReadError> {
     decode(bytes, path)
 }
 
-/// Reads the text of a robot description; what it is written in is told as by [`load_robot`], from the extension of
-/// `path` and the content. `path` is named in messages, and is where files that an MJCF includes are looked for; it
-/// need not exist.
+/// Reads a robot from the text of its description. The format is determined as in [`load_robot`], from the extension of
+/// `path` and the content. `path` appears in messages, and files included by an MJCF are searched relative to its
+/// folder; it need not exist.
 ///
 /// # Errors
-/// If the text is empty or faulty; every message names `path`. Macros are refused.
+/// Empty or invalid text, or xacro macros; every message names `path`.
 pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
     let named = || path.to_owned();
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
@@ -230,10 +169,9 @@ pub fn read_robot(text: String, path: &Path) -> Result<Robot, ReadError> {
     Ok(Robot { model, format, path: named(), text, unread, irregularities, notices, sdf_notices })
 }
 
-/// The bytes of a file.
 fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
-    // Bounded reading: the length that the system reports may be wrong (files of the kernel).
+    // The size reported by the system may be wrong (kernel files), so the read itself is bounded.
     dynident_files::open(path)
         .and_then(|file| file.take(MAX_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
@@ -243,13 +181,12 @@ fn bounded(path: &Path) -> Result<Vec<u8>, ReadError> {
     Ok(bytes)
 }
 
-/// Extensions of recordings and tables.
 const RECORDINGS: [&str; 16] = [
     "csv", "tsv", "dat", "log", "mcap", "bag", "db3", "h5", "hdf5", "mat", "npy", "npz", "parquet", "feather", "xlsx",
     "ods",
 ];
 
-/// What a file is that is plainly no robot description, and what to do with it.
+/// Kind of a file that is obviously not a robot description, and the fix.
 fn other_kind(bytes: &[u8], extension: Option<&str>) -> Option<(&'static str, &'static str)> {
     const LOG: &str = "name the log in a study, as `file` of a [[log]], and give the URDF or the D-H table here";
     if extension.is_some_and(|extension| RECORDINGS.contains(&extension)) {
@@ -258,7 +195,7 @@ fn other_kind(bytes: &[u8], extension: Option<&str>) -> Option<(&'static str, &'
     let text = str::from_utf8(bytes).ok()?;
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     if extension == Some("toml") {
-        // Sections that a study has and a D-H table has not.
+        // Sections that only a study has.
         let section = |line: &str| matches!(line, "[robot]" | "[[log]]" | "[format]" | "[design]" | "[iteration]");
         return lines.any(section).then_some((
             "a study",
@@ -269,7 +206,7 @@ fn other_kind(bytes: &[u8], extension: Option<&str>) -> Option<(&'static str, &'
     if first.starts_with('{') && extension == Some("json") {
         return Some(("a JSON file", "give the URDF or the D-H table"));
     }
-    // A row of names or numbers, without any key or bracket of TOML or XML.
+    // A row of names or numbers without syntax of TOML or XML.
     let plain = |c: char| !matches!(c, '=' | '[' | ']' | '<' | '>' | '{' | '}' | '"');
     let table =
         [',', ';', '\t'].iter().any(|delimiter| first.matches(*delimiter).count() >= 2) && first.chars().all(plain);

@@ -1,4 +1,4 @@
-//! Sample robots for tests, benchmarks and examples, and the small seeded generator that they share.
+//! Sample robots for tests, benchmarks and examples, with a small seeded random generator.
 
 use crate::inertial::InertialParameters;
 use crate::joint::{Joint, JointKind, JointLimits};
@@ -7,24 +7,24 @@ use crate::tree::{Body, Link, Model};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// SplitMix64 (Steele, Lea and Flood 2014): seeded, the same on every robot.
+/// SplitMix64 (Steele, Lea and Flood 2014): the same sequence on every platform.
 #[derive(Clone, Debug)]
 pub struct Random(SplitMix64);
 
 impl Random {
-    /// The generator of this seed.
+    /// Generator with this seed.
     pub fn new(seed: u64) -> Self {
         Self(SplitMix64::seed_from_u64(seed))
     }
 
-    /// The next 64 random bits.
+    /// Next 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
     /// Uniform between `low` and `high`.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        // 2^-53 steps: every value of the grid is exact.
+        // Steps of 2^-53, so that every value of the grid is exact.
         low + (high - low) * ((self.bits() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0))
     }
 
@@ -34,14 +34,14 @@ impl Random {
         radius * (core::f64::consts::TAU * self.uniform(0.0, 1.0)).cos()
     }
 
-    /// A uniformly distributed unit vector.
+    /// Uniformly distributed unit vector.
     pub fn direction(&mut self) -> Vec3 {
         let v = Vec3([self.normal(), self.normal(), self.normal()]);
         v.scale(1.0 / v.norm())
     }
 
-    /// A physically consistent body: three positive principal moments that keep the triangle inequality, about a centre
-    /// of mass within 0.3 m.
+    /// A physically consistent body: positive principal moments that satisfy the triangle inequality, centre of mass
+    /// within 0.3 m.
     pub fn body(&mut self) -> InertialParameters {
         let mass = self.uniform(0.2, 5.0);
         let second: [f64; 3] = core::array::from_fn(|_| mass * self.uniform(0.001, 0.04));
@@ -57,7 +57,6 @@ impl Random {
     }
 }
 
-/// A joint without limits or friction at a given placement.
 fn plain_joint(name: String, kind: JointKind, parent: Option<usize>, placement: Transform, axis: Vec3) -> Joint {
     Joint {
         name,
@@ -78,8 +77,8 @@ fn plain_body(name: String, inertial: Option<InertialParameters>) -> Body {
     Body { links: vec![Link { name, placement: Transform::IDENTITY, inertial, collision: Vec::new() }] }
 }
 
-/// A random tree of `dof` joints: turning and sliding (one in four), general axes and placements, branches, sometimes
-/// several trees on the base; physically consistent bodies; gravity in a general direction.
+/// A random tree of `dof` joints: revolute and prismatic (one in four), general axes and placements, branches,
+/// sometimes several trees on the base; physically consistent bodies; gravity in a general direction.
 ///
 /// # Panics
 /// Never: every part is valid by construction.
@@ -87,7 +86,7 @@ pub fn random_tree(seed: u64, dof: usize) -> Model {
     let mut random = Random::new(seed.wrapping_mul(0x1234_5678_9abc_def1).wrapping_add(7));
     let (mut joints, mut bodies) = (Vec::new(), Vec::new());
     for index in 0..dof {
-        // Mostly the last body, so that trees are deep; otherwise any earlier one or the base.
+        // Usually the last body, so that trees are deep; otherwise any earlier one or the base.
         let parent = if index > 0 && random.uniform(0.0, 1.0) < 0.7 {
             Some(index - 1)
         } else {
@@ -108,7 +107,7 @@ pub fn random_tree(seed: u64, dof: usize) -> Model {
         .expect("a random tree is valid by construction")
 }
 
-/// The paper's planar arm: two revolute joints with parallel axes along z, first link of length `a1_m`, gravity along
+/// Planar arm of the paper: two revolute joints with parallel axes along z, first link of length `a1_m`, gravity along
 /// -y (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Fig. 1 and Table 1).
 ///
 /// # Panics

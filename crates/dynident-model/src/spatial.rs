@@ -117,8 +117,7 @@ impl<T> IndexMut<usize> for Vec3<T> {
     }
 }
 
-/// All nine entries written out: the compiler keeps them in registers, which it does not with `array::from_fn` on wide
-/// lanes.
+/// Explicit entries keep the matrix in registers; `array::from_fn` does not on wide lanes.
 macro_rules! by_entry {
     ($entry:expr) => {{
         let entry = $entry;
@@ -215,7 +214,7 @@ impl<T: Scalar> Sub for Mat3<T> {
 }
 
 impl Mat3<f64> {
-    /// The rotation of fixed-axis roll, pitch, yaw in radians, as URDF means it: `R = Rz(yaw) Ry(pitch) Rx(roll)`.
+    /// Rotation by fixed-axis roll, pitch, yaw in radians (URDF): `R = Rz(yaw) Ry(pitch) Rx(roll)`.
     pub fn from_roll_pitch_yaw(roll: f64, pitch: f64, yaw: f64) -> Self {
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
         Self([
@@ -225,7 +224,7 @@ impl Mat3<f64> {
         ])
     }
 
-    /// The rotation that the unit quaternion `x y z w` stands for.
+    /// Rotation of the unit quaternion `x y z w`.
     pub fn from_quaternion(quaternion: [f64; 4]) -> Self {
         let [x, y, z, w] = quaternion;
         Self([
@@ -235,7 +234,7 @@ impl Mat3<f64> {
         ])
     }
 
-    /// The rotation by `angle` radians about the unit vector `axis` (Rodrigues).
+    /// Rotation by `angle` radians about the unit vector `axis` (Rodrigues).
     pub fn from_axis_angle(axis: Vec3, angle: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
         let outer = Self::outer(axis, axis);
@@ -243,8 +242,8 @@ impl Mat3<f64> {
     }
 }
 
-/// A rigid transform `parent_from_child`: a point `p` of the child frame lies at `rotation · p + translation` in the
-/// parent.
+/// A rigid transform `parent_from_child`: a point `p` of the child frame is at `rotation · p + translation` in the
+/// parent frame.
 #[doc(alias("se3", "placement"))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform<T = f64> {
@@ -255,7 +254,7 @@ pub struct Transform<T = f64> {
 }
 
 impl<T: Scalar> Transform<T> {
-    /// The transform between equal frames.
+    /// Identity transform.
     pub const IDENTITY: Self = Self { rotation: Mat3::IDENTITY, translation: Vec3::ZERO };
 
     /// `a_from_b.then(&b_from_c)` is `a_from_c`.
@@ -267,7 +266,7 @@ impl<T: Scalar> Transform<T> {
         }
     }
 
-    /// The transform the other way round.
+    /// The inverse transform.
     #[inline(always)]
     pub fn inverse(&self) -> Self {
         Self { rotation: self.rotation.transpose(), translation: -self.rotation.transpose_mul_vec(self.translation) }

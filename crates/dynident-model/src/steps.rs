@@ -1,82 +1,83 @@
-//! The tree in the form that costs the recursions of the dynamics least: made once for a model.
+//! The tree in the form with the least operations for the dynamics, prepared once per model.
 //!
-//! Joint torques do not depend on how a body's frame is turned about its joint's axis, nor on what of a turning body
-//! lies on that axis without moving. Both freedoms are used up here:
+//! Joint torques are independent of the orientation of a body's frame about its joint axis, and of the mass moments of
+//! a revolute body along its axis. Both are used here:
 //!
-//! - **Frames.** Every body has an inner frame at the origin of its own, with z along the joint's axis. Its x is chosen
-//!   so that a child's axis, where it stands at a right angle, comes out of a quarter turn about x (the modified
-//!   Denavit-Hartenberg convention: Khalil and Kleinfinger, *A new geometric notation for open and closed-loop
-//!   robots*, ICRA 1986). On most arms every constant rotation is then the identity or that quarter turn, and to turn a
-//!   vector from frame to frame takes four products.
-//! - **Inertia.** Mass, first moment along the axis and second moment along the axis of a turning body act as a part of
-//!   its parent: they are moved there, and three of ten numbers are zero (the regrouping of base parameters: Gautier
-//!   and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots*, IEEE T-RA 1990).
+//! - **Frames.** Every body has an inner frame with the same origin and with z along the joint axis. Its x axis is
+//!   chosen so that a child's axis at a right angle results from a quarter turn about x (modified Denavit-Hartenberg
+//!   convention: Khalil and Kleinfinger, *A new geometric notation for open and closed-loop robots*, ICRA 1986). On
+//!   most arms every constant rotation is then the identity or that quarter turn, and rotating a vector between frames
+//!   takes four products.
+//! - **Inertia.** Mass, first moment along the axis and second moment along the axis of a revolute body act like a part
+//!   of its parent. They are moved to the parent, so that three of ten numbers are zero (regrouping of base parameters:
+//!   Gautier and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots*, IEEE T-RA 1990).
 
 use crate::inertial::InertialParameters;
 use crate::joint::Joint;
 use crate::spatial::{Mat3, Vec3};
-use crate::structure::{EXACT, Shift};
+use crate::structure::{PARALLEL_TOLERANCE_RAD, Shift};
 
-/// The constant part of the rotation from a body's inner frame to its parent's.
+/// Constant part of the rotation from a body's inner frame to its parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRotation {
-    /// None: parallel axes.
+    /// Identity: parallel axes.
     Aligned,
     /// 90° about x: `(x, y, z)` becomes `(x, -z, y)`.
     Quarter,
-    /// Any other.
+    /// Any other rotation.
     General(Mat3),
 }
 
-/// One joint and its body in inner frames. Its torque is the same as that of the [`Joint`] and body which it stands
-/// for; its body's inertial parameters alone are not.
+/// One joint and its body in inner frames. The joint torques are those of the original [`Joint`] and body; the inertial
+/// parameters of the body alone are not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointStep {
     /// Index of the parent body, or `None` for the base.
     pub parent: Option<usize>,
-    /// True for joints that turn; the others slide.
+    /// True for revolute joints, false for prismatic joints.
     pub turns: bool,
-    /// What is added to the position of a turning joint, rad: x of the inner frame is not x of the body's own.
+    /// Offset added to the position of a revolute joint, rad: angle between the x axes of the inner frame and the body
+    /// frame.
     pub offset: f64,
-    /// Constant rotation, before the joint's own turn about z. General for a joint that slides.
+    /// Constant rotation, before the joint's rotation about z. `General` for a prismatic joint.
     pub rotation: StepRotation,
-    /// Origin in the parent's inner frame, m; of a sliding joint at `q = 0`.
+    /// Origin in the parent's inner frame, m; for a prismatic joint at `q = 0`.
     pub translation: Vec3,
-    /// Which entries of the origin are not zero.
+    /// Nonzero entries of the origin.
     pub shift: Shift,
-    /// Axis of a sliding joint in the parent's inner frame; zero for one that turns.
+    /// Axis of a prismatic joint in the parent's inner frame; zero for a revolute joint.
     pub slide: Vec3,
-    /// Mass, kg; zero for a turning body, whose mass has gone to its parent.
+    /// Mass, kg; zero for a revolute body, whose mass was moved to its parent.
     pub mass: f64,
     /// First moment `∫ x dm`, kg m.
     pub first: Vec3,
     /// Second moment `∫ x xᵀ dm`, upper triangle by rows: xx, xy, xz, yy, yz, zz. kg m².
     pub second: [f64; 6],
-    /// Mass of this body and all that hangs on it, kg.
+    /// Mass of this body and all its descendants, kg.
     pub subtree_mass: f64,
-    /// True when nothing hangs on the body.
+    /// True if the body has no children.
     pub is_tip: bool,
-    /// True when a body other than the next one hangs on this one, and its state is needed later.
+    /// True if a body other than the next one is a child of this body, so that its state is needed later.
     pub branches: bool,
-    /// How it hangs on its parent.
+    /// Relation to the parent.
     pub hang: Hang,
 }
 
-/// How a body hangs on its parent; all false at the base.
+/// Relation of a body to its parent; all false at the base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hang {
-    /// True when no body with a higher index hangs on the same parent: from the tips to the base it is the first that
-    /// gives its parent something.
+    /// True if no sibling has a higher index: in a pass from the tips to the base, this body is the first to contribute
+    /// to the parent.
     pub is_last_child: bool,
-    /// True when the parent is the body before this one: its state need not be looked up.
+    /// True if the parent is the previous body, so that its state is still at hand.
     pub follows: bool,
-    /// True when the parent turns about an axis that rests in the base: only what acts about that axis counts there.
+    /// True if the parent rotates about an axis that is fixed in the base, so that only moments about that axis matter
+    /// there.
     pub on_resting_axis: bool,
 }
 
-/// The steps of a tree, in its order.
 pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<JointStep> {
-    // Body from inner frame: first with any x, then turned about z.
+    // Body from inner frame: first with any x axis, then rotated about z.
     let plain: Vec<Mat3> = tree.iter().map(|joint| along_z(joint.axis)).collect();
     let relative = |child: usize, parent_frame: &Mat3| {
         parent_frame.transpose().mul_mat(&tree[child].placement.rotation).mul_mat(&plain[child])
@@ -84,7 +85,7 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
     let turn = |parent: usize| {
         let children = (parent + 1..tree.len()).filter(|&child| tree[child].parent == Some(parent));
         let mut relatives = children.map(|child| relative(child, &plain[parent]).0);
-        let right = relatives.find(|w| w[2][2].abs() <= EXACT);
+        let right = relatives.find(|w| w[2][2].abs() <= PARALLEL_TOLERANCE_RAD);
         // W = Rz(γ) Rx(α) Rz(δ), third column: (sin γ sin α, -cos γ sin α, cos α).
         right.map_or(0.0, |w| w[0][2].atan2(-w[1][2]))
     };
@@ -136,7 +137,7 @@ pub(crate) fn steps(tree: &[Joint], inertials: &[InertialParameters]) -> Vec<Joi
     steps
 }
 
-/// Moves what lies on the axes of turning bodies to their parents, from the tips to the base, and sums the masses.
+/// Moves mass moments on the axes of revolute bodies to their parents, from the tips to the base, and sums the masses.
 fn regroup(steps: &mut [JointStep]) {
     for index in (0..steps.len()).rev() {
         let (inner, outer) = steps.split_at_mut(index);
@@ -164,7 +165,6 @@ fn regroup(steps: &mut [JointStep]) {
 }
 
 impl StepRotation {
-    /// The child's z in the parent's frame.
     fn axis(&self) -> Vec3 {
         match self {
             Self::Aligned => Vec3([0.0, 0.0, 1.0]),
@@ -174,13 +174,13 @@ impl StepRotation {
     }
 }
 
-/// `W` as a constant rotation and a turn about z behind it.
+/// `W` as a constant rotation followed by a rotation about z.
 fn constant_rotation(w: &Mat3) -> (StepRotation, f64) {
     let m = &w.0;
     let slant = m[0][2].hypot(m[1][2]);
-    if m[2][2] > 0.0 && slant <= EXACT {
+    if m[2][2] > 0.0 && slant <= PARALLEL_TOLERANCE_RAD {
         (StepRotation::Aligned, m[1][0].atan2(m[0][0]))
-    } else if m[2][2].abs() <= EXACT && m[0][2].abs() <= EXACT && m[1][2] < 0.0 {
+    } else if m[2][2].abs() <= PARALLEL_TOLERANCE_RAD && m[0][2].abs() <= PARALLEL_TOLERANCE_RAD && m[1][2] < 0.0 {
         // Rx(90°) Rz(δ) has the third row (sin δ, cos δ, 0).
         (StepRotation::Quarter, m[2][0].atan2(m[2][1]))
     } else {
@@ -188,7 +188,7 @@ fn constant_rotation(w: &Mat3) -> (StepRotation, f64) {
     }
 }
 
-/// A rotation whose third column is the unit vector `axis`, with as many zeros as may be.
+/// A rotation whose third column is the unit vector `axis`, with as many zeros as possible.
 fn along_z(axis: Vec3) -> Mat3 {
     let least = (0..3).fold(0, |least, k| if axis[k].abs() < axis[least].abs() { k } else { least });
     let z = axis.scale(1.0 / axis.norm());
@@ -213,7 +213,7 @@ mod tests {
     use crate::sample::{Random, random_tree};
     use crate::{Model, Transform};
 
-    /// `base_from_inner` of every body at `q`, by the steps.
+    /// `base_from_inner` of every body at `q`, computed from the steps.
     fn inner_placements(model: &Model, q: &[f64]) -> Vec<Transform> {
         let mut placements: Vec<Transform> = Vec::new();
         for (step, q) in model.steps().iter().zip(q) {
@@ -232,8 +232,8 @@ mod tests {
         placements
     }
 
-    /// Origins and axes of all bodies are where the joints put them. Rotations and lengths are of the size of one, ten
-    /// of them follow one another: 1e-13.
+    /// Asserts that the origins and axes of all bodies agree with the joints. Ten successive rotations and lengths of
+    /// order one: tolerance 1e-13.
     fn assert_same_axes(model: &Model, random: &mut Random) {
         let q: Vec<f64> = (0..model.body_count()).map(|_| random.uniform(-3.0, 3.0)).collect();
         let mut bodies: Vec<Transform> = Vec::new();
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn inner_frames_stand_on_the_joints() {
+    fn inner_frames_are_on_the_joint_axes() {
         let mut random = Random::new(5);
         for seed in 0..40 {
             assert_same_axes(&random_tree(seed, 1 + seed as usize % 10), &mut random);
@@ -260,7 +260,7 @@ mod tests {
     fn right_angles_are_quarter_turns() {
         let mut random = Random::new(6);
         let plain = random_tree(1, 6);
-        // Axes along any of the three and placements turned by multiples of 90° about any.
+        // Axes along x, y or z, and placements rotated by multiples of 90°.
         let unit = |k: usize, sign: f64| Vec3(core::array::from_fn(|i| if i == k { sign } else { 0.0 }));
         for case in 0..60 {
             let mut joints = plain.tree_joints().to_vec();
@@ -274,7 +274,7 @@ mod tests {
             let model = Model::new("right angles", plain.base().clone(), joints, plain.bodies().to_vec()).unwrap();
             assert_same_axes(&model, &mut random);
             for (index, step) in model.steps().iter().enumerate().skip(1) {
-                // Parallel axes in opposite directions are the one case left.
+                // Antiparallel axes are the only case that remains general.
                 let opposite = |rotation: &Mat3| (rotation.0[2][2] + 1.0).abs() < 1e-12;
                 let is_general = matches!(&step.rotation, StepRotation::General(rotation) if !opposite(rotation));
                 assert!(!is_general, "case {case}, joint {index}: {:?}", step.rotation);
@@ -283,13 +283,13 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_on_an_axis_goes_to_the_parent() {
+    fn moments_on_an_axis_move_to_the_parent() {
         for seed in 0..20 {
             let model = random_tree(seed, 8);
             for step in model.steps().iter().filter(|step| step.turns) {
                 assert_eq!((step.mass, step.first[2], step.second[5]), (0.0, 0.0, 0.0));
             }
-            // Without a sliding joint nothing is left that could fall.
+            // The remaining prismatic bodies carry all masses.
             let masses = model.steps().iter().filter(|step| !step.turns).map(|step| step.mass).sum::<f64>();
             let whole: f64 =
                 model.steps().iter().filter(|step| step.parent.is_none()).map(|step| step.subtree_mass).sum();

@@ -1,12 +1,12 @@
-//! What of a robot's geometry is zero, and within what: algorithms leave its products out.
+//! Structural zeros of a robot's geometry, which algorithms skip.
 
 use crate::spatial::Vec3;
 
-/// Axes are taken for parallel or at a right angle within this, rad: what rounding leaves of rotations by multiples of
-/// 90° that were written as roll, pitch and yaw. It moves no result by more than its own rounding.
-pub(crate) const EXACT: f64 = 1e-15;
+/// Tolerance of parallel and perpendicular axes, rad: rounding error of rotations by multiples of 90° written as roll,
+/// pitch and yaw. It changes results by less than their own rounding error.
+pub(crate) const PARALLEL_TOLERANCE_RAD: f64 = 1e-15;
 
-/// Where an origin stands in the parent's frame, by the entries that are not zero: what is zero needs no product.
+/// Nonzero entries of an origin in the parent's frame; products with zeros are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shift {
     /// At the parent's origin.
@@ -17,12 +17,12 @@ pub enum Shift {
     Y,
     /// On the z axis.
     Z,
-    /// Anywhere, or moving with the joint.
+    /// General, or moving with the joint.
     Any,
 }
 
 impl Shift {
-    /// Of an origin that does not move.
+    /// Shift of an origin that does not move.
     pub(crate) fn of(Vec3([x, y, z]): Vec3) -> Self {
         match (x != 0.0, y != 0.0, z != 0.0) {
             (false, false, false) => Self::None,

@@ -12,34 +12,33 @@ use crate::steps::{JointStep, steps};
 /// Standard gravity of the tools of this field (Pinocchio, MuJoCo, URDF simulators), m/s², along -z of the base.
 pub const STANDARD_GRAVITY: Vec3 = Vec3([0.0, 0.0, -9.81]);
 
-/// A link of the description that moves with a body: the body's own link, or one fixed to it.
+/// A link of the description that belongs to a body: the body's own link, or one fixed to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
-    /// Name in the description.
+    /// Name in the robot description.
     pub name: String,
     /// `body_from_link`.
     pub placement: Transform,
-    /// Inertial parameters in the **link's** frame; `None` when the description gives none (unknown, not zero).
+    /// Inertial parameters in the **link's** frame; `None` if the description has none (unknown, not zero).
     pub inertial: Option<InertialParameters>,
-    /// Shapes for collision checking in the **link's** frame; empty where the description gives none.
+    /// Shapes for collision checking in the **link's** frame; may be empty.
     pub collision: Vec<CollisionShape>,
 }
 
-/// A body: everything that moves with one joint, lumped.
+/// A rigid body: all links that move together with one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
-    /// The links that move with the joint; the first is the joint's own child link, at the identity.
+    /// Links of the body; the first is the joint's child link, at the identity.
     pub links: Vec<Link>,
 }
 
 impl Body {
-    /// Name of the joint's own child link.
+    /// Name of the joint's child link.
     pub fn name(&self) -> &str {
         &self.links[0].name
     }
 
-    /// Prior inertial parameters in the body frame: the sum over its links that have any. `None` when none has:
-    /// unknown.
+    /// Prior inertial parameters in the body frame: sum over the links with known inertial; `None` if no link has one.
     pub fn prior(&self) -> Option<InertialParameters> {
         self.links
             .iter()
@@ -48,19 +47,19 @@ impl Body {
     }
 }
 
-/// A robot on a fixed base: a tree of joints and bodies in an order where parents come before children.
+/// A robot on a fixed base: a tree of joints and bodies, parents before children.
 ///
-/// Body `i` hangs on joint `i` of the tree ([`tree_joints`](Model::tree_joints)). Most robots have one degree of
-/// freedom for each of these; where joints follow others ([`Joint::mimic`]) the **degrees of freedom**
-/// ([`joints`](Model::joints)) are those that move by themselves, and [`coupling`](Model::coupling) says how the tree
-/// follows them. Positions, velocities and torques are vectors over the degrees of freedom.
+/// Body `i` is moved by joint `i` of the tree ([`tree_joints`](Model::tree_joints)). Usually each tree joint is a
+/// degree of freedom. If some joints follow others ([`Joint::mimic`]), the **degrees of freedom**
+/// ([`joints`](Model::joints)) are the independent joints, and [`coupling`](Model::coupling) maps them to the tree.
+/// Positions, velocities and torques are vectors over the degrees of freedom.
 #[doc(alias("robot", "kinematic tree", "multibody"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     name: String,
     gravity: Vec3,
     tree: Vec<Joint>,
-    /// The degrees of freedom: `tree` without the joints that follow others.
+    /// Degrees of freedom: `tree` without mimic joints.
     joints: Vec<Joint>,
     coupling: Option<JointCoupling>,
     bodies: Vec<Body>,
@@ -71,7 +70,6 @@ pub struct Model {
     other_convention: Option<Box<OtherConvention>>,
 }
 
-/// What a D-H table is in the other convention.
 #[derive(Clone, Debug, PartialEq)]
 struct OtherConvention {
     convention: DhConvention,
@@ -79,11 +77,11 @@ struct OtherConvention {
 }
 
 impl Model {
-    /// A model from the joints of its tree and the bodies that hang on them. `base` holds the links that do not move.
+    /// Builds a model from the joints of its tree and their bodies. `base` contains the fixed links.
     ///
     /// # Errors
-    /// If counts differ, a name stands twice, a parent does not come before its child, an axis is not a unit vector,
-    /// joints follow each other in a circle, or a number is not finite.
+    /// Different counts, a repeated name, a parent after its child, an axis that is not a unit vector, a cycle of mimic
+    /// joints, or a number that is not finite.
     pub fn new(name: &str, base: Body, joints: Vec<Joint>, bodies: Vec<Body>) -> Result<Self, ModelError> {
         if joints.len() != bodies.len() {
             return Err(ModelError::Counts { joints: joints.len(), bodies: bodies.len() });
@@ -95,7 +93,7 @@ impl Model {
             if joint.parent.is_some_and(|parent| parent >= index) {
                 return Err(ModelError::ParentAfterChild { joint: joint.name.clone() });
             }
-            // 1e-9 is what normalising a vector in double precision leaves, with room.
+            // Tolerance well above the rounding error of a normalised vector.
             if (joint.axis.norm() - 1.0).abs().is_nan() || (joint.axis.norm() - 1.0).abs() > 1e-9 {
                 return Err(ModelError::AxisNotUnit { joint: joint.name.clone() });
             }
@@ -134,41 +132,40 @@ impl Model {
         &self.name
     }
 
-    /// Degrees of freedom: the length of every joint vector.
+    /// Degrees of freedom: length of every joint vector.
     pub fn dof(&self) -> usize {
         self.joints.len()
     }
 
-    /// The joints that move by themselves, parents first: the degrees of freedom.
+    /// The independent joints, parents first: the degrees of freedom.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
     }
 
-    /// All joints of the tree, parents first: body `i` hangs on joint `i`. The same as [`joints`](Model::joints) unless
-    /// some follow others.
+    /// All joints of the tree, parents first: joint `i` moves body `i`. The same as [`joints`](Model::joints) without
+    /// mimic joints.
     pub fn tree_joints(&self) -> &[Joint] {
         &self.tree
     }
 
-    /// How the joints of the tree follow the degrees of freedom; `None` where each is one.
+    /// Map from the degrees of freedom to the joints of the tree; `None` if they are the same.
     pub fn coupling(&self) -> Option<&JointCoupling> {
         self.coupling.as_ref()
     }
 
-    /// Place in the tree of a degree of freedom: the body that hangs on it.
+    /// Tree index of a degree of freedom, and of its body.
     pub fn body_of(&self, joint: usize) -> usize {
         self.coupling.as_ref().map_or(joint, |coupling| coupling.driving()[joint])
     }
 
-    /// The degrees of freedom that a joint of the tree moves with, and its velocity per velocity of each: its row of
-    /// `G`.
+    /// Degrees of freedom that move a joint of the tree, with the velocity ratios: its row of `G`.
     pub fn drivers(&self, tree_joint: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let itself = self.coupling.is_none().then_some((tree_joint, 1.0));
         let followed = self.coupling.iter().flat_map(move |coupling| coupling.row(tree_joint).iter().copied());
         itself.into_iter().chain(followed)
     }
 
-    /// The degree of freedom that a joint of the tree is; `None` where it follows others.
+    /// Degree of freedom of a tree joint; `None` for a mimic joint.
     pub fn joint_of(&self, tree_joint: usize) -> Option<usize> {
         match &self.coupling {
             Some(coupling) => coupling.driving().binary_search(&tree_joint).ok(),
@@ -176,7 +173,7 @@ impl Model {
         }
     }
 
-    /// The joints of the tree that follow others, with their places in it.
+    /// Mimic joints of the tree, with their tree indices.
     pub fn followers(&self) -> impl Iterator<Item = (usize, &Joint)> {
         self.tree.iter().enumerate().filter(|(place, _)| self.joint_of(*place).is_none())
     }
@@ -191,22 +188,22 @@ impl Model {
         10 * self.body_count()
     }
 
-    /// The joints' numbers, prepared for the algorithms; same order as [`tree_joints`](Model::tree_joints).
+    /// Precomputed numbers of the joints; same order as [`tree_joints`](Model::tree_joints).
     pub fn maps(&self) -> &[JointMap] {
         &self.maps
     }
 
-    /// Joints and bodies in the form that costs the dynamics least; same order as [`tree_joints`](Model::tree_joints).
+    /// Joints and bodies in the form with the least operations; same order as [`tree_joints`](Model::tree_joints).
     pub fn steps(&self) -> &[JointStep] {
         &self.steps
     }
 
-    /// The moving bodies; body `i` hangs on joint `i` of the tree.
+    /// The moving bodies; joint `i` of the tree moves body `i`.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
 
-    /// What does not move.
+    /// The fixed body.
     pub fn base(&self) -> &Body {
         &self.base
     }
@@ -216,13 +213,13 @@ impl Model {
         self.gravity
     }
 
-    /// Inertial parameters of the bodies in their frames, zero where [`Body::prior`] is unknown: what the dynamics
-    /// compute with.
+    /// Inertial parameters of the bodies in their frames, as used by the dynamics; zero where [`Body::prior`] is
+    /// unknown.
     pub fn inertials(&self) -> &[InertialParameters] {
         &self.inertials
     }
 
-    /// All inertial parameters, body after body: the vector `π` that the torque regressor multiplies.
+    /// All inertial parameters, body by body: the vector `π` that the torque regressor multiplies.
     pub fn parameter_vector(&self) -> Vec<f64> {
         self.inertials.iter().flat_map(|inertial| inertial.0).collect()
     }
@@ -237,7 +234,7 @@ impl Model {
         self.joints.iter().position(|joint| joint.name == name)
     }
 
-    /// True when body `body` moves with degree of freedom `joint`.
+    /// True if degree of freedom `joint` moves body `body`.
     pub fn moves(&self, joint: usize, body: usize) -> bool {
         let mut at = Some(body);
         while let Some(index) = at {
@@ -249,7 +246,7 @@ impl Model {
         false
     }
 
-    /// The joints of the tree from the base to body `body`, inclusive.
+    /// Joints of the tree from the base to body `body`, inclusive.
     pub fn path(&self, body: usize) -> Vec<usize> {
         let mut path = vec![body];
         while let Some(parent) = self.tree[path[path.len() - 1]].parent {
@@ -259,7 +256,7 @@ impl Model {
         path
     }
 
-    /// The same robot under another gravity (base frame, m/s²).
+    /// The same robot with another gravity (base frame, m/s²).
     ///
     /// # Errors
     /// If a component is not finite.
@@ -274,22 +271,20 @@ impl Model {
         Ok(self)
     }
 
-    /// The robot that a Denavit-Hartenberg table describes if it is meant in the other convention than the one that it
-    /// states, and that convention; none for other descriptions. Gravity and held joints are as here; every other
-    /// change of the model ends it.
+    /// The model of a Denavit-Hartenberg table read in the convention that it does not state, and that convention;
+    /// `None` for other descriptions. Gravity and locked joints are kept; any other change of the model removes it.
     pub fn other_convention(&self) -> Option<(DhConvention, &Self)> {
         self.other_convention.as_ref().map(|other| (other.convention, &other.model))
     }
 
-    /// The same robot, which `model` is in this other convention.
     pub(crate) fn with_other_convention(mut self, convention: DhConvention, model: Self) -> Self {
         self.other_convention = Some(Box::new(OtherConvention { convention, model }));
         self
     }
 
-    /// The same robot with these joints of the tree (numbers from 0, as in [`tree_joints`](Model::tree_joints))
-    /// `factor` times as far from the joint before each: `p → factor p` of the placement's translation, metres. So
-    /// links are longer, shorter, or mirrored. Bodies stay as they are in their own frames.
+    /// The same robot with the distance of these tree joints (indices as in [`tree_joints`](Model::tree_joints)) from
+    /// the previous joint multiplied by `factor`: `p → factor p` of the placement's translation, m. Links become
+    /// longer, shorter, or mirrored. Bodies keep their parameters in their frames.
     ///
     /// # Errors
     /// If a joint is not there or a number would not be finite.
@@ -305,8 +300,8 @@ impl Model {
         Self::new(&name, base, tree, bodies)?.with_gravity(gravity)
     }
 
-    /// The same robot mounted with its base turned by roll, pitch, yaw (radians, fixed axes) against the world: gravity
-    /// turns the other way in the base frame.
+    /// The same robot with its base rotated by roll, pitch, yaw (radians, fixed axes) relative to the world. Gravity in
+    /// the base frame rotates in the opposite direction.
     ///
     /// # Errors
     /// If an angle is not finite.
@@ -338,11 +333,11 @@ impl Model {
         Ok(model)
     }
 
-    /// The same robot without some links: one that is fixed to another is taken off it; with one that moves with a
-    /// joint goes everything that hangs on it.
+    /// The same robot without some links. A fixed link is removed alone; a link that moves with a joint is removed
+    /// together with all its descendants.
     ///
     /// # Errors
-    /// If a link is not there, or a joint would follow one that went.
+    /// An unknown link, or a mimic joint whose source would be removed.
     pub fn without_links(&self, links: &[String]) -> Result<Self, ModelError> {
         if links.is_empty() {
             return Ok(self.clone());
@@ -350,7 +345,7 @@ impl Model {
         if links.is_empty() {
             return Ok(self.clone());
         }
-        // The base keeps the link that all others hang on.
+        // The base keeps its first link, the root of all others.
         let all = || self.bodies.iter().flat_map(|body| &body.links).chain(self.base.links.iter().skip(1));
         if let Some(link) = links.iter().find(|name| all().all(|link| link.name != **name)) {
             let known = all().map(|link| link.name.clone()).collect();
@@ -359,7 +354,7 @@ impl Model {
         let is_kept = |link: &Link| !links.contains(&link.name);
         let mut base = self.base.clone();
         base.links.retain(is_kept);
-        // New index of each body that stays.
+        // New index of each remaining body.
         let mut stays: Vec<Option<usize>> = Vec::with_capacity(self.body_count());
         let (mut joints, mut bodies) = (Vec::new(), Vec::new());
         for (joint, body) in self.tree.iter().zip(&self.bodies) {
@@ -383,7 +378,7 @@ impl Model {
         Self::new(&self.name, base, joints, bodies)?.with_gravity(self.gravity)
     }
 
-    /// The same robot with every joint of the tree moving by itself, whatever the description says that it follows.
+    /// The same robot with all joints of the tree independent.
     #[must_use]
     pub fn without_followers(mut self) -> Self {
         for joint in &mut self.tree {
@@ -394,10 +389,10 @@ impl Model {
         self
     }
 
-    /// The same robot with another list of what its joints follow: `followers` names joints of the tree.
+    /// The same robot with other mimic laws: `followers` names joints of the tree.
     ///
     /// # Errors
-    /// If a name is unknown, joints follow each other in a circle, or a number is not finite.
+    /// An unknown name, a cycle of mimic joints, or a number that is not finite.
     pub fn with_followers(self, followers: &[(String, Mimic)]) -> Result<Self, ModelError> {
         if followers.is_empty() {
             return Ok(self);
@@ -419,8 +414,8 @@ impl Model {
         Self::new(&name, base, tree, bodies)?.with_gravity(gravity)
     }
 
-    /// The same robot with the named joints held at the given positions (rad or m): each one's body joins its parent's.
-    /// A joint that follows held joints alone is held as well.
+    /// The same robot with the named joints locked at the given positions (rad or m): their bodies are merged into the
+    /// parent bodies. A mimic joint whose sources are all locked is locked as well.
     ///
     /// # Errors
     /// If a name is unknown or given twice, or a position is not finite.
@@ -439,7 +434,7 @@ impl Model {
             }
         }
         let tree = self.following_the_rest(&mut position_of);
-        // Where each old body went: new body index (None: base) and new_from_old.
+        // New index of each old body (`None`: base), and `new_from_old`.
         let mut went: Vec<(Option<usize>, Transform)> = Vec::with_capacity(self.body_count());
         let (mut joints, mut bodies, mut base) = (Vec::new(), Vec::<Body>::new(), self.base.clone());
         for (index, joint) in tree.iter().enumerate() {
@@ -467,13 +462,13 @@ impl Model {
         })
     }
 
-    /// The joints of the tree once those with a position are held: what is followed and held becomes an offset, and a
-    /// follower with nothing left to follow is held too.
+    /// Joints of the tree after locking those with a position: locked sources become an offset, and a mimic joint
+    /// without a free source is locked as well.
     fn following_the_rest(&self, position_of: &mut [Option<f64>]) -> Vec<Joint> {
         let mut tree = self.tree.clone();
         let Some(coupling) = &self.coupling else { return tree };
         let place = |name: &str| self.tree.iter().position(|joint| joint.name == *name);
-        // A chain of followers is as long as the tree at most.
+        // A chain of mimic joints is at most as long as the tree.
         for _ in 0..tree.len() {
             for index in 0..tree.len() {
                 if coupling.driving().contains(&index) || position_of[index].is_some() {

@@ -1,7 +1,7 @@
-//! Whether a robot file needs the program `xacro`.
+//! Detection of xacro macros.
 
-/// Whether a text contains xacro macros. A declaration of the namespace alone, as expanded files often keep it, is no
-/// macro, and xacro leaves comments as they are.
+/// Whether a text contains xacro macros. A namespace declaration alone, which expanded files often keep, and comments
+/// are ignored.
 pub(crate) fn has_macros(text: &str) -> bool {
     if !text.contains("xmlns:xacro") {
         return false;

@@ -1,4 +1,5 @@
-//! What a sample costs: seven joints with 64 base parameters, the regressor and the update of the triangle apart.
+//! Measures the time per sample for seven joints with 64 base parameters: regressor and update of the triangle
+//! separately.
 //!
 //! ```text
 //! cargo run --release -p dynident-online --example cost_per_sample [SAMPLES]
@@ -26,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = load_robot(file)?.model;
     let coulomb = Some(CoulombShape::Smooth { width: 0.02 });
     let choice = DriveChoice { coulomb, viscous: true, offset: true, drive_inertia: true };
-    // Of the robot's parameters, as many as stand in the promise.
+    // Uses a model with exactly 64 base parameters, as promised in the documentation.
     let terms = terms_per_joint(&model, |_| choice);
     let robot = (0..terms.len())
         .rev()
@@ -85,7 +86,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Runs a task for samples in turn and prints what one took; the first tenth warms up.
+/// Runs a task for consecutive samples and prints the time per sample; the first tenth is a warm-up.
 fn measure(
     name: &str,
     samples: usize,

@@ -1,52 +1,55 @@
-//! What touches the robot, by what its model does not explain.
+//! Detection of contact from the residuals of the model.
 
 use crate::error::{OnlineError, check, check_positive};
 
-/// How contact is looked for.
+/// Settings of contact detection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactSettings {
-    /// Samples a second.
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
-    /// Time constant of the look for collisions, s.
+    /// Time constant of the collision detection, s.
     pub collision_s: f64,
-    /// Time constant of the look for what stays, a payload or a hand, s.
+    /// Time constant of the detection of persistent loads (a payload or a hand), s.
     pub payload_s: f64,
-    /// False alarms in an hour, all joints and both looks together.
+    /// Allowed false alarms per hour, for all joints and both time scales together.
     pub false_alarms_per_hour: f64,
+    /// Minimum duration of the calibration, in payload time constants; shorter ones give inaccurate thresholds.
+    pub min_calibration_ratio: f64,
 }
 
 impl ContactSettings {
-    /// 20 ms and 2 s, one false alarm in twenty hours.
+    /// Time constants of 20 ms and 2 s, one false alarm in twenty hours, calibration of at least ten time constants.
     pub fn new(rate_hz: f64) -> Self {
-        Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.05 }
+        Self { rate_hz, collision_s: 0.02, payload_s: 2.0, false_alarms_per_hour: 0.05, min_calibration_ratio: 10.0 }
     }
 
-    /// That the settings can be met.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// A number that is not positive.
+    /// A value that is not positive.
     pub fn validate(&self) -> Result<(), OnlineError> {
         check_positive("rate_hz", &[self.rate_hz])?;
         check_positive("collision_s", &[self.collision_s])?;
         check_positive("payload_s", &[self.payload_s])?;
-        check_positive("false_alarms_per_hour", &[self.false_alarms_per_hour])
+        check_positive("false_alarms_per_hour", &[self.false_alarms_per_hour])?;
+        check_positive("min_calibration_ratio", &[self.min_calibration_ratio])
     }
 }
 
-/// Residuals `τ − τ̂` of motion that nothing touched, on which the model was not fitted: one list for each joint, one
-/// value for each sample, Nm (N).
+/// Residuals `τ − τ̂` of an undisturbed motion that was not used for the fit: one list per joint, one value per sample,
+/// Nm (N).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Residuals {
-    /// The joints'.
+    /// Residuals by joint.
     pub joints: Vec<Vec<f64>>,
 }
 
-/// How a contact was seen.
+/// Time scale at which a contact was detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// Over the short time constant.
+    /// Short time constant.
     Collision,
-    /// Over the long one.
+    /// Long time constant.
     Payload,
 }
 
@@ -55,60 +58,60 @@ pub enum Look {
 pub struct Contact {
     /// The joint.
     pub joint: usize,
-    /// By which look.
+    /// Time scale of the detection.
     pub look: Look,
-    /// The residual's mean over the look's time constant, without what it is by itself, Nm (N).
+    /// Mean residual over the time constant, minus its level on undisturbed motion, Nm (N).
     pub residual_nm: f64,
-    /// What it would exceed by chance as often as was allowed, Nm (N).
+    /// Threshold for the allowed false-alarm rate, Nm (N).
     pub threshold_nm: f64,
 }
 
-/// Watches residuals for contact.
+/// Detects contact from residuals.
 ///
-/// Each joint's residual goes through two exponential means. On motion that nothing touched each mean has a standard
-/// deviation σ and crosses its own level upwards ν₀ times a second; a Gaussian process exceeds a height h upwards
-/// `ν₀ exp(−h²/2σ²)` times a second (Rice, Bell System Technical Journal 24 (1945) 46, 3.3), so that
+/// Each joint's residual is filtered by two exponential means. On undisturbed motion each mean has a standard deviation
+/// σ and crosses its level upwards ν₀ times per second. A Gaussian process crosses a height h upwards `ν₀ exp(−h²/2σ²)`
+/// times per second (Rice, Bell System Technical Journal 24 (1945) 46, 3.3), so that the threshold is
 ///
 /// ```text
 ///     h = k σ √(2 ln(2 · 3600 ν₀ / f)),
 /// ```
 ///
-/// with f the false alarms an hour that fall to this mean, has them on both sides together. Residuals have heavier
-/// tails than that: k is how far the largest mean seen stood beyond what Rice expects of the time that was seen, 1 at
-/// least.
+/// with f the allowed false alarms per hour of this mean, for both signs together. Residuals have heavier tails than
+/// Gaussian noise, so k ≥ 1 is the ratio of the largest observed mean to the one that Rice predicts for the observed
+/// time.
 #[derive(Clone, Debug)]
 pub struct ContactMonitor {
     settings: ContactSettings,
-    /// For each joint, by look: its level, its threshold.
+    /// Level and threshold of each joint, by time scale.
     levels: Vec<[f64; 2]>,
     thresholds: Vec<[f64; 2]>,
     means: Vec<[f64; 2]>,
 }
 
 impl ContactMonitor {
-    /// A monitor for joints with these residuals: half a minute at least, better the motion that will be watched.
+    /// A monitor calibrated with residuals of an undisturbed motion, preferably of the motion that will be monitored.
     ///
     /// # Errors
-    /// Settings that cannot be met; residuals that are too few, not numbers, or zero.
+    /// Invalid settings; residuals that are too short, not finite, or zero.
     pub fn new(settings: ContactSettings, calibration: &Residuals) -> Result<Self, OnlineError> {
         settings.validate()?;
-        let least = (10.0 * settings.payload_s * settings.rate_hz).ceil();
+        let least = (settings.min_calibration_ratio * settings.payload_s * settings.rate_hz).ceil();
         let joints = calibration.joints.len();
-        // Two looks at each joint share what is allowed.
+        // The allowed false alarms are divided among two time scales of each joint.
         let each = settings.false_alarms_per_hour / (2.0 * joints.max(1) as f64);
         let (mut levels, mut thresholds) = (Vec::new(), Vec::new());
         for residuals in &calibration.joints {
             check("residuals of a joint", residuals, residuals.len())?;
             if (residuals.len() as f64) < least {
-                let fix = "give at least ten times the longest time constant";
+                let fix = "give a longer recording (min_calibration_ratio payload time constants)";
                 return Err(OnlineError::Number {
                     what: "samples of the calibration",
                     value: residuals.len() as f64,
                     fix,
                 });
             }
-            let looks = [settings.collision_s, settings.payload_s];
-            let found = looks.map(|constant_s| Watched::new(residuals, constant_s, settings.rate_hz));
+            let time_constants = [settings.collision_s, settings.payload_s];
+            let found = time_constants.map(|constant_s| MeanStatistics::new(residuals, constant_s, settings.rate_hz));
             levels.push(found.map(|one| one.level));
             let heights = found.map(|one| one.threshold(settings.rate_hz, residuals.len(), each));
             if let Some(&value) = heights.iter().find(|height| !(**height > 0.0 && height.is_finite())) {
@@ -120,20 +123,20 @@ impl ContactMonitor {
         Ok(Self { means: levels.clone(), settings, levels, thresholds })
     }
 
-    /// A monitor by what a model says of itself: `std_nm`, the standard deviation of each joint's residual (half the
-    /// width of its 95 % band over 1.96), the time over which residuals forget themselves, and the cut-off `band_hz` of
-    /// the filter behind which they were measured, if there was one.
+    /// A monitor with thresholds from the accuracy of the model: `std_nm` is the standard deviation of each joint's
+    /// residual (half width of its 95 % band divided by 1.96), `correlation_s` the correlation time of the residual,
+    /// and `band_hz` the cut-off of the filter behind which it was measured, if any.
     ///
-    /// Noise with a correlation `exp(−t/τ)` through a mean of time constant T has the variance `σ² τ/(τ + T)` and
-    /// crosses its level upwards `ν₀ = 1/(2π √(τ T))` times a second (Rice, as above, of a spectrum of two poles). What
-    /// a model does not explain goes with the motion, so that τ is that of the motion, a second or so, and not that of
-    /// the sensors' noise: the longer, the higher the thresholds. A filter of cut-off B hides noise that a mean of less
-    /// than `1/(4 B)` lets through. If all of σ² were white it would be `σ² min(1/(4 T), rate/2)/B` in the mean, of
-    /// which samples cross their level `rate acos(e^(−1/(T rate)))/2π` times a second; whichever threshold is higher
-    /// holds. Where undisturbed motion can be recorded, thresholds by [`new`](Self::new) are better.
+    /// Noise with the correlation `exp(−t/τ)`, filtered by a mean of time constant T, has the variance `σ² τ/(τ + T)`
+    /// and crosses its level upwards `ν₀ = 1/(2π √(τ T))` times per second (Rice, as above, for a spectrum with two
+    /// poles). Model errors change with the motion, so τ is the time scale of the motion (about one second), not that
+    /// of the sensor noise; a larger τ gives higher thresholds. A filter of cut-off B removes noise that remains in a
+    /// mean with T below `1/(4 B)`. If all of σ² was white, it would be `σ² min(1/(4 T), rate/2)/B` in the mean, whose
+    /// samples cross their level `rate acos(e^(−1/(T rate)))/2π` times per second. The higher threshold is used. If
+    /// undisturbed motion can be recorded, thresholds from [`new`](Self::new) are more accurate.
     ///
     /// # Errors
-    /// Settings that cannot be met; deviations, a time or a cut-off that are not positive.
+    /// Invalid settings; deviations, a time or a cut-off that are not positive.
     pub fn from_band(
         settings: ContactSettings,
         std_nm: &[f64],
@@ -145,10 +148,11 @@ impl ContactMonitor {
         check_positive("std_nm", std_nm)?;
         check_positive("correlation_s", &[correlation_s])?;
         let each = settings.false_alarms_per_hour / (2.0 * std_nm.len().max(1) as f64);
-        let (looks, rate_hz) = ([settings.collision_s, settings.payload_s], settings.rate_hz);
+        let (time_constants, rate_hz) = ([settings.collision_s, settings.payload_s], settings.rate_hz);
         let of = |std: &f64| {
-            looks.map(|constant_s| {
-                let height = |share: f64, crossings_hz: f64| share.sqrt() * rice(2.0 * 3600.0 * crossings_hz / each);
+            time_constants.map(|constant_s| {
+                let height =
+                    |share: f64, crossings_hz: f64| share.sqrt() * rice_height(2.0 * 3600.0 * crossings_hz / each);
                 let slow = height(
                     correlation_s / (correlation_s + constant_s),
                     1.0 / (core::f64::consts::TAU * (correlation_s * constant_s).sqrt()),
@@ -165,19 +169,19 @@ impl ContactMonitor {
         Ok(Self { means: levels.clone(), thresholds: std_nm.iter().map(of).collect(), settings, levels })
     }
 
-    /// For each joint its thresholds, of collision and of payload, Nm (N).
+    /// Thresholds of each joint for collision and payload, Nm (N).
     pub fn thresholds_nm(&self) -> &[[f64; 2]] {
         &self.thresholds
     }
 
-    /// Takes the residuals of a sample, one for each joint; gives the contact that stands out most, if any. Allocates
-    /// nothing.
+    /// Processes the residuals of a sample, one per joint; returns the contact with the largest ratio to its threshold,
+    /// if any. Does not allocate.
     ///
     /// # Errors
-    /// Residuals of another number than the joints', or that are no numbers: nothing has changed then.
+    /// A different number of residuals, or a value that is not finite; the state is then unchanged.
     pub fn add(&mut self, residuals: &[f64]) -> Result<Option<Contact>, OnlineError> {
         check("residuals", residuals, self.means.len())?;
-        let gains = [self.settings.collision_s, self.settings.payload_s].map(|s| gain(s, self.settings.rate_hz));
+        let gains = [self.settings.collision_s, self.settings.payload_s].map(|s| mean_gain(s, self.settings.rate_hz));
         let (mut strongest, mut most) = (None, 1.0);
         for (joint, residual) in residuals.iter().enumerate() {
             for (place, look) in [Look::Collision, Look::Payload].into_iter().enumerate() {
@@ -193,37 +197,36 @@ impl ContactMonitor {
         Ok(strongest)
     }
 
-    /// Forgets what was seen: the next sample begins a motion.
+    /// Resets the means: the next sample starts a new motion.
     pub fn restart(&mut self) {
         self.means.clone_from(&self.levels);
     }
 }
 
-/// What a sample counts in an exponential mean.
-fn gain(constant_s: f64, rate_hz: f64) -> f64 {
+/// Weight of a new sample in an exponential mean.
+fn mean_gain(constant_s: f64, rate_hz: f64) -> f64 {
     1.0 - (-1.0 / (constant_s * rate_hz)).exp()
 }
 
-/// One mean on motion that nothing touched.
 #[derive(Clone, Copy)]
-struct Watched {
+struct MeanStatistics {
     level: f64,
     std: f64,
-    /// Upwards through the level, and the largest distance from it.
+    /// Number of upward crossings of the level, and largest distance from it.
     crossings: usize,
     largest: f64,
 }
 
-impl Watched {
+impl MeanStatistics {
     fn new(residuals: &[f64], constant_s: f64, rate_hz: f64) -> Self {
-        let gain = gain(constant_s, rate_hz);
-        // The first time constants hold the start.
+        let mean_gain = mean_gain(constant_s, rate_hz);
+        // The initial transient is skipped.
         let skipped = ((3.0 * constant_s * rate_hz) as usize).min(residuals.len() / 2);
         let mut mean = residuals.first().copied().unwrap_or(0.0);
         let means: Vec<f64> = residuals
             .iter()
             .map(|residual| {
-                mean += gain * (residual - mean);
+                mean += mean_gain * (residual - mean);
                 mean
             })
             .skip(skipped)
@@ -239,13 +242,13 @@ impl Watched {
     fn threshold(&self, rate_hz: f64, samples: usize, per_hour: f64) -> f64 {
         let seen_s = samples as f64 / rate_hz;
         let crossings_hz = self.crossings.max(1) as f64 / seen_s;
-        let expected = self.std * rice(2.0 * crossings_hz * seen_s);
+        let expected = self.std * rice_height(2.0 * crossings_hz * seen_s);
         let heavier = (self.largest / expected).max(1.0);
-        heavier * self.std * rice(2.0 * 3600.0 * crossings_hz / per_hour)
+        heavier * self.std * rice_height(2.0 * 3600.0 * crossings_hz / per_hour)
     }
 }
 
-/// The height, in standard deviations, that a Gaussian process exceeds once in so many crossings of its level.
-fn rice(crossings: f64) -> f64 {
+/// Height, in standard deviations, that a Gaussian process exceeds once per this number of level crossings.
+fn rice_height(crossings: f64) -> f64 {
     (2.0 * crossings.max(core::f64::consts::E).ln()).sqrt()
 }

@@ -1,49 +1,50 @@
-//! Velocities and accelerations of positions that come one by one.
+//! Velocities and accelerations from a stream of positions.
 
 use crate::error::{OnlineError, check, check_positive};
 
-/// Local polynomials through the newest samples: position, velocity and acceleration in the middle of a window, and
-/// what else was measured there.
+/// Local polynomials through the latest samples: position, velocity and acceleration in the middle of a window,
+/// together with the torques measured there.
 ///
-/// The window holds `2 m + 1` samples; the answer is `m` samples old, the price of a derivative without phase. With
-/// positions `q_i` at the times `i T`, i from −m to m, the cubic that fits them best has at i = 0
+/// The window contains `2 m + 1` samples, so the result has a delay of `m` samples but no phase error. For positions
+/// `q_i` at the times `i T`, i from −m to m, the least-squares cubic has at i = 0
 ///
 /// ```text
 ///     q̂ = Σ (3 m² + 3 m − 1 − 5 i²) q_i · 3 / ((2m−1)(2m+1)(2m+3)),
 ///     q̇ = Σ c_i q_i / T  (the slope of the cubic),       q̈ = Σ d_i q_i / T²
 /// ```
 ///
-/// (Savitzky and Golay, Analytical Chemistry 36 (1964) 1627; here by discrete orthogonal polynomials up to degree 3).
+///  (Savitzky and Golay, Analytical Chemistry 36 (1964) 1627; here by discrete orthogonal polynomials up to degree 3).
 #[derive(Clone, Debug)]
 pub struct DelayedDerivatives {
     joints: usize,
     half: usize,
-    /// Weights of position, velocity and acceleration over the window, the oldest first.
+    /// Weights of position, velocity and acceleration over the window, oldest first.
     weights: [Vec<f64>; 3],
-    /// Positions and torques of the window, one ring for both: sample `s` at `(s % window) * 2 * joints`.
+    /// Ring buffer of positions and torques: sample `s` starts at `(s % window) * 2 * joints`.
     ring: Vec<f64>,
     seen: usize,
     now: DelayedSample,
 }
 
-/// A sample in the middle of the window: one entry for each joint.
+/// A sample in the middle of the window, with one entry per joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DelayedSample {
-    /// Positions, smoothed, rad (m).
+    /// Smoothed positions, rad (m).
     pub q: Vec<f64>,
     /// Velocities, rad/s (m/s).
     pub dq: Vec<f64>,
     /// Accelerations, rad/s² (m/s²).
     pub ddq: Vec<f64>,
-    /// Torques as measured at that time, Nm (N).
+    /// Measured torques at that time, Nm (N).
     pub tau: Vec<f64>,
 }
 
 impl DelayedDerivatives {
-    /// For so many joints, sampled at `rate_hz`, over windows of `2 half + 1` samples; `half` is at least 2.
+    /// Derivatives for a number of joints, sampled at `rate_hz`, over windows of `2 half + 1` samples; `half` is at
+    /// least 2.
     ///
     /// # Errors
-    /// [`OnlineError::Number`] for a rate that is not positive, or a window that is too short.
+    /// [`OnlineError::Number`] for a rate that is not positive, or an invalid window.
     pub fn new(joints: usize, rate_hz: f64, half: usize) -> Result<Self, OnlineError> {
         check_positive("rate_hz", &[rate_hz])?;
         if !(2..=10_000).contains(&half) {
@@ -61,15 +62,15 @@ impl DelayedDerivatives {
         })
     }
 
-    /// By how many samples the answer is behind.
+    /// Delay of the result, in samples.
     pub fn delay_samples(&self) -> usize {
         self.half
     }
 
-    /// Takes the newest positions and torques; gives the sample in the middle of the window once it is full.
+    /// Adds the latest positions and torques; returns the sample in the middle of the window once it is full.
     ///
     /// # Errors
-    /// A vector of another length, or a number that is none: nothing has changed then.
+    /// A vector of a different length, or a value that is not finite; the state is then unchanged.
     pub fn add(&mut self, q: &[f64], tau: &[f64]) -> Result<Option<&DelayedSample>, OnlineError> {
         check("q", q, self.joints)?;
         check("tau", tau, self.joints)?;
@@ -96,18 +97,18 @@ impl DelayedDerivatives {
         Ok(Some(&self.now))
     }
 
-    /// Forgets all samples: the next one begins a recording.
+    /// Removes all samples: the next sample starts a new recording.
     pub fn restart(&mut self) {
         self.seen = 0;
     }
 }
 
-/// Weights over the window, the oldest sample first: of the value, the slope and the curvature of the best cubic.
+/// Weights over the window, oldest sample first: value, slope and curvature of the least-squares cubic.
 fn weights(half: usize, rate_hz: f64) -> [Vec<f64>; 3] {
     let places: Vec<f64> = (0..=2 * half).map(|i| i as f64 - half as f64).collect();
     let sum = |power: i32| places.iter().map(|i| i.powi(power)).sum::<f64>();
     let (s0, s2, s4, s6) = (sum(0), sum(2), sum(4), sum(6));
-    // Normal equations of 1, i, i², i³ fall apart into even and odd ones.
+    // The normal equations of 1, i, i², i³ decouple into even and odd ones.
     let even = s0 * s4 - s2 * s2;
     let odd = s2 * s6 - s4 * s4;
     [

@@ -1,76 +1,87 @@
-//! Whether the model that was loaded is still true of the robot.
+//! Detection of drift of the robot's parameters.
 
 use crate::error::{OnlineError, check, check_positive};
 use crate::estimator::{OnlineEstimator, StartingPoint};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-/// Checks from which on the statistic's size and scatter are known well enough.
-const LEAST_LEARNED: usize = 8;
-
-/// The confidence with which the statistic scatters no more than is reckoned.
-const CONFIDENCE: f64 = 0.95;
-
-/// How drift is looked for.
+/// Settings of drift detection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriftSettings {
-    /// Time from check to check, s: four half-lives of the estimator or more, so that checks are independent.
+    /// Time between checks, s; at least four half-lives of the estimator, so that checks are independent.
     pub check_s: f64,
-    /// False alarms in an hour.
+    /// Allowed false alarms per hour.
     pub false_alarms_per_hour: f64,
+    /// Minimum number of checks that determine mean and variance of the statistic; at least 2, default 8.
+    pub min_learned_checks: usize,
+    /// Confidence of the upper limit of the statistic's variance, between 0 and 1, default 0.95.
+    pub variance_confidence: f64,
 }
 
 impl DriftSettings {
     /// One false alarm in ten hours.
     pub fn new(check_s: f64) -> Self {
-        Self { check_s, false_alarms_per_hour: 0.1 }
+        Self { check_s, false_alarms_per_hour: 0.1, min_learned_checks: 8, variance_confidence: 0.95 }
     }
 
-    /// That the settings can be met.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// A number that is not positive, or more alarms than there are checks.
+    /// A value that is not positive, more allowed alarms than half of the checks, or a value outside its range.
     pub fn validate(&self) -> Result<(), OnlineError> {
         check_positive("check_s", &[self.check_s])?;
         check_positive("false_alarms_per_hour", &[self.false_alarms_per_hour])?;
-        if self.level() < 0.5 {
-            return Ok(());
+        let faults = [
+            (
+                self.level() < 0.5,
+                "false_alarms_per_hour",
+                self.false_alarms_per_hour,
+                "allow fewer than one in two checks",
+            ),
+            (self.min_learned_checks >= 2, "min_learned_checks", self.min_learned_checks as f64, "give at least 2"),
+            (
+                self.variance_confidence > 0.0 && self.variance_confidence < 1.0,
+                "variance_confidence",
+                self.variance_confidence,
+                "give a number between 0 and 1",
+            ),
+        ];
+        match faults.into_iter().find(|(is_valid, ..)| !is_valid) {
+            Some((_, what, value, fix)) => Err(OnlineError::Number { what, value, fix }),
+            None => Ok(()),
         }
-        let fix = "give less than one for every second check";
-        Err(OnlineError::Number { what: "false_alarms_per_hour", value: self.false_alarms_per_hour, fix })
     }
 
-    /// The share of checks that may alarm falsely.
+    /// Allowed share of checks with a false alarm.
     fn level(&self) -> f64 {
         self.false_alarms_per_hour * self.check_s / 3600.0
     }
 }
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriftAlarm {
-    /// How far the parameters are from the reference, in the metric of both covariances, over what is usual: about 1.
+    /// Distance between estimate and reference in the metric of both covariances, divided by its mean without drift.
     pub statistic: f64,
-    /// What it exceeds by chance as often as was allowed.
+    /// Threshold for the allowed false-alarm rate.
     pub threshold: f64,
-    /// The base parameter that alone would explain most of it.
+    /// The base parameter that alone explains the largest part of the distance.
     pub parameter: usize,
 }
 
-/// Compares a forgetting estimate with a reference.
+/// Compares an estimate with forgetting with a reference.
 ///
-/// With R and r the triangle of an [`OnlineEstimator`] that forgets, and θ₀ the reference with its covariance V₀,
-/// `d = r − R θ₀` has the covariance `C = I + R V₀ Rᵀ` if the reference is true and errors are as the estimator's
-/// settings say. The statistic is `T = dᵀ C⁻¹ d`: where the samples determine all parameters it is the distance between
-/// both estimates in the metric of the sum of their covariances, and what they do not determine adds nothing.
+/// With R and r the triangle of an [`OnlineEstimator`] with forgetting, and θ₀ the reference with its covariance V₀, `d
+/// = r − R θ₀` has the covariance `C = I + R V₀ Rᵀ` if the reference is correct and the errors are as in the
+/// estimator's settings. The statistic is `T = dᵀ C⁻¹ d`. If the samples determine all parameters, T is the distance
+/// between both estimates in the metric of the sum of their covariances; undetermined directions contribute nothing.
 ///
-/// Errors are neither white nor of the size that was thought, so T is measured where the model is true: from n checks,
-/// its mean m and variance v. As a sum of squares of Gaussian numbers of any correlation T is close to `m χ²_ν / ν`
-/// with `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check, its mean found
-/// from n others, follows `F(ν, n ν)`. For ν the least is taken that the scatter of n checks allows with 95 %. The
-/// threshold is the quantile of that F that is exceeded `f Δ` times, f the false alarms allowed in a time and Δ the
-/// time from check to check. Motions with other speeds or loads than those of learning have other errors: learn on
-/// what will be watched.
+/// Errors are neither white nor of the assumed size, so the distribution of T is learned from n checks without drift,
+/// with mean m and variance v. As a sum of squares of correlated Gaussian variables, T is approximately `m χ²_ν / ν`
+/// with `ν = 2 m²/v` (Satterthwaite, Biometrics Bulletin 2 (1946) 110), so that T/m of a later check follows `F(ν, n
+/// ν)`. ν is the lower limit at 95 % confidence from the scatter of n checks. The threshold is the quantile of that F
+/// that is exceeded with probability `f Δ`, with f the allowed false-alarm rate and Δ the time between checks. Errors
+/// depend on speed and load: learn with the motion that will be monitored.
 #[derive(Clone, Debug)]
 pub struct DriftMonitor {
     settings: DriftSettings,
@@ -79,10 +90,10 @@ pub struct DriftMonitor {
 }
 
 impl DriftMonitor {
-    /// A monitor for a reference, which has learned nothing.
+    /// A monitor for a reference, without learned checks.
     ///
     /// # Errors
-    /// Settings that cannot be met; a reference with numbers that are none, or a covariance of another size.
+    /// Invalid settings; a reference with values that are not finite, or a covariance of a different size.
     pub fn new(settings: DriftSettings, reference: StartingPoint) -> Result<Self, OnlineError> {
         settings.validate()?;
         let columns = reference.values.len();
@@ -91,21 +102,21 @@ impl DriftMonitor {
         Ok(Self { settings, reference, learned: Vec::new() })
     }
 
-    /// Checks that it has learned from.
+    /// Number of learned checks.
     pub fn learned(&self) -> usize {
         self.learned.len()
     }
 
-    /// Whether enough was learned to check: [`check`](Self::check) is none before.
+    /// Whether enough checks were learned; before that, [`check`](Self::check) returns `None`.
     pub fn is_ready(&self) -> bool {
-        self.learned.len() >= LEAST_LEARNED
+        self.learned.len() >= self.settings.min_learned_checks
     }
 
-    /// Learns from a time in which the reference is true of the robot; to be called as often as
-    /// [`check`](Self::check) will be, eight times at least and better thirty. Allocates.
+    /// Learns the statistic while the reference is correct. Call it at the same interval as [`check`](Self::check)
+    /// later, at least eight times, preferably thirty times. Allocates.
     ///
     /// # Errors
-    /// An estimator of another robot, or one that has seen nothing.
+    /// An estimator of a different robot, or one without samples.
     pub fn learn(&mut self, estimator: &OnlineEstimator) -> Result<(), OnlineError> {
         let (statistic, _) = self.distance(estimator)?;
         check_positive("the distance from the reference", &[statistic])?;
@@ -113,7 +124,7 @@ impl DriftMonitor {
         Ok(())
     }
 
-    /// What `T/m` may reach; none before enough was learned.
+    /// Threshold of `T/m`; `None` before enough checks were learned.
     pub fn threshold(&self) -> Option<f64> {
         if !self.is_ready() {
             return None;
@@ -121,15 +132,17 @@ impl DriftMonitor {
         let count = self.learned.len() as f64;
         let mean = self.learned.iter().sum::<f64>() / count;
         let squares: f64 = self.learned.iter().map(|one| (one / mean - 1.0).powi(2)).sum();
-        // The greatest variance that is likely to have scattered so little.
-        let variance = squares / ChiSquared::new(count - 1.0).ok()?.inverse_cdf(1.0 - CONFIDENCE);
+        // Upper limit of the variance.
+        let variance =
+            squares / ChiSquared::new(count - 1.0).ok()?.inverse_cdf(1.0 - self.settings.variance_confidence);
         let freedom = 2.0 / variance.max(f64::EPSILON);
         let tail = FisherSnedecor::new(freedom, count * freedom).ok()?;
         Some(tail.inverse_cdf(1.0 - self.settings.level()))
     }
 
-    /// How far the estimate is from the reference now; none before enough was learned. An alarm if its statistic is
-    /// above its threshold. Takes 2 n³ operations for n parameters and allocates: not for the loop that controls.
+    /// Distance between estimate and reference; `None` before enough checks were learned. See
+    /// [`DriftAlarm::is_raised`]. Needs 2 n³ operations for n parameters and allocates: do not call it in the control
+    /// loop.
     ///
     /// # Errors
     /// As [`learn`](Self::learn).
@@ -140,7 +153,7 @@ impl DriftMonitor {
         Ok(Some(DriftAlarm { statistic: distance / mean, threshold, parameter }))
     }
 
-    /// T, and the parameter that alone explains most of it.
+    /// T, and the parameter that alone explains the largest part of it.
     fn distance(&self, estimator: &OnlineEstimator) -> Result<(f64, usize), OnlineError> {
         let factor = estimator.information();
         let columns = self.reference.values.len();

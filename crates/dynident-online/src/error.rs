@@ -1,51 +1,31 @@
-//! What can be wrong with samples and settings.
+//! Errors of samples and settings.
 
 use dynident_estimation::EstimationError;
 use dynident_identification::consistent::ConsistencyError;
 use thiserror::Error;
 
-/// Why a sample or a setting cannot be used. A refused sample changes nothing.
+/// Why a sample or a setting is invalid. An invalid sample changes nothing.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum OnlineError {
-    /// A vector of another length.
     #[error("{what}: {found} entries where {expected} are needed")]
-    Length {
-        /// Which vector.
-        what: &'static str,
-        /// How many there should be.
-        expected: usize,
-        /// How many there are.
-        found: usize,
-    },
-    /// A number that cannot be used.
+    Length { what: &'static str, expected: usize, found: usize },
     #[error("{what} = {value}: {fix}")]
-    Number {
-        /// Which number.
-        what: &'static str,
-        /// The number.
-        value: f64,
-        /// What to give.
-        fix: &'static str,
-    },
-    /// A covariance that is none.
+    Number { what: &'static str, value: f64, fix: &'static str },
     #[error("the covariance of the start is not positive definite: give that of an identified model")]
     Covariance,
-    /// Friction that follows a temperature.
     #[error("joint {joint}: its friction follows its temperature, which samples do not have: identify without it")]
-    Temperature {
-        /// The joint.
-        joint: String,
-    },
-    /// No consistent parameters.
+    Temperature { joint: String },
+    /// No consistent parameters were found.
     #[error(transparent)]
     Consistency(#[from] ConsistencyError),
-    /// Rows that a factor refuses.
+    /// Rows that the factor rejects.
     #[error(transparent)]
     Rows(#[from] EstimationError),
 }
 
-/// That a vector has one finite number for each entry.
+/// Checks the length of a vector, and that its values are finite.
 pub(crate) fn check(what: &'static str, values: &[f64], expected: usize) -> Result<(), OnlineError> {
     if values.len() != expected {
         return Err(OnlineError::Length { what, expected, found: values.len() });
@@ -56,7 +36,6 @@ pub(crate) fn check(what: &'static str, values: &[f64], expected: usize) -> Resu
     }
 }
 
-/// That all numbers are positive and finite.
 pub(crate) fn check_positive(what: &'static str, values: &[f64]) -> Result<(), OnlineError> {
     match values.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
         Some(&value) => Err(OnlineError::Number { what, value, fix: "give a positive number" }),

@@ -1,4 +1,4 @@
-//! The estimate that a batch would give, after every sample.
+//! Recursive estimate that equals the batch estimate after every sample.
 
 use crate::error::{OnlineError, check, check_positive};
 use dynident_dynamics::{Panels, TermHistory, Workspace, regressor_panels_of_sample};
@@ -9,31 +9,31 @@ use dynident_identification::consistent::{ConsistencySettings, consistent_parame
 use dynident_model::terms::JointMotion;
 use nalgebra::{Cholesky, DMatrix};
 
-/// A weight above which all rows are scaled back: far from what squares to infinity.
-const LARGEST_GROWTH: f64 = 1e30;
+/// Weight above which all rows are rescaled, to prevent an overflow of its square.
+const MAX_GROWTH: f64 = 1e30;
 
-/// How samples count.
+/// Settings of the estimator: weights of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OnlineSettings {
-    /// Standard deviation of each joint's torque error, Nm (N): rows are divided by it.
+    /// Standard deviation of each joint's torque error, Nm (N); rows are divided by it.
     pub torque_std_nm: Vec<f64>,
-    /// Samples after which a sample counts half; none forgets nothing.
+    /// Number of samples after which the weight of a sample has halved; `None` disables forgetting.
     pub half_life_samples: Option<f64>,
-    /// Samples that tell as much as one with an independent error: residuals that are correlated in time say less than
-    /// their number. 1 for independent ones.
+    /// Number of samples with the information of one independent sample; above 1 for residuals that are correlated in
+    /// time.
     pub samples_per_independent: f64,
 }
 
 impl OnlineSettings {
-    /// Independent errors of these sizes, nothing forgotten.
+    /// Independent errors with these standard deviations, without forgetting.
     pub fn new(torque_std_nm: Vec<f64>) -> Self {
         Self { torque_std_nm, half_life_samples: None, samples_per_independent: 1.0 }
     }
 
-    /// That the settings can be met.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// What is wrong.
+    /// The first invalid value.
     pub fn validate(&self) -> Result<(), OnlineError> {
         check_positive("torque_std_nm", &self.torque_std_nm)?;
         check_positive("half_life_samples", self.half_life_samples.as_slice())?;
@@ -49,27 +49,27 @@ impl OnlineSettings {
     }
 }
 
-/// What is known before the first sample.
+/// Estimate before the first sample.
 #[derive(Clone, Debug)]
 pub struct StartingPoint {
     /// Base parameters.
     pub values: Vec<f64>,
-    /// Their covariance; zeros for what was held where it is.
+    /// Covariance of the base parameters; zero for fixed parameters.
     pub covariance: DMatrix<f64>,
 }
 
-/// A recursive estimate of base parameters in square-root form.
+/// Recursive estimate of base parameters in square-root form.
 ///
-/// Every sample gives one row `w_j/σ_j`, `τ_j/σ_j` for each joint, which goes into the triangle of all before
-/// (a [`RecursiveFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so that no number of samples makes
-/// the covariance indefinite, and without forgetting it is the batch estimate to rounding. Bierman, Factorization
-/// Methods for Discrete Sequential Estimation (1977), ch. IV.
+/// Every sample adds one row `w_j/σ_j`, `τ_j/σ_j` per joint to the triangle of all previous rows (a
+/// [`RecursiveFactor`]); the estimate solves `R θ = r`. Nothing is subtracted, so the covariance stays positive
+/// definite for any number of samples. Without forgetting the result is the batch estimate, up to rounding. Bierman,
+/// Factorization Methods for Discrete Sequential Estimation (1977), ch. IV.
 #[derive(Debug)]
 pub struct OnlineEstimator {
     model: RegressorModel,
     settings: OnlineSettings,
     factor: RecursiveFactor,
-    /// What new rows are multiplied by: old ones weigh less because new ones weigh more.
+    /// Factor of new rows: forgetting increases the weight of new rows instead of reducing that of old ones.
     growth: f64,
     growth_per_sample: f64,
     samples: u64,
@@ -79,13 +79,13 @@ pub struct OnlineEstimator {
 }
 
 impl OnlineEstimator {
-    /// An estimator for a robot (a [`ParametricModel`](dynident_dynamics::ParametricModel), or one with what
-    /// identification has added to it), from what is known of it; without a start the first samples alone say what it
-    /// is, and [`values`](Self::values) are none until they do.
+    /// An estimator for a robot (a [`ParametricModel`](dynident_dynamics::ParametricModel), or one extended by an
+    /// identification), from an initial estimate. Without `start`, [`values`](Self::values) returns false until the
+    /// samples determine the parameters.
     ///
     /// # Errors
-    /// Settings or a start that do not belong to the robot, a covariance that is none; friction that follows a
-    /// temperature, which samples do not have.
+    /// Settings or a start that do not match the robot, an invalid covariance, or temperature-dependent friction,
+    /// because samples have no temperature.
     pub fn new(
         model: impl Into<RegressorModel>,
         settings: OnlineSettings,
@@ -105,7 +105,7 @@ impl OnlineEstimator {
         let begins: Vec<usize> = (0..dof).map(first).collect();
         let mut factor = RecursiveFactor::new(columns, &begins);
         if let Some(start) = start {
-            // What is known counts as it says, however many samples tell as much as one.
+            // The weight of the start is independent of the samples per independent one.
             let rows = TriangularFactor::from_rows(columns, &starting_rows(start, columns)?, columns)?;
             factor.start_from(&rows.scaled(settings.samples_per_independent.sqrt())?)?;
         }
@@ -121,51 +121,50 @@ impl OnlineEstimator {
             settings,
             model,
         };
-        // What grows with the first sample has its size before it.
+        // Buffers that grow with the first sample are allocated before it.
         let rest = vec![0.0; dof];
-        made.see(&rest, &rest, &rest);
+        made.update_regressor(&rest, &rest, &rest);
         made.restart();
         Ok(made)
     }
 
-    /// The robot.
+    /// Model of the robot.
     pub fn model(&self) -> &RegressorModel {
         &self.model
     }
 
-    /// Samples so far.
+    /// Number of samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// The triangle of all rows, the start among them. With forgetting it is multiplied by a growing number,
-    /// which [`information`](Self::information) takes out.
+    /// Triangle of all rows including the start. With forgetting it is scaled by an increasing factor, which
+    /// [`information`](Self::information) removes.
     pub fn factor(&self) -> &RecursiveFactor {
         &self.factor
     }
 
-    /// How samples count.
+    /// Settings of the estimator.
     pub fn settings(&self) -> &OnlineSettings {
         &self.settings
     }
 
-    /// The regressor of a motion's next sample.
-    fn see(&mut self, q: &[f64], dq: &[f64], ddq: &[f64]) {
+    fn update_regressor(&mut self, q: &[f64], dq: &[f64], ddq: &[f64]) {
         let motion = JointMotion { samples: 1, q, dq, ddq };
         let (model, layout) = (self.model.model(), self.model.layout());
         regressor_panels_of_sample(model, &mut self.workspace, layout, &motion, &mut self.history, &mut self.panels);
     }
 
-    /// The next sample begins a motion: friction with memory starts at rest.
+    /// The next sample starts a new motion: friction with memory is reset.
     pub fn restart(&mut self) {
         self.history.restart();
     }
 
-    /// Torque of the last sample by base parameters `values`, for each joint in `out`, as the drive's log would have
-    /// it, Nm (N). Allocates nothing.
+    /// Torque of the last sample for the base parameters `values`, in `out`, in the unit of the drive's log, Nm (N).
+    /// Does not allocate.
     ///
     /// # Panics
-    /// If `values` has not one entry for each base parameter, or `out` for each joint.
+    /// If the length of `values` is not the number of base parameters, or that of `out` not the number of joints.
     pub fn torque(&self, values: &[f64], out: &mut [f64]) {
         let layout = self.model.layout();
         assert_eq!((values.len(), out.len()), (layout.columns().len(), self.model.dof()), "parameters and joints");
@@ -175,21 +174,20 @@ impl OnlineEstimator {
         }
     }
 
-    /// What logged torque of a joint is multiplied by.
     fn gain(&self, joint: usize) -> f64 {
         self.model.torque_gains.get(joint).copied().unwrap_or(1.0)
     }
 
-    /// Takes a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Allocates nothing.
+    /// Adds a sample: positions (rad, m), velocities, accelerations and measured torques (Nm, N). Does not allocate.
     ///
     /// # Errors
-    /// A vector of another length or a number that is none: nothing has changed then.
+    /// A vector of a different length or a value that is not finite; the state is then unchanged.
     pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<(), OnlineError> {
         let dof = self.model.dof();
         for (what, values) in [("q", q), ("dq", dq), ("ddq", ddq), ("tau", tau)] {
             check(what, values, dof)?;
         }
-        self.see(q, dq, ddq);
+        self.update_regressor(q, dq, ddq);
         let layout = self.model.layout();
         let columns = layout.columns().len();
         for (joint, (tau, std)) in tau.iter().zip(&self.settings.torque_std_nm).enumerate() {
@@ -203,23 +201,23 @@ impl OnlineEstimator {
         self.factor.absorb()?;
         self.samples += 1;
         self.growth *= self.growth_per_sample;
-        if self.growth > LARGEST_GROWTH {
+        if self.growth > MAX_GROWTH {
             self.factor.scale(1.0 / self.growth)?;
             self.growth = 1.0;
         }
         Ok(())
     }
 
-    /// The base parameters now, in `out`; false while the samples do not determine them.
+    /// Writes the current base parameters to `out`; returns false while the samples do not determine them.
     ///
     /// # Panics
-    /// If `out` has not one entry for each base parameter.
+    /// If the length of `out` is not the number of base parameters.
     pub fn values(&self, out: &mut [f64]) -> bool {
         self.factor.solve(out)
     }
 
-    /// Their covariance, `κ (RᵀR)⁻¹` of rows with unit variance, κ the samples per independent one; none while the
-    /// samples do not determine them. Allocates.
+    /// Covariance of the base parameters, `κ (RᵀR)⁻¹` with κ the samples per independent one; `None` while the samples
+    /// do not determine them. Allocates.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let triangle = self.information().regressor_triangle();
         let columns = triangle.ncols();
@@ -228,16 +226,16 @@ impl OnlineEstimator {
         covariance.iter().all(|value| value.is_finite()).then_some(covariance)
     }
 
-    /// `R/√κ` without what forgetting has multiplied it by: `(RᵀR)⁻¹` is the covariance. Allocates.
+    /// `R/√κ` without the factor of forgetting: `(RᵀR)⁻¹` is the covariance. Allocates.
     pub fn information(&self) -> TriangularFactor {
         let scale = self.growth_per_sample / self.growth / self.settings.samples_per_independent.sqrt();
-        // Both are positive and finite: growth is kept below a bound.
+        // Both are positive and finite, because growth is bounded.
         self.factor.to_triangular().scaled(scale).unwrap_or_else(|_| self.factor.to_triangular())
     }
 
-    /// The parameters of all bodies and terms that can be real and explain what was seen best, as
-    /// [`consistent_parameters`] finds them from the factors of logs; all joints' rows count as those of one, in units
-    /// of their noise. Takes milliseconds and allocates: not for the loop that controls.
+    /// The physically consistent parameters of all bodies and terms that fit the samples best, as
+    /// [`consistent_parameters`] computes them from the factors of logs; the rows of all joints are treated as those of
+    /// one, in units of their noise. Needs milliseconds and allocates: do not call it in the control loop.
     ///
     /// # Errors
     /// As [`consistent_parameters`].
@@ -255,15 +253,14 @@ impl OnlineEstimator {
     }
 }
 
-/// The rows that say what is known before: `L⁻¹ θ = L⁻¹ θ₀` with `V = L Lᵀ`.
+/// Rows of the initial estimate: `L⁻¹ θ = L⁻¹ θ₀` with `V = L Lᵀ`.
 fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, OnlineError> {
     check("values of the start", &start.values, columns)?;
     if start.covariance.shape() != (columns, columns) {
         let found = start.covariance.nrows();
         return Err(OnlineError::Length { what: "covariance of the start", expected: columns, found });
     }
-    // What an identification held where it was has no variance: it counts as known a thousand times better than the
-    // best of the others.
+    // Fixed parameters have no variance; they get a standard deviation of a thousandth of the smallest other one.
     let mut covariance = start.covariance.clone();
     let least = covariance.diagonal().iter().copied().filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
     for held in 0..columns {
@@ -275,17 +272,16 @@ fn starting_rows(start: &StartingPoint, columns: usize) -> Result<Vec<f64>, Onli
         Some(own) => {
             own.l().solve_lower_triangular(&DMatrix::identity(columns, columns)).ok_or(OnlineError::Covariance)?
         }
-        None => inverse_root(&covariance)?,
+        None => inverse_square_root(&covariance)?,
     };
     let right = &root * nalgebra::DVector::from_column_slice(&start.values);
     Ok(root.iter().chain(right.iter()).copied().collect())
 }
 
-/// `V^(-1/2)` of a covariance without full rank, as one from fewer segments than parameters is: what it does not know
-/// of a direction is no knowledge, and no direction counts as known better than a hundredth of the worst, in units of
-/// the parameters' own deviations.
-fn inverse_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
-    const LEAST_SHARE: f64 = 1e-4;
+/// `V^(-1/2)` of a rank-deficient covariance, such as from fewer segments than parameters. Small eigenvalues of the
+/// correlation matrix are raised to 1e-4 of the largest, so that unknown directions are not treated as exactly known.
+fn inverse_square_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> {
+    const MIN_EIGENVALUE_RATIO: f64 = 1e-4;
     let std = covariance.diagonal().map(f64::sqrt);
     if !std.iter().all(|value| *value > 0.0 && value.is_finite()) {
         return Err(OnlineError::Covariance);
@@ -293,10 +289,10 @@ fn inverse_root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, OnlineError> 
     let correlation = DMatrix::from_fn(std.len(), std.len(), |i, j| covariance[(i, j)] / (std[i] * std[j]));
     let eigen = correlation.symmetric_eigen();
     let largest = eigen.eigenvalues.max();
-    // Rounding of a rank that is not full, and no more.
+    // A negative eigenvalue is accepted only within rounding.
     if eigen.eigenvalues.min() < -1e-9 * largest {
         return Err(OnlineError::Covariance);
     }
-    let scale = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE * largest).sqrt());
+    let scale = eigen.eigenvalues.map(|value| value.max(MIN_EIGENVALUE_RATIO * largest).sqrt());
     Ok(DMatrix::from_fn(std.len(), std.len(), |i, j| eigen.eigenvectors[(j, i)] / (scale[i] * std[j])))
 }

@@ -1,16 +1,16 @@
-//! **Does the model still hold, now?** One sample at a time, without allocation: the parameters as the newest samples
-//! have them, what touches the robot, what it carries, and whether the model has drifted.
+//! Online monitoring of a robot, one sample at a time and without allocation: recursive estimates of the parameters,
+//! detection of contacts, payloads and drift.
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
-//! | all of it, by an identified model | [`Watch`] |
-//! | velocities and accelerations of positions that come one by one | [`DelayedDerivatives`] |
-//! | the estimate that a batch would give, after every sample | [`OnlineEstimator`] |
-//! | a collision, a payload, a hand on the arm | [`ContactMonitor`] |
-//! | whether the model is still true of the robot | [`DriftMonitor`] |
-//! | bodies and friction that can be real, now | [`OnlineEstimator::consistent`] |
+//! | complete monitoring with an identified model | [`Watch`] |
+//! | velocities and accelerations from a stream of positions | [`DelayedDerivatives`] |
+//! | recursive estimate, equal to the batch estimate | [`OnlineEstimator`] |
+//! | detection of collisions, payloads, and a hand on the arm | [`ContactMonitor`] |
+//! | detection of drift | [`DriftMonitor`] |
+//! | current physically consistent parameters | [`OnlineEstimator::consistent`] |
 //!
-//! Everything is for one robot, a [`ParametricModel`](dynident_dynamics::ParametricModel), and for samples at one rate.
+//! All types are for one robot, a [`ParametricModel`](dynident_dynamics::ParametricModel), and one sampling rate.
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! All of it around one robot: from what is measured to alarms.
+//! Complete monitoring of one robot, from measurements to alarms.
 
 use crate::contact::{Contact, ContactMonitor, ContactSettings, Residuals};
 use crate::derivatives::{DelayedDerivatives, DelayedSample};
@@ -7,29 +7,29 @@ use crate::error::{OnlineError, check_positive};
 use crate::estimator::{OnlineEstimator, OnlineSettings, StartingPoint};
 use dynident_identification::RegressorModel;
 
-/// Half-lives of the estimator from one check of drift to the next.
-const CHECK_HALF_LIVES: f64 = 4.0;
-
-/// How a robot is watched.
+/// Settings of the monitoring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchSettings {
-    /// How contact is looked for, and the rate of samples.
+    /// Contact detection, and sampling rate.
     pub contact: ContactSettings,
-    /// Half-life of samples in the estimate, s; none goes on with the reference for ever and looks for no drift.
+    /// Half-life of samples in the estimate, s; `None` disables forgetting and drift detection, and starts from the
+    /// reference.
     pub half_life_s: Option<f64>,
-    /// Time over which residuals forget themselves, s: see [`ContactMonitor::from_band`].
+    /// Correlation time of the residuals, s; see [`ContactMonitor::from_band`].
     pub correlation_s: f64,
-    /// Cut-off of the filter behind which the residuals' deviations were measured, Hz; none for samples as they come.
+    /// Cut-off of the filter behind which the residuals' deviations were measured, Hz; `None` without a filter.
     pub band_hz: Option<f64>,
-    /// Samples on each side of the one whose derivatives are taken: see [`DelayedDerivatives`].
+    /// Number of samples on each side of the derivative window; see [`DelayedDerivatives`].
     pub half_window: usize,
-    /// False alarms of drift in an hour.
+    /// Allowed false drift alarms per hour.
     pub drift_alarms_per_hour: f64,
+    /// Time between drift checks, in half-lives of the estimator; checks are nearly independent at the default of 4.
+    pub drift_check_half_lives: f64,
 }
 
 impl WatchSettings {
-    /// A half-life of 15 s, so that drift is looked for every minute; residuals that go with the motion, in a second;
-    /// windows of 21 samples; one false alarm of contact in twenty hours and one of drift in ten.
+    /// Half-life of 15 s with a drift check every minute, correlation time of 1 s, windows of 21 samples, one false
+    /// contact alarm in twenty hours and one false drift alarm in ten hours.
     pub fn new(rate_hz: f64) -> Self {
         Self {
             contact: ContactSettings::new(rate_hz),
@@ -38,11 +38,12 @@ impl WatchSettings {
             band_hz: None,
             half_window: 10,
             drift_alarms_per_hour: 0.1,
+            drift_check_half_lives: 4.0,
         }
     }
 }
 
-/// A robot under watch: its estimate, contact and drift, from samples that come one by one.
+/// Monitoring of a robot: estimate, contact and drift from a stream of samples.
 ///
 /// ```
 /// use dynident_dynamics::ParametricModel;
@@ -55,11 +56,11 @@ impl WatchSettings {
 /// let model = dynident_model::read_urdf(text)?.model;
 /// let friction = terms_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 /// let pendulum = ParametricModel::new(model, friction)?;
-/// // What an identification has found, with its covariance; the residual has 0.1 Nm.
+/// // An identified estimate with its covariance; the residual has a standard deviation of 0.1 Nm.
 /// let values = pendulum.nominal_base().unwrap().to_vec();
 /// let reference = StartingPoint { covariance: DMatrix::identity(4, 4) * 1e-4, values };
 /// let mut watch = Watch::new(pendulum, reference, &[0.1], &WatchSettings::new(500.0))?;
-/// // In the loop that controls: nothing is allocated. The pendulum hangs; a hand pushes with 2 Nm from 1 s on.
+/// // Control loop, without allocation. The pendulum hangs; a hand pushes with 2 Nm from 1 s on.
 /// let mut seen_s = None;
 /// for sample in 0..1000 {
 ///     let time_s = f64::from(sample) / 500.0;
@@ -86,12 +87,12 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// A watch by a model: `reference` its base parameters with their covariance, `std_nm` the standard deviation of
-    /// each joint's residual. Thresholds of contact are those of [`ContactMonitor::from_band`] until
+    /// Monitoring with a model: `reference` is the estimate of its base parameters with covariance, `std_nm` the
+    /// standard deviation of each joint's residual. Contact thresholds are those of [`ContactMonitor::from_band`] until
     /// [`calibrate`](Self::calibrate).
     ///
     /// # Errors
-    /// Settings that cannot be met, or a reference that is not the robot's.
+    /// Invalid settings, or a reference that does not match the robot.
     pub fn new(
         model: impl Into<RegressorModel>,
         reference: StartingPoint,
@@ -102,15 +103,16 @@ impl Watch {
         let contact =
             ContactMonitor::from_band(settings.contact.clone(), std_nm, settings.correlation_s, settings.band_hz)?;
         check_positive("half_life_s", settings.half_life_s.as_slice())?;
+        check_positive("drift_check_half_lives", &[settings.drift_check_half_lives])?;
         let online = OnlineSettings {
             half_life_samples: settings.half_life_s.map(|half| half * rate_hz),
-            // Of noise with a correlation of e^(-t/τ), or white up to the filter's cut-off.
+            // For noise with a correlation of e^(-t/τ), or white noise up to the filter's cut-off.
             samples_per_independent: (2.0 * settings.correlation_s * rate_hz)
                 .max(settings.band_hz.map_or(1.0, |band_hz| 0.5 * rate_hz / band_hz))
                 .max(1.0),
             ..OnlineSettings::new(std_nm.to_vec())
         };
-        // An estimate that forgets is compared with the reference, and must not hold it.
+        // An estimate with forgetting is compared with the reference, so it must be independent of it.
         let start = settings.half_life_s.is_none().then_some(&reference);
         let estimator = OnlineEstimator::new(model, online, start)?;
         let columns = estimator.factor().columns();
@@ -118,10 +120,11 @@ impl Watch {
             let found = reference.values.len();
             return Err(OnlineError::Length { what: "values of the reference", expected: columns, found });
         }
-        let check_s = settings.half_life_s.map(|half| CHECK_HALF_LIVES * half);
+        let check_s = settings.half_life_s.map(|half| settings.drift_check_half_lives * half);
         let values = reference.values.clone();
         let drift = |check_s| {
-            let settings = DriftSettings { check_s, false_alarms_per_hour: settings.drift_alarms_per_hour };
+            let false_alarms_per_hour = settings.drift_alarms_per_hour;
+            let settings = DriftSettings { false_alarms_per_hour, ..DriftSettings::new(check_s) };
             DriftMonitor::new(settings, reference)
         };
         let samples_to_check = check_s.map_or(u64::MAX, |check_s| (check_s * rate_hz).ceil() as u64);
@@ -129,7 +132,7 @@ impl Watch {
             derivatives: DelayedDerivatives::new(std_nm.len(), rate_hz, settings.half_window)?,
             residuals: vec![0.0; std_nm.len()],
             drift: check_s.map(drift).transpose()?,
-            // The first one would still hold the start.
+            // The first check would still depend on the start.
             next_check: samples_to_check.saturating_mul(2),
             contact_settings: settings.contact.clone(),
             reference: values,
@@ -139,34 +142,35 @@ impl Watch {
         })
     }
 
-    /// Takes a sample with its derivatives; gives the contact that stands out most, if any. Allocates nothing.
+    /// Adds a sample with its derivatives; returns the contact with the largest ratio to its threshold, if any. Does
+    /// not allocate.
     ///
     /// # Errors
-    /// As [`OnlineEstimator::add`]: nothing has changed then.
+    /// As [`OnlineEstimator::add`]; the state is then unchanged.
     pub fn add(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
         let Self { estimator, reference, residuals, contact, .. } = self;
-        look(estimator, reference, residuals, contact, [q, dq, ddq, tau])
+        add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
-    /// Takes positions and torques as they were measured; velocities and accelerations are those of
-    /// [`DelayedDerivatives`], and the answer is for the middle of their window. Allocates nothing.
+    /// Adds measured positions and torques. Velocities and accelerations come from [`DelayedDerivatives`], so the
+    /// result applies to the middle of their window. Does not allocate.
     ///
     /// # Errors
     /// As [`add`](Self::add).
     pub fn add_measured(&mut self, q: &[f64], tau: &[f64]) -> Result<Option<Contact>, OnlineError> {
         let Self { derivatives, estimator, reference, residuals, contact, .. } = self;
         let Some(DelayedSample { q, dq, ddq, tau }) = derivatives.add(q, tau)? else { return Ok(None) };
-        look(estimator, reference, residuals, contact, [q, dq, ddq, tau])
+        add_sample(estimator, reference, residuals, contact, [q, dq, ddq, tau])
     }
 
-    /// Whether it is time for [`check_drift`](Self::check_drift).
+    /// Whether [`check_drift`](Self::check_drift) is due.
     pub fn drift_is_due(&self) -> bool {
         self.drift.is_some() && self.estimator.samples() >= self.next_check
     }
 
-    /// Learns what is usual in the first eight checks, which hold that the reference is true of the robot, and compares
-    /// with it later. None before, and where it is not time. Takes a fraction of a millisecond for 64 parameters and
-    /// allocates: from another place than the loop that controls.
+    /// Learns the drift statistic in the first eight checks, assuming a correct reference, and compares with it later.
+    /// `None` while learning, and if no check is due. Needs a fraction of a millisecond for 64 parameters and
+    /// allocates: do not call it in the control loop.
     ///
     /// # Errors
     /// As [`DriftMonitor::check`].
@@ -183,10 +187,10 @@ impl Watch {
         Ok(None)
     }
 
-    /// Thresholds of contact by residuals of motion that nothing touched: see [`ContactMonitor::new`].
+    /// Sets the contact thresholds from residuals of undisturbed motion; see [`ContactMonitor::new`].
     ///
     /// # Errors
-    /// As [`ContactMonitor::new`], or residuals of other joints.
+    /// As [`ContactMonitor::new`], or residuals of a different number of joints.
     pub fn calibrate(&mut self, residuals: &Residuals) -> Result<(), OnlineError> {
         let (expected, found) = (self.residuals.len(), residuals.joints.len());
         if found != expected {
@@ -196,14 +200,14 @@ impl Watch {
         Ok(())
     }
 
-    /// The next sample begins a motion.
+    /// The next sample starts a new motion.
     pub fn restart(&mut self) {
         self.derivatives.restart();
         self.estimator.restart();
         self.contact.restart();
     }
 
-    /// The residual of the last sample, torque less what the reference explains, Nm (N).
+    /// Residual of the last sample: torque minus prediction by the reference, Nm (N).
     pub fn residuals_nm(&self) -> &[f64] {
         &self.residuals
     }
@@ -218,14 +222,14 @@ impl Watch {
         &self.contact
     }
 
-    /// By how many samples answers of [`add_measured`](Self::add_measured) are behind.
+    /// Delay of the results of [`add_measured`](Self::add_measured), in samples.
     pub fn delay_samples(&self) -> usize {
         self.derivatives.delay_samples()
     }
 }
 
-/// A sample for the estimate, and its residual by the reference for the monitor.
-fn look(
+/// Adds a sample to the estimator, and its residual to the contact monitor.
+fn add_sample(
     estimator: &mut OnlineEstimator,
     reference: &[f64],
     residuals: &mut [f64],

@@ -1,4 +1,4 @@
-//! What a control loop calls allocates nothing from its first sample on: counted by a global allocator.
+//! Functions for the control loop do not allocate, including the first sample: counted by a global allocator.
 
 #![allow(unsafe_code, reason = "a global allocator cannot be written without")]
 
@@ -14,13 +14,13 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 thread_local! {
-    /// Requests of this thread alone: the test harness has threads of its own.
+    /// Requests of this thread only, because the test harness has other threads.
     static REQUESTS: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
 
-// Sound: every request goes to the system's allocator as it came.
+// Safe: every request is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         REQUESTS.set(REQUESTS.get() + 1);
@@ -42,7 +42,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Memory requests of a call.
+/// Number of allocations of a call, and its result.
 fn requests<T>(call: impl FnOnce() -> T) -> (usize, T) {
     let before = REQUESTS.get();
     let result = call();
@@ -63,7 +63,7 @@ fn nothing_is_allocated_from_the_first_sample_on() {
     let (dof, columns) = (robot.dof(), robot.layout().columns().len());
     let mut random = Random::new(1);
     let mut draw = |count: usize| -> Vec<f64> { (0..count).map(|_| random.uniform(-1.0, 1.0)).collect() };
-    // A short half-life: the scaling back of all rows is among the samples.
+    // With a short half-life the samples include a rescaling of all rows.
     let settings = OnlineSettings { half_life_samples: Some(2.0), ..OnlineSettings::new(vec![1.0; dof]) };
     let mut estimator = OnlineEstimator::new(robot, settings, None).unwrap();
     let mut derivatives = DelayedDerivatives::new(dof, 1000.0, 10).unwrap();
@@ -83,7 +83,7 @@ fn nothing_is_allocated_from_the_first_sample_on() {
         assert_eq!(requested, 0, "sample {sample}");
     }
     assert!(determined > 900, "{determined}");
-    // Nor by what is refused.
+    // Rejected samples do not allocate either.
     let bad = vec![f64::NAN; dof];
     assert_eq!(requests(|| estimator.add(&bad, &bad, &bad, &bad).is_err()), (0, true));
 }

@@ -1,24 +1,24 @@
-//! Folders: listed and removed with errors instead of panics. The standard library's `read_dir`, and with it
-//! `remove_dir_all`, panics if the system cannot close a folder (a network drive that is gone, a broken disk).
+//! Lists and removes folders with errors instead of panics. The standard library's `read_dir`, and thereby
+//! `remove_dir_all`, panics if the system cannot close a folder (missing network drive, broken disk).
 
 use std::ffi::OsString;
 use std::io;
 use std::path::Path;
 
-/// The names in a folder, in order.
+/// Names in a folder, sorted.
 ///
 /// # Errors
-/// The system's reason.
+/// Error of the operating system.
 pub fn names(folder: &Path) -> io::Result<Vec<OsString>> {
     let mut names = system::names(folder)?;
     names.sort();
     Ok(names)
 }
 
-/// Removes a folder with everything in it. Symbolic links are removed, never followed.
+/// Removes a folder with all its contents. Symbolic links are removed, never followed.
 ///
 /// # Errors
-/// The system's reason; a part may then have been removed.
+/// Error of the operating system; a part may then have been removed.
 pub fn remove_folder(folder: &Path) -> io::Result<()> {
     system::remove_folder(folder)
 }
@@ -60,7 +60,7 @@ mod system {
         for inside in names_in(folder.try_clone()?)? {
             match unlinkat(folder.as_fd(), &inside, AtFlags::empty()) {
                 Ok(()) => {}
-                // Linux answers EISDIR for a folder, POSIX EPERM.
+                // Linux returns EISDIR for a folder, POSIX EPERM.
                 Err(Errno::ISDIR | Errno::PERM) => remove_folder_at(folder.as_fd(), &inside)?,
                 Err(error) => return Err(error.into()),
             }

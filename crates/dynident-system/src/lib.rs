@@ -1,6 +1,6 @@
-//! **What has the operating system to do?** Programs, folders and files, for all other crates of Dynident.
+//! Access to the operating system for all crates of Dynident: programs, folders and files.
 //!
-//! | task | take |
+//! | task | use |
 //! | --- | --- |
 //! | decide which programs may be started | [`ProgramPermission`], [`ProgramRequest`] |
 //! | start a permitted program and stop it with all the processes that it starts | [`ProcessGroup`] |

@@ -1,4 +1,4 @@
-//! Folders that are removed when they are no longer needed, also after a writer was killed.
+//! Folders that are removed after use, even if a program was killed.
 
 use crate::folder::{names, remove_folder};
 use std::fs::{self, File};
@@ -6,28 +6,25 @@ use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::Builder;
 
-/// What the name of a folder in the system's temporary folder begins with.
 const PREFIX: &str = ".dynident-temporary-";
-/// Random characters at the end of the name.
 const RANDOM_CHARACTERS: usize = 6;
-/// Attempts to create a folder that no other program takes for an abandoned one.
+/// Maximum number of attempts to create a folder that no other program treats as abandoned.
 const ATTEMPTS: usize = 100;
 
-/// A folder that is removed with everything in it when this value is dropped. Unlike that of `tempfile`, removing it
-/// never panics.
+/// A folder that is removed with all its contents on drop. Unlike in `tempfile`, removing it never panics.
 #[derive(Debug)]
 pub struct TemporaryFolder {
     path: PathBuf,
     is_kept: bool,
-    /// Locked as long as it is open: nobody takes the folder for an abandoned one.
+    /// Locked while open, so that no other program treats the folder as abandoned.
     _lock: Option<File>,
 }
 
 impl TemporaryFolder {
-    /// A folder in the system's temporary folder. Folders that killed programs left there are removed.
+    /// Creates a folder in the system's temporary folder, and removes folders that killed programs left there.
     ///
     /// # Errors
-    /// The system's reason.
+    /// Error of the operating system.
     pub fn new() -> io::Result<Self> {
         Self::locked_in(&std::env::temp_dir())
     }
@@ -37,8 +34,7 @@ impl TemporaryFolder {
         for _ in 0..ATTEMPTS {
             let path = created(parent, PREFIX, 0o700)?;
             let lock = File::open(&path).ok();
-            // Another program may have found it before it was locked, and removed it. Where the system has no locks,
-            // nobody removes it.
+            // Another program may have removed it before it was locked. On systems without locks nobody removes it.
             let _ = lock.as_ref().map(File::lock);
             if path.exists() {
                 return Ok(Self { path, is_kept: false, _lock: lock });
@@ -47,28 +43,28 @@ impl TemporaryFolder {
         Err(io::Error::new(io::ErrorKind::WouldBlock, "other programs keep removing the temporary folder"))
     }
 
-    /// A folder in `parent` whose name begins with `prefix`. It is private to its owner.
+    /// Creates a folder in `parent` with a name that begins with `prefix`. Only its owner can access it.
     ///
     /// # Errors
-    /// The system's reason.
+    /// Error of the operating system.
     pub fn create_in(parent: &Path, prefix: &str) -> io::Result<Self> {
         Ok(Self { path: created(parent, prefix, 0o700)?, is_kept: false, _lock: None })
     }
 
-    /// As [`create_in`](Self::create_in), accessible to all users whom the user's mask lets in.
+    /// As [`create_in`](Self::create_in), with the access rights of the user's mask.
     ///
     /// # Errors
-    /// The system's reason.
+    /// Error of the operating system.
     pub fn create_open_in(parent: &Path, prefix: &str) -> io::Result<Self> {
         Ok(Self { path: created(parent, prefix, 0o777)?, is_kept: false, _lock: None })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where it is; it is not removed any more.
+    /// Path of the folder, which is then not removed on drop.
     pub fn keep(mut self) -> PathBuf {
         self.is_kept = true;
         self.path.clone()
@@ -78,13 +74,13 @@ impl TemporaryFolder {
 impl Drop for TemporaryFolder {
     fn drop(&mut self) {
         if !self.is_kept {
-            // What cannot be removed now, the next program removes.
+            // The next program removes the remaining parts.
             let _ = remove_folder(&self.path);
         }
     }
 }
 
-/// A new folder with a mode, from which the user's mask is taken.
+/// A new folder with an access mode, reduced by the user's mask.
 #[cfg_attr(not(unix), allow(unused_variables, reason = "other systems have no such mode"))]
 fn created(parent: &Path, prefix: &str, mode: u32) -> io::Result<PathBuf> {
     let mut builder = Builder::new();
@@ -97,7 +93,7 @@ fn created(parent: &Path, prefix: &str, mode: u32) -> io::Result<PathBuf> {
     Ok(builder.tempdir_in(parent)?.keep())
 }
 
-/// Removes the temporary folders in `parent` whose programs have ended. What cannot be removed stays.
+/// Removes the temporary folders of ended programs in `parent`. Errors are ignored.
 fn remove_abandoned(parent: &Path) {
     for name in names(parent).unwrap_or_default() {
         let is_temporary = name.to_str().and_then(|name| name.strip_prefix(PREFIX)).is_some_and(|random| {

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all, and the temporary files of writers that were killed.
+//! Files that appear complete or not at all, and cleanup of temporary files of killed writers.
 
 use crate::folder::names;
 use std::ffi::OsStr;
@@ -7,22 +7,22 @@ use std::io::{self, Write};
 use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
-/// What follows the name of the file in the name of its temporary file: `.model.json.dynident-a1b2c3`.
+/// Separator between file name and random part in the name of a temporary file: `.model.json.dynident-a1b2c3`.
 const MARK: &str = ".dynident-";
-/// Random characters at the end of the name of a temporary file.
+/// Number of random characters at the end of the name of a temporary file.
 const RANDOM_CHARACTERS: usize = 6;
-/// Largest part of the file's name in that of its temporary file, bytes: both must fit into the 255 of a file system.
+/// Maximum length of the file's name in that of its temporary file, bytes; file systems allow 255 for both.
 const MAX_NAME_BYTES: usize = 200;
-/// Attempts to create a temporary file that no other writer takes for an abandoned one.
+/// Maximum number of attempts to create a temporary file that no other writer treats as abandoned.
 const ATTEMPTS: usize = 100;
 
-/// Writes a file through a temporary file in the same folder. A reader finds the old file or the new one, never a part,
-/// and an error changes nothing. A symbolic link is replaced by the file. Temporary files of this file that writers
-/// left when they were killed are removed; those of running writers are locked and stay.
+/// Writes a file through a temporary file in the same folder. A reader finds the old or the new file, never a part, and
+/// an error changes nothing. A symbolic link is replaced by the file. Temporary files that killed writers left for this
+/// file are removed; those of running writers are locked and stay.
 ///
 /// # Errors
-/// The system's reason, and [`io::ErrorKind::InvalidInput`] for a device, a pipe or a socket, which the file would
-/// replace: a superuser would lose `/dev/null` or `/dev/stdout`.
+/// Error of the operating system, and [`io::ErrorKind::InvalidInput`] for a device, a pipe or a socket, which the file
+/// would replace: a superuser would lose `/dev/null` or `/dev/stdout`.
 pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
     if is_special(path) {
         let problem = "it is a device, a pipe or a socket, which would be replaced: give the name of a regular file";
@@ -45,36 +45,35 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
 }
 
 /// Whether a path leads to a device, a pipe or a socket, or through a link to an open file of this process:
-/// `/dev/stdout` is a link into `/proc`, also where standard output is a regular file.
+/// `/dev/stdout` is a link into `/proc`, even if standard output is a regular file.
 fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
         || fs::read_link(path).is_ok_and(|target| target.starts_with("/proc"))
 }
 
-/// Tests whether a file can be created in `folder`, or in the nearest folder above it that exists. Leaves nothing.
+/// Tests whether a file can be created in `folder`, or in its nearest existing parent. Creates no permanent file.
 ///
 /// # Errors
-/// The system's reason.
+/// Error of the operating system.
 pub fn check_writable(folder: &Path) -> io::Result<()> {
     let nearest = folder.ancestors().find(|ancestor| ancestor.exists() || ancestor.as_os_str().is_empty());
     let nearest = nearest.filter(|ancestor| !ancestor.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // On Linux a file without a name, of which a kill leaves nothing.
+    // On Linux an unnamed file, which disappears even if the program is killed.
     tempfile::tempfile_in(nearest).map(drop)
 }
 
-/// What the names of a file's temporary files begin with.
+/// Prefix of the temporary files of a file.
 fn temporary_prefix(name: &OsStr) -> String {
     let name = name.to_string_lossy();
     let end = (0..=name.len().min(MAX_NAME_BYTES)).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
     format!(".{}{MARK}", &name[..end])
 }
 
-/// A new temporary file, locked as long as it is open.
+/// A new temporary file, locked while open.
 fn created(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
     for _ in 0..ATTEMPTS {
         let file = Builder::new().prefix(prefix).rand_bytes(RANDOM_CHARACTERS).tempfile_in(folder)?;
-        // Another writer may have found it before it was locked, and removed it. Where the system has no locks, nobody
-        // removes it.
+        // Another writer may have removed it before it was locked. On systems without locks nobody removes it.
         let _ = file.as_file().lock();
         if file.path().exists() {
             return Ok(file);
@@ -83,7 +82,7 @@ fn created(folder: &Path, prefix: &str) -> io::Result<NamedTempFile> {
     Err(io::Error::new(io::ErrorKind::WouldBlock, "other writers keep removing the temporary file"))
 }
 
-/// Removes temporary files whose writers have ended. What cannot be removed stays.
+/// Removes temporary files of ended writers. Errors are ignored.
 fn remove_abandoned(folder: &Path, prefix: &str) {
     for name in names(folder).unwrap_or_default() {
         let is_temporary = name.to_str().and_then(|name| name.strip_prefix(prefix)).is_some_and(|random| {
@@ -91,7 +90,7 @@ fn remove_abandoned(folder: &Path, prefix: &str) {
         });
         let path = folder.join(&name);
         if is_temporary && fs::symlink_metadata(&path).is_ok_and(|found| found.is_file()) {
-            // Its writer holds the lock until it ends.
+            // A running writer holds the lock.
             if let Ok(file) = File::open(&path)
                 && file.try_lock().is_ok()
             {

@@ -1,15 +1,14 @@
-//! C99 in one header: functions of fixed size, no allocation, nothing but math.h.
+//! C99 in one header: functions of fixed size, no allocation, only math.h.
 
 use super::{Source, unused};
 use crate::graph::{Function, Function2, Input, Node};
 use crate::statements::Syntax;
 use core::fmt::Write;
 
-/// Expressions of C; those of C++ differ in the namespace of functions.
+/// Syntax of C expressions; C++ adds a namespace.
 pub(super) struct CSyntax {
     /// `std::` in C++.
     pub(super) functions: &'static str,
-    /// Name of the step function.
     pub(super) step: String,
 }
 

@@ -1,4 +1,4 @@
-//! C++17 in one header: the functions of C in a namespace, over `std::array`.
+//! C++17 in one header: the functions in a namespace, over `std::array`.
 
 use super::c::CSyntax;
 use super::{Source, unused};

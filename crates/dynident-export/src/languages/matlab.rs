@@ -1,4 +1,5 @@
-//! A function file for MATLAB and Octave: the first argument names the quantity, for a file shows one function only.
+//! A function file for MATLAB and Octave. The first argument is the name of the quantity, because a file exposes only
+//! one function.
 
 use super::Source;
 use crate::graph::{Function, Function2, Input, Node};
@@ -34,7 +35,8 @@ impl Syntax for MatlabSyntax {
     }
 }
 
-/// A file `NAME_dynamics.m`: `tau = NAME_dynamics('inverse_dynamics', q, dq, ddq)` and so on; column vectors come back.
+/// A file `NAME_dynamics.m`: `tau = NAME_dynamics('inverse_dynamics', q, dq, ddq)` and so on; results are column
+/// vectors.
 pub(crate) fn matlab_function(source: &Source<'_>) -> String {
     let (name, dof) = (format!("{}_dynamics", source.robot.identifier()), source.dof());
     let functions = &source.equations.functions;

@@ -1,4 +1,4 @@
-//! One file for each language: how it writes expressions, and what it writes around them.
+//! One file per language: syntax of expressions and surrounding code.
 
 mod c;
 mod cpp;
@@ -17,11 +17,9 @@ use crate::graph::Input;
 use crate::robot_model::RobotModel;
 use crate::statements::{Statements, Syntax, statements};
 
-/// What a language writes, with its own names around it.
 pub(crate) struct Source<'a> {
     pub(crate) robot: &'a RobotModel,
     pub(crate) equations: &'a Equations,
-    /// Lines of the comment at its head.
     pub(crate) notes: &'a [String],
 }
 
@@ -30,7 +28,6 @@ impl Source<'_> {
         self.equations.dof
     }
 
-    /// The statements of a function.
     fn statements(&self, function: &Equation, syntax: &dyn Syntax) -> Statements {
         statements(&self.equations.graph, &function.values, syntax)
     }
@@ -51,7 +48,6 @@ impl Source<'_> {
     }
 }
 
-/// The inputs of a function that its statements do not use.
 fn unused<'a>(function: &'a Equation, statements: &'a Statements) -> impl Iterator<Item = &'static str> + 'a {
     function.inputs.iter().filter(|input| !statements.used.contains(input)).map(|input| Input::name(*input))
 }

@@ -1,4 +1,4 @@
-//! Python with NumPy: one state or many at once, the last axis being joints.
+//! Python with NumPy: one state or arrays of states, with joints on the last axis.
 
 use super::Source;
 use crate::graph::{Function, Function2, Input, Node};
@@ -40,7 +40,6 @@ impl Syntax for PythonSyntax {
     }
 }
 
-/// A module of functions.
 pub(crate) fn python_module(source: &Source<'_>) -> String {
     let dof = source.dof();
     let mut text = source.comment("#");

@@ -1,4 +1,4 @@
-//! Rust without `std` and without dependencies: `core` has no sine, so who calls says where sines come from.
+//! Rust without `std` and without dependencies. `core` has no sine, so the caller provides elementary functions.
 
 use super::{Source, unused};
 use crate::graph::{Function, Function2, Input, Node};
@@ -14,7 +14,7 @@ impl Syntax for RustSyntax {
 
     fn call(&self, function: Function, of: &str) -> String {
         match function {
-            // The only one that `core` has.
+            // The only function in `core`.
             Function::Abs => format!("({of}).abs()"),
             Function::Ln => format!("M::ln({of})"),
             other => format!("M::{}({of})", other.name()),
@@ -38,7 +38,7 @@ impl Syntax for RustSyntax {
     }
 }
 
-/// A module of functions over a trait `Math` with the elementary functions that this robot needs.
+/// A module of functions over a trait `Math` with the required elementary functions.
 pub(crate) fn rust_module(source: &Source<'_>) -> String {
     let dof = source.dof();
     let graph = &source.equations.graph;

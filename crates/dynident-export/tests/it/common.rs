@@ -1,5 +1,5 @@
-//! Robots with every term that can be written, states, and the torque by the numeric algorithms: regressor columns of
-//! the terms and the dynamics core over `f64`, which share no code with the graph's printing.
+//! Robots with every exportable term, states, and the torque by numeric algorithms (regressor columns of the terms and
+//! the dynamics over `f64`), which are independent of the graph.
 
 use dynident_dynamics::{Workspace, forward_dynamics, gravity_torque, inverse_dynamics, mass_matrix};
 use dynident_export::RobotModel;
@@ -13,20 +13,21 @@ use dynident_model::{Model, Vec3, load_robot, read_urdf};
 use dynident_testing::repository;
 use std::process::Command;
 
-/// States of every comparison.
+/// Number of states in a comparison.
 pub(crate) const STATES: usize = 1000;
 
-/// Torques agree to this share of the largest of a state: rounding of some thousand operations on a condition of ten.
+/// Tolerance relative to the largest torque of a state: rounding of some thousand operations at a condition number of
+/// ten.
 pub(crate) const TOLERANCE: f64 = 1e-12;
 
-/// A robot of the collection, hung askew, with one term of every kind that can be written.
+/// A robot of the collection with a tilted base and one term of every exportable kind.
 pub(crate) fn all_terms(name: &str) -> RobotModel {
     let model = load_robot(repository("robots").join(name)).unwrap().model;
     let model = model.with_gravity(Vec3([1.0, -3.0, -9.0])).unwrap();
     with_all_terms(model)
 }
 
-/// An expression with every function and operation, defined at all states and inside all limits.
+/// An expression with every function and operation, defined in all states and within all limits.
 const ALL_FUNCTIONS: &str = "atan2(sin(q), 2 + cos(q2)) * sqrt(1 + q^2) + min(q, 0.5) * max(dq, -0.3)^3 + exp(-q^2) \
     + ln(8 + q) + asin(q / 8) * acos(dq2 / 8) - atan(q) + sinh(q / 2) - cosh(q / 3) + tanh(dq) + abs(q) + (8 + q)^1.5 \
     + tan(q / 8) + 1 / (8 + q)^2";
@@ -46,7 +47,7 @@ pub(crate) fn with_all_terms(model: Model) -> RobotModel {
     let expression = |own, text: &str| {
         DeclaredLaw::Expression(Expression::parse(text, &JointNames { own: Some(own), names: &[] }).unwrap())
     };
-    // States go beyond both ends.
+    // States exceed both ends.
     let points = vec![[-2.0, -3.0], [-1.1, -2.0], [-1.0, 0.5], [0.3, 0.5], [1.2, 2.0], [2.5, 1.0]];
     let table = TorqueTable::new(points).unwrap();
     let mut terms: Vec<(TorqueTerm, f64)> =
@@ -91,7 +92,7 @@ pub(crate) fn with_all_terms(model: Model) -> RobotModel {
     RobotModel::new(model, terms, values).unwrap()
 }
 
-/// Two branches, a joint that slides, an axis along no axis.
+/// Two branches, a prismatic joint, and an axis that is not aligned with its frame.
 pub(crate) fn tree() -> RobotModel {
     let link = |name: &str, x: f64| {
         format!(
@@ -126,7 +127,7 @@ pub(crate) fn tree() -> RobotModel {
     with_all_terms(read_urdf(&text.concat()).unwrap().model)
 }
 
-/// One state and what the numeric algorithms make of it.
+/// One state with the outputs of the numeric algorithms.
 pub(crate) struct Expected {
     pub(crate) q: Vec<f64>,
     pub(crate) dq: Vec<f64>,
@@ -136,7 +137,7 @@ pub(crate) struct Expected {
     pub(crate) outputs: [Vec<f64>; 7],
 }
 
-/// Torque of the terms, by their regressor columns.
+/// Torque of the terms from their regressor columns.
 fn terms_torque(robot: &RobotModel, [q, dq, ddq]: [&[f64]; 3], wanted: impl Fn(&TorqueTerm) -> bool) -> Vec<f64> {
     let mut torque = vec![0.0; robot.model().dof()];
     let motion = JointMotion { samples: 1, q, dq, ddq };
@@ -160,7 +161,7 @@ pub(crate) fn expected(robot: &RobotModel) -> Vec<Expected> {
             let mut vector = |size: f64| (0..dof).map(|_| random.uniform(-size, size)).collect::<Vec<f64>>();
             let (q, mut dq, ddq) = (vector(3.0), vector(2.0), vector(8.0));
             if state % 10 == 0 {
-                // Rest, and inside of dead bands.
+                // Zero velocity, and velocities within dead bands.
                 let share = if state % 20 == 0 { 0.0 } else { 0.005 };
                 for dq in &mut dq {
                     *dq *= share;
@@ -188,18 +189,17 @@ pub(crate) fn expected(robot: &RobotModel) -> Vec<Expected> {
         .collect()
 }
 
-/// The robot's rigid forward dynamics and those of the file agree where there are no drives: an oracle that is not the
-/// inverse of the inverse dynamics.
+/// Rigid forward dynamics by another algorithm: an independent reference for robots without drives.
 pub(crate) fn rigid_accelerations(model: &Model, state: &Expected) -> Vec<f64> {
     forward_dynamics(model, &mut Workspace::new(model), &state.q, &state.dq, &state.tau).to_vec()
 }
 
-/// Whether a program can be run.
 pub(crate) fn has(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
-/// Runs a program on the states, one line each of q, dq, ddq, tau; compares every number of every line it prints.
+/// Runs a program on the states, one line each of q, dq, ddq, tau, and compares every number of every line that it
+/// prints.
 pub(crate) fn compare(program: &mut Command, robot: &RobotModel, states: &[Expected]) {
     use std::io::Write;
     let folder = tempfile::tempdir().unwrap();
@@ -215,8 +215,8 @@ pub(crate) fn compare(program: &mut Command, robot: &RobotModel, states: &[Expec
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(text.lines().count(), states.len());
     let names = ["inverse_dynamics", "gravity", "coriolis", "friction", "mass_matrix", "forward_dynamics", "declared"];
-    // A moving state's torque is the scale of all torques; accelerations are those torques through the inverse mass
-    // matrix, whose condition (some thousand for six joints with drives) the rounding grows by.
+    // The scale is the torque of a moving state. For accelerations the rounding error grows by the condition number of
+    // the mass matrix, some thousand for six joints with drives.
     for (number, (line, state)) in text.lines().zip(states).enumerate() {
         let mut found = line.split_whitespace().map(|word| word.parse::<f64>().unwrap());
         let scale = state.tau.iter().chain(&state.outputs[2]).fold(1.0, |most: f64, tau| most.max(tau.abs()));

@@ -1,4 +1,4 @@
-//! What is written, compiled with warnings as errors and run at a thousand states.
+//! Exported code, compiled with warnings as errors and run at a thousand states.
 
 use super::common::{all_terms, compare, expected, has, rigid_accelerations, tree};
 use core::fmt::Write;
@@ -20,7 +20,7 @@ fn robots() -> Vec<RobotModel> {
     vec![all_terms("ur10.urdf"), all_terms("iiwa14.urdf"), tree()]
 }
 
-/// Compiles `program` beside the file `name` of `text`, or shows what the compiler says.
+/// Compiles `program` next to the file `name` with `text`, or shows the compiler's messages.
 fn compiled(folder: &Path, (name, text): (&str, &str), (main, program): (&str, &str), compiler: &[&str]) -> Command {
     std::fs::write(folder.join(name), text).unwrap();
     std::fs::write(folder.join(main), program).unwrap();
@@ -57,7 +57,7 @@ fn c_computes_what_the_core_computes() {
         let text = export(&robot, Target::C, &[]).unwrap().text;
         let flags = ["cc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off"];
         let compiler: Vec<&str> = flags.into_iter().collect();
-        // The library of mathematics stands behind the program.
+        // The mathematics library must follow the program in the command.
         std::fs::write(folder.path().join("robot.h"), &text).unwrap();
         std::fs::write(folder.path().join("main.c"), &program).unwrap();
         let output = Command::new(compiler[0])
@@ -135,7 +135,7 @@ fn rust_computes_what_the_core_computes() {
         let compiler = [rustc.as_str(), "--edition", "2021", "-O", "-D", "warnings"];
         let mut run = compiled(folder.path(), ("robot.rs", &text), ("main.rs", &program), &compiler);
         compare(&mut run, &robot, &expected(&robot));
-        // On its own, as a library without the standard library.
+        // The module also compiles alone, as a library without the standard library.
         std::fs::write(folder.path().join("alone.rs"), format!("#![no_std]\n{text}")).unwrap();
         let alone = Command::new(&rustc)
             .args(["--edition", "2021", "--crate-type", "lib", "--emit", "metadata", "-D", "warnings", "alone.rs"])
@@ -146,8 +146,7 @@ fn rust_computes_what_the_core_computes() {
     }
 }
 
-/// The oracle of the accelerations is not only the inverse of the torques: without drives they are those of the
-/// articulated-body algorithm.
+/// The reference of the accelerations is verified with the articulated-body algorithm, for a robot without drives.
 #[test]
 fn accelerations_are_those_of_articulated_bodies() {
     let with_drives = all_terms("iiwa14.urdf");
@@ -165,7 +164,7 @@ fn octave_computes_what_the_core_computes() {
         println!("skipped: there is no `octave-cli`");
         return;
     }
-    // Octave takes milliseconds a state, so the tree alone: it has every term and a joint that slides.
+    // Octave needs milliseconds per state, so only the tree is tested, which has every term and a prismatic joint.
     let robot = tree();
     let (name, dof) = (robot.identifier(), robot.model().dof());
     let calls: Vec<String> = FUNCTIONS

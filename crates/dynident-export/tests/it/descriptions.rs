@@ -1,4 +1,4 @@
-//! MJCF and URDF. That MuJoCo reads the former and moves as the model does is proved in `.ci/export.py`.
+//! MJCF and URDF. `.ci/export.py` shows that MuJoCo reads the MJCF and gives the same motion as the model.
 
 use super::common::{all_terms, tree};
 use dynident_export::{NearestFriction, RobotModel, Target, export};
@@ -6,13 +6,13 @@ use dynident_model::read_urdf;
 use dynident_model::terms::{Coulomb, CoulombShape, Offset, Stribeck, TorqueTerm, Viscous};
 
 #[test]
-fn a_law_of_the_simulator_comes_back() {
+fn simulator_friction_is_reproduced_exactly() {
     let model = tree().model().clone();
     let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: CoulombShape::Sign { dead_band: 0.0 } });
     let terms = vec![coulomb, TorqueTerm::Viscous(Viscous { joint: 0 })];
     let robot = RobotModel::new(model, terms, vec![3.0, 0.7]).unwrap();
     let found = NearestFriction::of(&robot, 0);
-    // Least squares of exact data, two unknowns: rounding.
+    // Tolerance: rounding error of exact data with two unknowns.
     assert!((found.coulomb - 3.0).abs() < 1e-12 && (found.viscous - 0.7).abs() < 1e-12 && found.most_error < 1e-11);
     assert_eq!(found.most_speed, 3.0);
     let none = NearestFriction::of(&robot, 1);
@@ -20,14 +20,14 @@ fn a_law_of_the_simulator_comes_back() {
 }
 
 #[test]
-fn what_is_left_of_another_law_is_its_error() {
+fn error_of_another_law_is_reported() {
     let model = tree().model().clone();
     let robot = RobotModel::new(model.clone(), vec![TorqueTerm::Offset(Offset { joint: 0 })], vec![1.5]).unwrap();
     let found = NearestFriction::of(&robot, 0);
     assert!(found.coulomb.abs() < 1e-12 && found.viscous.abs() < 1e-12);
     assert!((found.rms_error - 1.5).abs() < 1e-12 && (found.most_error - 1.5).abs() < 1e-12);
 
-    // Friction that only falls with the velocity: the best damping would be negative, so there is none.
+    // For friction that decreases with velocity the best damping would be negative, so it is zero.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
     let falling = TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 1.0, exponent: 1.0, shape });
     let robot = RobotModel::new(model, vec![falling], vec![2.0]).unwrap();
@@ -60,7 +60,7 @@ fn a_urdf_reads_back_with_the_robots_bodies() {
 }
 
 #[test]
-fn mjcf_says_what_it_does_not_hold() {
+fn mjcf_notes_unsupported_contents() {
     let exported = export(&tree(), Target::Mjcf, &[]).unwrap();
     assert!(exported.text.contains("type=\"slide\"") && exported.text.contains("armature=\"0.7\""));
     assert_eq!(exported.text.matches("<body").count(), exported.text.matches("</body>").count());

@@ -1,4 +1,4 @@
-//! Tests of the crate, one program.
+//! Integration tests of this crate in one binary.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says where")]
 

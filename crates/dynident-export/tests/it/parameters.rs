@@ -1,5 +1,5 @@
-//! JSON, ROS 2 parameters and SDF. That PyYAML, jsonschema and libsdformat read them, and that Pinocchio finds the same
-//! torques in the numbers, is proved in `.ci/export.py`.
+//! JSON, ROS 2 parameters and SDF. `.ci/export.py` shows that PyYAML, jsonschema and libsdformat read them, and that
+//! Pinocchio computes the same torques from the numbers.
 
 use super::common::{TOLERANCE, all_terms, expected, tree};
 use dynident_export::{ModelFile, NearestFriction, RobotModel, Target, export};
@@ -7,7 +7,7 @@ use dynident_model::terms::{CoulombShape, LoadFriction, MaxwellSlip, TorqueTerm}
 use dynident_model::{InertialParameters, read_urdf};
 use serde_json::Value;
 
-/// A term's torque at its joint's velocity, by nothing but the file.
+/// Torque of a term at its joint's velocity, computed from the file alone.
 fn law(term: &Value, dq: f64) -> f64 {
     let constants = &term["constants"];
     let number = |name: &str| {
@@ -34,14 +34,14 @@ fn law(term: &Value, dq: f64) -> f64 {
         }
         "power" => dq * dq.hypot(number("rounding")).powf(number("exponent") - 1.0),
         "offset" => 1.0,
-        // At rest of acceleration and at the reference temperature; and what follows positions is no friction.
+        // Acceleration is zero, temperature is at its reference, and position-dependent torque is not friction.
         "drive-inertia" | "temperature-viscous" | "declared" => 0.0,
         other => panic!("{other}"),
     };
     term["value"].as_f64().unwrap() * function
 }
 
-/// Both joints' torque of a coupling's friction.
+/// Friction torque of a coupling on both joints.
 fn coupled(term: &Value, dq: [f64; 2]) -> [f64; 2] {
     let ratios = [0, 1].map(|k| term["constants"]["ratios"][k].as_f64().unwrap());
     let value = term["value"].as_f64().unwrap();
@@ -58,7 +58,7 @@ fn coupled(term: &Value, dq: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn the_json_holds_the_friction_that_the_core_computes() {
+fn json_friction_equals_the_core() {
     for robot in [all_terms("ur10.urdf"), tree()] {
         let text = export(&robot, Target::Json, &["From here.".to_owned()]).unwrap().text;
         let file: Value = serde_json::from_str(&text).unwrap();
@@ -86,7 +86,7 @@ fn the_json_holds_the_friction_that_the_core_computes() {
 }
 
 #[test]
-fn the_json_holds_the_robot_to_the_last_bit() {
+fn json_keeps_every_bit_of_the_robot() {
     let robot = tree();
     let text = export(&robot, Target::Json, &[]).unwrap().text;
     let back: ModelFile = serde_json::from_str(&text).unwrap();
@@ -99,7 +99,7 @@ fn the_json_holds_the_robot_to_the_last_bit() {
         assert_eq!(found.placement.rotation, joint.placement.rotation.0);
     }
     assert_eq!(back.joints[2].parent.as_deref(), Some("slide"));
-    // Units follow the joint: this one slides.
+    // Units of a prismatic joint.
     let stribeck = back.joints[1].terms.iter().find(|term| term.kind == "stribeck").unwrap();
     assert_eq!(stribeck.unit, "N");
     let names: Vec<&str> = stribeck.constants.keys().map(String::as_str).collect();
@@ -109,7 +109,7 @@ fn the_json_holds_the_robot_to_the_last_bit() {
 }
 
 #[test]
-fn what_code_cannot_hold_stands_in_json_and_yaml() {
+fn json_and_yaml_contain_terms_that_code_cannot() {
     let load = TorqueTerm::Load(LoadFriction { joint: 1, shape: CoulombShape::Smooth { width: 0.1 } });
     let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
     let robot = RobotModel::new(tree().model().clone(), vec![load, slip], vec![0.2, 3.0]).unwrap();
@@ -140,14 +140,14 @@ fn parameters_of_ros() {
     ] {
         assert!(text.contains(said), "{said}: {text}");
     }
-    // Names that ROS would divide are told.
+    // Renamed parts, here because of a dot, are reported.
     let dotted = robot_named("arm.1/joint");
     let exported = export(&dotted, Target::Ros2Yaml, &[]).unwrap();
     assert!(exported.text.contains("      arm_1_joint:\n") && exported.text.contains("joints: [\"arm.1/joint\"]"));
-    assert!(exported.notes.iter().any(|note| note == "Joint arm.1/joint stands under dynamics.arm_1_joint."));
+    assert!(exported.notes.iter().any(|note| note == "Joint arm.1/joint is under dynamics.arm_1_joint."));
 }
 
-/// One link on one joint, both of this name.
+/// One link on one joint, both with this name.
 fn robot_named(name: &str) -> RobotModel {
     let text = format!(
         r#"<robot name="world"><link name="base"/><link name="{name}"><inertial><mass value="1"/>
@@ -158,7 +158,7 @@ fn robot_named(name: &str) -> RobotModel {
 }
 
 #[test]
-fn sdf_says_what_it_does_not_hold() {
+fn sdf_notes_unsupported_contents() {
     let exported = export(&tree(), Target::Sdf, &[]).unwrap();
     for said in ["SDF has no drive inertia: Ia1 = 0.7 kg m² is left out.", "Ia_a = 0.2", "off by"] {
         assert!(exported.notes.iter().any(|note| note.contains(said)), "{said}: {:#?}", exported.notes);
@@ -186,6 +186,6 @@ fn a_body_that_cannot_be_real_is_refused_by_its_reader() {
     let refused = export(&robot, Target::Sdf, &[]).unwrap_err().to_string();
     assert!(refused.contains("body `arm`") && refused.contains("libsdformat would refuse it"), "{refused}");
     assert!(export(&robot, Target::Mjcf, &[]).unwrap_err().to_string().contains("MuJoCo would refuse it"));
-    // Numbers are numbers.
+    // These formats accept any numbers.
     assert!(export(&robot, Target::Json, &[]).is_ok() && export(&robot, Target::Ros2Yaml, &[]).is_ok());
 }

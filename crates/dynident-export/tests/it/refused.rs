@@ -1,4 +1,4 @@
-//! What cannot be written is named.
+//! Errors of models that cannot be exported.
 
 use super::common::{all_terms, tree};
 use dynident_export::{RobotModel, Target, export};
@@ -20,7 +20,7 @@ fn terms_that_need_more_than_the_motion() {
 }
 
 #[test]
-fn values_that_are_none() {
+fn invalid_values_are_refused() {
     let model = tree().model().clone();
     let offset = || vec![TorqueTerm::Offset(Offset { joint: 0 })];
     let error = RobotModel::new(model.clone(), offset(), Vec::new()).unwrap_err();
@@ -42,14 +42,14 @@ fn a_joint_that_moves_nothing() {
 }
 
 #[test]
-fn a_term_by_temperature_is_noted() {
+fn temperature_terms_are_noted() {
     let exported = export(&all_terms("ur10.urdf"), Target::Python, &[]).unwrap();
-    let note = "fvT1 is left out: the drive counts as being at 25 °C.";
+    let note = "fvT1 is left out: the drive is assumed to be at 25 °C.";
     assert_eq!(exported.notes, [note]);
     assert!(exported.text.contains(note));
 }
 
-/// Numbers from which infinity follows: no form writes `inf`.
+/// No format writes `inf` for numbers that overflow.
 #[test]
 fn numbers_that_overflow() {
     let model = tree().model().clone();
@@ -60,7 +60,7 @@ fn numbers_that_overflow() {
     };
     let large = with([1e308; 10]);
     assert!(large.contains("body `left`") && large.contains("1e308"), "{large}");
-    // The centre of mass is the first moment over the mass.
+    // The centre of mass is the first moment divided by the mass.
     let mut light = [0.0; 10];
     (light[0], light[1]) = (1e-305, 1e8);
     assert!(with(light).contains("the centre of mass is inf"), "{}", with(light));

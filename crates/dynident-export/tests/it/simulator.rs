@@ -1,4 +1,4 @@
-//! Friction nearest over a recorded motion, and the error bars of what simulators ask for.
+//! Nearest friction over a recorded motion, and error bars of simulator parameters.
 
 use super::common::tree;
 use dynident_export::{
@@ -31,15 +31,16 @@ fn robot(terms: Vec<TorqueTerm>, values: &[f64], velocities: &[(f64, f64)]) -> R
 }
 
 #[test]
-fn the_line_goes_through_the_two_speeds_that_were_recorded() {
+fn nearest_friction_fits_two_recorded_speeds() {
     let law = |v: f64| 2.0 + 3.0 * (-v / 0.5).exp() + 0.4 * v;
     let motion = [(0.1, 50.0), (-0.1, 7.0), (1.5, 3.0), (-1.5, 900.0)];
     let robot = robot(vec![coulomb(), stribeck(), viscous()], &[2.0, 3.0, 4.0], &motion);
-    // Friction that falls between the two: the best damping would be negative, unless viscous friction is strong.
+    // Friction decreases between the two velocities: the best damping would be negative without strong viscous
+    // friction.
     let law = |v: f64| law(v) + 3.6 * v;
     let viscous = (law(1.5) - law(0.1)) / 1.4;
     let found = NearestFriction::of(&robot, 0);
-    // Two unknowns through two points: rounding.
+    // Tolerance: rounding error of two unknowns from two points.
     assert!((found.viscous - viscous).abs() < 1e-12 && (found.coulomb - (law(0.1) - 0.1 * viscous)).abs() < 1e-12);
     assert!(found.most_error < 1e-12, "{found:?}");
     assert_eq!((found.over, found.most_speed), (ComparedOver::RecordedMotion, 1.5));
@@ -48,10 +49,10 @@ fn the_line_goes_through_the_two_speeds_that_were_recorded() {
 
 #[test]
 fn samples_weigh() {
-    // What no line holds, an offset: by the share of samples forward and backward it goes into the Coulomb friction.
+    // An offset is assigned to Coulomb friction according to the share of samples in each direction.
     let offset = || vec![TorqueTerm::Offset(Offset { joint: 0 })];
     let found = NearestFriction::of(&robot(offset(), &[1.0], &[(1.0, 3.0), (-1.0, 1.0)]), 0);
-    // One speed: no damping can be told from it. (3 - 1) / 4 of the offset; squares of 1/2 thrice and of 3/2 once.
+    // One speed does not determine damping. (3 - 1) / 4 of the offset; squares of 1/2 three times and of 3/2 once.
     assert_eq!((found.coulomb, found.viscous), (0.5, 0.0));
     assert!((found.rms_error - (3.0_f64 / 4.0).sqrt()).abs() < 1e-15 && found.most_error == 1.5, "{found:?}");
     let against = NearestFriction::of(&robot(offset(), &[1.0], &[(1.0, 1.0), (-1.0, 3.0)]), 0);
@@ -59,7 +60,7 @@ fn samples_weigh() {
 }
 
 #[test]
-fn slip_counts_as_coulomb_friction() {
+fn maxwell_slip_is_approximated_by_coulomb_friction() {
     let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
     let found = NearestFriction::of(&robot(vec![slip, viscous()], &[1.5, 0.2], &[(0.2, 1.0), (-0.9, 2.0)]), 0);
     assert!((found.coulomb - 1.5).abs() < 1e-12 && (found.viscous - 0.2).abs() < 1e-12, "{found:?}");
@@ -68,7 +69,7 @@ fn slip_counts_as_coulomb_friction() {
 #[test]
 fn shares_are_derivatives() {
     let motion: Vec<(f64, f64)> = (1..40).map(|k| (0.05 * f64::from(k) - 0.73, 1.0 + f64::from(k % 5))).collect();
-    // On either side of the boundary: with 0.3 of viscous friction the best damping is zero.
+    // On both sides of the boundary: with 0.3 of viscous friction the best damping is zero.
     for strength in [4.0, 0.3] {
         let values = [2.0, 3.0, strength];
         let with = |values: &[f64]| robot(vec![coulomb(), stribeck(), viscous()], values, &motion);
@@ -81,7 +82,7 @@ fn shares_are_derivatives() {
                 NearestFriction::of(&with(&values), 0)
             };
             let (above, below) = (moved(0.01), moved(-0.01));
-            // Linear: the difference quotient is exact but for rounding, by 1e2.
+            // The dependence is linear, so the difference quotient is exact except for rounding times 1e2.
             assert!((share.coulomb - 50.0 * (above.coulomb - below.coulomb)).abs() < 1e-10, "{share:?}");
             assert!((share.viscous - 50.0 * (above.viscous - below.viscous)).abs() < 1e-10, "{share:?}");
         }
@@ -111,7 +112,7 @@ fn bars_follow_from_the_covariance() {
     let file = SimulatorFile::of(&robot, &knowledge(products.clone(), dof), &[]).unwrap();
     assert_eq!((file.schema.as_str(), file.joints.len()), (SIMULATOR_SCHEMA, dof));
     let joint = &file.joints[0];
-    // The line through two points, by hand: the Stribeck term falls from e^-0.2 to e^-3.
+    // Expected line through two points: the Stribeck term decreases from e^-0.2 to e^-3.
     let (low, high) = ((-0.2_f64).exp(), (-3.0_f64).exp());
     let slope = (high - low) / 1.4;
     let of = |a: [f64; 4]| {
@@ -123,7 +124,7 @@ fn bars_follow_from_the_covariance() {
     assert!(near(joint.frictionloss.half_width_95, of([1.0, low - 0.1 * slope, 0.0, 0.0])), "{:?}", joint.frictionloss);
     assert_eq!((joint.armature.value, joint.armature.half_width_95), (0.7, Some(0.5)));
 
-    // A term that the logs do not tell takes the bar of what it is a part of, and says why.
+    // A term without an individual interval gets the error bar of its combination, with a reason.
     let mut unknown = knowledge(products, dof);
     for k in 0..4 {
         unknown.term_products[1][k] = None;

@@ -1,47 +1,33 @@
-//! Inertials of the moving links: can such a body exist, and is it likely?
+//! Checks whether the inertials of the moving links are physically consistent and plausible.
 
 use super::AuditLevel::{Info, Problem, Warning};
-use super::{Findings, Lengths};
+use super::{AuditSettings, Findings, Lengths};
 use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Vec3};
 use crate::tree::{Link, Model};
 use nalgebra::Matrix3;
 
-/// Heavier single links are found on no common arm, kg.
-const LARGEST_MASS_KG: f64 = 1000.0;
-/// The densest metal, kg/m³: of all bodies with one mass, a ball of osmium has nearly the least inertia that matter
-/// allows.
+/// Density of osmium, the densest metal, kg/m³. A solid ball of it has nearly the smallest inertia possible for its
+/// mass.
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
-/// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits
-/// are usual there.
-const ROUNDING: f64 = 1e-2;
-/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the inertia about the frame's
-/// origin.
-const NUMERICAL: f64 = 1e-9;
-/// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit
-/// slip.
-const FAR: f64 = 3.0;
-const ABSURDLY_FAR: f64 = 50.0;
-/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; bodies given rightly
-/// rarely look as if more than this came from it.
-const MOSTLY_SHIFT: f64 = 0.7;
+/// Rounding error of the eigenvalues relative to the inertia about the frame's origin.
+const EIGENVALUE_ROUNDING: f64 = 1e-9;
 
-pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
+pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, findings: &mut Findings) {
     for (index, body) in model.bodies().iter().enumerate() {
         for link in &body.links {
             if let Some(inertial) = &link.inertial {
-                check_consistent(&link.name, inertial, findings);
-                likely(&link.name, inertial, lengths.bodies[index], findings);
+                check_consistent(&link.name, inertial, settings, findings);
+                check_plausible(&link.name, inertial, lengths.bodies[index], settings, findings);
             }
         }
-        unknown(model, index, findings);
+        report_unknown(model, index, findings);
     }
-    massless(model, findings);
-    equal(model, findings);
+    report_massless(model, findings);
+    report_equal(model, findings);
 }
 
-/// Mass and principal moments that a body can have.
-fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Findings) {
+fn check_consistent(link: &str, inertial: &InertialParameters, settings: &AuditSettings, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
     if *inertial == InertialParameters::ZERO {
@@ -50,37 +36,42 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
         return;
     }
     let Some(moments) = inertial.principal_moments().filter(|_| mass > 0.0) else {
-        let message = format!("has mass {mass} kg but moments: no body is like that, measure or weigh it");
+        let message = format!("has mass {mass} kg but nonzero moments, which is impossible: weigh the link");
         findings.add(Problem, "mass-not-positive", place(), message);
         return;
     };
     let [least, middle, most] = moments;
-    // The moments are a difference from the inertia about the frame's origin, and carry its rounding.
-    let rounding = NUMERICAL * trace(&inertial.inertia_at_origin()).abs();
+    // The moments are a difference from the inertia about the frame's origin and carry its rounding error.
+    let rounding = EIGENVALUE_ROUNDING * trace(&inertial.inertia_at_origin()).abs();
     if least < -rounding {
         let message = format!(
-            "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: none may be negative; \
+            "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: negative moments are impossible; \
              check signs, products of inertia, and the point that the inertia is about"
         );
         findings.add(Problem, "inertia-not-positive", place(), message);
     } else if least + middle < most - rounding {
         let excess = (most - least - middle) / most;
-        let level = if excess < ROUNDING { Warning } else { Problem };
+        let level = if excess < settings.moment_rounding { Warning } else { Problem };
         let message = format!(
             "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2: the largest may not exceed the sum of the others \
-             (by {:.2} % here); no mass distribution has them, check the moments",
+             (by {:.2} % here), which is impossible: check the moments",
             100.0 * excess
         );
         findings.add(level, "triangle-inequality", place(), message);
     }
 }
 
-/// Sizes that the robot's lengths make plausible.
-fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &mut Findings) {
+fn check_plausible(
+    link: &str,
+    inertial: &InertialParameters,
+    length_m: f64,
+    settings: &AuditSettings,
+    findings: &mut Findings,
+) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
     let (Some(com), Some(inertia)) = (inertial.com_m(), inertial.inertia_at_com()) else { return };
-    if mass > LARGEST_MASS_KG {
+    if mass > settings.max_link_mass_kg {
         let message = format!("has mass {mass} kg: if that is grams, divide by 1000");
         findings.add(Warning, "mass-absurd", place(), message);
     }
@@ -88,22 +79,22 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
         return;
     }
     let distance = com.norm();
-    if distance > FAR * length_m {
-        let absurd = distance > ABSURDLY_FAR * length_m;
+    if distance > settings.max_distance_lengths * length_m {
+        let absurd = distance > settings.problem_distance_lengths * length_m;
         let fix = if absurd { "; if that is millimetres, divide by 1000" } else { ": check its frame and unit" };
         let message =
             format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}");
         findings.add(if absurd { Problem } else { Warning }, "centre-of-mass-outside", place(), message);
     }
-    // Mean square distance of the mass from its centre: half the trace of the inertia over the mass.
+    // Mean square distance of the mass from its centre: `½ tr(I) / m`.
     let square = 0.5 * trace(&inertia) / mass;
-    if square > (FAR * length_m).powi(2) {
+    if square > (settings.max_distance_lengths * length_m).powi(2) {
         findings.add(
-            if square > (ABSURDLY_FAR * length_m).powi(2) { Problem } else { Warning },
+            if square > (settings.problem_distance_lengths * length_m).powi(2) { Problem } else { Warning },
             "inertia-too-large",
             place(),
             format!(
-                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: check \
+                "has a radius of gyration of {:.3} m with its {mass} kg, on a body of about {length_m:.3} m: check \
                  its unit (kg mm^2: divide by 1e6, g mm^2: by 1e9)",
                 square.sqrt()
             ),
@@ -112,39 +103,40 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     let ball_radius = (3.0 * mass / (4.0 * core::f64::consts::PI * OSMIUM_DENSITY_KG_M3)).cbrt();
     if square >= 0.0 && square < 0.6 * ball_radius.powi(2) {
         let message = format!(
-            "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): it is a point mass or a placeholder, or the unit slipped",
+            "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): point mass, placeholder or wrong unit; check the moments",
             0.4 * mass * ball_radius.powi(2)
         );
         findings.add(Warning, "inertia-too-small", place(), message);
     }
-    about_origin(link, inertial, com, &inertia, findings);
+    check_reference_point(link, inertial, settings.max_parallel_axis_share, findings);
     let d = [inertia.0[0][0], inertia.0[1][1], inertia.0[2][2]];
     let products = [inertia.0[0][1], inertia.0[0][2], inertia.0[1][2]];
     let power_of_ten = |x: f64| x > 0.0 && (x.log10() - x.log10().round()).abs() < 1e-9;
     if com == Vec3::ZERO && products == [0.0; 3] && d[0] == d[1] && d[1] == d[2] && power_of_ten(d[0]) {
         let message = format!(
-            "has the inertia {} kg m^2 about all axes and its centre of mass at the frame: that looks like a placeholder",
+            "has the inertia {} kg m^2 about all axes and its centre of mass at the frame, probably a placeholder: measure it",
             d[0]
         );
         findings.add(Warning, "placeholder", place(), message);
     }
 }
 
-/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the
-/// parallel-axis term a consistent body remains, and that term is most of the inertia given.
-fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
+/// Reports an inertia that was computed about the link's origin but written as if about the centre of mass: without the
+/// parallel-axis term, which is most of the inertia, a consistent body remains.
+fn check_reference_point(link: &str, inertial: &InertialParameters, max_share: f64, findings: &mut Findings) {
+    let (Some(com), Some(inertia)) = (inertial.com_m(), inertial.inertia_at_com()) else { return };
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);
-    let share = trace(&shift) / trace(inertia);
-    if !(MOSTLY_SHIFT..1.0).contains(&share) {
+    let share = trace(&shift) / trace(&inertia);
+    if !(max_share..1.0).contains(&share) {
         return;
     }
-    let rest = *inertia - shift;
+    let rest = inertia - shift;
     let mut moments: [f64; 3] = Matrix3::from_fn(|a, b| rest.0[a][b]).symmetric_eigenvalues().into();
     moments.sort_by(f64::total_cmp);
     if moments[0] > 0.0 && moments[0] + moments[1] >= moments[2] {
         let message = format!(
-            "has an inertia of which {:.0} % could be the parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
+            "has an inertia that could contain {:.0} % parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
              origin, move it to the centre of mass",
             100.0 * share
         );
@@ -152,12 +144,13 @@ fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &
     }
 }
 
-/// Bodies and links without any inertial.
-fn unknown(model: &Model, index: usize, findings: &mut Findings) {
+fn report_unknown(model: &Model, index: usize, findings: &mut Findings) {
     let body = &model.bodies()[index];
     let place = || format!("link {}", body.name());
     if body.prior().is_none() {
-        let message = "moves but has no inertial (nor a link fixed to it): its prior is unknown and counts as zero in predictions".to_owned();
+        let message =
+            "moves but has no inertial (nor a link fixed to it): its prior is unknown and is zero in predictions"
+                .to_owned();
         findings.add(Warning, "inertial-unknown", place(), message);
     } else {
         let names: Vec<&str> =
@@ -170,19 +163,17 @@ fn unknown(model: &Model, index: usize, findings: &mut Findings) {
     }
 }
 
-/// Joints that move no mass at all.
-fn massless(model: &Model, findings: &mut Findings) {
+fn report_massless(model: &Model, findings: &mut Findings) {
     let known: Vec<bool> = model.inertials().iter().map(|inertial| *inertial != InertialParameters::ZERO).collect();
     let moves_mass = |joint: usize| (0..known.len()).any(|body| known[body] && model.moves(joint, body));
     for (_, joint) in model.joints().iter().enumerate().filter(|(index, _)| !moves_mass(*index)) {
         let message =
-            "moves no mass that is known: the mass matrix is singular; give an inertial, or lock the joint".to_owned();
+            "moves no known mass, so that the mass matrix is singular: give an inertial, or lock the joint".to_owned();
         findings.add(Problem, "massless-subtree", format!("joint {}", joint.name), message);
     }
 }
 
-/// Links that all have one inertial.
-fn equal(model: &Model, findings: &mut Findings) {
+fn report_equal(model: &Model, findings: &mut Findings) {
     let known: Vec<(&Link, &InertialParameters)> = model
         .bodies()
         .iter()
@@ -190,7 +181,7 @@ fn equal(model: &Model, findings: &mut Findings) {
         .filter(|(_, inertial)| **inertial != InertialParameters::ZERO)
         .collect();
     if known.len() >= 3 && known.iter().all(|(_, inertial)| *inertial == known[0].1) {
-        let message = format!("all {} inertials are the same: that looks like placeholders", known.len());
+        let message = format!("all {} inertials are equal, probably placeholders: measure them", known.len());
         findings.add(Warning, "equal-inertials", "model".to_owned(), message);
     }
 }

@@ -1,29 +1,21 @@
-//! Joints: limits, offsets, friction, followers.
+//! Checks of the joints: limits, offsets, friction, mimic joints.
 
 use super::AuditLevel::{Info, Problem, Warning};
-use super::{Findings, Lengths};
+use super::{AuditSettings, Findings, Lengths};
 use crate::joint::{Joint, JointKind};
 use crate::tree::Model;
 
-/// No common robot has two joints further apart, m.
-const LARGEST_OFFSET_M: f64 = 10.0;
-/// Nearly five turns: more than any common multi-turn joint, far less than a half turn in degrees. rad.
-const LARGEST_TURN_RAD: f64 = 30.0;
-/// Longer than any common rail, m.
-const LARGEST_STROKE_M: f64 = 100.0;
-/// Faster than the joints of small legged robots by a factor of two, rad/s.
-const LARGEST_REVOLUTE_VELOCITY_RAD_S: f64 = 100.0;
-
-pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
+pub(super) fn check(model: &Model, lengths: &Lengths, settings: &AuditSettings, findings: &mut Findings) {
     for joint in model.tree_joints() {
         let place = || format!("joint {}", joint.name);
         let offset = joint.placement.translation.norm();
-        if offset > LARGEST_OFFSET_M {
-            let message = format!("stands {offset:.4} m from its parent joint: if that is millimetres, divide by 1000");
+        if offset > settings.max_joint_offset_m {
+            let message =
+                format!("is {offset:.4} m away from its parent joint: if that is millimetres, divide by 1000");
             findings.add(Problem, "length-unit", place(), message);
         }
         let follows = model.joint_index(&joint.name).is_none();
-        limits(joint, follows, findings);
+        check_limits(joint, follows, settings, findings);
         for (what, value) in [("damping", joint.damping), ("friction", joint.friction)] {
             if value.is_some_and(|value| value < 0.0) {
                 let message = format!("has a negative {what}, which would drive the joint: fix the sign");
@@ -32,21 +24,21 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
         }
         if let Some(mimic) = &joint.mimic {
             let rest = if follows {
-                ": it is no degree of freedom, and what it carries is felt by what it follows"
+                ": it is not a degree of freedom, and its load acts on these joints"
             } else {
-                ", which does not move here, and counts as a free joint: lock it if the log does not hold it"
+                ", which is not a degree of freedom here, so that this joint is independent: lock it if the log does not contain it"
             };
             findings.add(Info, "mimic", place(), format!("follows {}{rest}", mimic.source_names()));
         }
     }
-    // All offsets in one point leave nothing to compare with, and no arm looks like that.
+    // If all joints have the same origin, no length is left for comparison.
     if lengths.reach > 0.0 && lengths.reach < 1e-3 {
         let message = format!("all joint origins lie within {:.2e} m: are lengths in kilometres?", lengths.reach);
         findings.add(Warning, "length-unit", "model".to_owned(), message);
     }
 }
 
-fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
+fn check_limits(joint: &Joint, follows: bool, settings: &AuditSettings, findings: &mut Findings) {
     let mut add = |level, check, message: String| findings.add(level, check, format!("joint {}", joint.name), message);
     let limits = &joint.limits;
     let turns = joint.turns();
@@ -55,27 +47,27 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
         match (limits.lower, limits.upper) {
             (Some(lower), Some(upper)) if lower > upper => {
                 let has =
-                    format!("has its lower limit {lower} {unit} above the upper one {upper} {unit}: exchange them");
+                    format!("has its lower limit {lower} {unit} above the upper limit {upper} {unit}: exchange them");
                 add(Problem, "limit-order", has);
             }
             (Some(lower), Some(upper)) if lower == upper => {
-                let cannot = format!("may not move: both limits are {lower} {unit}; give its range or lock it");
+                let cannot = format!("cannot move: both limits are {lower} {unit}; give its range or lock it");
                 add(Warning, "limit-range", cannot);
             }
             (Some(_), Some(_)) => {}
-            // What it follows has limits of its own.
+            // The limits of a mimic joint follow from its sources.
             _ if follows => {}
             _ => {
-                let has = "has no position limits: no excitation can be designed until they are given";
+                let has = "has no position limits: give them before designing an excitation";
                 add(Warning, "limit-missing", has.to_owned());
             }
         }
         let largest = limits.lower.into_iter().chain(limits.upper).map(f64::abs).fold(0.0, f64::max);
-        if turns && largest > LARGEST_TURN_RAD {
+        if turns && largest > settings.max_position_limit_rad {
             let has = format!("has a limit of {largest} rad: if that is degrees, write {:.6}", largest.to_radians());
             add(Warning, "limit-unit", has);
         }
-        if !turns && largest > LARGEST_STROKE_M {
+        if !turns && largest > settings.max_position_limit_m {
             let has = format!("has a limit of {largest} m: if that is millimetres, write {}", largest / 1000.0);
             add(Warning, "limit-unit", has);
         }
@@ -83,10 +75,10 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
     match limits.velocity {
         Some(velocity) if velocity <= 0.0 => {
             let has =
-                format!("has a velocity limit of {velocity} {unit}/s, so that it may not move: give the real one");
+                format!("has a velocity limit of {velocity} {unit}/s, so that it cannot move: give the real limit");
             add(Warning, "velocity-limit", has);
         }
-        Some(velocity) if turns && velocity > LARGEST_REVOLUTE_VELOCITY_RAD_S => {
+        Some(velocity) if turns && velocity > settings.max_velocity_limit_rad_s => {
             let degrees = velocity.to_radians();
             let has = format!("has a velocity limit of {velocity} rad/s: if that is degrees, write {degrees:.6}");
             add(Warning, "limit-unit", has);
@@ -99,15 +91,15 @@ fn limits(joint: &Joint, follows: bool, findings: &mut Findings) {
         }
     }
     match limits.effort {
-        // A joint that follows others has no drive.
+        // A mimic joint has no drive.
         _ if follows => {}
         Some(effort) if effort <= 0.0 => {
-            let has = format!("has an effort limit of {effort}, so that it could carry nothing: give the real one");
+            let has = format!("has an effort limit of {effort}, so that it cannot move: give the real limit");
             add(Warning, "effort-limit", has);
         }
         Some(_) => {}
         None => {
-            let has = "has no effort limit: saturated torque in a log cannot be recognised by it";
+            let has = "has no effort limit: saturated torque in a log cannot be detected with it";
             add(Info, "effort-limit", has.to_owned());
         }
     }

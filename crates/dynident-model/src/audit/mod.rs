@@ -1,29 +1,32 @@
-//! Audit of a model's physics: what a description says that no robot can be, or that is likely a slip.
+//! Audit of a model's physics: impossible values in a robot description, and likely mistakes.
 //!
-//! The limits below were chosen so that the published descriptions of common arms pass. A finding is advice: the
-//! identification itself does not use the prior inertials unless asked to.
+//! The thresholds were chosen so that the published descriptions of common arms pass. A finding is advice: the
+//! identification does not use the prior inertials unless the user requests it.
 
 mod inertials;
 mod joints;
+mod settings;
 mod slips;
 
-pub use slips::{Correction, Slip, SlipKind, Slips, slips};
+pub use settings::AuditSettings;
+pub use slips::{Correction, Slip, SlipKind, SlipSettings, Slips, slips, slips_with};
 
+use crate::error::ModelError;
 use crate::tree::Model;
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AuditLevel {
-    /// Good to know.
+    /// Information.
     Info,
-    /// Likely a slip, or something that a later step will need.
+    /// A likely mistake, or a value that a later step needs.
     Warning,
     /// Physically inconsistent, or unusable.
     Problem,
 }
 
 impl AuditLevel {
-    /// The name in reports.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Info => "info",
@@ -33,38 +36,51 @@ impl AuditLevel {
     }
 }
 
-/// One finding.
+/// One finding of the audit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AuditFinding {
-    /// How much it matters.
+    /// Severity.
     pub level: AuditLevel,
-    /// Which check found it: a short name that does not change.
+    /// Name of the check; names do not change between versions.
     pub check: &'static str,
     /// `model`, `link NAME` or `joint NAME`.
     pub place: String,
-    /// What it is, why it matters, and the fix.
+    /// Problem, reason and fix.
     pub message: String,
 }
 
-/// Audits a model: the inertials of its moving links, its joints' limits, lengths and units. Findings stand in the
-/// order of the tree; the first sums the model up.
+/// Audits the inertials of a model's moving links and the limits, lengths and units of its joints. Findings are in the
+/// order of the tree; the first one is a summary of the model.
 ///
 /// Checks (`check` of the findings): `summary`, `mass-not-positive`, `mass-absurd`, `inertia-not-positive`,
 /// `triangle-inequality`, `centre-of-mass-outside`, `inertia-too-large`, `inertia-too-small`, `inertia-at-origin`,
 /// `placeholder`, `equal-inertials`, `inertial-unknown`, `massless-subtree`, `length-unit`, `limit-missing`,
 /// `limit-order`, `limit-range`, `limit-unit`, `velocity-limit`, `effort-limit`, `friction-negative`, `mimic`.
 pub fn audit(model: &Model) -> Vec<AuditFinding> {
+    findings(model, &AuditSettings::default())
+}
+
+/// As [`audit`], with other thresholds.
+///
+/// # Errors
+/// Invalid settings.
+pub fn audit_with(model: &Model, settings: &AuditSettings) -> Result<Vec<AuditFinding>, ModelError> {
+    settings.validate()?;
+    Ok(findings(model, settings))
+}
+
+fn findings(model: &Model, settings: &AuditSettings) -> Vec<AuditFinding> {
     let mass: f64 = model.inertials().iter().map(crate::InertialParameters::mass_kg).sum();
     let lengths = Lengths::of(model);
     let mut findings = Findings(Vec::new());
     let summary = format!(
-        "{} joints; the bodies that move have {mass:.4} kg in all; joint origins reach {:.3} m from the base",
+        "{} joints; the moving bodies have {mass:.4} kg in total; joint origins reach {:.3} m from the base",
         model.dof(),
         lengths.reach
     );
     findings.add(AuditLevel::Info, "summary", "model".to_owned(), summary);
-    joints::check(model, &lengths, &mut findings);
-    inertials::check(model, &lengths, &mut findings);
+    joints::check(model, &lengths, settings, &mut findings);
+    inertials::check(model, &lengths, settings, &mut findings);
     findings.0
 }
 
@@ -76,12 +92,11 @@ impl Findings {
     }
 }
 
-/// Lengths to compare with.
 struct Lengths {
     /// Largest sum of joint offsets from the base to a joint, m.
     reach: f64,
-    /// Of each body: the largest distance between its frame and a joint or link on it, or its parent joint; at least a
-    /// tenth of a metre (a wrist or a finger often has all its joints in one point).
+    /// Size of each body, m: the largest distance between its frame and a joint or link on it, or its parent joint; at
+    /// least 0.1 m, because the joints of a wrist often intersect in one point.
     bodies: Vec<f64>,
 }
 

@@ -1,12 +1,11 @@
 //! Triangles of a COLLADA file (`.dae`).
 //!
-//! Specification: COLLADA 1.4.1 (Khronos 2008), sections 5 (geometry, scene) and 4 (asset). Read are all
+//! Specification: COLLADA 1.4.1 (Khronos 2008), sections 5 (geometry, scene) and 4 (asset). Supported are all
 //! `<instance_geometry>` of the scene with the transforms of their nodes, and `<unit meter>`. A file without a scene
-//! gives all its geometries. `<up_axis>` is **not** applied: URDF tools (RViz, MoveIt, Gazebo, Pinocchio) take
-//! coordinates as they are, and robot descriptions are drawn for these.
+//! gives all its geometries. `<up_axis>` is **not** applied, because URDF tools (RViz, MoveIt, Gazebo, Pinocchio)
+//! ignore it as well.
 //!
-//! Own code on the XML parser that is here: no crate applies the transforms of several instances of one geometry
-//! (decision 0053).
+//! This is own code because no crate applies the transforms of several instances of one geometry (decision 0053).
 
 use super::MeshFault;
 use super::mesh::TriangleMesh;
@@ -15,22 +14,21 @@ use crate::xml::{MAX_NODES, flood, parse_number, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashMap;
 
-/// Most corners of triangles: as many as the largest STL file holds. Instances of instances multiply.
+/// Maximum number of triangle corners, as in the largest STL file; nested instances multiply.
 const MAX_CORNERS: usize = 16_000_000;
 
-/// Most nodes of the scene that are visited, and how deep they are nested.
+/// Maximum number of visited scene nodes, and maximum depth.
 const MAX_VISITS: usize = 100_000;
 const MAX_DEPTH: usize = 64;
 
-/// A linear map and a shift: `x -> a x + b` as rows `[a | b]`.
+/// Affine map `x -> a x + b` as rows `[a | b]`.
 type Affine = [[f64; 4]; 3];
 
 const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// The triangles of all geometries in the scene, m.
 pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
     if flood(text).is_some() {
-        return Err(MeshFault::Collada("thousands of attributes in one element, or of nested namespaces"));
+        return Err(MeshFault::Collada("too many attributes in one element, or too many nested namespaces"));
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document =
@@ -69,7 +67,7 @@ pub(super) fn read(text: &str) -> Result<TriangleMesh, MeshFault> {
     Ok(TriangleMesh::of_corners(&reader.corners))
 }
 
-/// The scene that the file shows: the one it names, else its first.
+/// The scene that the file names, otherwise its first.
 fn scene<'a, 'i>(root: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
     let named = child(root, "scene").and_then(|scene| child(scene, "instance_visual_scene"));
     let named = named.and_then(|instance| target(instance, by_id));
@@ -83,7 +81,6 @@ struct Reader<'a, 'i> {
 }
 
 impl<'a, 'i> Reader<'a, 'i> {
-    /// A node of the scene with all below it; `placed` maps from the frame of its parent.
     fn node(&mut self, node: Node<'a, 'i>, placed: &Affine, depth: usize) -> Result<(), MeshFault> {
         self.visits += 1;
         if self.visits > MAX_VISITS || depth > MAX_DEPTH {
@@ -128,7 +125,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             let mut counts =
                 child(form, "vcount").map(|node| indices(node)).transpose()?.unwrap_or_default().into_iter();
             let lists = form.children().filter(|node| node.has_tag_name("p"));
-            // A polygon with holes: its outer boundary.
+            // Only the outer boundary of a polygon with holes is used.
             let outer = children(form, "ph").filter_map(|node| child(node, "p"));
             for list in lists.chain(outer) {
                 let corners = indices(list)?;
@@ -165,7 +162,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    /// Where the index of a corner's position stands among its indices, how many there are, and all positions.
+    /// Offset of the position among the indices of a corner, number of indices per corner, and all positions.
     fn positions(&self, mesh: Node<'a, 'i>, form: Node<'a, 'i>) -> Result<(usize, usize, Vec<Vec3>), MeshFault> {
         const MISSING: MeshFault = MeshFault::Collada("a geometry without positions of its vertices");
         let offset = |input: Node<'_, '_>| input.attribute("offset").map_or(Ok(0), |text| text.trim().parse::<usize>());
@@ -178,7 +175,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 vertices = Some((offset, input));
             }
         }
-        // More inputs than any exporter writes would only be a way to take memory.
+        // A limit on the number of inputs bounds the memory.
         if stride > 256 {
             return Err(MeshFault::Face);
         }
@@ -207,7 +204,6 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 }
 
-/// The triangles of a convex polygon.
 fn fan(corners: &[Vec3]) -> impl Iterator<Item = [Vec3; 3]> {
     corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
@@ -278,12 +274,10 @@ fn children<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Ite
     node.children().filter(move |child| child.has_tag_name(name))
 }
 
-/// The element that `url="#id"` names.
 fn target<'a, 'i>(instance: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
     by_id.get(instance.attribute("url")?.trim().strip_prefix('#')?).copied()
 }
 
-/// The element that `source="#id"` names.
 fn source<'a, 'i>(input: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> Option<Node<'a, 'i>> {
     by_id.get(input.attribute("source")?.trim().strip_prefix('#')?).copied()
 }
@@ -292,7 +286,7 @@ fn source<'a, 'i>(input: Node<'a, 'i>, by_id: &HashMap<&str, Node<'a, 'i>>) -> O
 mod tests {
     use super::*;
 
-    /// A unit tetrahedron, used twice: once turned and shifted by a node below a node, once by a library node.
+    /// A unit tetrahedron with two instances: one rotated and translated by nested nodes, one in a library node.
     fn document(asset: &str, scene: &str) -> String {
         format!(
             r##"<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
@@ -319,9 +313,10 @@ mod tests {
         let asset = |up: &str| format!(r#"<unit name="centimeter" meter="0.01"/><up_axis>{up}</up_axis>"#);
         let [y, z] = ["Y_UP", "Z_UP"].map(|up| read(&document(&asset(up), SCENE)).unwrap());
         assert_eq!(y, z);
-        // The quadrilateral is two triangles, the triangle one, of two instances.
+        // Per instance: a quadrilateral (two triangles) and a triangle.
         assert_eq!((y.vertices.len(), y.triangles.len()), (8, 6));
-        // Turned by 90 degrees about z and raised by 5; stretched by 2 along x and shifted by 7; in centimetres.
+        // First instance: rotated by 90° about z, raised by 5. Second: scaled by 2 along x, shifted by 7. In
+        // centimetres.
         let expected = [[0.0, 0.0, 5.0], [0.0, 1.0, 5.0], [-1.0, 0.0, 5.0], [0.0, 0.0, 6.0]];
         let expected = expected.into_iter().chain([[7.0, 0.0, 0.0], [9.0, 0.0, 0.0], [7.0, 1.0, 0.0], [7.0, 0.0, 1.0]]);
         for place in expected {
@@ -346,7 +341,7 @@ mod tests {
         assert!(fault(&scene("<node><skew/></node>")).contains("skew"));
         assert!(fault(&scene("<node><matrix>1 2</matrix></node>")).contains("transform"));
         assert!(fault(&scene("<node><instance_controller url=\"#c\"/></node>")).contains("skinned"));
-        // A node that holds itself, and thirty levels that each hold the next twice.
+        // A node that contains itself, and thirty levels that each contain the next one twice.
         assert!(fault(&scene("<node id=\"loop\"><instance_node url=\"#loop\"/></node>")).contains("64 levels"));
         let level = |k: usize| {
             let next = format!("<instance_node url=\"#l{}\"/>", k + 1);
@@ -356,7 +351,6 @@ mod tests {
         let levels = format!("<node><instance_node url=\"#l0\"/><node>{levels}<node id=\"l30\"/></node></node>");
         assert!(fault(&scene(&levels)).contains("100,000 nodes"));
         for text in ["<COLLADA", "<COLLADA/>", "<robot/>"] {
-            // Malformed or empty: no triangles.
             assert!(read(text).map_or(true, |mesh| mesh.triangles.is_empty()), "{text}");
         }
         let negative = document("<unit meter=\"-1\"/>", "");

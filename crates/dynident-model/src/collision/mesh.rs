@@ -1,18 +1,17 @@
-//! A surface of triangles.
+//! Triangle meshes.
 
 use crate::spatial::Vec3;
 
-/// Triangles over shared vertices. A file without faces gives vertices only.
+/// A triangle mesh with shared vertices. A file without faces gives vertices only.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Each vertex once, in an order that depends on the coordinates only.
+    /// Unique vertices, in an order that depends only on the coordinates.
     pub vertices: Vec<Vec3>,
-    /// Places of the corners among the vertices.
+    /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl TriangleMesh {
-    /// The mesh with equal vertices merged. Triangles with less than three different corners are dropped.
     pub(super) fn merged(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let bits: Vec<[u64; 3]> = vertices.iter().map(|v| v.0.map(|x| (x + 0.0).to_bits())).collect();
         let mut ordered = bits.clone();
@@ -26,7 +25,6 @@ impl TriangleMesh {
         }
     }
 
-    /// The mesh of separate triangles, three vertices each.
     pub(super) fn of_corners(corners: &[Vec3]) -> Self {
         let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         Self::merged(corners, &triangles)

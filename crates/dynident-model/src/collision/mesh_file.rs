@@ -1,4 +1,4 @@
-//! From the name of a mesh in a description to its triangles.
+//! Reads the mesh file that a robot description names.
 
 use super::mesh::TriangleMesh;
 use super::{collada, mesh_text, stl};
@@ -7,44 +7,30 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Largest mesh that is read, bytes: five million triangles.
+/// Size limit of a mesh file, bytes: five million triangles.
 const MAX_MESH_BYTES: u64 = 256 << 20;
 
-/// Largest coordinate, m before scaling: beyond it the file is no link.
+/// Coordinate limit before scaling, m: larger values cannot belong to a link.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// How far above the description's folder a package is looked for.
-const LEVELS: usize = 8;
+/// Number of folders above the description that are searched for a package.
+const MAX_PARENT_LEVELS: usize = 8;
 
 /// Why a collision shape cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MeshError {
-    /// No such file.
     #[error("mesh `{name}` is missing (searched next to and above {})", folder.display())]
     Missing {
-        /// The name in the description.
         name: String,
-        /// Where the description stands.
+        /// Folder of the description.
         folder: PathBuf,
     },
-    /// The file cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
-    /// The file holds no usable mesh.
+    File { path: PathBuf, source: std::io::Error },
     #[error("{}: {fault}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        fault: MeshFault,
-    },
-    /// The reader of the description does not support the shape.
+    Content { path: PathBuf, fault: MeshFault },
     #[error("{what}")]
     Unsupported {
         /// The element and what is wrong with it.
@@ -52,20 +38,20 @@ pub enum MeshError {
     },
 }
 
-/// What is wrong with the content of a mesh file.
+/// A fault in the content of a mesh file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MeshFault {
-    /// None of the formats that are read.
+    /// Unknown format.
     #[error("unknown format; STL (binary or text), OBJ and COLLADA (.dae) are read")]
     Format,
     /// Git LFS has not fetched the file.
     #[error("Git LFS pointer in place of the mesh: run `git lfs pull` in the repository of the file")]
     LfsPointer,
-    /// More bytes than are read.
+    /// The file exceeds the size limit.
     #[error("larger than {} MiB", MAX_MESH_BYTES >> 20)]
     TooLarge,
-    /// No vertex at all.
+    /// No vertex.
     #[error("no vertices")]
     Empty,
     /// A vertex without three numbers.
@@ -85,9 +71,9 @@ pub enum MeshFault {
     Collada(&'static str),
 }
 
-/// The file of a mesh that a description in `folder` calls `name`: `package://NAME/rest` beside or up to eight levels
-/// above the folder (as `NAME/rest`, or as `rest` in a folder called `NAME`, or as `rest`), else a path, relative ones
-/// from the folder.
+/// Finds the mesh file `name` of a description in `folder`. `package://NAME/rest` is searched in the folder and up to
+/// eight levels above (as `NAME/rest`, as `rest` in a folder `NAME`, or as `rest`); any other name is a path, relative
+/// to the folder.
 pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
     let there = |path: PathBuf| path.is_file().then_some(path);
     let Some(of_package) = name.strip_prefix("package://").or_else(|| name.strip_prefix("model://")) else {
@@ -95,7 +81,7 @@ pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
     };
     let (package, rest) = of_package.split_once('/')?;
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let above = || absolute.ancestors().take(LEVELS);
+    let above = || absolute.ancestors().take(MAX_PARENT_LEVELS);
     let named = |at: &Path| at.file_name().is_some_and(|name| name == package);
     above()
         .find_map(|at| there(at.join(package).join(rest)))
@@ -103,11 +89,11 @@ pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
         .or_else(|| above().find_map(|at| there(at.join(rest))))
 }
 
-/// The vertices of a mesh, each once, and its triangles, in the file's frame; in the file's unit, but in metres for
-/// COLLADA, which names its unit.
+/// Reads the unique vertices and the triangles of a mesh in the file's frame and unit; COLLADA states its unit and is
+/// converted to metres.
 ///
 /// # Errors
-/// If the file is not found, cannot be read, or is no STL, OBJ or COLLADA with at least one vertex.
+/// File not found or not readable, or not an STL, OBJ or COLLADA file with at least one vertex.
 pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     let missing = || MeshError::Missing { name: name.to_owned(), folder: folder.to_owned() };
     let path = find_mesh(folder, name).ok_or_else(missing)?;
@@ -119,7 +105,6 @@ pub fn read_mesh(folder: &Path, name: &str) -> Result<TriangleMesh, MeshError> {
     parsed.map_err(|fault| MeshError::Content { path, fault })
 }
 
-/// The mesh of an STL, OBJ or COLLADA file, distinguished by content.
 fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
     if bytes.starts_with(b"version https://git-lfs.github.com/spec") {
         return Err(MeshFault::LfsPointer);
@@ -148,7 +133,6 @@ fn parse(bytes: &[u8]) -> Result<TriangleMesh, MeshFault> {
 mod tests {
     use super::*;
 
-    /// Two triangles over four corners of which two are shared.
     const TEXT: &str = "solid part\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1e0 0\n  endloop\n endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 1 0 0\n   vertex 0 1 0\n   vertex 0 0 -2.5\n  endloop\n endfacet\nendsolid part\n";
 
     fn binary(head: &[u8; 80], corners: &[[f32; 3]]) -> Vec<u8> {
@@ -167,7 +151,7 @@ mod tests {
         let folder = tempfile_folder("same");
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let corners = [&corners[..], &[[0.0, 0.0, -2.5]]].concat();
-        // A binary head may begin as text does.
+        // The header of a binary file may begin like a text file.
         let mut head = [b' '; 80];
         head[..5].copy_from_slice(b"solid");
         std::fs::write(folder.join("a.stl"), TEXT).unwrap();

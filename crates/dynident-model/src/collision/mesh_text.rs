@@ -1,10 +1,9 @@
-//! Meshes written as text: STL (`vertex x y z`) and Wavefront OBJ (`v x y z`, `f i j k`).
+//! Text meshes: STL (`vertex x y z`) and Wavefront OBJ (`v x y z`, `f i j k`).
 
 use super::MeshFault;
 use super::mesh::TriangleMesh;
 use crate::spatial::Vec3;
 
-/// The triangles of a text STL: each three `vertex` lines.
 pub(super) fn stl(text: &str) -> Result<TriangleMesh, MeshFault> {
     let mut corners = Vec::new();
     for line in text.lines() {
@@ -16,8 +15,7 @@ pub(super) fn stl(text: &str) -> Result<TriangleMesh, MeshFault> {
     Ok(TriangleMesh::of_corners(&corners))
 }
 
-/// The vertices and faces of an OBJ; a face with more than three corners becomes a fan. `None` if no line begins with
-/// `v`.
+/// Vertices and faces of an OBJ; a face with more than three corners becomes a fan. `None` if no line begins with `v`.
 pub(super) fn obj(text: &str) -> Result<Option<TriangleMesh>, MeshFault> {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for line in text.lines() {
@@ -42,8 +40,7 @@ fn vertex<'t>(words: &mut impl Iterator<Item = &'t str>) -> Result<Vec3, MeshFau
     Ok(Vec3([number()?, number()?, number()?]))
 }
 
-/// Index of a face's corner `i`, `i/t`, `i//n` or `i/t/n`, which counts from 1, or backwards from the last vertex if
-/// negative.
+/// Vertex index of a face's corner `i`, `i/t`, `i//n` or `i/t/n`: 1-based, or relative to the last vertex if negative.
 fn corner(word: &str, count: usize) -> Option<u32> {
     let index: i64 = word.split('/').next()?.parse().ok()?;
     let count = i64::try_from(count).ok()?;

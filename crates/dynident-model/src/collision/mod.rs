@@ -1,4 +1,4 @@
-//! The shapes of links, as the description gives them for collision checking, and points that span them.
+//! Collision shapes of links, and convex solids around them.
 //!
 //! ```
 //! use dynident_model::collision::{CollisionGeometry, CollisionShape};
@@ -30,16 +30,16 @@ use crate::spatial::Transform;
 pub struct CollisionShape {
     /// `link_from_shape`.
     pub placement: Transform,
-    /// What stands there.
+    /// The shape.
     pub geometry: CollisionGeometry,
 }
 
-/// A shape about its own frame's origin, m.
+/// A shape centred at its own frame, m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CollisionGeometry {
-    /// A box with these edges along x, y, z.
+    /// A box.
     Box {
-        /// Lengths of the edges, m.
+        /// Edge lengths along x, y, z, m.
         size_m: [f64; 3],
     },
     /// A cylinder along z with flat ends.
@@ -54,7 +54,7 @@ pub enum CollisionGeometry {
         /// Radius, m.
         radius_m: f64,
     },
-    /// A cylinder along z with half spheres beyond its ends.
+    /// A cylinder along z with hemispheres at its ends.
     Capsule {
         /// Radius, m.
         radius_m: f64,
@@ -63,14 +63,14 @@ pub enum CollisionGeometry {
     },
     /// A mesh in a file.
     Mesh {
-        /// The file as the description names it: `package://..`, `file://..` or a path.
+        /// File as named in the description: `package://..`, `file://..` or a path.
         file: String,
-        /// Factors along x, y, z.
+        /// Scale factors along x, y, z.
         scale: [f64; 3],
     },
-    /// A shape of the description that its reader does not support: an unknown element, or one with invalid sizes.
+    /// A shape that the reader does not support: an unknown element or invalid sizes.
     Unsupported {
-        /// The element and what is wrong with it.
+        /// The element and its fault.
         what: String,
     },
 }

@@ -1,30 +1,30 @@
-//! A convex solid that holds a shape: a few corners and a radius about their hull.
+//! A convex solid around a shape: the hull of a few corners, enlarged by a radius.
 
 use super::{CollisionGeometry, CollisionShape, MeshError, TriangleMesh, read_mesh};
 use crate::spatial::{Transform, Vec3};
 use std::path::Path;
 
-/// All points within `radius_m` of the convex hull of `corners_m`: the frame is the caller's.
+/// All points within `radius_m` of the convex hull of `corners_m`, in the caller's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
     /// Corners of the hull, m; at least one.
     pub corners_m: Vec<Vec3>,
-    /// What is laid about the hull, m.
+    /// Radius around the hull, m.
     pub radius_m: f64,
-    /// Of a mesh the triangles of its surface, as places among the corners; else empty.
+    /// Surface triangles of a mesh, as indices of corners; otherwise empty.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Sides of the prism that stands about a cylinder: 2 % wider at its corners.
-const SIDES: usize = 16;
+/// Sides of the prism around a cylinder: 2 % wider at its corners.
+const PRISM_SIDES: usize = 16;
 
 impl CollisionShape {
-    /// A solid in the link's frame that holds the shape: exact for boxes, spheres and capsules, a prism of 16 sides
-    /// about a cylinder, and of a mesh all its vertices (their hull, as simulators take it too). `folder` is where the
-    /// description stands.
+    /// A solid in the link's frame that contains the shape: exact for boxes, spheres and capsules, a prism with 16
+    /// sides for a cylinder, and all vertices for a mesh (simulators also use the hull). `folder` is the folder of the
+    /// description.
     ///
     /// # Errors
-    /// A mesh that cannot be found or read, and a shape that is not supported.
+    /// A mesh that is missing or unreadable, or an unsupported shape.
     pub fn solid(&self, folder: &Path) -> Result<Solid, MeshError> {
         let mut triangles = Vec::new();
         let (mut corners_m, radius_m) = match &self.geometry {
@@ -35,13 +35,18 @@ impl CollisionShape {
                 ((0..8).map(corner).collect(), 0.0)
             }
             CollisionGeometry::Cylinder { radius_m, length_m } => {
-                let outer = radius_m / (core::f64::consts::PI / SIDES as f64).cos();
+                let outer = radius_m / (core::f64::consts::PI / PRISM_SIDES as f64).cos();
                 let corner = |side: usize, z: f64| {
-                    let (sin, cos) = (core::f64::consts::TAU * side as f64 / SIDES as f64).sin_cos();
+                    let (sin, cos) = (core::f64::consts::TAU * side as f64 / PRISM_SIDES as f64).sin_cos();
                     Vec3([outer * cos, outer * sin, z])
                 };
                 let ends = [-0.5 * length_m, 0.5 * length_m];
-                (ends.into_iter().flat_map(|z| (0..SIDES).map(move |side| corner(side, z))).collect::<Vec<_>>(), 0.0)
+                (
+                    ends.into_iter()
+                        .flat_map(|z| (0..PRISM_SIDES).map(move |side| corner(side, z)))
+                        .collect::<Vec<_>>(),
+                    0.0,
+                )
             }
             CollisionGeometry::Sphere { radius_m } => (vec![Vec3::ZERO], *radius_m),
             CollisionGeometry::Capsule { radius_m, length_m } => {
@@ -63,7 +68,7 @@ impl CollisionShape {
 }
 
 impl Solid {
-    /// The same solid seen from another frame: `to_from_here` places it there.
+    /// The solid in another frame.
     #[must_use]
     pub fn placed(&self, to_from_here: &Transform) -> Self {
         Self {

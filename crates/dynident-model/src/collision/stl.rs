@@ -1,31 +1,31 @@
 //! Triangles of a binary STL file.
 //!
-//! Own code rather than a crate: of the format only the corners are needed, and a count in the file's head must not
-//! decide how much memory is taken.
+//! This is own code because only the corners are needed, and the triangle count in the header must not determine the
+//! allocated memory.
 
 use crate::spatial::Vec3;
 
-/// Head of a binary file: 80 bytes of anything and the number of triangles.
-const HEAD: usize = 84;
-/// A triangle: normal, three corners, two bytes more.
-const TRIANGLE: usize = 50;
+/// Header of a binary file: 80 arbitrary bytes and the number of triangles.
+const HEADER_BYTES: usize = 84;
+/// Bytes of a triangle: normal, three corners, attribute.
+const TRIANGLE_BYTES: usize = 50;
 
-/// Whether the bytes are a binary STL: the length that its count of triangles asks for (text may begin with any head).
+/// Whether the file length matches the triangle count of a binary STL; a text file can have any header bytes.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
-    let Some(count) = bytes.get(80..HEAD) else { return false };
+    let Some(count) = bytes.get(80..HEADER_BYTES) else { return false };
     let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize;
-    let needed = count.checked_mul(TRIANGLE).and_then(|length| length.checked_add(HEAD));
-    // Some writers add bytes at the end.
+    let needed = count.checked_mul(TRIANGLE_BYTES).and_then(|length| length.checked_add(HEADER_BYTES));
+    // Some programs append bytes.
     let text = bytes.starts_with(b"solid") && bytes.windows(8).take(4096).any(|window| window == b"endfacet");
     needed.is_some_and(|needed| count > 0 && bytes.len() >= needed && !text)
 }
 
-/// The corners of all triangles of a binary file.
 pub(super) fn binary(bytes: &[u8]) -> Vec<Vec3> {
-    let count = bytes.get(80..HEAD).map_or(0, |count| u32::from_le_bytes([count[0], count[1], count[2], count[3]]));
+    let count =
+        bytes.get(80..HEADER_BYTES).map_or(0, |count| u32::from_le_bytes([count[0], count[1], count[2], count[3]]));
     let number = |bytes: &[u8]| f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
-    bytes[HEAD.min(bytes.len())..]
-        .chunks_exact(TRIANGLE)
+    bytes[HEADER_BYTES.min(bytes.len())..]
+        .chunks_exact(TRIANGLE_BYTES)
         .take(count as usize)
         .flat_map(|triangle| triangle[12..48].chunks_exact(12))
         .map(|corner| Vec3([number(&corner[..4]), number(&corner[4..8]), number(&corner[8..12])]))

@@ -1,4 +1,4 @@
-//! From the keys of a D-H table to the link tree.
+//! Builds the link tree from the keys of a D-H table.
 
 use super::table::{Base, Dynamics, Inertial, Limits, Number, Row, Table};
 use super::{DhError, DhFault};
@@ -12,18 +12,18 @@ use crate::urdf::{MAX_MAGNITUDE, MAX_MOVING_JOINTS};
 use std::collections::{HashMap, HashSet};
 use toml::Spanned;
 
-/// The model that `table`, read from `text`, describes, with what it is in the other convention.
+/// Builds the model of `table`, read from `text`, and stores the model of the other convention in it.
 pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
     let stated = model_in(text, table, table.convention)?;
     let other = table.convention.other();
-    // What the table is not meant to be is no reason to refuse it.
+    // A failure in the other convention is not an error of the table.
     Ok(match model_in(text, table, other) {
         Ok(model) => stated.with_other_convention(other, model),
         Err(_) => stated,
     })
 }
 
-/// The model that `table` describes in this convention.
+/// Builds the model of `table` in the given convention.
 fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model, DhError> {
     let source = Source { text };
     let gravity = table.gravity_m_s2.as_ref().map(|gravity| source.finite("gravity_m_s2", gravity)).transpose()?;
@@ -80,16 +80,14 @@ fn model_in(text: &str, table: &Table, convention: DhConvention) -> Result<Model
     model.and_then(|model| model.with_gravity(gravity)).map_err(|error| source.fault(0, DhFault::Model(error)))
 }
 
-/// Where a link is.
 #[derive(Clone, Copy)]
 struct LinkPlace {
-    /// The body it moves with; `None` for the base.
+    /// Body that the link belongs to; `None` for the base.
     body: Option<usize>,
-    /// Its D-H frame in the frame of that body.
+    /// D-H frame of the link in the frame of that body.
     body_from_dh: Transform,
 }
 
-/// A row's names and the place of its D-H frame.
 pub(super) struct RowFrame {
     pub(super) joint: String,
     pub(super) link: String,
@@ -113,9 +111,8 @@ fn default_link(joint: &str) -> String {
     format!("{joint}_link")
 }
 
-/// Where a row puts the body frame and the D-H frame.
 struct Frames {
-    /// The body frame at position zero, in the parent's D-H frame.
+    /// Body frame at position zero, in the parent's D-H frame.
     placement: Transform,
     /// D-H frame i in body frame i.
     body_from_dh: Transform,
@@ -154,7 +151,7 @@ impl Source<'_> {
         }
     }
 
-    /// The place of a row's parent link, by default the link of the row before.
+    /// Place of a row's parent link; by default, the link of the previous row.
     fn parent(&self, row: &Row, previous: &str, places: &HashMap<String, LinkPlace>) -> Result<LinkPlace, DhError> {
         let parent = row.parent.as_ref().map_or(previous, |parent| parent.get_ref());
         places.get(parent).copied().ok_or_else(|| {
@@ -166,7 +163,6 @@ impl Source<'_> {
         })
     }
 
-    /// The joint of a row.
     fn joint(&self, row: &Row, name: &str, parent: LinkPlace, frames: &Frames) -> Result<Joint, DhError> {
         let kind = JointKind::from(row.kind);
         let sign = row.sign.as_ref().map_or(1.0, |sign| *sign.get_ref());
@@ -190,7 +186,7 @@ impl Source<'_> {
         })
     }
 
-    /// The one of two keys that is given.
+    /// Value of a quantity that may be given by one of two keys.
     fn one_of(&self, keys: [&'static str; 2], numbers: [&Number; 2]) -> Result<[Option<f64>; 2], DhError> {
         if let [Some(_), Some(second)] = numbers {
             return Err(self.fault(second.span().start, DhFault::BothUnits { first: keys[0], second: keys[1] }));
@@ -198,7 +194,7 @@ impl Source<'_> {
         Ok([self.number(keys[0], numbers[0])?, self.number(keys[1], numbers[1])?])
     }
 
-    /// An angle in radians or degrees, 0 if neither is given, as sine and cosine.
+    /// Sine and cosine of an angle in radians or degrees; the angle is 0 if neither key is given.
     fn angle(&self, keys: [&'static str; 2], numbers: [&Number; 2]) -> Result<(f64, f64), DhError> {
         Ok(match self.one_of(keys, numbers)? {
             [_, Some(degrees)] => sin_cos_degrees(degrees),
@@ -278,7 +274,6 @@ impl Source<'_> {
         })
     }
 
-    /// The inertial in D-H frame i.
     fn inertial(&self, inertial: &Spanned<Inertial>) -> Result<InertialParameters, DhError> {
         let Inertial { mass_kg, com_m, inertia_at_com, inertia_at_origin, parameters } = inertial.get_ref();
         let matrix = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
@@ -301,8 +296,8 @@ impl Source<'_> {
     }
 }
 
-/// Sine and cosine of degrees, exact at multiples of 90: right angles are the rule in D-H tables, and structural zeros
-/// hang on them.
+/// Sine and cosine of degrees, exact at multiples of 90. Most angles in D-H tables are right angles, and structural
+/// zeros of the model depend on exact values.
 fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),

@@ -8,7 +8,7 @@
 //!
 //! [base]                             # all optional
 //! link = "base"                      # name of the fixed link
-//! xyz_m = [0.0, 0.0, 0.0]            # where D-H frame 0 stands in the base frame
+//! xyz_m = [0.0, 0.0, 0.0]            # origin of D-H frame 0 in the base frame
 //! rpy_deg = [0.0, 0.0, 0.0]          # or rpy_rad; fixed axes, as in URDF
 //!
 //! [[joint]]
@@ -42,11 +42,11 @@
 //! | `standard` (Denavit and Hartenberg 1955; Paul 1981) | `Rz(θ) Tz(d) Tx(a) Rx(α)` | those after joint i: `a_i`, `α_i` |
 //!
 //! **Frames.** In the modified convention the model's body frame i is D-H frame i: its z axis is the joint's axis. In
-//! the standard convention the axis of joint i is z of frame i-1, so that D-H frame i does not lie on it: there the
-//! body frame is frame i-1 turned by `Rz(θ)` (slid along z by `s q`), and D-H frame i stands in it at `Tz(d) Tx(a)
-//! Rx(α)`. Inertials in the table are always given in D-H frame i; the reader carries them into the body frame.
+//! the standard convention the axis of joint i is z of frame i-1. There the body frame is frame i-1 rotated by `Rz(θ)`
+//! (or translated along z by `s q`), and D-H frame i in it is `Tz(d) Tx(a) Rx(α)`. Inertials in the table are always
+//! given in D-H frame i; the reader transforms them into the body frame.
 //!
-//! **Inertials**, where known (otherwise the body is unknown, never zero), are one of
+//! **Inertials** are given in one of two forms; a body without an inertial is unknown, not massless:
 //! - `mass_kg`, `com_m` and `inertia_at_com` (kg m², about the centre of mass) or `inertia_at_origin` (about the origin
 //!   of D-H frame i), both as `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`;
 //! - `parameters`, all ten in the order [`INERTIAL_NAMES`](crate::INERTIAL_NAMES).
@@ -65,85 +65,35 @@ use thiserror::Error;
 /// Why a D-H table could not be read, with line and column.
 pub type DhError = Located<DhFault>;
 
-/// What is wrong in a D-H table, and the fix.
+/// A fault in a D-H table, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum DhFault {
-    /// Not TOML, a key that does not exist, or a value of the wrong kind.
     #[error("{reason}; fix this entry of the D-H table")]
-    Toml {
-        /// What the TOML parser says.
-        reason: String,
-    },
-    /// A number that is not finite, or beyond [`MAX_MAGNITUDE`](crate::urdf::MAX_MAGNITUDE).
+    Toml { reason: String },
     #[error("`{key}` is {value:e}: write a finite number below 1e9")]
-    Number {
-        /// The key.
-        key: &'static str,
-        /// The number.
-        value: f64,
-    },
-    /// One quantity given twice, in two units.
-    #[error("`{first}` and `{second}` say the same thing: keep one")]
-    BothUnits {
-        /// One key.
-        first: &'static str,
-        /// The other.
-        second: &'static str,
-    },
-    /// A key that does not fit the kind of joint.
+    Number { key: &'static str, value: f64 },
+    #[error("`{first}` and `{second}` are the same quantity: keep one")]
+    BothUnits { first: &'static str, second: &'static str },
     #[error("`{key}` does not fit a {kind} joint: use {fix}")]
-    WrongUnit {
-        /// The key.
-        key: &'static str,
-        /// Kind of the joint.
-        kind: &'static str,
-        /// The keys that fit.
-        fix: &'static str,
-    },
-    /// A sign that is neither 1 nor -1.
+    WrongUnit { key: &'static str, kind: &'static str, fix: &'static str },
     #[error("`sign` is {sign}: write 1 or -1")]
-    Sign {
-        /// The value.
-        sign: f64,
-    },
-    /// A name without a character.
+    Sign { sign: f64 },
     #[error("a {what} has an empty name: give it one")]
-    EmptyName {
-        /// `joint` or `link`.
-        what: &'static str,
-    },
-    /// Two joints or two links with one name.
-    #[error("{what} `{name}` stands twice: rename one")]
-    DuplicateName {
-        /// `joint` or `link`.
-        what: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A parent that no earlier joint moves.
+    EmptyName { what: &'static str },
+    #[error("duplicate {what} `{name}`: rename one")]
+    DuplicateName { what: &'static str, name: String },
     #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
-    UnknownParent {
-        /// The name.
-        parent: String,
-        /// Links that are known at this place.
-        known: Vec<String>,
-    },
-    /// No joint.
+    UnknownParent { parent: String, known: Vec<String> },
     #[error("the table has no joint: add [[joint]] entries")]
     NoJoint,
-    /// More joints than [`MAX_MOVING_JOINTS`](crate::urdf::MAX_MOVING_JOINTS).
     #[error("the table has more than {limit} joints: remove some")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
-    /// An inertial that is neither complete nor absent.
+    TooManyJoints { limit: usize },
     #[error(
-        "the inertial is not complete or says things twice: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
+        "the inertial is incomplete or redundant: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
     )]
     Inertial,
-    /// The parts do not make a model.
     #[error("{0}; fix the table")]
     Model(#[from] ModelError),
 }
@@ -151,14 +101,13 @@ pub enum DhFault {
 /// Reads a D-H table (format: [module documentation](self)).
 ///
 /// # Errors
-/// If the text is no TOML, holds unknown keys or unusable values, or describes no tree; with line and column.
+/// The text is not TOML, contains unknown keys or invalid values, or does not describe a tree; with line and column.
 pub fn read_dh(text: &str) -> Result<Model, DhError> {
     let (text, table) = parsed(text)?;
     build::model(text, &table)
 }
 
-/// The text without a byte order mark, which is no part of the table (positions are counted after it, as editors do),
-/// and its keys.
+/// The text without a byte order mark (positions start after it, as in editors), and its keys.
 fn parsed(text: &str) -> Result<(&str, table::Table), DhError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let table = toml::from_str(text)

@@ -1,11 +1,10 @@
-//! The keys of a D-H table, as they stand in the file.
+//! The keys of a D-H table in the file.
 
 use crate::dh_convention::DhConvention;
 use crate::joint::JointKind;
 use serde::Deserialize;
 use toml::Spanned;
 
-/// A number with its place.
 pub(super) type Number = Option<Spanned<f64>>;
 
 #[derive(Clone, Copy, Default, Deserialize)]

@@ -11,51 +11,33 @@ use std::collections::HashSet;
 use thiserror::Error;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 
-/// The keys of an `inertial`.
 const KEYS: [&str; 5] = ["mass_kg", "com_m", "inertia_at_com", "inertia_at_origin", "parameters"];
-/// What a comment of this program begins with; that of an earlier identification gives way to the next one's.
+/// Prefix of comments written by Dynident; a new identification replaces them.
 const SIGNATURE: &str = "# identified: ";
 
-/// Why a D-H table could not be rewritten.
+/// Why values could not be written into a D-H table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum DhWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] DhError),
-    /// A change to something that the original does not hold.
     #[error("the D-H table has no {kind} `{name}`: write into the file that the model was read from")]
-    Unknown {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// Two changes to one link or joint.
+    Unknown { kind: &'static str, name: String },
     #[error("two changes to {kind} `{name}`: give one")]
-    Repeated {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A value that is not finite.
+    Repeated { kind: &'static str, name: String },
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
-    NotFinite {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
+    NotFinite { kind: &'static str, name: String },
 }
 
-/// `original` with the changes made: inertials, which the changes give in the **body** frames, are written in the D-H
-/// frames of the rows (see the [module](crate::dh)) as `mass_kg`, `com_m` and `inertia_at_com` or, where there is no
-/// centre of mass, as `parameters`. Every number stands in the shortest form that reads back to the same `f64`. Notes
-/// become comments before the row's `inertial`.
+/// Writes the changes into `original`. Inertials, which the changes give in the **body** frames, are written in the D-H
+/// frames of the rows (see the [module](crate::dh)) as `mass_kg`, `com_m` and `inertia_at_com`, or as `parameters` if
+/// there is no centre of mass. Every number has the shortest form that parses to the same `f64`. Notes become comments
+/// before the row's `inertial`.
 ///
 /// # Errors
-/// If the original is no D-H table, a link or joint is unknown or named twice, or a value is not finite.
+/// An invalid D-H table, an unknown link or joint, a repeated change, or a value that is not finite.
 pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, DhWriteError> {
     let (text, table) = parsed(original)?;
     let rows = rows(text, &table)?;
@@ -107,7 +89,7 @@ pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) 
     Ok(dynident_text::toml_document(&format!("{mark}{document}")).into_owned())
 }
 
-/// A row of the table as tables of either kind hold it: `[[joint]]`, or an element of `joint = [..]`.
+/// A row as a table: `[[joint]]`, or an element of `joint = [..]`.
 fn row_mut(document: &mut DocumentMut, index: usize) -> Option<&mut dyn TableLike> {
     match document.get_mut("joint")? {
         Item::ArrayOfTables(rows) => rows.get_mut(index).map(|row| row as &mut dyn TableLike),
@@ -118,7 +100,7 @@ fn row_mut(document: &mut DocumentMut, index: usize) -> Option<&mut dyn TableLik
     }
 }
 
-/// The table `key` of a row, made where there is none.
+/// The table `key` of a row, created if missing.
 fn child<'r>(row: &'r mut dyn TableLike, key: &str) -> Option<&'r mut dyn TableLike> {
     if !row.get(key).is_some_and(Item::is_table_like) {
         row.insert(key, Item::Value(Value::InlineTable(InlineTable::new())));
@@ -126,7 +108,7 @@ fn child<'r>(row: &'r mut dyn TableLike, key: &str) -> Option<&'r mut dyn TableL
     row.get_mut(key)?.as_table_like_mut()
 }
 
-/// Sets a value in its place; the spacing and the comment around the old one stay.
+/// Sets a value and keeps the spacing and comment around it.
 fn put(table: &mut dyn TableLike, key: &str, mut value: Value) {
     match table.get_mut(key) {
         Some(item) => {
@@ -160,7 +142,6 @@ fn set_inertial(row: &mut dyn TableLike, inertial: &InertialParameters) {
     }
 }
 
-/// The note as a comment on a line of its own before `inertial`.
 fn set_note(row: &mut dyn TableLike, note: &str) {
     let line = format!("{SIGNATURE}{}\n", dynident_text::comment(note));
     let with_note = |before: Option<&str>| -> String {

@@ -1,4 +1,4 @@
-//! From nested `<body>` elements to the tree of moving bodies.
+//! Builds the tree of moving bodies from nested `<body>` elements.
 
 use super::classes::{ClassId, Classes, MAIN, Stated};
 use super::compiler::{Compiler, FromGeoms};
@@ -18,11 +18,10 @@ use crate::urdf::MAX_MOVING_JOINTS;
 use crate::xml::shortened;
 use std::collections::{HashMap, HashSet};
 
-/// Name of the link that does not move.
 pub(super) const WORLD: &str = "world";
 
-/// Elements that a body may hold and that play no part in its dynamics.
-const APART: [&str; 4] = ["site", "camera", "light", "plugin"];
+/// Elements of a body without influence on its dynamics.
+const NON_DYNAMIC_ELEMENTS: [&str; 4] = ["site", "camera", "light", "plugin"];
 const IN_BODY: [&str; 14] = [
     "name",
     "class",
@@ -69,52 +68,46 @@ const IN_JOINT: [&str; 25] = [
     "align",
 ];
 
-/// Where a link stands in the document.
 #[derive(Clone, Debug)]
 pub(super) struct LinkPlace {
     pub(super) name: String,
-    /// The `<body>`; `None` for a link between two joints of one body, which the document does not have.
+    /// The `<body>`; `None` for a link between two joints of one body, which has no element.
     pub(super) body: Option<Place>,
-    /// The origin of the link's frame in the body's frame, which has the same axes, m.
+    /// Origin of the link's frame in the body's frame, m; the axes are the same.
     pub(super) origin: Vec3,
 }
 
-/// The tree so far.
 pub(super) struct Tree {
     pub(super) joints: Vec<Joint>,
-    /// The elements of the joints, in the same order.
+    /// Elements of the joints, in the same order.
     pub(super) joint_places: Vec<Place>,
-    /// Positions in the drawn pose, in the same order, rad or m.
+    /// Positions in the drawn pose (`ref`), in the same order, rad or m.
     pub(super) references: Vec<f64>,
     pub(super) bodies: Vec<Body>,
     pub(super) base: Body,
     pub(super) links: Vec<LinkPlace>,
-    /// Links that have mass which is not known.
     pub(super) unknown: HashSet<String>,
 }
 
-/// A `<body>` still to visit.
 #[derive(Clone, Copy)]
-struct Ahead<'t> {
+struct PendingBody<'t> {
     element: &'t Element,
-    /// The body of the model that carries the one around it.
+    /// Body of the model that carries the surrounding `<body>`.
     carrier: Option<usize>,
-    /// Where the body around it, or the `<frame>` in that, stands in the carrier.
+    /// Pose of the surrounding `<body>` or `<frame>` in the carrier.
     carrier_from_parent: Transform,
     childclass: ClassId,
 }
 
-/// What the elements of a body say.
 #[derive(Default)]
 struct Contents<'t> {
     inertial: Option<InertialParameters>,
     joints: Vec<JointElement>,
     geoms: Vec<Result<Geom, MjcfError>>,
-    /// Bodies in it, where their frames stand in the body, and their class.
+    /// Nested bodies with their surrounding frame and class.
     bodies: Vec<(&'t Element, Transform, ClassId)>,
 }
 
-/// Reads `<worldbody>`.
 pub(super) struct Reader<'t> {
     pub(super) document: &'t Expanded,
     pub(super) classes: &'t Classes<'t>,
@@ -124,7 +117,6 @@ pub(super) struct Reader<'t> {
     body_count: usize,
     body_names: HashSet<String>,
     joint_names: HashSet<String>,
-    /// Links whose mass is not known although they have some, and why.
     unknown: HashMap<String, (&'static str, Place)>,
 }
 
@@ -154,12 +146,12 @@ impl<'t> Reader<'t> {
             links: Vec::new(),
             unknown: HashSet::new(),
         };
-        // A stack, not recursion: a chain may be as long as the file.
-        let mut ahead: Vec<Ahead<'t>> = Vec::new();
+        // A stack avoids recursion, because a chain may be as long as the file.
+        let mut ahead: Vec<PendingBody<'t>> = Vec::new();
         for world in self.document.sections("worldbody") {
             let contents = self.contents(world, WORLD, MAIN, true)?;
             tree.base.links[0].collision.extend(shapes(contents.geoms, Vec3::ZERO));
-            ahead.extend(contents.bodies.into_iter().map(|(element, carrier_from_parent, childclass)| Ahead {
+            ahead.extend(contents.bodies.into_iter().map(|(element, carrier_from_parent, childclass)| PendingBody {
                 element,
                 carrier: None,
                 carrier_from_parent,
@@ -175,8 +167,13 @@ impl<'t> Reader<'t> {
         Ok(tree)
     }
 
-    fn visit(&mut self, next: Ahead<'t>, tree: &mut Tree, ahead: &mut Vec<Ahead<'t>>) -> Result<(), MjcfError> {
-        let Ahead { element, carrier, carrier_from_parent, childclass } = next;
+    fn visit(
+        &mut self,
+        next: PendingBody<'t>,
+        tree: &mut Tree,
+        ahead: &mut Vec<PendingBody<'t>>,
+    ) -> Result<(), MjcfError> {
+        let PendingBody { element, carrier, carrier_from_parent, childclass } = next;
         let stated = Stated::own(self.document, element);
         let name = self.body_name(element)?;
         self.note_unread(&stated, &IN_BODY);
@@ -188,7 +185,7 @@ impl<'t> Reader<'t> {
         let moves = carrier.is_some() || !contents.joints.is_empty();
         let inertial = self.mass(&name, element, &mut contents, moves)?;
 
-        // The joints one after the other, each with a body of its own; all but the last are without mass.
+        // Each joint gets a separate body; all but the last are massless.
         let joints = std::mem::take(&mut contents.joints);
         let (mut at, mut origin) = (carrier, Vec3::ZERO);
         let mut placement = carrier_from_parent.then(&place(&stated, self.compiler)?);
@@ -230,7 +227,7 @@ impl<'t> Reader<'t> {
             host.links.push(Link { name, placement, inertial, collision });
         }
         let carrier_from_body = placement.then(&shift);
-        ahead.extend(contents.bodies.into_iter().rev().map(|(element, body_from_frame, childclass)| Ahead {
+        ahead.extend(contents.bodies.into_iter().rev().map(|(element, body_from_frame, childclass)| PendingBody {
             element,
             carrier: at,
             carrier_from_parent: carrier_from_body.then(&body_from_frame),
@@ -239,7 +236,7 @@ impl<'t> Reader<'t> {
         Ok(())
     }
 
-    /// The joint at `placement` in its parent; `ref` moves the position zero back from the drawn pose.
+    /// Joint at `placement` in its parent; `ref` shifts the zero position away from the drawn pose.
     fn joint(
         &mut self,
         element: JointElement,
@@ -285,7 +282,7 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// Everything in a body, through `<frame>` elements.
+    /// Collects everything in a body, including nested `<frame>` elements.
     fn contents(
         &mut self,
         body: &'t Element,
@@ -342,7 +339,7 @@ impl<'t> Reader<'t> {
                     let what = format!("<{}>", element.tag);
                     return unsupported(&what, "save the model from MuJoCo (mj_saveLastXML), which writes it out");
                 }
-                tag if APART.contains(&tag) => {}
+                tag if NON_DYNAMIC_ELEMENTS.contains(&tag) => {}
                 tag => {
                     let loss = Loss::Unread { element: shortened(tag), attribute: None };
                     self.notices.note_at(self.document, element.place, loss);
@@ -352,7 +349,7 @@ impl<'t> Reader<'t> {
         Ok(found)
     }
 
-    /// The mass of a body by its `<inertial>` or its geoms, with the compiler's corrections.
+    /// Mass of a body from its `<inertial>` or its geoms, with the corrections of `<compiler>`.
     fn mass(
         &mut self,
         name: &str,
@@ -372,7 +369,7 @@ impl<'t> Reader<'t> {
             }
             for mass in contents.geoms.iter().flatten().map(|geom| geom.mass) {
                 match mass {
-                    GeomMass::Nothing => {}
+                    GeomMass::Massless => {}
                     GeomMass::Known(inertial) => sum = Some(sum.map_or(inertial, |sum| sum.plus(&inertial))),
                     GeomMass::Unknown(why) => {
                         self.unknown.insert(name.to_owned(), (why, element.place));
@@ -388,7 +385,7 @@ impl<'t> Reader<'t> {
         Ok(corrected(sum.or(contents.inertial), self.compiler))
     }
 
-    /// `settotalmass`: all masses and inertias by one factor.
+    /// Applies `settotalmass`: scales all masses and inertias by one factor.
     fn set_total_mass(&self, tree: &mut Tree) -> Result<(), MjcfError> {
         let Some(total) = self.compiler.total_mass else { return Ok(()) };
         if let Some((body, (why, place))) = self.unknown.iter().min_by_key(|(_, (_, place))| (place.source, place.at)) {
@@ -419,7 +416,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    /// `name`, or with underscores behind it where it is taken.
+    /// `name`, with underscores appended if it is taken.
     fn free_name(&mut self, mut name: String) -> String {
         while !self.body_names.insert(name.clone()) {
             name.push('_');
@@ -435,7 +432,7 @@ impl<'t> Reader<'t> {
     }
 }
 
-/// The shapes of geoms, in a frame whose origin stands at `origin` in the body.
+/// Shapes of geoms, in a frame with the origin `origin` in the body.
 fn shapes(geoms: Vec<Result<Geom, MjcfError>>, origin: Vec3) -> Vec<CollisionShape> {
     let faulty = |error: MjcfError| {
         let geometry = CollisionGeometry::Unsupported { what: error.to_string() };

@@ -1,8 +1,7 @@
-//! `<connect>` under `<equality>`: chains of the parallelogram kind are closed, as `[[robot.loop]]` of a study closes
-//! them.
+//! `<connect>` under `<equality>`: closes chains of the parallelogram kind, as `[[robot.loop]]` of a study does.
 //!
-//! The two points are the anchor and what it meets in the drawn pose. The file does not say which joints are passive:
-//! of those that the chain moves, the ones that no actuator drives and that follow nothing yet.
+//! The two points are the anchor and the coinciding point in the drawn pose. MJCF does not mark passive joints: they
+//! are the joints of the chain without an actuator that do not follow another joint.
 
 use super::bodies::LinkPlace;
 use super::classes::Stated;
@@ -15,32 +14,30 @@ use crate::spatial::{Transform, Vec3};
 use crate::tree::Model;
 use std::collections::HashSet;
 
-/// Chains that are tried: their sizes multiply, and robots have a few.
-const MOST: usize = 16;
+/// Maximum number of chains; robots have few, and their sizes multiply.
+const MAX_CHAINS: usize = 16;
 
 /// A `<connect>` that names a body and an anchor.
 pub(super) struct Connect<'t> {
     pub(super) stated: Stated<'t>,
     pub(super) bodies: [String; 2],
-    /// In the frame of the first body, m.
+    /// Anchor in the frame of the first body, m.
     pub(super) anchor: Vec3,
 }
 
-/// What is known of the bodies and joints that chains close.
-pub(super) struct Around<'a> {
+pub(super) struct ChainContext<'a> {
     pub(super) document: &'a Expanded,
     pub(super) links: &'a [LinkPlace],
     /// Positions in the drawn pose, in the order of the tree.
     pub(super) references: &'a [f64],
-    /// Joints with actuators.
     pub(super) driven: &'a HashSet<String>,
 }
 
-/// The robot with its chains closed; those that are no parallelograms are noted with the reason, and stay open.
+/// Closes the chains of a robot. Chains that are not parallelograms stay open, with a notice.
 pub(super) fn closed(
     model: Model,
     connects: &[Connect<'_>],
-    around: &Around<'_>,
+    around: &ChainContext<'_>,
     notices: &mut Notices,
 ) -> Result<Model, MjcfError> {
     let mut left = |connect: &Connect<'_>, why: String| {
@@ -49,8 +46,8 @@ pub(super) fn closed(
     };
     let mut held = Vec::new();
     for (number, connect) in connects.iter().enumerate() {
-        if number >= MOST {
-            left(connect, format!("more than {MOST} chains are not tried"));
+        if number >= MAX_CHAINS {
+            left(connect, format!("more than {MAX_CHAINS} chains are not supported"));
             continue;
         }
         match closure(&model, connect, around) {
@@ -63,7 +60,7 @@ pub(super) fn closed(
         match loops::followers(&model, &closures) {
             Ok(followers) => break followers,
             Err(error) => {
-                // One chain less: the one that is at fault, where the error says so.
+                // Removes one chain: the one that the error names, otherwise the first.
                 let at_fault = held.iter().position(|(_, closure)| blames(&error, closure)).unwrap_or(0);
                 let (connect, _) = held.remove(at_fault);
                 left(connect, error.to_string());
@@ -84,9 +81,9 @@ fn blames(error: &LoopError, closure: &LoopClosure) -> bool {
     }
 }
 
-/// The cut of a chain, or why there is none.
-fn closure(model: &Model, connect: &Connect<'_>, around: &Around<'_>) -> Result<LoopClosure, String> {
-    let way = |link: &String| loops::way_to(model, link).ok_or_else(|| format!("there is no body `{link}`"));
+/// Cut of a chain, or the reason why it cannot be closed.
+fn closure(model: &Model, connect: &Connect<'_>, around: &ChainContext<'_>) -> Result<LoopClosure, String> {
+    let way = |link: &String| loops::path_to(model, link).ok_or_else(|| format!("unknown body `{link}`"));
     let [(first, first_placement), (second, second_placement)] = [way(&connect.bodies[0])?, way(&connect.bodies[1])?];
     let drawn = |path: &[usize], placement: Transform| {
         let joints = path.iter().map(|&joint| model.tree_joints()[joint].transform(around.references[joint]));
@@ -98,7 +95,7 @@ fn closure(model: &Model, connect: &Connect<'_>, around: &Around<'_>) -> Result<
     let meets = drawn(&first, first_placement).point(point);
     let other = drawn(&second, second_placement).inverse().point(meets);
     if around.driven.is_empty() {
-        return Err("no actuator says which joints have a drive; name the others in [[robot.loop]]".to_owned());
+        return Err("no joint has an actuator; name the passive joints in [[robot.loop]]".to_owned());
     }
     let moves = |joint: &usize| first.contains(joint) != second.contains(joint);
     let free = |joint: &usize| {

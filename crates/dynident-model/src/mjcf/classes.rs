@@ -1,11 +1,11 @@
-//! `<default>`: attributes that elements of a class have without stating them.
+//! `<default>`: default attributes by class.
 
 use super::expanded::{Attribute, Element, Expanded, Place};
 use super::fault::{MjcfError, MjcfFault};
 use crate::xml::shortened;
 use std::collections::HashMap;
 
-/// The actuators share one set of defaults, whichever of them states it.
+/// All actuator elements share one set of defaults.
 const ACTUATORS: [&str; 11] = [
     "general",
     "motor",
@@ -20,25 +20,23 @@ const ACTUATORS: [&str; 11] = [
     "plugin",
 ];
 
-/// Number of a class.
 pub(super) type ClassId = usize;
 
-/// The class of everything that names none.
+/// Class of elements that do not name one.
 pub(super) const MAIN: ClassId = 0;
 
 struct Class<'t> {
     parent: Option<ClassId>,
-    /// Attributes by the kind of element; of an attribute stated twice the last counts.
+    /// Attributes by kind of element; if an attribute is repeated, the last one applies.
     attributes: HashMap<&'static str, Vec<&'t Attribute>>,
 }
 
-/// All classes of a document.
 pub(super) struct Classes<'t> {
     classes: Vec<Class<'t>>,
     by_name: HashMap<&'t str, ClassId>,
 }
 
-/// The elements that are read with their defaults.
+/// Elements that are read with their defaults.
 fn kind_of(tag: &str) -> Option<&'static str> {
     match tag {
         "joint" => Some("joint"),
@@ -50,7 +48,6 @@ fn kind_of(tag: &str) -> Option<&'static str> {
 }
 
 impl<'t> Classes<'t> {
-    /// Reads all `<default>` sections.
     pub(super) fn new(document: &'t Expanded) -> Result<Self, MjcfError> {
         let main = Class { parent: None, attributes: HashMap::new() };
         let mut found = Self { classes: vec![main], by_name: HashMap::from([("main", MAIN)]) };
@@ -94,7 +91,7 @@ impl<'t> Classes<'t> {
         Ok(class)
     }
 
-    /// The class that an attribute (`class`, `childclass`) of an element names.
+    /// Class named by an attribute (`class`, `childclass`) of an element.
     pub(super) fn named(
         &self,
         document: &Expanded,
@@ -106,8 +103,8 @@ impl<'t> Classes<'t> {
         self.by_name.get(&*name.value).copied().map(Some).ok_or_else(unknown)
     }
 
-    /// The attributes of an element: its own, then those of its class (`class`, or `childclass` of what is around it)
-    /// and of the classes around that.
+    /// Attributes of an element: its own, then those of its class (`class`, or `childclass` of a surrounding body),
+    /// then those of the parent classes.
     pub(super) fn stated(
         &'t self,
         document: &'t Expanded,
@@ -127,7 +124,6 @@ impl<'t> Classes<'t> {
     }
 }
 
-/// The attributes that count for an element, nearest statement first.
 pub(super) struct Stated<'t> {
     pub(super) document: &'t Expanded,
     pub(super) tag: &'t str,
@@ -136,24 +132,21 @@ pub(super) struct Stated<'t> {
 }
 
 impl<'t> Stated<'t> {
-    /// An element that has no defaults.
     pub(super) fn own(document: &'t Expanded, element: &'t Element) -> Self {
         let levels = vec![element.attributes.iter().collect()];
         Self { document, tag: &element.tag, place: element.place, levels }
     }
 
-    /// The attributes that the element itself states.
     pub(super) fn own_attributes(&self) -> impl Iterator<Item = &'t Attribute> {
         self.levels[0].iter().copied()
     }
 
-    /// The nearest statement of an attribute.
     pub(super) fn get(&self, name: &str) -> Option<&'t Attribute> {
         self.levels.iter().flatten().find(|attribute| attribute.name == name).copied()
     }
 
-    /// The attributes among `names` of the nearest level that states any of them: a nearer orientation replaces a
-    /// farther one that is written in another way.
+    /// Attributes among `names` from the nearest level that states any of them: a nearer orientation overrides one that
+    /// is written in another form.
     pub(super) fn nearest(&self, names: &[&'static str]) -> Vec<(&'static str, &'t Attribute)> {
         let of = |level: &Vec<&'t Attribute>| -> Vec<(&'static str, &'t Attribute)> {
             names

@@ -1,4 +1,4 @@
-//! `<compiler>`: how the other elements are meant.
+//! `<compiler>`: interpretation of the other elements.
 
 use super::classes::Stated;
 use super::expanded::Expanded;
@@ -12,15 +12,15 @@ pub(super) enum FromGeoms {
     Never,
 }
 
-/// The settings that matter for the tree and its masses, with MuJoCo's defaults.
+/// Settings that affect the tree and its masses, with MuJoCo's defaults.
 #[derive(Clone, Debug)]
 pub(super) struct Compiler {
     pub(super) degrees: bool,
-    /// Axes of `euler` in their order; lower case turns with the body, upper case does not.
+    /// Axes of `euler` in their order: lower case for rotating axes, upper case for fixed axes.
     pub(super) eulerseq: [u8; 3],
     pub(super) autolimits: bool,
     pub(super) from_geoms: FromGeoms,
-    /// Groups of geoms that count for inertia, first and last.
+    /// First and last group of the geoms that are included in the inertia.
     pub(super) groups: [f64; 2],
     pub(super) bound_mass: f64,
     pub(super) bound_inertia: f64,
@@ -30,7 +30,7 @@ pub(super) struct Compiler {
 }
 
 impl Compiler {
-    /// All `<compiler>` sections, the later over the earlier.
+    /// Reads all `<compiler>` sections; a later one overrides an earlier one.
     pub(super) fn new(document: &Expanded) -> Result<Self, MjcfError> {
         let mut found = Self {
             degrees: true,
@@ -68,7 +68,7 @@ impl Compiler {
             found.groups = stated.numbers("inertiagrouprange")?.unwrap_or(found.groups);
             found.bound_mass = stated.size("boundmass")?.unwrap_or(found.bound_mass);
             found.bound_inertia = stated.size("boundinertia")?.unwrap_or(found.bound_inertia);
-            // MuJoCo scales only to a positive total.
+            // MuJoCo scales only if the total is positive.
             if let Some(total) = stated.number("settotalmass")? {
                 found.total_mass = (total > 0.0).then_some(total);
             }
@@ -87,7 +87,6 @@ impl Compiler {
         Ok(found)
     }
 
-    /// An angle of the document in radians.
     pub(super) fn radians(&self, angle: f64) -> f64 {
         if self.degrees { angle.to_radians() } else { angle }
     }

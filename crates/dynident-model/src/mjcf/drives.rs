@@ -1,5 +1,5 @@
-//! `<actuator>`, `<equality>`, `<tendon>`, `<option>`: effort limits, followers, gravity, and what the model does not
-//! hold of them.
+//! `<actuator>`, `<equality>`, `<tendon>`, `<option>`: effort limits, mimic joints, gravity, and notices of unsupported
+//! contents.
 
 use super::bodies::{Tree, WORLD};
 use super::chains::Connect;
@@ -13,7 +13,6 @@ use crate::tree::STANDARD_GRAVITY;
 use crate::xml::shortened;
 use std::collections::{HashMap, HashSet};
 
-/// Gravity of `<option>`.
 pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3, MjcfError> {
     let (mut gravity, mut is_on) = (STANDARD_GRAVITY, true);
     for option in document.sections("option") {
@@ -34,9 +33,8 @@ pub(super) fn gravity(document: &Expanded, notices: &mut Notices) -> Result<Vec3
     Ok(if is_on { gravity } else { Vec3::ZERO })
 }
 
-/// Effort limits of joints by their actuators: what a joint's actuators can give at most together, where each of them
-/// has a limit that is the same both ways. A lower limit of the joint itself stays. Gives the joints that have
-/// actuators.
+/// Effort limits of joints from their actuators: the sum of the limits of a joint's actuators, if each has a symmetric
+/// limit. A lower limit of the joint itself is kept. Returns the joints that have actuators.
 pub(super) fn efforts(
     document: &Expanded,
     classes: &Classes<'_>,
@@ -75,7 +73,7 @@ pub(super) fn efforts(
     Ok(driven)
 }
 
-/// The range of an actuator's force: its own, or that of a motor's control, which is the force.
+/// Force range of an actuator: its own, or that of the control of a motor, which equals the force.
 fn force(stated: &Stated<'_>, element: &Element) -> Result<Option<[f64; 2]>, MjcfError> {
     let limited = |range: &str, limited: &str| -> Result<Option<[f64; 2]>, MjcfError> {
         let is_off = stated.flag(limited)? == Some(false);
@@ -94,7 +92,7 @@ fn force(stated: &Stated<'_>, element: &Element) -> Result<Option<[f64; 2]>, Mjc
     })
 }
 
-/// Joints that follow others, chains that may be closed, and constraints that the model does not hold.
+/// Mimic joints, chains that may be closed, and unsupported constraints.
 pub(super) fn couplings<'t>(
     document: &'t Expanded,
     tree: &mut Tree,
@@ -140,7 +138,7 @@ pub(super) fn couplings<'t>(
             notices.note(&stated, Loss::CouplingPolynomial { joint: tree.joints[follower].name.clone() });
             continue;
         }
-        // MuJoCo's law is between the distances from `ref`: q1 - ref1 = c0 + c1 (q2 - ref2).
+        // MuJoCo relates the distances from `ref`: q1 - ref1 = c0 + c1 (q2 - ref2).
         let offset = tree.references[follower] + law[0] - law[1] * tree.references[source];
         let mimic = Mimic::of(&tree.joints[source].name, law[1], offset);
         tree.joints[follower].mimic = Some(mimic);
@@ -148,7 +146,7 @@ pub(super) fn couplings<'t>(
     Ok(connects)
 }
 
-/// Tendons that act by themselves.
+/// Reports tendons with a spring, damping, friction or inertia.
 pub(super) fn tendons(document: &Expanded, notices: &mut Notices) -> Result<(), MjcfError> {
     for element in document.sections("tendon").flat_map(|section| document.children(section)) {
         let stated = Stated::own(document, element);

@@ -1,4 +1,4 @@
-//! The document with the files of its `<include>` elements in their places.
+//! The document with its `<include>` elements replaced by the included files.
 
 use super::fault::{MjcfError, MjcfFault};
 use crate::place::{Located, line_and_column};
@@ -6,10 +6,8 @@ use crate::xml::{MAX_NODES, Malformed, flood, malformed, root_name, shortened};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::HashSet;
 
-/// Most bytes in all files together.
 pub(super) const MAX_BYTES: usize = 16 << 20;
 
-/// An attribute and where its value stands.
 #[derive(Debug)]
 pub(super) struct Attribute {
     pub(super) name: String,
@@ -17,15 +15,13 @@ pub(super) struct Attribute {
     pub(super) place: Place,
 }
 
-/// A byte of one of the files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Place {
-    /// Number of the file; 0 is the main one.
+    /// Index of the file; 0 is the main file.
     pub(super) source: usize,
     pub(super) at: usize,
 }
 
-/// An element.
 #[derive(Debug)]
 pub(super) struct Element {
     pub(super) tag: String,
@@ -40,32 +36,31 @@ impl Element {
     }
 }
 
-/// A file: its name in the document, its text, and where it is included (nowhere: the main one).
+/// A file: name in the document, text, and place of its `<include>` (`None` for the main file).
 struct Source {
     name: String,
     text: String,
     included: Option<Place>,
 }
 
-/// All elements, the root first.
 pub(super) struct Expanded {
     elements: Vec<Element>,
     sources: Vec<Source>,
 }
 
-/// Gives the text of an included file, or why it cannot be read.
+/// Returns the text of an included file, or the reason why it cannot be read.
 pub type Include<'f> = dyn FnMut(&str) -> Result<String, String> + 'f;
 
 impl Expanded {
-    /// The document `text` with its included files, which `include` reads.
+    /// Parses `text` and its included files, which `include` reads.
     pub(super) fn new(text: &str, include: &mut Include<'_>) -> Result<Self, MjcfError> {
         let mut found = Self { elements: Vec::new(), sources: Vec::new() };
         found.sources.push(Source { name: String::new(), text: text.to_owned(), included: None });
         let mut names = HashSet::new();
         let mut bytes = text.len();
         found.append(0, None)?;
-        // Elements stand in the arena before their children, so that one pass meets every `<include>`, nested ones
-        // with the files that it appends.
+        // Elements precede their children in the arena, so that one pass finds every `<include>`, including those in
+        // appended files.
         let mut next = 0;
         while next < found.elements.len() {
             let mut children = 0;
@@ -100,7 +95,7 @@ impl Expanded {
         Ok(found)
     }
 
-    /// Parses a file into the arena; the index of its root.
+    /// Parses a file into the arena; returns the index of its root.
     fn append(&mut self, source: usize, included: Option<Place>) -> Result<usize, MjcfError> {
         // Parsed text and arena cannot be borrowed at once.
         let text = std::mem::take(&mut self.sources[source].text);
@@ -124,7 +119,7 @@ impl Expanded {
         if first + document.descendants().count() > MAX_NODES as usize {
             return Err((0, MjcfFault::TooLarge { limit: MAX_NODES as usize, what: "nodes" }));
         }
-        // A stack, not recursion: elements may nest as deep as the file is long.
+        // A stack avoids recursion, because elements may be nested as deep as the file is long.
         let mut ahead: Vec<(Node<'_, '_>, Option<usize>)> = vec![(root, None)];
         while let Some((node, parent)) = ahead.pop() {
             let index = self.elements.len();
@@ -148,22 +143,20 @@ impl Expanded {
         Ok(first)
     }
 
-    /// `<mujoco>`.
     pub(super) fn root(&self) -> &Element {
         &self.elements[0]
     }
 
-    /// Children in the order of the document.
     pub(super) fn children<'t>(&'t self, of: &'t Element) -> impl DoubleEndedIterator<Item = &'t Element> {
         of.children.iter().map(|&child| &self.elements[child])
     }
 
-    /// All children of the root with this tag: MJCF's sections may stand several times.
+    /// All children of the root with this tag: a section may be repeated in MJCF.
     pub(super) fn sections<'t>(&'t self, tag: &'t str) -> impl Iterator<Item = &'t Element> {
         self.children(self.root()).filter(move |element| element.tag == tag)
     }
 
-    /// `fault` at a place: line and column in the main file, of the `<include>` for a fault in an included one.
+    /// `fault` with line and column in the main file; for an included file, those of the `<include>`.
     pub(super) fn fault(&self, place: Place, fault: MjcfFault) -> MjcfError {
         let source = &self.sources[place.source];
         let (line, column) = line_and_column(&source.text, place.at);
@@ -176,7 +169,7 @@ impl Expanded {
         }
     }
 
-    /// Line of a place, with the name of its file if it is not the main one.
+    /// Line of a place, with the name of its file if it is not the main file.
     pub(super) fn line(&self, place: Place) -> (Option<String>, u32) {
         let source = &self.sources[place.source];
         let line = line_and_column(&source.text, place.at).0;
@@ -184,7 +177,6 @@ impl Expanded {
     }
 }
 
-/// True for a text whose root element is MJCF's.
 pub(crate) fn is_mjcf(text: &str) -> bool {
     root_name(text) == Some("mujoco")
 }

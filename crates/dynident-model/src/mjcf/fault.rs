@@ -1,4 +1,4 @@
-//! What can be wrong in an MJCF.
+//! Errors of the MJCF reader.
 
 use crate::error::ModelError;
 use crate::place::Located;
@@ -7,199 +7,61 @@ use thiserror::Error;
 /// Why an MJCF could not be read, with line and column.
 pub type MjcfError = Located<MjcfFault>;
 
-/// What is wrong in an MJCF, and the fix.
+/// A fault in an MJCF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfFault {
-    /// A fault in a file that stands in an `<include>` here.
     #[error("in the included `{file}`, {line}:{column}: {fault}")]
-    Included {
-        /// The file as the document names it.
-        file: String,
-        /// Line in it.
-        line: u32,
-        /// Column in it.
-        column: u32,
-        /// The fault.
-        fault: Box<MjcfFault>,
-    },
-    /// A file of an `<include>` that cannot be read.
+    Included { file: String, line: u32, column: u32, fault: Box<MjcfFault> },
     #[error("the included `{file}` cannot be read: {reason}; give its path from the folder of the main file")]
-    Include {
-        /// The file.
-        file: String,
-        /// Why.
-        reason: String,
-    },
-    /// A file that is included twice, by itself perhaps.
+    Include { file: String, reason: String },
     #[error("`{file}` is included a second time: delete one <include>, MuJoCo takes each file once")]
-    IncludedTwice {
-        /// The file.
-        file: String,
-    },
-    /// The XML is malformed.
+    IncludedTwice { file: String },
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
-    Xml {
-        /// What the XML parser says.
-        reason: String,
-    },
-    /// More elements or bytes than a robot has.
+    Xml { reason: String },
     #[error("the document has more than {limit} {what}: give the MJCF of one robot")]
-    TooLarge {
-        /// The limit.
-        limit: usize,
-        /// Of what.
-        what: &'static str,
-    },
-    /// Thousands of attributes in one tag, or of namespaces.
-    #[error("more attributes in a tag, or namespaces in the document, than any robot has: give the MJCF of one robot")]
+    TooLarge { limit: usize, what: &'static str },
+    #[error("too many attributes in a tag, or namespaces in the document: give the MJCF of one robot")]
     Flood,
-    /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
-    /// The root element is not `<mujoco>`.
     #[error("the root element is <{root}>, not <mujoco>: give an MJCF file")]
-    NotMjcf {
-        /// Name of the root element.
-        root: String,
-    },
-    /// An attribute is missing.
+    NotMjcf { root: String },
     #[error("<{element}> has no attribute `{attribute}`: add it")]
-    MissingAttribute {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
-    /// Something that is not a usable number.
+    MissingAttribute { element: String, attribute: &'static str },
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
-    Number {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// What stands there, shortened.
-        text: String,
-        /// What is wrong with it.
-        fault: &'static str,
-        /// What to write.
-        fix: &'static str,
-    },
-    /// Too many or too few numbers.
+    Number { element: String, attribute: String, text: String, fault: &'static str, fix: &'static str },
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
-    Count {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// How many are needed.
-        expected: usize,
-        /// How many stand there.
-        found: usize,
-    },
-    /// A word that the attribute does not take.
+    Count { element: String, attribute: String, expected: usize, found: usize },
     #[error("`{attribute}` of <{element}> is `{text}`: write {expected}")]
-    Word {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// What stands there, shortened.
-        text: String,
-        /// What it takes.
-        expected: &'static str,
-    },
-    /// Two bodies or two joints with one name, or two classes.
+    Word { element: String, attribute: String, text: String, expected: &'static str },
     #[error("{kind} `{name}` is defined a second time: rename or delete one")]
-    DuplicateName {
-        /// `body`, `joint` or `default class`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A class that no `<default>` defines.
+    DuplicateName { kind: &'static str, name: String },
     #[error("class `{class}` is not defined: add its <default class=\"{class}\"> or fix the name")]
-    UnknownClass {
-        /// The class.
-        class: String,
-    },
-    /// A joint that an actuator or an equality names is not there.
+    UnknownClass { class: String },
     #[error("<{element}> names joint `{joint}`, which is not defined: add the joint or fix the name")]
-    UnknownJoint {
-        /// The element.
-        element: String,
-        /// The joint.
-        joint: String,
-    },
-    /// Two statements of which only one may stand.
+    UnknownJoint { element: String, joint: String },
     #[error("<{element}> has both `{first}` and `{second}`: keep one of them")]
-    Both {
-        /// The element.
-        element: String,
-        /// One attribute.
-        first: &'static str,
-        /// The other.
-        second: &'static str,
-    },
-    /// A vector that gives no direction.
+    Both { element: String, first: &'static str, second: &'static str },
     #[error("`{attribute}` of <{element}> gives no direction: write a vector with a length, such as `0 0 1`")]
-    NoDirection {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
-    /// A body with two inertials.
+    NoDirection { element: String, attribute: &'static str },
     #[error("body `{body}` has a second <inertial>: keep one")]
-    RepeatedInertial {
-        /// The body.
-        body: String,
-    },
-    /// `<inertial>` outside a body.
+    RepeatedInertial { body: String },
     #[error("the world has no inertia: delete this <inertial>, or put it into a <body>")]
     WorldInertial,
-    /// A joint or body that a robot on a fixed base does not have.
     #[error("{what} is not supported: {fix}")]
-    Unsupported {
-        /// What stands there.
-        what: String,
-        /// What to do.
-        fix: &'static str,
-    },
-    /// A geom without the sizes of its type.
+    Unsupported { what: String, fix: &'static str },
     #[error("a geom of type `{kind}` needs {needed} positive numbers in `size`: write them")]
-    Size {
-        /// The type.
-        kind: &'static str,
-        /// How many.
-        needed: usize,
-    },
-    /// A mass, density, moment or bound below zero.
+    Size { kind: &'static str, needed: usize },
     #[error("`{attribute}` of <{element}> is negative: write a value of zero or more")]
-    Negative {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
-    /// `settotalmass` with masses that are not known.
+    Negative { element: String, attribute: &'static str },
     #[error("`settotalmass` needs all masses, and that of body `{body}` {why}: give the body an <inertial>")]
-    TotalMass {
-        /// The body.
-        body: String,
-        /// Why its mass is not known.
-        why: &'static str,
-    },
-    /// Nothing moves.
+    TotalMass { body: String, why: &'static str },
     #[error("the model has no joint of type hinge or slide: give the MJCF of a robot that moves")]
     NoMovingJoint,
-    /// More moving joints than a description may have.
-    #[error("the model has more than {limit} joints: fix those that the log does not hold")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
-    /// The parts do not make a model.
+    #[error("the model has more than {limit} joints: fix those that the log does not contain")]
+    TooManyJoints { limit: usize },
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }

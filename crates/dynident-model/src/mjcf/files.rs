@@ -1,10 +1,8 @@
-//! The files that a document includes.
-
 use super::expanded::MAX_BYTES;
 use std::path::Path;
 
-/// Reads the files that an MJCF in `folder` includes: for [`read_mjcf_with`](super::read_mjcf_with). Regular
-/// files of at most 16 MiB.
+/// Reads the files that an MJCF in `folder` includes, for [`read_mjcf_with`](super::read_mjcf_with): regular files of
+/// at most 16 MiB.
 pub fn included_from(folder: &Path) -> impl FnMut(&str) -> Result<String, String> + use<> {
     let folder = folder.to_owned();
     move |file| {

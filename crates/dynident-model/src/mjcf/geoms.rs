@@ -12,30 +12,27 @@ use crate::xml::shortened;
 use core::f64::consts::PI;
 use std::collections::HashMap;
 
-/// Water: MuJoCo's density of a geom that states none, kg/m³.
-const DENSITY: f64 = 1000.0;
+/// MuJoCo's default density of a geom, kg/m³ (water).
+const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 
-/// The mass that a geom adds to its body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum GeomMass {
-    /// None: of a group that does not count, of mass zero, or a plane.
-    Nothing,
-    /// In the body's frame.
+    /// No mass: a plane, a geom of mass zero, or a geom of a group that is not included.
+    Massless,
+    /// Known inertial in the body's frame.
     Known(InertialParameters),
-    /// There is some, and why it is not known.
+    /// Unknown, with the reason.
     Unknown(&'static str),
 }
 
-/// A geom, in its body's frame.
 pub(super) struct Geom {
     pub(super) mass: GeomMass,
     pub(super) shape: Option<CollisionShape>,
 }
 
-/// The meshes of `<asset>`: file and scale by name.
 pub(super) type Meshes = HashMap<String, (String, [f64; 3])>;
 
-/// The kinds of solid with half sizes or radius and half length.
+/// Solids, with half sizes, or radius and half length.
 #[derive(Clone, Copy)]
 enum Solid {
     Sphere,
@@ -45,7 +42,6 @@ enum Solid {
     Ellipsoid,
 }
 
-/// All meshes with a file.
 pub(super) fn meshes<'t>(
     document: &'t Expanded,
     classes: &'t Classes<'t>,
@@ -60,7 +56,7 @@ pub(super) fn meshes<'t>(
         let name = element.attribute("name").map_or(stem, |name| &name.value);
         let folder = compiler.meshdir.trim_end_matches('/');
         let path = if folder.is_empty() { file.value.clone() } else { format!("{folder}/{}", file.value) };
-        // A mesh that is moved in its own frame is no shape that can be placed by its file.
+        // A mesh that is moved in its own frame cannot be placed by its file alone.
         if stated.get("refpos").is_none() && stated.get("refquat").is_none() {
             found.insert(name.to_owned(), (path, stated.numbers("scale")?.unwrap_or([1.0; 3])));
         }
@@ -68,7 +64,7 @@ pub(super) fn meshes<'t>(
     Ok(found)
 }
 
-/// A geom of a body; `body_from_frame` is where the `<frame>` around it stands.
+/// Reads a geom of a body; `body_from_frame` is the pose of the surrounding `<frame>`.
 pub(super) fn geom(
     stated: &Stated<'_>,
     body_from_frame: &Transform,
@@ -80,16 +76,16 @@ pub(super) fn geom(
     let (contype, conaffinity) = (stated.number("contype")?, stated.number("conaffinity")?);
     let collides = contype != Some(0.0) || conaffinity != Some(0.0);
     let mass = stated.size("mass")?;
-    let density = stated.size("density")?.unwrap_or(DENSITY);
+    let density = stated.size("density")?.unwrap_or(DEFAULT_DENSITY_KG_M3);
     let counts = compiler.groups[0] <= group && group <= compiler.groups[1];
     let weighs = counts && mass.unwrap_or(density) != 0.0;
-    let unknown = |why, shape| Geom { mass: if weighs { GeomMass::Unknown(why) } else { GeomMass::Nothing }, shape };
+    let unknown = |why, shape| Geom { mass: if weighs { GeomMass::Unknown(why) } else { GeomMass::Massless }, shape };
     let unsupported = |what: &str| {
         let geometry = CollisionGeometry::Unsupported { what: what.to_owned() };
         collides.then_some(CollisionShape { placement: Transform::IDENTITY, geometry })
     };
     let solid = match kind {
-        "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Nothing, shape: None }),
+        "plane" | "hfield" => return Ok(Geom { mass: GeomMass::Massless, shape: None }),
         "mesh" => {
             let name = stated.get("mesh").map_or("", |mesh| &mesh.value);
             let shape = match meshes.get(name) {
@@ -131,7 +127,7 @@ pub(super) fn geom(
         return Ok(unknown("follows from a shell", shape));
     }
     if !weighs {
-        return Ok(Geom { mass: GeomMass::Nothing, shape });
+        return Ok(Geom { mass: GeomMass::Massless, shape });
     }
     let mass = mass.unwrap_or_else(|| density * volume(solid, size));
     let [x, y, z] = moments(solid, size, mass);
@@ -140,7 +136,7 @@ pub(super) fn geom(
     Ok(Geom { mass: GeomMass::Known(own.expressed_in(&placement)), shape })
 }
 
-/// Where the geom stands in its frame, and its half sizes (or radius and half length, the last of them zero).
+/// Pose of the geom in its frame, and its half sizes (or radius and half length, then zero).
 fn placed(stated: &Stated<'_>, compiler: &Compiler, solid: Solid) -> Result<(Transform, [f64; 3]), MjcfError> {
     let given = stated.numbers_between("size", 1, 3)?.unwrap_or_default();
     let mut size = [0.0; 3];
@@ -180,7 +176,6 @@ fn placed(stated: &Stated<'_>, compiler: &Compiler, solid: Solid) -> Result<(Tra
     Ok((transform, size))
 }
 
-/// m³.
 fn volume(solid: Solid, size: [f64; 3]) -> f64 {
     let [a, b, c] = size;
     match solid {
@@ -201,7 +196,7 @@ fn moments(solid: Solid, size: [f64; 3], mass: f64) -> [f64; 3] {
             let length = 2.0 * b;
             let ends = mass * 4.0 * a / (4.0 * a + 3.0 * length);
             let middle = mass - ends;
-            // Two half balls, their centres of mass 3/8 of the radius beyond the ends.
+            // Two hemispheres with centres of mass 3/8 of the radius beyond the ends.
             let across = middle * (3.0 * a * a + length * length) / 12.0
                 + ends * (0.4 * a * a + length * (3.0 * a + 2.0 * length) / 8.0);
             [across, across, 0.5 * middle * a * a + 0.4 * ends * a * a]
@@ -221,7 +216,7 @@ fn shape(solid: Solid, size: [f64; 3]) -> CollisionGeometry {
         Solid::Sphere => CollisionGeometry::Sphere { radius_m: a },
         Solid::Capsule => CollisionGeometry::Capsule { radius_m: a, length_m: 2.0 * b },
         Solid::Cylinder => CollisionGeometry::Cylinder { radius_m: a, length_m: 2.0 * b },
-        // The box around an ellipsoid: checks against it are on the safe side.
+        // The bounding box of an ellipsoid: collision checks are conservative.
         Solid::Box | Solid::Ellipsoid => CollisionGeometry::Box { size_m: [2.0 * a, 2.0 * b, 2.0 * c] },
     }
 }

@@ -1,4 +1,4 @@
-//! `<inertial>`, and the rules of `<compiler>` that change what bodies weigh.
+//! `<inertial>`, and the settings of `<compiler>` that change masses.
 
 use super::classes::Stated;
 use super::compiler::Compiler;
@@ -8,7 +8,7 @@ use crate::inertial::InertialParameters;
 use crate::spatial::{Mat3, Transform, Vec3};
 use nalgebra::{Matrix3, Vector3};
 
-/// The `<inertial>` of a body, in the body's frame; `body_from_frame` is where the `<frame>` around it stands.
+/// `<inertial>` of a body, in the body's frame; `body_from_frame` is the pose of the surrounding `<frame>`.
 pub(super) fn inertial(
     stated: &Stated<'_>,
     body_from_frame: &Transform,
@@ -34,13 +34,13 @@ pub(super) fn inertial(
     let frame_from_inertial = place(stated, compiler)?;
     let body_from_inertial = body_from_frame.then(&frame_from_inertial);
     let r = &body_from_inertial.rotation;
-    // Exact numbers stay exact where nothing turns.
+    // Without a rotation the numbers stay exact.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(InertialParameters::from_centre_of_mass(mass, body_from_inertial.translation, &turned))
 }
 
-/// A body's inertial after `boundmass`, `boundinertia` and `balanceinertia`, in this order, as MuJoCo applies them; a
-/// body without any gets the bounds.
+/// Applies `boundmass`, `boundinertia` and `balanceinertia` in MuJoCo's order; a body without an inertial gets the
+/// bounds.
 pub(super) fn corrected(inertial: Option<InertialParameters>, compiler: &Compiler) -> Option<InertialParameters> {
     let is_bounded = compiler.bound_mass > 0.0 || compiler.bound_inertia > 0.0;
     if !is_bounded && !compiler.balance {
@@ -53,7 +53,7 @@ pub(super) fn corrected(inertial: Option<InertialParameters>, compiler: &Compile
     };
     let mass = given.mass_kg().max(compiler.bound_mass);
     let com = given.com_m().unwrap_or(Vec3::ZERO);
-    // Without mass the moments are about the frame's origin, which is then the centre of mass.
+    // Without mass the moments are about the frame's origin, which then replaces the centre of mass.
     let at_com = given.inertia_at_com().unwrap_or_else(|| given.inertia_at_origin()).0;
     let eigen = Matrix3::from_fn(|a, b| at_com[a][b]).symmetric_eigen();
     let bounded: Vec<f64> = eigen.eigenvalues.iter().map(|moment| moment.max(compiler.bound_inertia)).collect();

@@ -15,9 +15,9 @@ pub(super) struct JointElement {
     pub(super) place: Place,
     pub(super) kind: JointKind,
     pub(super) axis: Vec3,
-    /// A point of a hinge's axis; `None` for a slide, which has no place.
+    /// A point on a hinge's axis; `None` for a slide.
     pub(super) anchor: Option<Vec3>,
-    /// Position in the pose that the document draws, rad or m.
+    /// Position in the drawn pose, rad or m.
     pub(super) reference: f64,
     pub(super) limits: JointLimits,
     pub(super) damping: Option<f64>,
@@ -26,7 +26,7 @@ pub(super) struct JointElement {
     pub(super) spring: Option<JointSpring>,
 }
 
-/// A joint; `body_from_frame` is where the `<frame>` around it stands.
+/// Reads a joint; `body_from_frame` is the pose of the surrounding `<frame>`.
 pub(super) fn joint(
     stated: &Stated<'_>,
     body_from_frame: &Transform,
@@ -95,7 +95,6 @@ pub(super) fn joint(
     })
 }
 
-/// `free` and `<freejoint>`.
 pub(super) fn floating(label: &str) -> MjcfFault {
     MjcfFault::Unsupported {
         what: format!("a floating base (joint {label} of type free)"),
@@ -103,7 +102,7 @@ pub(super) fn floating(label: &str) -> MjcfFault {
     }
 }
 
-/// `actuatorfrcrange`, where it is the same both ways.
+/// `actuatorfrcrange`, if it is symmetric.
 fn effort(stated: &Stated<'_>, notices: &mut Notices, label: &str) -> Result<Option<f64>, MjcfError> {
     let Some([low, high]) = stated.range("actuatorfrcrange")? else { return Ok(None) };
     if stated.flag("actuatorfrclimited")? == Some(false) || low >= high {

@@ -1,13 +1,13 @@
 //! MJCF, MuJoCo's model format: reading and writing back.
 //!
-//! Read are nested bodies with `<inertial>` or geoms of simple solids, and joints of type hinge and slide, on a fixed
-//! base, with `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`, `damping` and `frictionloss`,
-//! effort limits of joints and actuators, and gravity. A body without joint is lumped into the one that carries it. A
-//! body whose mass follows from a mesh is unknown, never zero.
+//! Supported are nested bodies with `<inertial>` or geoms of simple solids, and joints of type hinge and slide, on a
+//! fixed base, with `<compiler>`, `<default>` classes, `<frame>` and `<include>`, `armature`, `damping` and
+//! `frictionloss`, effort limits of joints and actuators, and gravity. A body without joint is merged into its parent.
+//! A body whose mass depends on a mesh is unknown, not massless.
 //!
-//! A joint's anchor need not be the origin of its body. The frame of a link that moves with a joint has the axes of its
-//! MJCF body, and its origin at the anchor of the body's last hinge. Several joints in one body become a chain with
-//! bodies of zero mass between them, called `BODY/JOINT`.
+//! A joint's anchor may differ from the origin of its body. The frame of a link that moves with a joint has the axes of
+//! its MJCF body, and its origin at the anchor of the body's last hinge. Several joints in one body become a chain with
+//! massless bodies between them, called `BODY/JOINT`.
 //!
 //! ```
 //! let text = r#"<mujoco model="pendulum"><compiler angle="radian"/>
@@ -47,36 +47,35 @@ pub use write::{MjcfWriteError, rewrite_mjcf};
 
 use crate::tree::Model;
 use bodies::{LinkPlace, Reader, Tree};
-use chains::Around;
+use chains::ChainContext;
 use classes::Classes;
 use compiler::Compiler;
 use expanded::{Expanded, Place};
 use notices::Notices;
 use std::collections::HashSet;
 
-/// What an MJCF says.
+/// Result of reading an MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfRobot {
     /// The robot on a fixed base.
     pub model: Model,
-    /// What the document says and the model does not hold, in the order of reading; at most 200 are kept.
+    /// Contents that the model cannot represent, in the order of reading; at most 200 are kept.
     pub notices: Vec<MjcfNotice>,
 }
 
 /// Reads an MJCF without `<include>`.
 ///
 /// # Errors
-/// If the text is malformed XML, no MJCF, includes a file, or describes no tree of bodies on one fixed base; with line
-/// and column.
+/// Malformed XML, not an MJCF, an `<include>`, or no tree of bodies on one fixed base; with line and column.
 #[doc(alias("mujoco"))]
 pub fn read_mjcf(text: &str) -> Result<MjcfRobot, MjcfError> {
     read_mjcf_with(text, |_| Err("files are included only where the MJCF is read from a file".to_owned()))
 }
 
-/// Reads an MJCF; `include` gives the text of a file that an `<include>` names, or the reason why it cannot.
+/// Reads an MJCF; `include` returns the text of a file named by an `<include>`, or the reason why it cannot be read.
 ///
 /// # Errors
-/// As [`read_mjcf`], and what `include` says; a fault in an included file names it.
+/// Those of [`read_mjcf`] and of `include`; a fault in an included file names the file.
 pub fn read_mjcf_with(
     text: &str,
     mut include: impl FnMut(&str) -> Result<String, String>,
@@ -86,15 +85,12 @@ pub fn read_mjcf_with(
     Ok(MjcfRobot { model: found.model, notices: found.notices })
 }
 
-/// A document read, with the places of its bodies and joints.
 struct Found {
     model: Model,
     notices: Vec<MjcfNotice>,
     compiler: Compiler,
     links: Vec<LinkPlace>,
-    /// In the order of the model's joints.
     joint_places: Vec<Place>,
-    /// Links that have mass which is not known.
     unknown: HashSet<String>,
 }
 
@@ -116,7 +112,7 @@ fn read(document: &Expanded) -> Result<Found, MjcfError> {
     let Tree { joints, bodies, base, links, joint_places, unknown, references } = tree;
     let model = Model::new(name, base, joints, bodies).and_then(|model| model.with_gravity(gravity));
     let model = model.map_err(|error| document.fault(root.place, MjcfFault::Model(error)))?;
-    let around = Around { document, links: &links, references: &references, driven: &driven };
+    let around = ChainContext { document, links: &links, references: &references, driven: &driven };
     let model = chains::closed(model, &connects, &around, &mut notices)?;
     Ok(Found { model, notices: notices.list, compiler, links, joint_places, unknown })
 }

@@ -1,92 +1,61 @@
-//! What a document says and the model does not hold.
+//! Contents of a document that the model cannot represent.
 
 use super::classes::Stated;
 use super::expanded::{Expanded, Place};
-use core::fmt;
+use thiserror::Error;
 
-/// Something in an MJCF that the model does not hold.
+/// A part of an MJCF that the model does not represent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfNotice {
-    /// The included file in which it stands; `None` for the main one.
+    /// Included file; `None` for the main file.
     pub file: Option<String>,
     /// Line, from 1.
     pub line: u32,
-    /// What is not held.
+    /// The part.
     pub loss: Loss,
 }
 
-/// What is not held.
-#[derive(Clone, Debug, PartialEq)]
+/// Kind of the part that is not represented.
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum Loss {
-    /// The mass of a body is not known, since one of its geoms has no solid that is computed.
-    UnknownMass {
-        /// The body.
-        body: String,
-        /// Why.
-        why: &'static str,
-    },
-    /// A joint with a spring that is no straight line: its first factor counts alone.
-    SpringPolynomial {
-        /// The joint.
-        joint: String,
-    },
-    /// Damping that grows with more than the velocity.
-    DampingPolynomial {
-        /// The joint.
-        joint: String,
-    },
-    /// An effort limit that is not the same both ways.
-    OneSidedEffort {
-        /// The joint.
-        joint: String,
-        /// Lowest, Nm or N.
-        low: f64,
-        /// Highest, Nm or N.
-        high: f64,
-    },
-    /// A body that MuJoCo holds up.
-    GravityCompensation {
-        /// The body.
-        body: String,
-    },
-    /// A constraint between bodies or joints.
-    Constraint {
-        /// The element under `<equality>`.
-        element: String,
-        /// What it joins.
-        between: String,
-    },
-    /// A closed chain that the model does not hold.
-    Chain {
-        /// What it joins.
-        between: String,
-        /// Why not.
-        why: String,
-    },
-    /// A coupling of two joints by more than a straight line.
-    CouplingPolynomial {
-        /// The joint that follows.
-        joint: String,
-    },
-    /// Tendons with a spring, damping, friction or inertia of their own.
-    Tendon {
-        /// The tendon.
-        tendon: String,
-    },
-    /// A medium around the robot.
+    #[error(
+        "the mass of body `{body}` {why}, which is not supported, so that it is unknown: give the body an <inertial>"
+    )]
+    UnknownMass { body: String, why: &'static str },
+    #[error("joint {joint} has a nonlinear spring (`stiffness`): only its linear coefficient is used")]
+    SpringPolynomial { joint: String },
+    #[error("the damping of joint {joint} is a polynomial: only its linear coefficient is used")]
+    DampingPolynomial { joint: String },
+    #[error("joint {joint} has the effort limits {low:?} and {high:?}: an asymmetric limit is ignored")]
+    OneSidedEffort { joint: String, low: f64, high: f64 },
+    #[error("body `{body}` has `gravcomp`, which is not supported: its full weight is used")]
+    GravityCompensation { body: String },
+    #[error(
+        "<{element}> under <equality> connects {between}, which is not supported: torques are those of the tree without it"
+    )]
+    Constraint { element: String, between: String },
+    #[error(
+        "<connect> under <equality> closes a chain at {between}, which is not supported ({why}): torques are those of the tree without it"
+    )]
+    Chain { between: String, why: String },
+    #[error("joint `{joint}` follows another by a polynomial, which is not supported: it is treated as independent")]
+    CouplingPolynomial { joint: String },
+    #[error("tendon {tendon} has a spring, damping, friction or inertia, which is not supported")]
+    Tendon { tendon: String },
+    #[error("<option> has a medium (`density`, `viscosity`), whose forces are not supported")]
     Medium,
-    /// An element or attribute that MJCF's joints, bodies and inertials do not have, as far as this reader knows.
+    #[error("{}<{element}> was not read: misspelt?", attribute.as_ref().map_or(String::new(), |name| format!("`{name}` of ")))]
     Unread {
-        /// The element.
         element: String,
-        /// The attribute, or none for the element itself.
+        /// The attribute; `None` for the element itself.
         attribute: Option<String>,
     },
 }
 
 impl Loss {
-    /// A short name.
+    /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
@@ -104,84 +73,20 @@ impl Loss {
     }
 }
 
-impl fmt::Display for Loss {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::UnknownMass { body, why } => {
-                write!(
-                    f,
-                    "the mass of body `{body}` {why}, which is not computed: it counts as unknown; give the body an <inertial>"
-                )
-            }
-            Self::SpringPolynomial { joint } => {
-                write!(
-                    f,
-                    "joint {joint} has a spring (`stiffness`) that is no straight line: its first factor counts alone"
-                )
-            }
-            Self::DampingPolynomial { joint } => {
-                write!(
-                    f,
-                    "the damping of joint {joint} is a polynomial, of which only the part in proportion to velocity is read"
-                )
-            }
-            Self::OneSidedEffort { joint, low, high } => {
-                write!(
-                    f,
-                    "joint {joint} has the effort limits {low:?} and {high:?}: a limit is read where it is the same both ways"
-                )
-            }
-            Self::GravityCompensation { body } => {
-                write!(f, "body `{body}` has `gravcomp`, which the model does not hold: its weight counts in full")
-            }
-            Self::Constraint { element, between } => {
-                write!(
-                    f,
-                    "<{element}> under <equality> joins {between}, which the model does not hold: torques are those of the tree without it"
-                )
-            }
-            Self::Chain { between, why } => {
-                write!(
-                    f,
-                    "<connect> under <equality> closes a chain at {between}, which the model does not hold ({why}): torques are those of the tree without it"
-                )
-            }
-            Self::CouplingPolynomial { joint } => {
-                write!(
-                    f,
-                    "joint `{joint}` follows another by a polynomial, which the model does not hold: it counts as free"
-                )
-            }
-            Self::Tendon { tendon } => {
-                write!(f, "tendon {tendon} has a spring, damping, friction or inertia, which the model does not hold")
-            }
-            Self::Medium => {
-                write!(f, "<option> has a medium (`density`, `viscosity`), whose forces the model does not hold")
-            }
-            Self::Unread { element, attribute: None } => write!(f, "<{element}> was not read: misspelt?"),
-            Self::Unread { element, attribute: Some(attribute) } => {
-                write!(f, "`{attribute}` of <{element}> was not read: misspelt?")
-            }
-        }
-    }
-}
-
-/// The notices so far.
 #[derive(Default)]
 pub(super) struct Notices {
     pub(super) list: Vec<MjcfNotice>,
 }
 
 impl Notices {
-    /// Most that are kept.
-    const MOST: usize = 200;
+    const MAX_NOTICES: usize = 200;
 
     pub(super) fn note(&mut self, stated: &Stated<'_>, loss: Loss) {
         self.note_at(stated.document, stated.place, loss);
     }
 
     pub(super) fn note_at(&mut self, document: &Expanded, place: Place, loss: Loss) {
-        if self.list.len() < Self::MOST {
+        if self.list.len() < Self::MAX_NOTICES {
             let (file, line) = document.line(place);
             self.list.push(MjcfNotice { file, line, loss });
         }

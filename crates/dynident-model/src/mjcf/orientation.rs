@@ -1,14 +1,14 @@
-//! The ways in which MJCF writes an orientation: `quat`, `axisangle`, `euler`, `xyaxes`, `zaxis`.
+//! Orientations in MJCF: `quat`, `axisangle`, `euler`, `xyaxes`, `zaxis`.
 
 use super::classes::Stated;
 use super::compiler::Compiler;
 use super::fault::{MjcfError, MjcfFault};
 use crate::spatial::{Mat3, Transform, Vec3};
 
-/// The attributes, of which an element may have one.
+/// Attributes of an orientation; an element may have only one of them.
 pub(super) const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
-/// The rotation that an element states, if it states one.
+/// Rotation that an element states, if any.
 pub(super) fn orientation(stated: &Stated<'_>, compiler: &Compiler) -> Result<Option<Mat3>, MjcfError> {
     let (name, attribute) = match stated.nearest(&ORIENTATIONS)[..] {
         [] => return Ok(None),
@@ -46,7 +46,7 @@ pub(super) fn orientation(stated: &Stated<'_>, compiler: &Compiler) -> Result<Op
     Ok(Some(rotation))
 }
 
-/// `pos` and orientation of an element: `parent_from_element`.
+/// Pose `parent_from_element` from `pos` and orientation of an element.
 pub(super) fn place(stated: &Stated<'_>, compiler: &Compiler) -> Result<Transform, MjcfError> {
     Ok(Transform {
         rotation: orientation(stated, compiler)?.unwrap_or(Mat3::IDENTITY),
@@ -68,7 +68,7 @@ fn euler(angles: [f64; 3], compiler: &Compiler) -> Mat3 {
     rotation
 }
 
-/// The smallest rotation that takes z to the unit vector `z`; half a turn about x where z points down.
+/// Smallest rotation from z to the unit vector `z`; half a turn about x if `z` points down.
 pub(super) fn from_z(z: Vec3) -> Mat3 {
     let axis = Vec3([0.0, 0.0, 1.0]).cross(z);
     let sine = axis.norm();

@@ -1,4 +1,4 @@
-//! Numbers and words in attributes.
+//! Numbers and keywords in attributes.
 
 use super::classes::Stated;
 use super::expanded::Attribute;
@@ -12,7 +12,7 @@ impl Stated<'_> {
         self.document.fault(self.place, fault)
     }
 
-    /// All numbers of an attribute; any size, since limits such as `1e16` mean "none".
+    /// All numbers of an attribute; any magnitude, because limits such as `1e16` mean "unlimited".
     fn list(&self, attribute: &Attribute) -> Result<Vec<f64>, MjcfError> {
         let number =
             |word: &str| parse_number(word).map_err(|(what, fix)| self.number_fault(attribute, word, what, fix));
@@ -30,7 +30,7 @@ impl Stated<'_> {
         self.document.fault(attribute.place, fault)
     }
 
-    /// Between `least` and `most` numbers, none beyond the size of a robot.
+    /// Between `least` and `most` numbers, each within the magnitude limit.
     pub(super) fn numbers_between(&self, name: &str, least: usize, most: usize) -> Result<Option<Vec<f64>>, MjcfError> {
         let Some(numbers) = self.numbers_of_any_size(name, least, most)? else { return Ok(None) };
         let Some(attribute) = self.get(name) else { return Ok(None) };
@@ -41,7 +41,7 @@ impl Stated<'_> {
         Ok(Some(numbers))
     }
 
-    /// Between `least` and `most` numbers.
+    /// Between `least` and `most` numbers of any magnitude.
     pub(super) fn numbers_of_any_size(
         &self,
         name: &str,
@@ -61,13 +61,11 @@ impl Stated<'_> {
         self.document.fault(attribute.place, MjcfFault::Count { element, attribute: name, expected, found })
     }
 
-    /// Exactly `N` numbers, none beyond the size of a robot.
     pub(super) fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, MjcfError> {
         let found = self.numbers_between(name, N, N)?;
         Ok(found.map(|found| core::array::from_fn(|k| found[k])))
     }
 
-    /// Two numbers of any size.
     pub(super) fn range(&self, name: &str) -> Result<Option<[f64; 2]>, MjcfError> {
         let Some(attribute) = self.get(name) else { return Ok(None) };
         match self.list(attribute)?[..] {
@@ -80,7 +78,7 @@ impl Stated<'_> {
         Ok(self.numbers::<1>(name)?.map(|[number]| number))
     }
 
-    /// A number that is not below zero.
+    /// A nonnegative number.
     pub(super) fn size(&self, name: &'static str) -> Result<Option<f64>, MjcfError> {
         let number = self.number(name)?;
         match (number, self.get(name)) {
@@ -96,25 +94,23 @@ impl Stated<'_> {
         Ok(self.numbers::<3>(name)?.map(Vec3))
     }
 
-    /// A vector made a unit vector.
     pub(super) fn direction(&self, name: &'static str) -> Result<Option<Vec3>, MjcfError> {
         let Some(vector) = self.vector(name)? else { return Ok(None) };
         let place = self.get(name).map_or(self.place, |attribute| attribute.place);
         self.unit(vector, name).map(Some).map_err(|fault| self.document.fault(place, fault))
     }
 
-    /// `vector` with length one.
     pub(super) fn unit(&self, vector: Vec3, attribute: &'static str) -> Result<Vec3, MjcfFault> {
         let norm = vector.norm();
-        // Below 1e-9 a direction is the rounding of zero, not a direction.
+        // Vectors shorter than 1e-9 are rounding errors of zero.
         if norm < 1e-9 {
             return Err(MjcfFault::NoDirection { element: self.tag.to_owned(), attribute });
         }
-        // Dividing would touch vectors that are exact already.
+        // A division could change vectors that are already exact.
         Ok(if norm == 1.0 { vector } else { Vec3(vector.0.map(|x| x / norm)) })
     }
 
-    /// `true`, `false`, or (`None`) `auto` and nothing.
+    /// `true` or `false`; `None` for `auto` and for a missing attribute.
     pub(super) fn flag(&self, name: &str) -> Result<Option<bool>, MjcfError> {
         match self.word(name, &["true", "false", "auto"], "true, false or auto")? {
             Some("true") => Ok(Some(true)),
@@ -123,7 +119,6 @@ impl Stated<'_> {
         }
     }
 
-    /// One of some words.
     pub(super) fn word(
         &self,
         name: &str,

@@ -1,9 +1,8 @@
-//! Writing identified values back into the user's own MJCF.
+//! Writes identified values into an existing MJCF.
 //!
-//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change; every other byte
-//! stays, except invisible characters, which become references to them ([`dynident_text::xml::document`]).
-//! A body that is fixed to one with a joint gets an `<inertial>` without mass instead of none, for without any its
-//! geoms would weigh.
+//! Only `<inertial>` of bodies and `damping`, `frictionloss` and `armature` of joints change; all other bytes stay,
+//! except invisible characters, which become character references ([`dynident_text::xml::document`]). A body fixed to a
+//! moving body gets a massless `<inertial>`, because without one MuJoCo computes its mass from its geoms.
 
 use super::bodies::LinkPlace;
 use super::compiler::FromGeoms;
@@ -22,79 +21,41 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use thiserror::Error;
 
-/// Why an MJCF could not be rewritten.
+/// Why values could not be written into an MJCF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum MjcfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] MjcfError),
-    /// A change to something that the original does not hold.
     #[error("the MJCF has no {kind} `{name}`: write into the file that the model was read from")]
-    Unknown {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// Two changes to one body or joint.
+    Unknown { kind: &'static str, name: String },
     #[error("two changes to {kind} `{name}`: give one")]
-    Repeated {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// Something that stands in an included file.
-    #[error("{kind} `{name}` stands in an included file, which is not rewritten: put the robot into one file")]
-    Included {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A value that is not finite, or beyond what a description may hold.
+    Repeated { kind: &'static str, name: String },
+    #[error("{kind} `{name}` is in an included file, which is not rewritten: put the robot into one file")]
+    Included { kind: &'static str, name: String },
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
-    NotFinite {
-        /// `body` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A body that MuJoCo refuses.
+    NotFinite { kind: &'static str, name: String },
     #[error(
         "the new values of body `{body}` are those of no body with mass, which MuJoCo refuses: use physically consistent parameters"
     )]
-    NotPhysical {
-        /// The body.
-        body: String,
-    },
-    /// Mass between two joints of one body.
+    NotPhysical { body: String },
     #[error(
-        "`{link}` stands between two joints of one MJCF body and cannot hold mass there: write the joints into bodies of their own"
+        "`{link}` is between two joints of one MJCF body and cannot have mass there: write the joints into separate bodies"
     )]
-    Between {
-        /// The link.
-        link: String,
-    },
-    /// A setting of `<compiler>` by which MuJoCo would not take the values as they are written.
+    Between { link: String },
     #[error("`{setting}` of <compiler> changes the masses that are written: {fix}")]
-    Compiler {
-        /// The attribute.
-        setting: &'static str,
-        /// What to do.
-        fix: &'static str,
-    },
+    Compiler { setting: &'static str, fix: &'static str },
 }
 
-/// `original` with the changes made and every other byte as it was: inertials in the links' frames, as
-/// [`read_mjcf`](super::read_mjcf) gives them, are written about the centre of mass in the axes of the `<body>`, every
-/// number in the shortest form that reads back to the same `f64`. `include` as for
-/// [`read_mjcf_with`](super::read_mjcf_with).
+/// Writes the changes into `original` and keeps all other bytes. Inertials, given in the links' frames as by
+/// [`read_mjcf`](super::read_mjcf), are written about the centre of mass in the axes of the `<body>`. Every number has
+/// the shortest form that parses to the same `f64`. `include` as in [`read_mjcf_with`](super::read_mjcf_with).
 ///
 /// # Errors
-/// If the original is no MJCF, a body or joint is unknown, named twice or in an included file, or MuJoCo would not take
-/// the values or change them.
+/// An invalid MJCF; a body or joint that is unknown, repeated or in an included file; or values that MuJoCo would
+/// reject or change.
 pub fn rewrite_mjcf(
     original: &str,
     include: &mut Include<'_>,
@@ -104,7 +65,7 @@ pub fn rewrite_mjcf(
     let document = Expanded::new(original, include)?;
     let found = read(&document)?;
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    // The same text has been parsed a moment ago.
+    // Cannot fail: the same text has just been parsed.
     let Ok(parsed) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
     let nodes: HashMap<usize, Node<'_, '_>> =
         parsed.descendants().filter(Node::is_element).map(|node| (node.range().start, node)).collect();
@@ -161,11 +122,11 @@ pub fn rewrite_mjcf(
     Ok(edited(original, edits))
 }
 
-/// The new inertial of a link and a note on it; `None` for one without mass.
+/// New inertial of a link with a note; `None` for a link without mass.
 type Change<'c> = Option<(InertialParameters, Option<&'c str>)>;
 
-/// The changes, and those that follow from them: a body whose mass follows from a mesh, and that is fixed to a changed
-/// one, has its mass in that one now.
+/// The changes and their consequences: a mesh body fixed to a changed body becomes massless, because its mass is
+/// included in that body.
 fn all_changes<'c>(found: &'c Found, links: &'c [LinkChange]) -> Vec<(&'c str, Change<'c>)> {
     let mut all: Vec<(&str, Change<'_>)> = Vec::new();
     for change in links {
@@ -204,7 +165,6 @@ fn node_at<'a, 'input>(
     found.ok_or_else(|| MjcfWriteError::Included { kind, name: name.to_owned() })
 }
 
-/// The `<inertial>` of a body, perhaps inside `<frame>` elements.
 fn inertial_of<'a, 'input>(body: Node<'a, 'input>) -> Option<Node<'a, 'input>> {
     let mut ahead: Vec<Node<'a, 'input>> = body.children().collect();
     while let Some(node) = ahead.pop() {
@@ -217,7 +177,6 @@ fn inertial_of<'a, 'input>(body: Node<'a, 'input>) -> Option<Node<'a, 'input>> {
     None
 }
 
-/// `<inertial>` with a note as a comment in it.
 fn inertial_line(
     found: &Found,
     body: &str,
@@ -227,18 +186,12 @@ fn inertial_line(
     if inertial.0.iter().any(|x| x.abs().is_nan() || x.abs() > MAX_MAGNITUDE) {
         return Err(MjcfWriteError::NotFinite { kind: "body", name: body.to_owned() });
     }
-    let not_physical = || MjcfWriteError::NotPhysical { body: body.to_owned() };
-    let (Some(com), Some(inertia), Some([a, b, c])) =
-        (inertial.com_m(), inertial.inertia_at_com(), inertial.principal_moments())
-    else {
-        return Err(not_physical());
-    };
-    let mass = inertial.mass_kg();
-    if com.0.iter().any(|x| x.abs() > MAX_MAGNITUDE) || !(mass > 0.0 && a > 0.0 && a + b >= c) {
-        return Err(not_physical());
-    }
-    if mass < found.compiler.bound_mass || a < found.compiler.bound_inertia {
-        let setting = if mass < found.compiler.bound_mass { "boundmass" } else { "boundinertia" };
+    let (mass, com, inertia) =
+        inertial.consistent_about_com().ok_or_else(|| MjcfWriteError::NotPhysical { body: body.to_owned() })?;
+    let is_small = |[a, ..]: [f64; 3]| a < found.compiler.bound_inertia;
+    let is_light = mass < found.compiler.bound_mass;
+    if is_light || inertial.principal_moments().is_some_and(is_small) {
+        let setting = if is_light { "boundmass" } else { "boundinertia" };
         return Err(MjcfWriteError::Compiler { setting, fix: "lower or delete it" });
     }
     let ([x, y, z], i) = (com.0, inertia.0);
@@ -252,7 +205,6 @@ fn inertial_line(
     })
 }
 
-/// The attributes of one joint that change.
 fn drive(
     node: Node<'_, '_>,
     change: &JointChange,

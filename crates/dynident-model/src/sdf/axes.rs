@@ -9,10 +9,9 @@ use crate::joint::{JointKind, JointLimits, JointSpring, Mimic};
 use crate::spatial::Vec3;
 use roxmltree::Node;
 
-/// Limits from here on mean none.
+/// Limits of at least this magnitude mean "unlimited".
 const UNLIMITED: f64 = 1e16;
 
-/// An axis with what acts about it.
 pub(super) struct Axis {
     pub(super) kind: JointKind,
     /// Unit vector in the model's frame.
@@ -24,7 +23,6 @@ pub(super) struct Axis {
     pub(super) mimic: Option<Mimic>,
 }
 
-/// The axis of a joint that slides or turns.
 pub(super) fn axis(joint: &Item<'_, '_>, slides: bool, version: Version, frames: &Frames) -> Result<Axis, SdfError> {
     let missing = || SdfFault::Missing { element: "joint".to_owned(), kind: "element", name: "axis" };
     let node = child(joint.node, "axis").ok_or_else(|| fault_at(joint.node, missing()))?;
@@ -41,7 +39,7 @@ pub(super) fn axis(joint: &Item<'_, '_>, slides: bool, version: Version, frames:
         let position = |name| -> Result<Option<f64>, SdfError> {
             Ok(number_of_any_size(limit, name)?.filter(|limit| limit.abs() < UNLIMITED))
         };
-        // Negative rates and efforts mean none.
+        // Negative rates and efforts mean "unlimited".
         let rate = |name| -> Result<Option<f64>, SdfError> {
             Ok(number_of_any_size(limit, name)?.filter(|limit| (0.0..UNLIMITED).contains(limit)))
         };
@@ -66,12 +64,12 @@ pub(super) fn axis(joint: &Item<'_, '_>, slides: bool, version: Version, frames:
     Ok(found)
 }
 
-/// The unit vector of the axis in the model's frame.
+/// Unit vector of the axis in the model's frame.
 fn direction(joint: &Item<'_, '_>, node: Node<'_, '_>, version: Version, frames: &Frames) -> Result<Vec3, SdfError> {
     let xyz = child(node, "xyz");
     let written = xyz.map(numbers_in::<3>).transpose()?.map_or(Vec3([0.0, 0.0, 1.0]), Vec3);
     let norm = written.norm();
-    // Below 1e-9 a direction is the rounding of zero, not a direction.
+    // Vectors shorter than 1e-9 are rounding errors of zero.
     if norm < 1e-9 {
         return Err(fault_at(node, SdfFault::ZeroAxis { joint: joint.name.clone() }));
     }
@@ -79,7 +77,7 @@ fn direction(joint: &Item<'_, '_>, node: Node<'_, '_>, version: Version, frames:
     let frame = if version >= Version([1, 7]) {
         xyz.and_then(|xyz| xyz.attribute("expressed_in")).filter(|frame| !frame.is_empty())
     } else {
-        // Up to 1.4 axes were the model's; in 1.5 and 1.6 where the joint says so.
+        // Before version 1.5 axes are in the model's frame; in 1.5 and 1.6, if the joint requests it.
         let is_models = version < Version([1, 5]) || flag(node, "use_parent_model_frame") == Some(true);
         is_models.then_some(MODEL)
     };
@@ -90,7 +88,7 @@ fn direction(joint: &Item<'_, '_>, node: Node<'_, '_>, version: Version, frames:
     Ok(place.rotation.mul_vec(unit))
 }
 
-/// `q = multiplier (q_leader − reference) + offset`.
+/// Mimic law `q = multiplier (q_leader − reference) + offset`.
 fn followed(joint: &Item<'_, '_>, mimic: Node<'_, '_>) -> Result<Mimic, SdfError> {
     let source = match mimic.attribute("joint") {
         Some(_) => word_of(mimic, "joint")?,

@@ -10,7 +10,7 @@ use crate::spatial::{Mat3, Transform};
 use crate::xml::shortened;
 use roxmltree::Node;
 
-/// The inertial of a link in the link's frame; `None` where it is not stated.
+/// Inertial of a link in the link's frame; `None` if it is not stated.
 pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Option<InertialParameters>, SdfError> {
     if flag(link.node, "gravity") == Some(false) {
         notices.note(link.node, SdfLoss::Weightless { link: link.name.clone() });
@@ -19,15 +19,15 @@ pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Opt
         notices.note(node, SdfLoss::UnknownMass { link: link.name.clone(), why });
         Ok(None)
     };
-    // A link that is only a frame says nothing either.
+    // A link that is only a frame has no inertial either.
     let Some(node) = child(link.node, "inertial") else {
-        return unknown(link.node, "is not stated, which SDF takes for 1 kg");
+        return unknown(link.node, "is not stated (SDF default: 1 kg)");
     };
     if matches!(node.attribute("auto"), Some("true" | "1")) {
-        return unknown(node, "follows from its collision shapes (`auto`), which is not computed");
+        return unknown(node, "depends on its collision shapes (`auto`), which is not supported");
     }
     let Some(mass) = number(node, "mass")? else {
-        return unknown(node, "is not stated, which SDF takes for 1 kg");
+        return unknown(node, "is not stated (SDF default: 1 kg)");
     };
     if mass < 0.0 {
         return Err(fault_at(node, SdfFault::NegativeMass { link: link.name.clone() }));
@@ -46,12 +46,12 @@ pub(super) fn inertial(link: &Item<'_, '_>, notices: &mut Notices) -> Result<Opt
     };
     let link_from_inertial = placement(node)?;
     let r = &link_from_inertial.rotation;
-    // Exact numbers stay exact where nothing turns.
+    // Without a rotation the numbers stay exact.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(Some(InertialParameters::from_centre_of_mass(mass, link_from_inertial.translation, &turned)))
 }
 
-/// Shapes of a link in its frame. They play no part in dynamics, so that one without a known geometry is not fatal.
+/// Shapes of a link in its frame. An unknown geometry is not an error, because shapes have no influence on dynamics.
 pub(super) fn shapes(link: Node<'_, '_>) -> Vec<CollisionShape> {
     let unsupported = |what: String| {
         let geometry = CollisionGeometry::Unsupported { what };
@@ -67,7 +67,7 @@ fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, SdfError> {
     let [radius, length] = [number(form, "radius")?, number(form, "length")?];
     let name = form.tag_name().name();
     let geometry = match name {
-        // The ground, and an empty element: no shape of a link.
+        // Not shapes of a link.
         "plane" | "heightmap" | "empty" => return Ok(None),
         "box" => numbers::<3>(form, "size")?.map(|size| CollisionGeometry::Box { size_m: size.map(f64::abs) }),
         "sphere" => radius.map(|radius| CollisionGeometry::Sphere { radius_m: radius.abs() }),

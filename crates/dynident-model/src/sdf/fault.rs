@@ -1,4 +1,4 @@
-//! What can be wrong in an SDF.
+//! Errors of the SDF reader.
 
 use crate::error::ModelError;
 use crate::place::Located;
@@ -9,199 +9,72 @@ use thiserror::Error;
 /// Why an SDF could not be read, with line and column.
 pub type SdfError = Located<SdfFault>;
 
-/// What is wrong in an SDF, and the fix.
+/// A fault in an SDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfFault {
-    /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
-    Xml {
-        /// What the XML parser says.
-        reason: String,
-    },
-    /// More elements than a robot has.
+    Xml { reason: String },
     #[error("the document has more than {limit} nodes: give the SDF of one robot")]
-    TooLarge {
-        /// The limit.
-        limit: u32,
-    },
-    /// Thousands of attributes in one tag, or of namespaces.
-    #[error("more attributes in a tag, or namespaces in the document, than any robot has: give the SDF of one robot")]
+    TooLarge { limit: u32 },
+    #[error("too many attributes in a tag, or namespaces in the document: give the SDF of one robot")]
     Flood,
-    /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
-    /// The root element is not `<sdf>`.
     #[error("the root element is <{root}>, not <sdf>: give an SDF file")]
-    NotSdf {
-        /// Name of the root element.
-        root: String,
-    },
-    /// `version` is none.
-    #[error("`version` of <sdf> is `{text}`: write one such as 1.9, by which frames are understood")]
-    Version {
-        /// What stands there, shortened.
-        text: String,
-    },
-    /// No model.
+    NotSdf { root: String },
+    #[error("`version` of <sdf> is `{text}`: write a version such as 1.9, which determines the meaning of frames")]
+    Version { text: String },
     #[error("there is no <model> here: give the SDF of one robot{hint}")]
-    NoModel {
-        /// More on the fix.
-        hint: &'static str,
-    },
-    /// Several worlds or models.
+    NoModel { hint: &'static str },
     #[error("there are several {what}: keep that of the robot")]
-    Several {
-        /// Worlds or models.
-        what: &'static str,
-    },
-    /// More links, joints and frames than a robot has.
+    Several { what: &'static str },
     #[error("the model has more than {limit} links, joints and frames: give the SDF of one robot")]
-    TooMany {
-        /// The limit.
-        limit: usize,
-    },
-    /// Models nested deeper than a robot's.
+    TooMany { limit: usize },
     #[error("models are nested more than {limit} deep: give the SDF of one robot")]
-    TooDeep {
-        /// The limit.
-        limit: usize,
-    },
-    /// An attribute or element is missing.
+    TooDeep { limit: usize },
     #[error("<{element}> has no {kind} `{name}`: add it")]
-    Missing {
-        /// The element around.
-        element: String,
-        /// `attribute` or `element`.
-        kind: &'static str,
-        /// What is missing.
-        name: &'static str,
-    },
-    /// Something that is not a usable number.
+    Missing { element: String, kind: &'static str, name: &'static str },
     #[error("<{element}> holds `{text}`, which is {fault}: write {fix}")]
-    Number {
-        /// The element.
-        element: String,
-        /// What stands there, shortened.
-        text: String,
-        /// What is wrong with it.
-        fault: &'static str,
-        /// What to write.
-        fix: &'static str,
-    },
-    /// Too many or too few numbers.
+    Number { element: String, text: String, fault: &'static str, fix: &'static str },
     #[error("<{element}> holds {found} numbers: write {expected}, separated by spaces")]
-    Count {
-        /// The element.
-        element: String,
-        /// How many are needed.
-        expected: usize,
-        /// How many stand there.
-        found: usize,
-    },
-    /// A word that is none of those expected.
-    #[error("`{text}` of <{element}> is not known: write {expected}")]
-    Word {
-        /// The element.
-        element: String,
-        /// What stands there, shortened.
-        text: String,
-        /// What is.
-        expected: &'static str,
-    },
-    /// Two things in one scope with one name.
+    Count { element: String, expected: usize, found: usize },
+    #[error("`{text}` of <{element}> is unknown: write {expected}")]
+    Word { element: String, text: String, expected: &'static str },
     #[error("`{name}` is defined a second time: rename or delete one")]
-    DuplicateName {
-        /// The name.
-        name: String,
-    },
-    /// A frame that is not there.
+    DuplicateName { name: String },
     #[error("{of} refers to `{name}`, which is no link, joint, frame or nested model here: add it or fix the name")]
-    UnknownFrame {
-        /// The frame.
-        name: String,
-        /// What refers to it.
-        of: String,
-    },
-    /// Frames whose poses refer to each other.
+    UnknownFrame { name: String, of: String },
     #[error("the pose of `{name}` refers back to itself: give one of these frames another `relative_to`")]
-    FrameLoop {
-        /// One of them.
-        name: String,
-    },
-    /// A link that two joints carry.
+    FrameLoop { name: String },
     #[error("link `{link}` is the child of joints `{first}` and `{second}`: delete one, closed chains are not read")]
-    TwoParents {
-        /// The link.
-        link: String,
-        /// One joint.
-        first: String,
-        /// The other.
-        second: String,
-    },
-    /// Parts that no joint joins.
-    #[error("links `{first}` and `{second}` are both carried by no joint: fix one of them to the other, or to `world`")]
-    SeveralRoots {
-        /// One root.
-        first: String,
-        /// Another.
-        second: String,
-    },
-    /// Links that carry each other.
-    #[error("link `{link}` is carried by itself through its joints: delete one joint of the loop")]
-    Loop {
-        /// One of the links.
-        link: String,
-    },
-    /// A joint that joins a link with itself.
+    TwoParents { link: String, first: String, second: String },
+    #[error("links `{first}` and `{second}` both have no parent joint: fix one of them to the other, or to `world`")]
+    SeveralRoots { first: String, second: String },
+    #[error("link `{link}` is its own ancestor through its joints: delete one joint of the loop")]
+    Loop { link: String },
     #[error("joint `{joint}` joins `{link}` with itself: fix <parent> or <child>")]
-    SameLink {
-        /// The joint.
-        joint: String,
-        /// The link.
-        link: String,
-    },
-    /// An axis without direction.
+    SameLink { joint: String, link: String },
     #[error("the axis of joint `{joint}` has no direction: write a vector with a length, such as `0 0 1`")]
-    ZeroAxis {
-        /// The joint.
-        joint: String,
-    },
-    /// A joint that a robot on a fixed base does not have, or something else that is not read.
+    ZeroAxis { joint: String },
     #[error("{what} is not supported: {fix}")]
-    Unsupported {
-        /// What stands there.
-        what: String,
-        /// What to do.
-        fix: &'static str,
-    },
-    /// A mass below zero.
+    Unsupported { what: String, fix: &'static str },
     #[error("the mass of link `{link}` is negative: write a value of zero or more")]
-    NegativeMass {
-        /// The link.
-        link: String,
-    },
-    /// Nothing moves.
+    NegativeMass { link: String },
     #[error("the model has no joint of type revolute, continuous or prismatic: give the SDF of a robot that moves")]
     NoMovingJoint,
-    /// More moving joints than a description may have.
-    #[error("the model has more than {limit} joints: fix those that the log does not hold")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
-    /// The parts do not make a model.
+    #[error("the model has more than {limit} joints: fix those that the log does not contain")]
+    TooManyJoints { limit: usize },
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }
 
-/// `fault` at the beginning of `node`.
 pub(super) fn fault_at(node: Node<'_, '_>, fault: SdfFault) -> SdfError {
     let at = node.document().text_pos_at(node.range().start);
     Located { line: at.row, column: at.col, fault }
 }
 
-/// What the XML parser says.
 pub(super) fn of_xml(text: &str, error: &roxmltree::Error) -> SdfError {
     let (at, why) = malformed(text, error);
     let fault = match why {

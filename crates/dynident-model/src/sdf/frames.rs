@@ -1,4 +1,4 @@
-//! Where every frame stands in the model.
+//! Poses of all frames in the model.
 
 use super::fault::{SdfError, SdfFault, fault_at};
 use super::scopes::{Item, Kind, MODEL, Scopes, WORLD, full_name};
@@ -7,17 +7,16 @@ use crate::spatial::Transform;
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// Places of frames by their full names.
 pub(super) struct Frames {
     model_from: HashMap<String, Transform>,
 }
 
 impl Frames {
-    /// Follows every pose to the model's frame.
+    /// Resolves all poses to the model's frame.
     pub(super) fn new(found: &Scopes<'_, '_>) -> Result<Self, SdfError> {
         let mut model_from = HashMap::from([(String::new(), Transform::IDENTITY)]);
         for start in 0..found.items.len() {
-            // From this frame towards one whose place is known, then back.
+            // Follows the chain from this frame to one with a known pose, then back.
             let mut chain: Vec<usize> = Vec::new();
             let mut is_on_chain = vec![false; found.items.len()];
             let mut at = start;
@@ -44,25 +43,23 @@ impl Frames {
         Ok(Self { model_from })
     }
 
-    /// `model_from_frame` by full name; the empty one is the model itself.
+    /// `model_from_frame` by full name; the empty name is the model itself.
     pub(super) fn of(&self, name: &str) -> Option<Transform> {
         self.model_from.get(name).copied()
     }
 }
 
-/// What a frame moves with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Carrier {
-    /// Nothing: it stands still.
     World,
-    /// A link, by its place among the items.
+    /// A link, by its index among the items.
     Link(usize),
 }
 
-/// What a frame moves with, by full name; `None` where a name leads nowhere.
+/// The carrier of a frame by full name; `None` for a name that cannot be resolved.
 pub(super) fn carrier(found: &Scopes<'_, '_>, name: &str) -> Option<Carrier> {
     let mut name = name.to_owned();
-    // No chain of frames is longer than their number.
+    // No chain of frames is longer than the number of frames.
     for _ in 0..=found.items.len() {
         if name == WORLD {
             return Some(Carrier::World);
@@ -85,7 +82,7 @@ pub(super) fn carrier(found: &Scopes<'_, '_>, name: &str) -> Option<Carrier> {
     None
 }
 
-/// The link that a model's own frame moves with: the one that it names, or its first.
+/// Canonical link of a model: the one that it names, or its first.
 fn canonical_link(found: &Scopes<'_, '_>, model: Node<'_, '_>, inner: &str) -> Option<String> {
     if let Some(link) = model.attribute("canonical_link").filter(|link| !link.is_empty()) {
         return Some(full_name(inner, link));

@@ -1,13 +1,13 @@
 //! SDF, the format of Gazebo: reading, and writing identified values back.
 //!
-//! Read is one model (in `<sdf>` or in its one `<world>`) with the models nested in it: links with `<inertial>`, joints
-//! of type revolute, continuous, prismatic and fixed, poses relative to any link, joint, frame or nested model, axes
-//! expressed in any of them, `<world>`'s gravity. Files before version 1.7 mean frames otherwise, and are read as they
-//! mean them. Fixed joints are lumped.
+//! Supported is one model (in `<sdf>` or in its one `<world>`) with nested models: links with `<inertial>`, joints of
+//! type revolute, continuous, prismatic and fixed, poses and axes relative to any link, joint, frame or nested model,
+//! `<world>`'s gravity. The frame semantics of files before version 1.7 are also supported. Links connected by fixed
+//! joints are merged into one body.
 //!
-//! A joint's frame need not be its child's. The frame of a link that moves with a joint has the axes of the SDF link,
-//! and its origin at the joint's. The base has the frame of the model, and gravity is turned into it by the model's
-//! pose. A link without `<inertial>`, which SDF takes for 1 kg, is unknown.
+//! A joint's frame may differ from that of its child. The frame of a link that moves with a joint has the axes of the
+//! SDF link, and its origin at the joint. The base has the frame of the model, and gravity is rotated into it by the
+//! model's pose. A link without `<inertial>` is unknown (SDF's default is 1 kg).
 //!
 //! Source: the specification at <http://sdformat.org/spec> and its page on the semantics of poses.
 //!
@@ -52,28 +52,27 @@ use roxmltree::{Document, Node, ParsingOptions};
 use scopes::scopes;
 use values::{children, numbers_in, placement, word_of};
 
-/// What an SDF says.
+/// Result of reading an SDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SdfRobot {
     /// The robot on a fixed base.
     pub model: Model,
-    /// What the document says and the model does not hold, in the order of reading; at most 200 are kept.
+    /// Contents that the model cannot represent, in the order of reading; at most 200 are kept.
     pub notices: Vec<SdfNotice>,
 }
 
-/// Whether `text` is an SDF by its root element.
 pub(crate) fn is_sdf(text: &str) -> bool {
     root_name(text) == Some("sdf")
 }
 
-/// How a file of this version means frames.
+/// Version of the file, which determines the semantics of frames.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(super) struct Version(pub(super) [u32; 2]);
 
 /// Reads an SDF.
 ///
 /// # Errors
-/// If the text is malformed XML, no SDF, or describes no tree of links on one fixed base; with line and column.
+/// Malformed XML, not an SDF, or no tree of links on one fixed base; with line and column.
 #[doc(alias("gazebo"))]
 pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
     if let Some(at) = flood(text) {
@@ -89,13 +88,12 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
     let version = version(root)?;
     let (around, model) = model_of(root)?;
 
-    // What stands there, and where.
     let found = scopes(model, version)?;
     let frames = Frames::new(&found)?;
     let mut notices = notices::Notices::default();
     let tree = tree::tree(&found, &frames, &mut notices)?;
 
-    // Gravity of the world, in the model's frame.
+    // World gravity in the model's frame.
     let gravity = match children(around, "gravity").next().filter(|_| around.has_tag_name("world")) {
         Some(node) => Vec3(numbers_in::<3>(node)?),
         None => STANDARD_GRAVITY,
@@ -115,7 +113,7 @@ pub fn read_sdf(text: &str) -> Result<SdfRobot, SdfError> {
     Ok(SdfRobot { model, notices: notices.list })
 }
 
-/// The one model, and what stands around it: the document or its world.
+/// The only model, and its parent: the document or its world.
 fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Node<'a, 'input>), SdfError> {
     let worlds: Vec<Node<'_, '_>> = children(root, "world").collect();
     let around = match worlds[..] {
@@ -131,10 +129,9 @@ fn model_of<'a, 'input>(root: Node<'a, 'input>) -> Result<(Node<'a, 'input>, Nod
     }
 }
 
-/// A model that stands in another file.
 fn include_hint(around: Node<'_, '_>) -> &'static str {
     match children(around, "include").next() {
-        Some(_) => "; <include> is not followed: write the whole out by `gz sdf -p`",
+        Some(_) => "; <include> is not supported: expand the file with `gz sdf -p`",
         None => "",
     }
 }
@@ -148,7 +145,6 @@ fn version(root: Node<'_, '_>) -> Result<Version, SdfError> {
     }
 }
 
-/// Line of a node, from 1.
 fn line(node: Node<'_, '_>) -> u32 {
     line_and_column(node.document().input_text(), node.range().start).0
 }

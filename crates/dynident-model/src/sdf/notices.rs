@@ -1,48 +1,35 @@
-//! What a document says and the model does not hold.
+//! Contents of a document that the model cannot represent.
 
 use super::line;
-use core::fmt;
 use roxmltree::Node;
+use thiserror::Error;
 
-/// Something in an SDF that the model does not hold.
+/// A part of an SDF that the model does not represent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SdfNotice {
     /// Line, from 1.
     pub line: u32,
-    /// What is not held.
+    /// Kind of the part.
     pub loss: SdfLoss,
 }
 
-/// What is not held.
-#[derive(Clone, Debug, PartialEq)]
+/// Kind of the part that is not represented.
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfLoss {
-    /// The mass of a link is not stated.
-    UnknownMass {
-        /// The link.
-        link: String,
-        /// Why.
-        why: &'static str,
-    },
-    /// A link on which gravity does not act.
-    Weightless {
-        /// The link.
-        link: String,
-    },
-    /// The mass of a fluid around a link.
-    AddedMass {
-        /// The link.
-        link: String,
-    },
-    /// A model in another file.
-    Include {
-        /// Where it is.
-        uri: String,
-    },
+    #[error("the mass of link `{link}` {why}, so that it is unknown: give the link an <inertial>")]
+    UnknownMass { link: String, why: &'static str },
+    #[error("link `{link}` has no gravity, which is not supported: its full weight is used")]
+    Weightless { link: String },
+    #[error("link `{link}` has `fluid_added_mass`, which is not supported")]
+    AddedMass { link: String },
+    #[error("the model at `{uri}` is not read: expand the file with `gz sdf -p`")]
+    Include { uri: String },
 }
 
 impl SdfLoss {
-    /// A short name.
+    /// Short name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::UnknownMass { .. } => "unknown-mass",
@@ -53,37 +40,16 @@ impl SdfLoss {
     }
 }
 
-impl fmt::Display for SdfLoss {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::UnknownMass { link, why } => {
-                write!(f, "the mass of link `{link}` {why}: it counts as unknown; give the link an <inertial>")
-            }
-            Self::Weightless { link } => {
-                write!(f, "link `{link}` has no gravity, which the model does not hold: its weight counts in full")
-            }
-            Self::AddedMass { link } => {
-                write!(f, "link `{link}` has `fluid_added_mass`, which the model does not hold")
-            }
-            Self::Include { uri } => {
-                write!(f, "the model at `{uri}` is not read: write the whole out by `gz sdf -p`")
-            }
-        }
-    }
-}
-
-/// The notices so far.
 #[derive(Default)]
 pub(super) struct Notices {
     pub(super) list: Vec<SdfNotice>,
 }
 
 impl Notices {
-    /// Most that are kept.
-    const MOST: usize = 200;
+    const MAX_NOTICES: usize = 200;
 
     pub(super) fn note(&mut self, node: Node<'_, '_>, loss: SdfLoss) {
-        if self.list.len() < Self::MOST {
+        if self.list.len() < Self::MAX_NOTICES {
             self.list.push(SdfNotice { line: line(node), loss });
         }
     }

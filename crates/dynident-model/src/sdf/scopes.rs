@@ -1,4 +1,4 @@
-//! The links, joints and frames of a model and of those nested in it, by their full names.
+//! Links, joints and frames of a model and its nested models, by their full names.
 
 use super::fault::{SdfError, SdfFault, fault_at};
 use super::values::{child, children, required_text, text, word_of};
@@ -6,16 +6,12 @@ use super::{Version, notices::Notices};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// The model's own frame.
 pub(super) const MODEL: &str = "__model__";
-/// What the base stands on.
 pub(super) const WORLD: &str = "world";
-/// Most links, joints, frames and nested models: some steps compare each with each.
-const MOST_ITEMS: usize = 5000;
-/// Most models in each other.
-const MOST_NESTED: usize = 20;
+/// Maximum number of links, joints, frames and nested models: some steps are quadratic in it.
+const MAX_ITEMS: usize = 5000;
+const MAX_NESTING: usize = 20;
 
-/// What has a name and a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Link,
@@ -24,28 +20,26 @@ pub(super) enum Kind {
     Nested,
 }
 
-/// A link, joint, frame or nested model.
 pub(super) struct Item<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) kind: Kind,
-    /// With the names of the models around it: `gripper::finger`.
+    /// Full name with the surrounding models: `gripper::finger`.
     pub(super) name: String,
-    /// Names of the models around it, with `::` behind each.
+    /// Names of the surrounding models, each followed by `::`.
     pub(super) scope: String,
-    /// Frame that its pose is relative to, by its full name; empty for the frame of the outermost model.
+    /// Full name of the frame that its pose is relative to; empty for the outermost model.
     pub(super) relative_to: String,
 }
 
-/// All of them, in the order of the document, with their places by name.
+/// All items in the order of the document, with their indices by name.
 pub(super) struct Scopes<'a, 'input> {
     pub(super) version: Version,
-    /// The outermost model.
     pub(super) model: Node<'a, 'input>,
     pub(super) items: Vec<Item<'a, 'input>>,
     pub(super) by_name: HashMap<String, usize>,
 }
 
-/// A name as it is seen from `scope`, in full; empty for the frame of the outermost model.
+/// Full name of `name` in `scope`; empty for the frame of the outermost model.
 pub(super) fn full_name(scope: &str, name: &str) -> String {
     match name {
         MODEL => scope.trim_end_matches("::").to_owned(),
@@ -56,14 +50,13 @@ pub(super) fn full_name(scope: &str, name: &str) -> String {
     }
 }
 
-/// Collects `model` and what is nested in it.
 pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> Result<Scopes<'a, 'input>, SdfError> {
     let mut found = Scopes { version, model, items: Vec::new(), by_name: HashMap::new() };
-    // Models still to look through, innermost last; each is looked through before what follows it.
+    // Models to be visited, innermost last, so that a nested model is visited before its successors.
     let mut ahead = vec![(model, String::new(), 0)];
     while let Some((model, scope, depth)) = ahead.pop() {
-        if depth > MOST_NESTED {
-            return Err(fault_at(model, SdfFault::TooDeep { limit: MOST_NESTED }));
+        if depth > MAX_NESTING {
+            return Err(fault_at(model, SdfFault::TooDeep { limit: MAX_NESTING }));
         }
         let mut nested = Vec::new();
         for node in model.children().filter(Node::is_element) {
@@ -74,8 +67,8 @@ pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> R
                 "model" => Kind::Nested,
                 _ => continue,
             };
-            if found.items.len() == MOST_ITEMS {
-                return Err(fault_at(node, SdfFault::TooMany { limit: MOST_ITEMS }));
+            if found.items.len() == MAX_ITEMS {
+                return Err(fault_at(node, SdfFault::TooMany { limit: MAX_ITEMS }));
             }
             let name = format!("{scope}{}", word_of(node, "name")?);
             let relative_to = full_name(&scope, relative_to(node, kind, version)?);
@@ -92,9 +85,9 @@ pub(super) fn scopes<'a, 'input>(model: Node<'a, 'input>, version: Version) -> R
     Ok(found)
 }
 
-/// Which frame the pose of an element is relative to, as its scope names it.
+/// Frame that the pose of an element is relative to, as named in its scope.
 fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&'a str, SdfError> {
-    // Before 1.7 there were no other frames: links stood in the model, joints in their child.
+    // Before version 1.7, poses of links are relative to the model and those of joints to their child.
     let stated = child(node, "pose").and_then(|pose| pose.attribute("relative_to")).filter(|frame| !frame.is_empty());
     if let Some(stated) = stated.filter(|_| version >= Version([1, 7])) {
         return Ok(stated);
@@ -112,7 +105,7 @@ fn relative_to<'a>(node: Node<'a, '_>, kind: Kind, version: Version) -> Result<&
     })
 }
 
-/// Models in other files, which are not read.
+/// Notes models in other files, which are not read.
 pub(super) fn note_includes(model: Node<'_, '_>, notices: &mut Notices) {
     for include in model.descendants().filter(|node| node.has_tag_name("include")) {
         let uri = children(include, "uri").next().map_or("", text).to_owned();

@@ -1,4 +1,4 @@
-//! From links and joints to the tree of moving bodies.
+//! Builds the tree of moving bodies from links and joints.
 
 use super::axes::{Axis, axis};
 use super::elements::{inertial, shapes};
@@ -15,14 +15,12 @@ use crate::urdf::MAX_MOVING_JOINTS;
 use crate::xml::shortened;
 use std::collections::{HashMap, HashSet};
 
-/// The parts of the model.
 pub(super) struct Tree {
     pub(super) base: Body,
     pub(super) joints: Vec<Joint>,
     pub(super) bodies: Vec<Body>,
 }
 
-/// A joint between two links, or the world and a link.
 struct Connection<'s, 'a, 'input> {
     item: &'s Item<'a, 'input>,
     parent: Carrier,
@@ -31,7 +29,7 @@ struct Connection<'s, 'a, 'input> {
     axis: Option<Axis>,
 }
 
-/// The tree: depth first from the base, joints under a link in the order of the document, fixed joints lumped.
+/// Builds the tree: depth first from the base, joints of a link in the order of the document, fixed joints merged.
 pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notices) -> Result<Tree, SdfError> {
     let links: Vec<usize> = (0..found.items.len()).filter(|&index| found.items[index].kind == Kind::Link).collect();
     let Some(&first) = links.first() else {
@@ -54,14 +52,13 @@ pub(super) fn tree(found: &Scopes<'_, '_>, frames: &Frames, notices: &mut Notice
     Ok(tree)
 }
 
-/// Which joint carries each link, and which joints each link or the world carries.
+/// The joint that carries each link, and the joints that each link or the world carries.
 struct Carriers {
     carried_by: HashMap<usize, usize>,
     under: HashMap<Carrier, Vec<usize>>,
 }
 
 impl Carriers {
-    /// Of all joints; two joints that carry the same link are refused.
     fn of(found: &Scopes<'_, '_>, connections: &[Connection<'_, '_, '_>]) -> Result<Self, SdfError> {
         let (mut carried_by, mut under) = (HashMap::new(), HashMap::<Carrier, Vec<usize>>::new());
         for (number, connection) in connections.iter().enumerate() {
@@ -78,7 +75,7 @@ impl Carriers {
         Ok(Self { carried_by, under })
     }
 
-    /// The one link that carries everything; `None` if the world does.
+    /// The link that carries all others; `None` if it is the world.
     fn root(&self, found: &Scopes<'_, '_>, links: &[usize]) -> Result<Option<usize>, SdfError> {
         let mut roots = links.iter().copied().filter(|link| !self.carried_by.contains_key(link));
         match (self.under.contains_key(&Carrier::World), roots.next(), roots.next()) {
@@ -94,7 +91,6 @@ impl Carriers {
     }
 }
 
-/// A walk from the root along all joints.
 struct Walk<'s, 'a, 'input> {
     found: &'s Scopes<'a, 'input>,
     frames: &'s Frames,
@@ -102,31 +98,29 @@ struct Walk<'s, 'a, 'input> {
     under: &'s HashMap<Carrier, Vec<usize>>,
 }
 
-/// The tree of a walk and the links on it.
 struct Walked {
     tree: Tree,
     reached: HashSet<usize>,
 }
 
-/// A body, `None` for the base, and its place in the frame of the model.
+/// A body (`None` for the base) and its pose in the model's frame.
 #[derive(Clone, Copy)]
 struct BodyPlace {
     body: Option<usize>,
     model_from_body: Transform,
 }
 
-/// A joint still to visit, with the body that carries its parent link.
-struct Ahead {
+/// A joint to be visited, with the body that carries its parent link.
+struct PendingJoint {
     connection: usize,
     parent: BodyPlace,
 }
 
 impl Walk<'_, '_, '_> {
-    /// Walks from the root, `None` for the world.
     fn walked(&self, root: Option<usize>, notices: &mut Notices) -> Result<Walked, SdfError> {
         let base = match root {
-            // The base's own link is at the identity: the frame of the model, to which the link is fixed. The inertial
-            // of a link that does not move may be unknown.
+            // The base's own link has the frame of the model, to which it is fixed. The inertial of a fixed link may be
+            // unknown.
             Some(root) => self.link(root, Transform::IDENTITY, self.model_from_link(root), &mut Notices::default())?,
             None => {
                 Link { name: WORLD.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() }
@@ -134,11 +128,11 @@ impl Walk<'_, '_, '_> {
         };
         let mut tree = Tree { base: Body { links: vec![base] }, joints: Vec::new(), bodies: Vec::new() };
         let mut reached: HashSet<usize> = root.into_iter().collect();
-        // A stack, not recursion: a chain may be as long as the file.
-        let mut ahead: Vec<Ahead> = Vec::new();
+        // A stack avoids recursion, because a chain may be as long as the file.
+        let mut ahead: Vec<PendingJoint> = Vec::new();
         let base_place = BodyPlace { body: None, model_from_body: Transform::IDENTITY };
         ahead.extend(self.below(root.map_or(Carrier::World, Carrier::Link), base_place));
-        while let Some(Ahead { connection, parent }) = ahead.pop() {
+        while let Some(PendingJoint { connection, parent }) = ahead.pop() {
             let Connection { child, axis, .. } = &self.connections[connection];
             reached.insert(*child);
             let place = match axis {
@@ -150,13 +144,12 @@ impl Walk<'_, '_, '_> {
         Ok(Walked { tree, reached })
     }
 
-    /// The joints under a link or the world, the last one first.
-    fn below(&self, carrier: Carrier, parent: BodyPlace) -> impl Iterator<Item = Ahead> {
+    /// The joints of a link or the world, the last one first.
+    fn below(&self, carrier: Carrier, parent: BodyPlace) -> impl Iterator<Item = PendingJoint> {
         let joints = self.under.get(&carrier).map_or(&[][..], Vec::as_slice);
-        joints.iter().rev().map(move |&connection| Ahead { connection, parent })
+        joints.iter().rev().map(move |&connection| PendingJoint { connection, parent })
     }
 
-    /// Adds a moving joint and the body of its child link.
     fn add_moving(
         &self,
         connection: usize,
@@ -190,7 +183,6 @@ impl Walk<'_, '_, '_> {
         Ok(BodyPlace { body: Some(tree.bodies.len() - 1), model_from_body: place })
     }
 
-    /// Adds the child link of a fixed joint to the body of its parent link.
     fn add_fixed(
         &self,
         child: usize,
@@ -199,7 +191,7 @@ impl Walk<'_, '_, '_> {
         notices: &mut Notices,
     ) -> Result<BodyPlace, SdfError> {
         let placement = parent.model_from_body.inverse().then(&self.model_from_link(child));
-        // The inertial of a link that does not move may be unknown.
+        // The inertial of a fixed link may be unknown.
         let mut unheard = Notices::default();
         let (body, notices) = match parent.body {
             Some(body) => (&mut tree.bodies[body], notices),
@@ -209,13 +201,12 @@ impl Walk<'_, '_, '_> {
         Ok(parent)
     }
 
-    /// The frame of a link in that of the model.
     fn model_from_link(&self, index: usize) -> Transform {
         self.frames.of(&self.found.items[index].name).unwrap_or(Transform::IDENTITY)
     }
 
-    /// A link of a body. `shift` moves its shapes and its inertial to the frame of the joint: only the first link of a
-    /// body is moved.
+    /// A link of a body. `shift` moves its shapes and its inertial to the frame of the joint; only the first link of a
+    /// body is shifted.
     fn link(
         &self,
         index: usize,
@@ -229,20 +220,18 @@ impl Walk<'_, '_, '_> {
             shape.placement = shift.then(&shape.placement);
         }
         let stays = shift == Transform::IDENTITY;
-        // Exact numbers stay exact where nothing is shifted.
+        // Without a shift the numbers stay exact.
         let shifted = |inertial: InertialParameters| if stays { inertial } else { inertial.expressed_in(&shift) };
         let inertial = inertial(item, notices)?.map(shifted);
         Ok(Link { name: item.name.clone(), placement: body_from_link, inertial, collision })
     }
 }
 
-/// More than one link, or the world and a link, that no joint carries.
 fn several(found: &Scopes<'_, '_>, first: &str, second: usize) -> SdfError {
     let item = &found.items[second];
     fault_at(item.node, SdfFault::SeveralRoots { first: first.to_owned(), second: item.name.clone() })
 }
 
-/// All joints of the document.
 fn connections<'s, 'a, 'input>(
     found: &'s Scopes<'a, 'input>,
     frames: &Frames,

@@ -1,4 +1,4 @@
-//! Numbers, words and poses in elements.
+//! Numbers, keywords and poses in elements.
 
 use super::fault::{SdfError, SdfFault, fault_at};
 use crate::spatial::{Mat3, Transform, Vec3};
@@ -6,12 +6,10 @@ use crate::urdf::MAX_MAGNITUDE;
 use crate::xml::{parse_number, shortened};
 use roxmltree::Node;
 
-/// All children called `element`.
 pub(super) fn children<'a, 'input>(node: Node<'a, 'input>, element: &str) -> impl Iterator<Item = Node<'a, 'input>> {
     node.children().filter(move |child| child.has_tag_name(element))
 }
 
-/// The first child called `element`.
 pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option<Node<'a, 'input>> {
     node.children().find(|child| child.has_tag_name(element))
 }
@@ -20,24 +18,21 @@ fn tag(node: Node<'_, '_>) -> String {
     node.tag_name().name().to_owned()
 }
 
-/// The text of an element, without the blanks around it.
 pub(super) fn text<'a>(node: Node<'a, '_>) -> &'a str {
     node.text().unwrap_or("").trim()
 }
 
-/// The child `element` and its text, which must be there.
 pub(super) fn required_text<'a>(node: Node<'a, '_>, element: &'static str) -> Result<&'a str, SdfError> {
     let found = child(node, element).map(text).filter(|text| !text.is_empty());
     found.ok_or_else(|| fault_at(node, SdfFault::Missing { element: tag(node), kind: "element", name: element }))
 }
 
-/// An attribute that must be there and not be empty.
 pub(super) fn word_of<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result<&'a str, SdfError> {
     let found = node.attribute(attribute).filter(|value| !value.trim().is_empty());
     found.ok_or_else(|| fault_at(node, SdfFault::Missing { element: tag(node), kind: "attribute", name: attribute }))
 }
 
-/// Numbers of any size; `inf` is one.
+/// Numbers of any magnitude, including `inf`.
 fn list(node: Node<'_, '_>) -> Result<Vec<f64>, SdfError> {
     let number = |word: &str| match word.trim_start_matches('+').to_ascii_lowercase().as_str() {
         "inf" | "infinity" => Ok(f64::INFINITY),
@@ -49,7 +44,7 @@ fn list(node: Node<'_, '_>) -> Result<Vec<f64>, SdfError> {
     text(node).split_ascii_whitespace().map(number).collect()
 }
 
-/// `N` numbers, none beyond the size of a robot.
+/// `N` numbers, each within the magnitude limit.
 pub(super) fn numbers_in<const N: usize>(node: Node<'_, '_>) -> Result<[f64; N], SdfError> {
     let found = list(node)?;
     if found.len() != N {
@@ -67,17 +62,14 @@ pub(super) fn numbers_in<const N: usize>(node: Node<'_, '_>) -> Result<[f64; N],
     Ok(core::array::from_fn(|k| found[k]))
 }
 
-/// `N` numbers of the child `element`.
 pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, element: &str) -> Result<Option<[f64; N]>, SdfError> {
     child(node, element).map(numbers_in).transpose()
 }
 
-/// One number of the child `element`.
 pub(super) fn number(node: Node<'_, '_>, element: &str) -> Result<Option<f64>, SdfError> {
     Ok(numbers::<1>(node, element)?.map(|[number]| number))
 }
 
-/// One number of any size of the child `element`.
 pub(super) fn number_of_any_size(node: Node<'_, '_>, element: &str) -> Result<Option<f64>, SdfError> {
     let Some(node) = child(node, element) else { return Ok(None) };
     match list(node)?[..] {
@@ -86,15 +78,15 @@ pub(super) fn number_of_any_size(node: Node<'_, '_>, element: &str) -> Result<Op
     }
 }
 
-/// `true`, `1`, `false`, `0` of the child `element`.
+/// Value of the child `element`: `true`, `1`, `false` or `0`.
 pub(super) fn flag(node: Node<'_, '_>, element: &str) -> Option<bool> {
     child(node, element).map(|node| matches!(text(node), "true" | "1"))
 }
 
-/// Where the `<pose>` of an element places it; in place without one.
+/// Pose of an element from its `<pose>`; the identity without one.
 pub(super) fn placement(node: Node<'_, '_>) -> Result<Transform, SdfError> {
     let Some(pose) = child(node, "pose") else { return Ok(Transform::IDENTITY) };
-    // An empty pose is none.
+    // An empty pose is treated as missing.
     if text(pose).is_empty() {
         return Ok(Transform::IDENTITY);
     }

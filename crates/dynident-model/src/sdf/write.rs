@@ -1,8 +1,8 @@
-//! Writing identified values back into the user's own SDF.
+//! Writes identified values into an existing SDF.
 //!
 //! Only `<pose>`, `<mass>` and `<inertia>` in `<inertial>` of links and `<damping>` and `<friction>` of joints change;
-//! every other byte stays. A link that is fixed to another keeps its own inertial, for SDF takes one without for 1 kg:
-//! the link that carries it gets the rest.
+//! all other bytes stay. A link that is fixed to another keeps its inertial, because SDF's default is 1 kg; the link
+//! that carries it gets the remaining part.
 
 use super::fault::SdfError;
 use super::frames::{Carrier, Frames, carrier};
@@ -20,64 +20,39 @@ use std::collections::HashSet;
 use std::ops::Range;
 use thiserror::Error;
 
-/// Why an SDF could not be rewritten.
+/// Why values could not be written into an SDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum SdfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] SdfError),
-    /// A change to something that the original does not hold.
     #[error("the SDF has no {kind} `{name}`: write into the file that the model was read from")]
-    Unknown {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// Two changes to one link or joint.
+    Unknown { kind: &'static str, name: String },
     #[error("two changes to {kind} `{name}`: give one")]
-    Repeated {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// An inertial that is to be taken away.
-    #[error("link `{link}` cannot be without <inertial>, which SDF takes for 1 kg: leave it as it is")]
-    Removed {
-        /// The link.
-        link: String,
-    },
-    /// A value that is not finite, or beyond what a description may hold.
+    Repeated { kind: &'static str, name: String },
+    #[error("link `{link}` needs an <inertial>, because SDF's default is 1 kg: keep it")]
+    Removed { link: String },
     #[error("the new values of {kind} `{name}` are not all finite numbers below {MAX_MAGNITUDE:e}")]
-    NotFinite {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A body that simulators refuse.
+    NotFinite { kind: &'static str, name: String },
     #[error(
         "the new values of link `{link}` are those of no body with mass, which simulators refuse: use physically consistent parameters"
     )]
-    NotPhysical {
-        /// The link.
-        link: String,
-    },
+    NotPhysical { link: String },
 }
 
-/// `original` with the changes made and every other byte as it was: inertials in the links' frames, as [`read_sdf`]
-/// gives them, are written about the centre of mass in the axes of the `<link>`, every number in the shortest form that
-/// reads back to the same `f64`. Drive inertia, which SDF has none of, is passed over.
+/// Writes the changes into `original` and keeps all other bytes. Inertials, given in the links' frames as by
+/// [`read_sdf`], are written about the centre of mass in the axes of the `<link>`. Every number has the shortest form
+/// that parses to the same `f64`. Drive inertia is ignored, because SDF has no element for it.
 ///
 /// # Errors
-/// If the original is no SDF, a link or joint is unknown or named twice, an inertial is to be removed, or a link would
-/// be no body that can be real.
+/// An invalid SDF; an unknown or repeated link or joint; a removed inertial; or a link without physically consistent
+/// parameters.
 pub fn rewrite_sdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, SdfWriteError> {
     read_sdf(original)?;
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    // The same text has been parsed a moment ago.
+    // Cannot fail: the same text has just been parsed.
     let Ok(document) = Document::parse_with_options(original, options) else { return Ok(original.to_owned()) };
     let root = document.root_element();
     let (_, model) = model_of(root)?;
@@ -117,7 +92,7 @@ fn named(found: &Scopes<'_, '_>, name: &str, kind: Kind, word: &'static str) -> 
     index.ok_or_else(|| SdfWriteError::Unknown { kind: word, name: name.to_owned() })
 }
 
-/// Where the frame that the reader gives to a link stands in the link: at the joint that moves it.
+/// Origin of the reader's link frame in the SDF link: the joint that moves it.
 fn moved_origin(found: &Scopes<'_, '_>, frames: &Frames, link: usize) -> Result<Vec3, SdfError> {
     let place = |name: &str| frames.of(name).unwrap_or(Transform::IDENTITY);
     for joint in found.items.iter().filter(|item| item.kind == Kind::Joint) {
@@ -131,7 +106,7 @@ fn moved_origin(found: &Scopes<'_, '_>, frames: &Frames, link: usize) -> Result<
     Ok(Vec3::ZERO)
 }
 
-/// The link's `<inertial>`; what stands in the old one beside pose, mass and inertia stays.
+/// Writes the link's `<inertial>`; other elements of the old one are kept.
 fn write_inertial(
     source: &Source<'_>,
     node: Node<'_, '_>,
@@ -143,16 +118,8 @@ fn write_inertial(
     if inertial.0.iter().any(|x| x.abs().is_nan() || x.abs() > MAX_MAGNITUDE) {
         return Err(SdfWriteError::NotFinite { kind: "link", name: link.to_owned() });
     }
-    let not_physical = || SdfWriteError::NotPhysical { link: link.to_owned() };
-    let (Some(com), Some(inertia), Some([a, b, c])) =
-        (inertial.com_m(), inertial.inertia_at_com(), inertial.principal_moments())
-    else {
-        return Err(not_physical());
-    };
-    let mass = inertial.mass_kg();
-    if com.0.iter().any(|x| x.abs() > MAX_MAGNITUDE) || !(mass > 0.0 && a > 0.0 && a + b >= c) {
-        return Err(not_physical());
-    }
+    let (mass, com, inertia) =
+        inertial.consistent_about_com().ok_or_else(|| SdfWriteError::NotPhysical { link: link.to_owned() })?;
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines: Vec<Line> = vec![(0, "<inertial>".to_owned())];
     lines.extend(note.map(|note| (1, format!("<!-- {} -->", xml::comment(note)))));
@@ -174,7 +141,6 @@ fn write_inertial(
     Ok(())
 }
 
-/// Damping and friction of one joint.
 fn write_dynamics(
     source: &Source<'_>,
     node: Node<'_, '_>,

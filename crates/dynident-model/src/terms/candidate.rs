@@ -1,26 +1,25 @@
-//! How a law takes part when recordings choose the friction of a joint.
+//! Candidate laws for the friction selection from recordings.
 
 use super::{CoulombShape, TorqueTerm};
 
-/// A law that recordings can choose for a joint: constants of its kind.
+/// A friction law that can be selected for a joint, with a grid of its constants.
 #[derive(Debug)]
 pub struct CandidateLaw {
-    /// Its name among candidates, each name once.
+    /// Unique name among the candidates.
     pub name: &'static str,
-    /// Number of constants that are chosen on the grid; they are included in the number of parameters.
+    /// Number of constants that are selected on the grid; they are included in the number of parameters.
     pub constants: usize,
-    /// When it is tried.
+    /// When the law is tried.
     pub role: CandidateRole,
-    /// Whether it is the step at rest, whose width is chosen again with every further term.
+    /// Whether it is the Coulomb step, whose width is selected again with every further term.
     pub is_step: bool,
-    /// Whether only rows near rest distinguish it from other friction.
+    /// Whether only rows near zero velocity distinguish it from other friction.
     pub is_near_rest: bool,
-    /// Its terms, for each point of the grid of its constants.
+    /// Terms of the law for each grid point of its constants.
     pub grid: fn(&CandidateJoint) -> Vec<GridPoint>,
 }
 
 impl CandidateLaw {
-    /// A law without constants.
     pub(super) const fn new(
         name: &'static str,
         role: CandidateRole,
@@ -29,18 +28,18 @@ impl CandidateLaw {
         Self { name, constants: 0, role, is_step: false, is_near_rest: false, grid }
     }
 
-    /// The law in whose place it is tried.
+    /// The law that it replaces.
     pub fn replaces(&self) -> Option<&'static Self> {
         let CandidateRole::InPlaceOf(replaced) = self.role else { return None };
         TorqueTerm::candidates().find(|law| law.name == replaced)
     }
 
-    /// True for the step at rest that is the same in both directions.
+    /// True for the Coulomb step that is the same in both directions.
     pub fn is_common_step(&self) -> bool {
         self.is_step && self.replaces().is_none()
     }
 
-    /// Its place in the order of laws: one that is tried in place of another follows it.
+    /// Position in the order of laws: a replacement follows the law that it replaces.
     pub fn rank(&self) -> (Option<usize>, bool) {
         let replaced = self.replaces();
         let name = replaced.map_or(self.name, |law| law.name);
@@ -59,63 +58,62 @@ impl Eq for CandidateLaw {}
 /// When a candidate is tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CandidateRole {
-    /// Part of every model that a search begins with.
+    /// Part of every start model of a search.
     Base,
-    /// With the base a model that a search begins with.
+    /// Together with the base, a start model of a search.
     Start,
-    /// In place of the candidate of this name.
+    /// Replaces the candidate of this name.
     InPlaceOf(&'static str),
-    /// In addition to all others. It is dropped where the data do not show it.
+    /// Added to all others, and dropped if it is not significant.
     Addition,
 }
 
-/// A point of a grid.
+/// A grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridPoint {
-    /// The terms there: one, or one for each direction.
+    /// Terms of the point: one, or one for each direction.
     pub terms: Vec<TorqueTerm>,
-    /// Number of its step on the first axis of the grid, ascending; `None` for a point that is tried alone.
+    /// Index on the first axis of the grid, ascending; `None` for a point that is tried alone.
     pub step: Option<usize>,
 }
 
 impl GridPoint {
-    /// A term that is tried alone.
     pub(super) fn alone(term: TorqueTerm) -> Self {
         Self { terms: vec![term], step: None }
     }
 
-    /// A term at step `step`.
+    /// A term at index `step`.
     pub(super) fn at(step: usize, term: TorqueTerm) -> Self {
         Self { terms: vec![term], step: Some(step) }
     }
 }
 
-/// The joint that candidates are made for.
+/// The joint for which candidates are made.
 #[derive(Clone, Debug)]
 pub struct CandidateJoint {
-    /// Its index.
+    /// Index of the joint.
     pub joint: usize,
-    /// A rad/s (m/s) of a usual arm.
+    /// Velocity of this joint that corresponds to 1 rad/s (m/s) of a typical arm.
     pub velocity: f64,
-    /// A rad (m) of a usual arm.
+    /// Position of this joint that corresponds to 1 rad (m) of a typical arm.
     pub position: f64,
-    /// Steps at rest that are tried alone.
+    /// Coulomb steps that are tried alone.
     pub alone: Vec<CoulombShape>,
-    /// Grid of widths of the step at rest, rad/s (m/s), ascending.
+    /// Grid of widths of the Coulomb step, rad/s (m/s), ascending.
     pub widths: Vec<f64>,
-    /// Width of the step of a law that has the joint's, rad/s (m/s).
+    /// Width of the Coulomb step that a law shares with the joint, rad/s (m/s).
     pub width: f64,
 }
 
-/// Bounds of the velocities among the constants, rad/s (m/s) of a usual arm.
-const VELOCITIES: [f64; 2] = [1.0e-4, 10.0];
+/// Bounds of the velocity constants, rad/s (m/s) of a typical arm.
+const VELOCITY_BOUNDS: [f64; 2] = [1.0e-4, 10.0];
 
-/// The constant of this logarithm, within its bounds.
-pub(super) fn within(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
+/// The constant with this logarithm, clamped to its bounds.
+pub(super) fn clamped_exp(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
     logarithm.clamp(least.ln(), most.ln()).exp()
 }
 
-/// The velocity of this logarithm, within bounds; `velocity` is a rad/s (m/s) of a usual arm.
-pub(super) fn velocity_within(logarithm: f64, velocity: f64) -> f64 {
-    within(logarithm, VELOCITIES.map(|usual| usual * velocity))
+/// The velocity with this logarithm, clamped; `velocity` corresponds to 1 rad/s (m/s) of a typical arm.
+pub(super) fn clamped_velocity(logarithm: f64, velocity: f64) -> f64 {
+    clamped_exp(logarithm, VELOCITY_BOUNDS.map(|usual| usual * velocity))
 }

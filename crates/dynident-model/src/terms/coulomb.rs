@@ -20,7 +20,7 @@ pub enum CoulombShape {
         /// Half width of the band without friction torque.
         dead_band: f64,
     },
-    /// `tanh(q̇ / width)`: no chatter of the sign of a noisy velocity near rest.
+    /// `tanh(q̇ / width)`, which avoids chatter caused by velocity noise near rest.
     Smooth {
         /// Velocity at which 76 % of the step is reached, rad/s or m/s, positive.
         width: f64,
@@ -28,23 +28,23 @@ pub enum CoulombShape {
 }
 
 impl CoulombShape {
-    /// The width of a smooth step that is usual, rad/s or m/s of a usual arm
+    /// Default width of a smooth step, rad/s or m/s of a typical arm
     /// ([`OwnScale::velocity`](crate::OwnScale::velocity)).
     pub const USUAL_WIDTH: f64 = 0.02;
 
-    /// The step at velocity `dq`.
+    /// Value of the step at velocity `dq`.
     #[inline]
     pub fn step(self, dq: f64) -> f64 {
         self.of(dq)
     }
 
-    /// The step's derivative by the velocity; zero for the sign, which has none at the step.
+    /// Derivative of the step with respect to velocity; zero for the sign.
     #[inline]
     pub fn slope(self, dq: f64) -> f64 {
         VelocityFunction::slope(&self, dq)
     }
 
-    /// As friction of a robot. The dead band of a sign is a device for noisy velocities of a log: a robot has none.
+    /// Friction curve of a robot. The dead band of a sign handles noisy velocities in a log; a robot has none.
     pub(super) fn curve(&self) -> VelocityCurve<'_> {
         match self {
             Self::Sign { .. } => VelocityCurve::Step { forward: true, backward: true },
@@ -81,8 +81,8 @@ impl VelocityLaw for Coulomb {
 }
 
 impl Coulomb {
-    /// Widths of the smooth step that recordings choose from, rad/s or m/s of a usual arm, in addition to the sign and
-    /// the width that a study states.
+    /// Candidate widths of the smooth step, rad/s or m/s of a typical arm, in addition to the sign and the width stated
+    /// in a study.
     pub const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {

@@ -1,7 +1,8 @@
-//! A drive that turns with two joints, as in a coupled wrist: its velocity is `w = k_1 q̇_1 + k_2 q̇_2`.
+//! A drive that is coupled to two joints, as in a coupled wrist: its velocity is `w = k_1 q̇_1 + k_2 q̇_2`.
 //!
-//! Its own joint's terms already hold the part that only one joint feels, so a coupling holds the cross terms
-//! (Stäubli TX and RX wrists: Gautier, Janot, Vandanjon 2013; the DFKI pendulum's rotor seen through two joints):
+//! The terms of each joint already contain the part that depends on one joint alone, so a coupling contains the cross
+//! terms (Stäubli TX and RX wrists: Gautier, Janot, Vandanjon 2013; a rotor coupled to both joints of the DFKI
+//! pendulum):
 //! * inertia: `τ_1 += k_1 k_2 I q̈_2`, `τ_2 += k_1 k_2 I q̈_1`,
 //! * viscous friction: `τ_1 += k_1 k_2 F q̇_2`, `τ_2 += k_1 k_2 F q̇_1`,
 //! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
@@ -12,7 +13,7 @@ use super::{Coulomb, CoulombShape, DriveInertia, JointMotion, TermInput, TorqueT
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// What the shared drive adds.
+/// Effect of the shared drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -21,13 +22,13 @@ pub enum CouplingEffect {
     Inertia,
     /// Cross viscous friction, Nm s/rad.
     Viscous,
-    /// Coulomb friction on the drive's own velocity, Nm.
+    /// Coulomb friction of the drive's velocity, Nm.
     Coulomb(CoulombShape),
 }
 
 impl CouplingEffect {
-    /// The term of a drive with this effect that turns with one joint, by `ratio` times the joint's velocity, and the
-    /// term's parameter per unit of the drive's.
+    /// The term of a drive with this effect on a single joint, with the velocity ratio `ratio`, and the term's
+    /// parameter per unit of the drive's parameter.
     pub fn of_joint(self, joint: usize, ratio: f64) -> (TorqueTerm, f64) {
         match self {
             Self::Inertia => (TorqueTerm::DriveInertia(DriveInertia { joint }), ratio * ratio),
@@ -37,7 +38,7 @@ impl CouplingEffect {
     }
 }
 
-/// One effect of one drive that turns with two joints.
+/// One effect of one drive that is coupled to two joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Coupling {
@@ -47,17 +48,17 @@ pub struct Coupling {
     pub first: usize,
     /// The other joint.
     pub second: usize,
-    /// Drive velocity per velocity of the first and of the second joint.
+    /// Drive velocity divided by the velocity of the first and of the second joint.
     pub ratios: [f64; 2],
     /// The effect.
     pub effect: CouplingEffect,
 }
 
 impl Coupling {
-    /// Sizes that a ratio may have: gears turn by less, and products of two stay far inside the range of `f64`.
+    /// Valid magnitudes of a ratio: real gears are inside, and products of two ratios stay within the range of `f64`.
     pub const RATIOS: core::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
-    /// For joint `row` the other joint and its own ratio.
+    /// For joint `row`, the other joint and its ratio.
     fn as_seen_by(&self, row: usize) -> (usize, f64) {
         if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) }
     }
@@ -94,7 +95,7 @@ impl TermKind for Coupling {
     }
 
     fn is_nonnegative(&self) -> bool {
-        // Cross terms are judged with their drive.
+        // Cross terms are checked together with their drive.
         false
     }
 

@@ -1,9 +1,9 @@
-//! A torque that a user declares: `τ = k f(q, q̇)` with a coefficient `k` to be found. Springs, counterbalances,
-//! cables, gas struts, magnets: all that holds a joint by where it stands.
+//! A torque declared by the user: `τ = k f(q, q̇)` with an identified coefficient `k`, for springs, counterbalances,
+//! cables, gas struts, magnets and other position-dependent torques.
 //!
-//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] of the joint's own position, or a caller's
-//! own code ([`TorqueFunction`]). As for every term, the torque is what the drive has to give: a spring that pulls the
-//! joint back to `q₀` with the stiffness `c` is `c (q - q₀)`, and one that helps the drive has the other sign.
+//! `f` is an [`Expression`] of positions and velocities, a [`TorqueTable`] over the joint's position, or the caller's
+//! code ([`TorqueFunction`]). As for every term, the torque is the one that the drive has to give: a spring of
+//! stiffness `c` that pulls the joint back to `q₀` is `c (q - q₀)`; one that helps the drive has the opposite sign.
 
 use super::kind::{JointProperty, StateFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
@@ -16,39 +16,39 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Declared {
-    /// The parameter's symbol: a letter, then letters, digits and `_`.
+    /// Symbol of the parameter: a letter, then letters, digits and `_`.
     pub name: String,
     /// The joint that it acts on.
     pub joint: usize,
-    /// What it follows.
+    /// Function `f`.
     pub law: DeclaredLaw,
     /// Unit of the coefficient, as the user writes it.
     pub unit: String,
-    /// What the coefficient is thought to be.
+    /// Nominal value of the coefficient.
     #[serde(default)]
     pub nominal: Option<f64>,
-    /// True for the spring that the robot's description has at this very joint: the coefficient is its stiffness.
+    /// True for the spring of this joint in the robot description; the coefficient is its stiffness.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
     pub is_spring: bool,
 }
 
-/// What a declared torque follows.
+/// Function of a declared torque.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum DeclaredLaw {
     /// An expression of positions and velocities of any joints.
     Expression(Expression),
-    /// A curve over the position of its own joint.
+    /// A curve over the position of the joint.
     Table(TorqueTable),
-    /// A caller's own code.
+    /// The caller's code.
     Function(TorqueFunction),
 }
 
 impl Declared {
-    /// The springs that the description of `model` has at its joints, `stiffness (q - reference)`, each named `k_` and
-    /// the joint. That of a joint which follows another acts on the one that it follows; where it follows several, it
-    /// is not among them, for a declared torque has one joint.
+    /// Springs of the joints in the robot description, `stiffness (q - reference)`, each named `k_` plus the joint
+    /// name. The spring of a mimic joint acts on its source. If the joint has several sources the spring is omitted,
+    /// because a declared torque acts on one joint.
     pub fn springs(model: &Model) -> Vec<Self> {
         let spring = |(place, described): (usize, &Joint)| {
             let JointSpring { stiffness, reference } = described.spring?;
@@ -73,21 +73,21 @@ impl Declared {
         model.tree_joints().iter().enumerate().filter_map(spring).collect()
     }
 
-    /// Whether `name` can be a symbol among others: an ASCII letter, then letters, digits and `_`, at most 60.
+    /// Whether `name` is a valid symbol: an ASCII letter, then letters, digits and `_`, at most 60 characters.
     pub fn is_symbol(name: &str) -> bool {
         name.len() <= 60
             && name.starts_with(|c: char| c.is_ascii_alphabetic())
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
     }
 
-    /// Derivatives of the torque of one unit at a sample: `take(joint, is_velocity, slope)`.
+    /// Derivatives of the torque per unit of the coefficient at a sample: `take(joint, is_velocity, slope)`.
     fn slopes(&self, motion: &JointMotion<'_>, sample: usize, mut take: impl FnMut(usize, bool, f64)) {
         match &self.law {
             DeclaredLaw::Expression(expression) => {
                 expression.slopes(|joint| motion.q_of(joint)[sample], |joint| motion.dq_of(joint)[sample], take);
             }
             DeclaredLaw::Table(table) => take(self.joint, false, table.slope(motion.q_of(self.joint)[sample])),
-            // Differentiated block by block, not here.
+            // Differentiated by blocks elsewhere.
             DeclaredLaw::Function(_) => {}
         }
     }

@@ -1,8 +1,8 @@
-//! Friction that differs by direction: one parameter for motion forward, one for motion backward.
+//! Friction with one parameter per direction of motion.
 //!
 //! Viscous: `τ = F_v⁺ max(q̇, 0) + F_v⁻ min(q̇, 0)`. Coulomb: `τ = F_c⁺ max(s(q̇), 0) + F_c⁻ min(s(q̇), 0)` with a step
-//! `s`. All four parameters are positive where friction takes power. With a step that is a sign, the two Coulomb
-//! columns and an offset say the same: keep two of the three.
+//! `s`. All four parameters are positive if friction dissipates power. If the step is a sign, the two Coulomb columns
+//! and an offset are linearly dependent: use only two of the three.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{
@@ -15,7 +15,7 @@ use super::{Coulomb, CoulombShape, FrictionTerm, TorqueTerm, Viscous};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// Sense of motion.
+/// Direction of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -53,7 +53,7 @@ impl Direction {
         })
     }
 
-    /// Its half of a function.
+    /// Part of a function in this direction.
     fn half(self, halves: [MotionFunction; 2]) -> Vec<MotionFunction> {
         let [forward, backward] = halves;
         match self {
@@ -69,7 +69,7 @@ impl Direction {
 pub struct DirectionalViscous {
     /// The joint.
     pub joint: usize,
-    /// The direction in which it is felt.
+    /// The direction in which it acts.
     pub direction: Direction,
 }
 
@@ -147,7 +147,7 @@ impl TermKind for DirectionalViscous {
 pub struct DirectionalCoulomb {
     /// The joint.
     pub joint: usize,
-    /// The direction in which it is felt.
+    /// The direction in which it acts.
     pub direction: Direction,
     /// The step near zero velocity.
     pub shape: CoulombShape,

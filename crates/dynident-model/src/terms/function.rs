@@ -1,32 +1,31 @@
-//! A torque law that is a caller's own code: what no expression says, tried out.
+//! A torque law in the caller's code, for laws that expressions cannot represent.
 
 use super::JointMotion;
 use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Share of a position or velocity (and absolute step around zero) by which a law is differentiated: the cube root of
-/// the rounding, where a central difference is most exact.
-const STEP: f64 = 6e-6;
+/// Step of the central differences, relative to the position or velocity (absolute around zero): cube root of the
+/// rounding error, which is optimal for central differences.
+const DIFFERENCE_STEP: f64 = 6e-6;
 
 /// A function `f(q, q̇)` of positions and velocities of any joints, for a whole block of samples at once.
 ///
-/// It must give the same values for the same motion, sample by sample, however samples are put into blocks.
+/// It must be deterministic per sample, independent of the division into blocks.
 pub trait TorqueLaw: Debug + Send + Sync {
-    /// Writes its value at every sample of `motion` into `out`, one for each: what the drive has to give, per unit of
-    /// the coefficient. NaN where it has none.
+    /// Writes one value per sample of `motion` into `out`: the torque that the drive has to give, per unit of the
+    /// coefficient; NaN where it is undefined.
     fn fill(&self, motion: &JointMotion<'_>, out: &mut [f64]);
 }
 
-/// A [`TorqueLaw`] with its name. No file holds code: what is read back has the name alone, and says nothing.
+/// A [`TorqueLaw`] with a name. Code is not serialised: a deserialised function has only its name, and no values.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueFunction {
-    /// What it is called in results.
+    /// Name in results.
     pub name: String,
-    /// The joints whose motion it follows, ascending.
+    /// Joints whose motion it depends on, ascending.
     pub follows: Vec<usize>,
-    /// The code.
     #[serde(skip)]
     law: Option<Arc<dyn TorqueLaw>>,
 }
@@ -43,14 +42,14 @@ impl PartialEq for TorqueFunction {
 }
 
 impl TorqueFunction {
-    /// Code that follows the motion of the joints `follows`.
+    /// A function that depends on the motion of the joints `follows`.
     pub fn new(name: impl Into<String>, mut follows: Vec<usize>, law: Arc<dyn TorqueLaw>) -> Self {
         follows.sort_unstable();
         follows.dedup();
         Self { name: name.into(), follows, law: Some(law) }
     }
 
-    /// Its value at every sample, NaN where it has none.
+    /// Values at all samples; NaN where undefined.
     pub(super) fn fill(&self, motion: &JointMotion<'_>, out: &mut [f64]) {
         match &self.law {
             Some(law) => law.fill(motion, out),
@@ -59,7 +58,7 @@ impl TorqueFunction {
         out.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f64::NAN);
     }
 
-    /// Its value at one sample of a motion.
+    /// Value at one sample of a motion.
     pub(super) fn value(&self, motion: &JointMotion<'_>, sample: usize) -> Option<f64> {
         let at = |rows: &[f64]| -> Vec<f64> { rows.iter().skip(sample).step_by(motion.samples).copied().collect() };
         let (q, dq, ddq) = (at(motion.q), at(motion.dq), at(motion.ddq));
@@ -68,8 +67,8 @@ impl TorqueFunction {
         Some(value[0]).filter(|value| value.is_finite())
     }
 
-    /// Adds `weights · ∂f` by the positions and velocities that it follows, by central differences: two calls for each.
-    /// Nothing where it has no value on either side.
+    /// Adds `weights · ∂f` with respect to the positions and velocities of its joints, by central differences with two
+    /// calls each. Adds nothing where `f` is undefined on either side.
     pub(super) fn apply_adjoint(&self, motion: &JointMotion<'_>, weights: &[f64], adjoints: [&mut [f64]; 2]) {
         let [by_q, by_dq] = adjoints;
         let (mut q, mut dq) = (motion.q.to_vec(), motion.dq.to_vec());
@@ -78,7 +77,7 @@ impl TorqueFunction {
             let own = joint * motion.samples..(joint + 1) * motion.samples;
             for is_velocity in [false, true] {
                 let state = if is_velocity { motion.dq } else { motion.q };
-                let step = |at: usize| STEP * (1.0 + state[at].abs());
+                let step = |at: usize| DIFFERENCE_STEP * (1.0 + state[at].abs());
                 for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
                     let moved = if is_velocity { &mut dq } else { &mut q };
                     own.clone().for_each(|at| moved[at] = state[at] + sign * step(at));

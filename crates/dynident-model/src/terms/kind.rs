@@ -1,58 +1,58 @@
-//! The properties that every kind of torque term defines. A kind is one type in one file that implements [`TermKind`];
-//! [`TorqueTerm`](super::TorqueTerm) passes every question on to it, so that no other code has to know the kinds.
+//! Interface of the kinds of torque terms. A kind is one type in one file that implements [`TermKind`];
+//! [`TorqueTerm`](super::TorqueTerm) delegates to it, so that other code does not depend on the kinds.
 
-use super::candidate::velocity_within;
+use super::candidate::clamped_velocity;
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use core::fmt::Debug;
 
-/// The joints that feel a term.
+/// Joints that a term acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TermJoints {
     /// One joint.
     One(usize),
-    /// Both joints that a shared drive turns with.
+    /// Both joints of a shared drive.
     Two(usize, usize),
 }
 
-/// Where a term enters the equation of motion: what its torque follows.
+/// How a term enters the equation of motion.
 #[derive(Clone, Copy, Debug)]
 pub enum TermAction<'a> {
-    /// `factor q̈`: a constant entry of the mass matrix, that of its joint or both off the diagonal of its two joints.
+    /// `factor q̈`: a constant entry of the mass matrix, on the diagonal for one joint, off the diagonal for two.
     Inertia {
         /// Entry per unit of the parameter.
         factor: f64,
     },
-    /// `factor q̇`, with the entries as for inertia.
+    /// `factor q̇`, with entries as for inertia.
     Damping {
         /// Entry per unit of the parameter.
         factor: f64,
     },
-    /// The same torque always.
+    /// A constant torque.
     Constant,
-    /// Friction that follows one velocity.
+    /// Friction that depends on one velocity.
     Friction(VelocityFriction<'a>),
-    /// Friction that follows positions and remembers them.
+    /// Friction that depends on the history of positions.
     Hysteresis,
-    /// Friction's change with the temperature: nothing at its reference.
+    /// Change of friction with temperature; zero at the reference temperature.
     Temperature,
-    /// A torque of one joint that follows the positions and velocities of any joints.
+    /// A torque of one joint that depends on the positions and velocities of any joints.
     State(&'a dyn StateFunction),
 }
 
 /// A function of positions and velocities that a user declares.
 pub trait StateFunction: Debug {
-    /// Its value at sample `sample` of a motion; `None` where it has none. Allocates nothing, but for code of a caller.
+    /// Value at sample `sample` of a motion; `None` where undefined. Does not allocate, except in the caller's code.
     fn value(&self, motion: &JointMotion<'_>, sample: usize) -> Option<f64>;
 
-    /// Its values at all samples of a motion, NaN where it has none.
+    /// Values at all samples of a motion; NaN where undefined.
     fn fill(&self, motion: &JointMotion<'_>, out: &mut [f64]) {
         for (sample, to) in out.iter_mut().enumerate() {
             *to = self.value(motion, sample).unwrap_or(f64::NAN);
         }
     }
 
-    /// Whether it says something of the state at sample `sample`: an expression with a value, a table that reaches so
-    /// far.
+    /// Whether the function is defined at sample `sample`: an expression with a value, a position within the range of a
+    /// table.
     fn is_inside(&self, motion: &JointMotion<'_>, sample: usize) -> bool;
 
     /// The first sample of a motion that is not [inside](Self::is_inside).
@@ -60,59 +60,58 @@ pub trait StateFunction: Debug {
         (0..motion.samples).find(|&sample| !self.is_inside(motion, sample))
     }
 
-    /// The joints whose motion it follows, ascending.
+    /// Joints whose motion it depends on, ascending.
     fn follows(&self) -> Vec<usize>;
 
-    /// It, in a few words.
+    /// Short description.
     fn description(&self) -> String;
 }
 
-/// Friction that follows one velocity `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
+/// Friction that depends on one velocity `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
 #[derive(Clone, Copy, Debug)]
 pub struct VelocityFriction<'a> {
-    /// Of its joints; the second counts where there are two.
+    /// Velocity ratios of its joints; the second one is used for two joints only.
     pub ratios: [f64; 2],
-    /// The velocity's function, before load and fading.
+    /// Function of the velocity, before load and fading.
     pub curve: VelocityCurve<'a>,
-    /// Times the absolute value of the load.
+    /// Whether it is multiplied by the absolute value of the load.
     pub by_load: bool,
-    /// Times `e^{-|w/v|^δ}`, with `v` and `δ`.
+    /// Constants `v` and `δ` of the factor `e^{-|w/v|^δ}`.
     pub fading: Option<[f64; 2]>,
 }
 
 impl<'a> VelocityFriction<'a> {
-    /// Friction of one joint by `curve` alone.
     pub(super) fn of(curve: VelocityCurve<'a>) -> Self {
         Self { ratios: [1.0, 0.0], curve, by_load: false, fading: None }
     }
 }
 
-/// How friction follows a velocity.
+/// Dependence of friction on velocity.
 #[derive(Clone, Copy, Debug)]
 pub enum VelocityCurve<'a> {
-    /// A sign: at rest, anything up to one. In which directions it is felt.
+    /// A sign; at rest, any value up to one. The fields are the directions in which it acts.
     Step {
         /// At positive velocity.
         forward: bool,
         /// At negative velocity.
         backward: bool,
     },
-    /// Without a jump.
+    /// A continuous function.
     Smooth(&'a dyn VelocityFunction),
 }
 
-/// A function of a velocity and its slope, per unit of the parameter.
+/// A function of velocity and its slope, per unit of the parameter.
 pub trait VelocityFunction: Debug {
-    /// Its value at velocity `dq`.
+    /// Value at velocity `dq`.
     fn value(&self, dq: f64) -> f64;
 
-    /// Its derivative by the velocity; a sign counts as constant.
+    /// Derivative with respect to velocity; zero for a sign.
     fn slope(&self, dq: f64) -> f64;
 
-    /// Its values in the motion of joint `joint`.
+    /// Values for the motion of joint `joint`.
     fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]);
 
-    /// Adds `weights · slope` in the motion of joint `joint` to its part of `by_dq`.
+    /// Adds `weights · slope` for the motion of joint `joint` to its part of `by_dq`.
     fn add_slopes(&self, joint: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64]) {
         let range = joint * motion.samples..(joint + 1) * motion.samples;
         for ((to, w), &dq) in by_dq[range].iter_mut().zip(weights).zip(motion.dq_of(joint)) {
@@ -127,62 +126,62 @@ pub trait VelocityFunction: Debug {
 pub struct MotionFunction {
     /// The joint.
     pub row: usize,
-    /// The function: the same text for the same function.
+    /// Identifier of the function: equal functions have equal texts.
     pub function: String,
-    /// How much of it per unit of the parameter.
+    /// Factor per unit of the parameter.
     pub factor: f64,
 }
 
-/// The property of a joint by which a robot description states a term, by its name in URDF (MJCF).
+/// Property of a joint in a robot description that corresponds to a term; URDF name (MJCF name).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointProperty {
     /// `damping`.
     Damping,
     /// `friction` (`frictionloss`).
     Friction,
-    /// Nothing (`armature`).
+    /// Not in URDF (`armature`).
     DriveInertia,
-    /// Nothing (`stiffness`).
+    /// Not in URDF (`stiffness`).
     Stiffness,
 }
 
-/// Which step at rest a law has when recordings choose the friction of a joint.
+/// Coulomb step of a law while the friction of a joint is selected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRole {
-    /// It is Coulomb friction: its step is the joint's.
+    /// Coulomb friction: its step is the joint's step.
     Joint,
-    /// The joint's, where that is smooth.
+    /// The joint's step, if it is smooth.
     AsJointIfSmooth,
-    /// Dry where the joint's is; else a smooth one of this width, rad/s (m/s).
+    /// A sign if the joint's step is a sign; otherwise a smooth step of this width, rad/s (m/s).
     Own {
         /// The width.
         width: f64,
     },
-    /// None, or one that recordings do not choose.
+    /// No step, or one that is not selected.
     Fixed,
 }
 
-/// A constant of a term, such as a velocity or an exponent, for programs that are not this one.
+/// A constant of a term, such as a velocity or an exponent, for other programs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TermConstant {
-    /// A number, and its unit at a revolute joint as names in files have it (`rad_s`); empty without a unit, or with
-    /// the unit in its name.
+    /// A number with its unit at a revolute joint, as used in file keys (`rad_s`); empty without a unit, or if the name
+    /// contains the unit.
     Number(f64, &'static str),
     /// One number per joint.
     Numbers([f64; 2]),
-    /// One of a few words.
+    /// A keyword.
     Word(&'static str),
     /// A step near zero velocity.
     Step(CoulombShape),
-    /// A text that the user wrote.
+    /// A text of the user.
     Text(String),
     /// Points of a curve.
     Points(Vec<[f64; 2]>),
-    /// Not there for this term.
+    /// Not applicable to this term.
     Nothing,
 }
 
-/// What a term is called.
+/// Names of a term.
 pub struct TermLabel<'a> {
     /// Name of the kind.
     pub kind: &'static str,
@@ -192,12 +191,12 @@ pub struct TermLabel<'a> {
     pub unit: &'a str,
 }
 
-/// The properties that every kind of torque term defines.
+/// Interface of a kind of torque term.
 pub trait TermKind: VelocityFunction {
-    /// What it is called.
+    /// Names of the term.
     fn label(&self) -> TermLabel<'_>;
 
-    /// The joints that feel it.
+    /// Joints that the term acts on.
     fn joints(&self) -> TermJoints;
 
     /// Whether a negative parameter is unphysical.
@@ -205,10 +204,10 @@ pub trait TermKind: VelocityFunction {
         true
     }
 
-    /// Where it enters the equation of motion.
+    /// How the term enters the equation of motion.
     fn action(&self) -> TermAction<'_>;
 
-    /// Its constants by name, beside joints and parameter.
+    /// Constants by name, in addition to joints and parameter.
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         Vec::new()
     }
@@ -218,13 +217,13 @@ pub trait TermKind: VelocityFunction {
         self.fill(row, motion, out);
     }
 
-    /// Adds what `Σ weights · column` in the row of joint `row` changes with positions, velocities and accelerations to
-    /// the three parts of `gradient`.
+    /// Adds the derivatives of `Σ weights · column` in the row of joint `row` with respect to positions, velocities and
+    /// accelerations to the three parts of `gradient`.
     fn apply_adjoint(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], [_, by_dq, _]: [&mut [f64]; 3]) {
         self.add_slopes(row, motion, weights, by_dq);
     }
 
-    /// The functions of the motion that friction adds. What shares no function with another kind is one of its own.
+    /// Functions of the motion that friction adds; functions that no other kind has are unique to this term.
     fn functions(&self) -> Vec<MotionFunction> {
         let row = match (self.action(), self.joints()) {
             (TermAction::Inertia { .. } | TermAction::Constant, _) => return Vec::new(),
@@ -233,49 +232,50 @@ pub trait TermKind: VelocityFunction {
         vec![MotionFunction { row, function: format!("{self:?}"), factor: 1.0 }]
     }
 
-    /// The property of the joint that a robot's description states it by, if any.
+    /// Corresponding property of the joint in a robot description, if any.
     fn property(&self) -> Option<JointProperty> {
         None
     }
 
-    /// The law of a study that states it; `None` for what has other keys.
+    /// Corresponding law of a study; `None` for terms with other keys.
     fn stated(&self) -> Option<FrictionTerm> {
         None
     }
 
-    /// The step near zero velocity, where it has one.
+    /// The step near zero velocity, if the law has one.
     fn step_mut(&mut self) -> Option<&mut CoulombShape> {
         None
     }
 
-    /// Which step at rest it has when recordings choose a joint's friction.
+    /// Coulomb step of the law during the friction selection.
     fn step_role(&self) -> StepRole {
         StepRole::Fixed
     }
 
-    /// Width of the step at rest where the constant of this name has this value, rad/s (m/s); `None` for a constant
-    /// that does not set the width.
+    /// Width of the Coulomb step for this value of the named constant, rad/s (m/s); `None` for a constant that does not
+    /// determine the width.
     fn step_width_by(&self, constant: &str, value: f64) -> Option<f64> {
         (constant == "width").then_some(value)
     }
 
-    /// The dry friction that it is where a joint rests below the velocity `rest`, and that term's parameter per unit.
+    /// Equivalent dry friction of a joint that is at rest below the velocity `rest`, and the parameter of that term per
+    /// unit.
     fn dry(&self, _rest: f64) -> Option<(TorqueTerm, f64)> {
         None
     }
 
-    /// The way in one direction after which a law that remembers positions is Coulomb friction, rad (m).
+    /// Distance in one direction after which a law with memory equals Coulomb friction, rad (m).
     fn sliding_distance(&self) -> Option<f64> {
         None
     }
 
-    /// For the forward half of friction by direction the other half, and the term that is the same in both.
+    /// For the forward part of directional friction: the backward part, and the term with equal parameters in both.
     fn both_directions(&self) -> Option<[TorqueTerm; 2]> {
         None
     }
 
-    /// The constants that recordings can choose as coordinates: logarithms, or in units of another constant. By default
-    /// the width of the joint's step.
+    /// Constants that can be selected from recordings, as coordinates: logarithms, or multiples of another constant. By
+    /// default the width of the joint's step.
     fn coordinates(&self) -> Vec<f64> {
         let is_joints = matches!(self.step_role(), StepRole::Joint | StepRole::AsJointIfSmooth);
         let width = self.constants().into_iter().find_map(|(_, constant)| match constant {
@@ -285,16 +285,17 @@ pub trait TermKind: VelocityFunction {
         width.filter(|_| is_joints).into_iter().collect()
     }
 
-    /// Moves its constants to these coordinates, within bounds; `velocity` is a rad/s (m/s) of a usual arm.
+    /// Sets the constants to these coordinates, within bounds; `velocity` corresponds to 1 rad/s (m/s) of a typical
+    /// arm.
     fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
         let is_joints = matches!(self.step_role(), StepRole::Joint | StepRole::AsJointIfSmooth);
         if let (true, [to, ..], Some(CoulombShape::Smooth { width })) = (is_joints, coordinates, self.step_mut()) {
-            *width = velocity_within(*to, velocity);
+            *width = clamped_velocity(*to, velocity);
         }
     }
 }
 
-/// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative velocity.
+/// Both parts of a function that directional [`MotionFunction`]s share: for positive and for negative velocity.
 pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {
     ['+', '-'].map(|sign| MotionFunction { row, function: format!("{function} {sign}"), factor: 1.0 })
 }

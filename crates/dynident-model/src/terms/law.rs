@@ -1,5 +1,5 @@
-//! A law of friction: one expression over any scalar. Its value, its column of samples, its slope and generated code
-//! come from it.
+//! A friction law as one expression over any scalar, from which value, regressor column, slope and generated code are
+//! derived.
 
 use super::JointMotion;
 use super::candidate::CandidateLaw;
@@ -7,16 +7,15 @@ use super::kind::{TermKind, VelocityFunction};
 use core::fmt::Debug;
 use dynident_lanes::{Dual, Lane, LaneFunction, Real, map_all};
 
-/// A function of a velocity, written once over all scalars. Implementations are marked `#[inline(always)]`, so that
-/// lanes of samples are compiled for each processor level.
+/// A function of velocity over any scalar. Implementations are `#[inline(always)]`, so that lanes of samples are
+/// compiled for each processor level.
 pub(super) trait VelocityLaw: Debug {
-    /// Torque per unit of the parameter at velocity `dq` of its joint; zero for what does not follow it alone.
+    /// Torque per unit of the parameter at velocity `dq` of its joint; zero for laws that depend on other quantities.
     fn of<S: Real>(&self, _dq: S) -> S {
         S::ZERO
     }
 }
 
-/// A law as a function of lanes.
 struct OnLanes<'a, L>(&'a L);
 
 impl<L: VelocityLaw> LaneFunction for OnLanes<'_, L> {
@@ -40,17 +39,17 @@ impl<L: VelocityLaw> VelocityFunction for L {
     }
 }
 
-/// Properties of a kind of term in addition to [`TermKind`]: what depends on the scalar, and constants of the kind.
+/// Part of a term kind that depends on the scalar type, and constants of the kind.
 pub(super) trait Law: TermKind + VelocityLaw {
-    /// How it takes part when recordings choose a joint's friction; empty where they do not choose it.
+    /// Candidates for the friction selection; empty for kinds that are not selected.
     const CANDIDATES: &'static [CandidateLaw] = &[];
 
-    /// Which of [`CANDIDATES`](Self::CANDIDATES) it is.
+    /// The corresponding entry of [`CANDIDATES`](Self::CANDIDATES).
     fn candidate(&self) -> Option<&'static CandidateLaw> {
         Self::CANDIDATES.first()
     }
 
-    /// As [`TorqueTerm::torque`](super::TorqueTerm::torque): by default that of its joint's velocity.
+    /// As [`TorqueTerm::torque`](super::TorqueTerm::torque); by default a function of its joint's velocity.
     fn torque<S: Real>(&self, row: usize, dq: &[S]) -> Result<S, &'static str> {
         Ok(self.of(dq[row]))
     }

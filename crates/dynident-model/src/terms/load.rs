@@ -1,18 +1,18 @@
 //! Friction that grows with the load: `τ = k |τ_load| s(q̇)` with a step `s`.
 //!
-//! `τ_load` is what the gear carries: the torque of the rigid bodies, by an earlier estimate. A term knows motions
-//! only, so the load comes with them (see [`TermInput`](super::TermInput)); without one the column is zero. Source:
-//! Hamon, Gautier and Garrec, IROS 2010, 6187.
+//! `τ_load` is the torque carried by the gear: the rigid-body torque of an earlier estimate. It is passed together with
+//! the motion (see [`TermInput`](super::TermInput)); without it the column is zero. Source: Hamon, Gautier and Garrec,
+//! IROS 2010, 6187.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, VALID_VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, JointMotion, TermInput, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// Share of the load that one joint loses to friction; no unit.
+/// Share of the load that a joint loses to friction, dimensionless.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LoadFriction {
@@ -55,7 +55,7 @@ impl StatedLaw for StatedLoad {
     }
 
     fn check(&self) -> Result<(), StatedFault> {
-        self.width.map_or(Ok(()), |width| check("width", width, VELOCITIES))
+        self.width.map_or(Ok(()), |width| check("width", width, VALID_VELOCITIES))
     }
 }
 

@@ -1,7 +1,6 @@
-//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each term is one parameter
-//! and one regressor column per joint that feels it. Each kind is one file, which holds everything about it, and a row
-//! of [`TorqueTerm`]; a law that a study can state has a row of [`FrictionTerm`] as well. No other code lists friction
-//! laws.
+//! Torque terms in addition to the rigid bodies: friction, drive inertia, offsets, couplings, declared torques. Each
+//! term is one parameter and one regressor column per joint that it acts on. Each kind is one file and a row of
+//! [`TorqueTerm`]; a law that a study can state also has a row of [`FrictionTerm`]. No other code lists friction laws.
 
 mod candidate;
 mod class;
@@ -59,7 +58,7 @@ use dynident_lanes::Real;
 use law::Law;
 use serde::{Deserialize, Serialize};
 
-/// Joint motion of a block of samples, joint-major: joint `j`, sample `s` stands at `j * samples + s`.
+/// Joint motion of a block of samples, joint-major: joint `j`, sample `s` has the index `j * samples + s`.
 #[derive(Clone, Copy, Debug)]
 pub struct JointMotion<'a> {
     /// Number of samples.
@@ -72,14 +71,14 @@ pub struct JointMotion<'a> {
     pub ddq: &'a [f64],
 }
 
-/// What a term is given beside the motion of a block.
+/// Inputs of a term in addition to the motion of a block.
 #[derive(Debug)]
 pub struct TermInput<'a> {
-    /// The load of the term's joint sample by sample, Nm (N), where it is known.
+    /// Load of the term's joint at every sample, Nm (N), if known.
     pub load: Option<&'a [f64]>,
-    /// The temperature of the term's joint sample by sample, °C, where it was measured.
+    /// Temperature of the term's joint at every sample, °C, if measured.
     pub temperature_c: Option<&'a [f64]>,
-    /// What the term remembers of earlier samples; afterwards, of this block as well.
+    /// State of a term with memory; updated by this block.
     pub memory: &'a mut HysteresisState,
 }
 
@@ -100,7 +99,7 @@ impl<'a> JointMotion<'a> {
     }
 }
 
-/// The one list of kinds: an enum, and what needs each kind's type.
+/// Declares all kinds: the enum, and functions that depend on the type of a kind.
 macro_rules! torque_terms {
     ($($(#[$documentation:meta])* $kind:ident($type:ident),)*) => {
         /// One parameter of the drives, linear in the joint torques.
@@ -113,7 +112,7 @@ macro_rules! torque_terms {
         }
 
         impl TorqueTerm {
-            /// The properties of its kind.
+            /// The interface of its kind.
             pub fn kind(&self) -> &dyn TermKind {
                 match self {
                     $(Self::$kind(term) => term,)*
@@ -126,25 +125,24 @@ macro_rules! torque_terms {
                 }
             }
 
-            /// All laws that recordings can choose for a joint, in the order in which they are tried.
+            /// All candidates of the friction selection, in the order in which they are tried.
             pub fn candidates() -> impl Iterator<Item = &'static CandidateLaw> {
                 [$($type::CANDIDATES),*].into_iter().flatten()
             }
 
-            /// Which of the [`candidates`](Self::candidates) the term belongs to; `None` where recordings do not choose
-            /// it.
+            /// The [`candidates`](Self::candidates) entry of the term; `None` for terms that are not selected.
             pub fn candidate(&self) -> Option<&'static CandidateLaw> {
                 match self {
                     $(Self::$kind(term) => term.candidate(),)*
                 }
             }
 
-            /// Torque of joint `row` per unit of the parameter at the velocities `dq`, over any scalar, as far as it
-            /// follows velocities: zero for inertia and declared torques, and for a change with temperature at its
-            /// reference.
+            /// Torque of joint `row` per unit of the parameter at the velocities `dq`, over any scalar. Only the
+            /// dependence on velocities is included: zero for inertia and declared torques, and for a change with
+            /// temperature at its reference.
             ///
             /// # Errors
-            /// With what it needs in addition to the velocities.
+            /// The additional quantity that the term needs.
             pub fn torque<S: Real>(&self, row: usize, dq: &[S]) -> Result<S, &'static str> {
                 match self {
                     $(Self::$kind(term) => term.torque(row, dq),)*
@@ -155,42 +153,42 @@ macro_rules! torque_terms {
 }
 
 torque_terms! {
-    /// Torque in proportion to velocity.
+    /// Torque proportional to velocity.
     Viscous(Viscous),
     /// Torque by the sign of the velocity.
     Coulomb(Coulomb),
-    /// Torque in proportion to velocity, in one direction.
+    /// Torque proportional to velocity, in one direction.
     DirectionalViscous(DirectionalViscous),
     /// Torque by the sign of the velocity, in one direction.
     DirectionalCoulomb(DirectionalCoulomb),
     /// A shifted smooth step.
     Sigmoid(Sigmoid),
-    /// More torque near rest.
+    /// Additional torque near zero velocity.
     Stribeck(Stribeck),
     /// Torque by a power of the velocity.
     Power(Power),
-    /// Torque in proportion to the load, against the motion.
+    /// Torque proportional to the load, against the motion.
     Load(LoadFriction),
-    /// A spring that slips: hysteresis.
+    /// A spring with a slider: hysteresis.
     MaxwellSlip(MaxwellSlip),
-    /// Viscous friction's change with the temperature.
+    /// Change of viscous friction with temperature.
     TemperatureViscous(TemperatureViscous),
-    /// Coulomb friction's change with the temperature.
+    /// Change of Coulomb friction with temperature.
     TemperatureCoulomb(TemperatureCoulomb),
     /// A constant torque.
     Offset(Offset),
-    /// Inertia of a drive that turns with its joint only.
+    /// Inertia of a drive that moves with one joint.
     DriveInertia(DriveInertia),
-    /// Inertia or friction of a drive that turns with two joints.
+    /// Inertia or friction of a drive that is coupled to two joints.
     Coupling(Coupling),
     /// A torque of positions and velocities that the user declares.
     Declared(Declared),
 }
 
-/// The one list of laws that a study can state.
+/// Declares all laws that a study can state.
 macro_rules! friction_terms {
     ($($(#[$documentation:meta])* $law:ident($type:ident),)*) => {
-        /// A law of `drive.laws`, beside `viscous`, `coulomb` and `offset`.
+        /// A law of `drive.laws`, in addition to `viscous`, `coulomb` and `offset`.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
         #[serde(tag = "law", rename_all = "kebab-case")]
@@ -199,14 +197,14 @@ macro_rules! friction_terms {
         }
 
         impl FrictionTerm {
-            /// The terms of its law with the stated constants.
+            /// The law with the stated constants.
             pub fn law(&self) -> &dyn StatedLaw {
                 match self {
                     $(Self::$law(law) => law,)*
                 }
             }
 
-            /// The same, to be changed.
+            /// Mutable access to [`law`](Self::law).
             pub fn law_mut(&mut self) -> &mut dyn StatedLaw {
                 match self {
                     $(Self::$law(law) => law,)*
@@ -219,8 +217,8 @@ macro_rules! friction_terms {
 friction_terms! {
     /// Viscous friction by direction, in place of `viscous`.
     AsymmetricViscous(AsymmetricViscous),
-    /// Coulomb friction by direction, in place of `coulomb`; with a sign it says the same as `offset`, so switch one
-    /// off.
+    /// Coulomb friction by direction, in place of `coulomb`. With a sign step it is linearly dependent on `offset`:
+    /// disable one of them.
     AsymmetricCoulomb(AsymmetricCoulomb),
     /// `e^{-|dq/speed|^exponent}` times the step.
     Stribeck(StatedStribeck),
@@ -230,17 +228,17 @@ friction_terms! {
     CubeRoot(CubeRoot),
     /// Torque by the square of the velocity.
     Quadratic(Quadratic),
-    /// Torque in proportion to the load, against the motion.
+    /// Torque proportional to the load, against the motion.
     Load(StatedLoad),
-    /// Viscous and Coulomb friction change with the joint's temperature, beside `viscous` and `coulomb`; logs need a
-    /// `temperature`.
+    /// Change of viscous and Coulomb friction with the joint's temperature, in addition to `viscous` and `coulomb`;
+    /// logs need a `temperature`.
     Temperature(StatedTemperature),
-    /// Springs that slip, one per yield displacement.
+    /// Maxwell-slip elements, one per yield displacement.
     MaxwellSlip(StatedMaxwellSlip),
 }
 
-/// The terms of joint after joint in the project's order: drive inertia, viscous, Coulomb, offset, as far as `choose`
-/// wants them.
+/// Terms of all joints, selected by `choose`, joint by joint in the project's order: drive inertia, viscous, Coulomb,
+/// offset.
 pub fn terms_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoice) -> Vec<TorqueTerm> {
     let mut terms = Vec::new();
     for joint in 0..model.dof() {
@@ -261,7 +259,7 @@ pub fn terms_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoi
     terms
 }
 
-/// Which terms a joint has.
+/// Terms of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveChoice {
     /// Inertia of the drive, reflected to the joint.

@@ -2,8 +2,8 @@
 
 use super::{JointProperty, TermAction, TorqueTerm};
 
-/// Sorts terms into the project's order: joint by joint drive inertia, viscous, Coulomb and offset; then, joint by
-/// joint, further friction as it stands; then couplings; then what the user declares, as it stands.
+/// Sorts terms into the project's order: drive inertia, viscous, Coulomb and offset, joint by joint; then further
+/// friction, joint by joint in the given order; then couplings; then declared torques in the given order.
 pub fn sort_terms(terms: &mut [TorqueTerm]) {
     terms.sort_by_key(|term| match (term.own_joint(), term.property(), term.action()) {
         (_, _, TermAction::State(_)) => (3, 0, 0),

@@ -1,8 +1,8 @@
-//! Friction by a power of the velocity, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)`
-//! for velocities well above `ε`.
+//! Friction by a power of velocity, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)` for
+//! velocities well above `ε`.
 //!
-//! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope
-//! finite at rest, where that of a cube root is not.
+//! `p = 1/3`: sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope of the
+//! cube root finite at rest.
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
@@ -18,15 +18,15 @@ use serde::{Deserialize, Serialize};
 pub struct Power {
     /// The joint.
     pub joint: usize,
-    /// Which power.
+    /// The power.
     pub exponent: PowerExponent,
     /// Velocity `ε` of the rounding, rad/s or m/s, positive.
     pub rounding: f64,
 }
 
 impl Power {
-    /// The rounding that is usual: below any velocity that a differentiated encoder separates from rest, rad/s or m/s
-    /// of a usual arm ([`OwnScale::velocity`](crate::OwnScale::velocity)).
+    /// Default rounding, below the velocity that a differentiated encoder distinguishes from rest, rad/s or m/s of a
+    /// typical arm ([`OwnScale::velocity`](crate::OwnScale::velocity)).
     pub const ROUNDING: f64 = 1.0e-3;
 
     fn usual(own: &StatedJoint, exponent: PowerExponent) -> Vec<TorqueTerm> {
@@ -40,7 +40,7 @@ impl Power {
     }
 }
 
-/// The powers in use.
+/// Supported powers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]

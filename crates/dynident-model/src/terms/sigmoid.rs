@@ -1,10 +1,10 @@
 //! Friction as one sigmoid: `τ = φ₁ [1/(1 + e^{-φ₂(q̇ + φ₃)}) - 1/(1 + e^{-φ₂ φ₃})]`.
 //!
-//! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0`
-//! it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE
-//! RA-L 4 (2019) 4147.
+//! It is a Coulomb step of height `φ₁` centred at `-φ₃`, linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is
+//! half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4
+//! (2019) 4147.
 
-use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within};
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_velocity};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction};
 use super::law::{Law, VelocityLaw};
 use super::stated::{StatedFault, StatedJoint, StatedLaw, check};
@@ -29,9 +29,9 @@ fn logistic(x: f64) -> f64 {
     0.5 * (1.0 + (0.5 * x).tanh())
 }
 
-/// Widths of half a Coulomb step that recordings choose from, rad/s or m/s of a usual arm.
-const WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
-/// Largest distance of the step from rest, in units of its width.
+/// Candidate widths of half a Coulomb step, rad/s or m/s of a typical arm.
+const CANDIDATE_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
+/// Largest shift of the step from zero velocity, in units of its width.
 const MAX_SHIFT: f64 = 2.0;
 
 impl VelocityLaw for Sigmoid {
@@ -45,7 +45,7 @@ impl VelocityLaw for Sigmoid {
 
 impl Sigmoid {
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
-        let widths = WIDTHS.map(|width| width * own.velocity).into_iter().enumerate();
+        let widths = CANDIDATE_WIDTHS.map(|width| width * own.velocity).into_iter().enumerate();
         let of = |(step, width): (usize, f64)| {
             [-0.5 * width, 0.5 * width].map(|offset_speed| {
                 let term = Self { joint: own.joint, steepness: 2.0 / width, offset_speed };
@@ -124,14 +124,14 @@ impl TermKind for Sigmoid {
         (self.offset_speed.abs() <= rest).then_some((coulomb, 0.5))
     }
 
-    /// The step's distance from rest in units of its width.
+    /// Second coordinate: shift of the step in units of its width.
     fn coordinates(&self) -> Vec<f64> {
         vec![self.steepness.ln(), 0.5 * self.offset_speed * self.steepness]
     }
 
     fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
         if let [steepness, shift] = coordinates {
-            self.steepness = 2.0 / velocity_within((2.0 / steepness.exp()).ln(), velocity);
+            self.steepness = 2.0 / clamped_velocity((2.0 / steepness.exp()).ln(), velocity);
             self.offset_speed = 2.0 * shift.clamp(-MAX_SHIFT, MAX_SHIFT) / self.steepness;
         }
     }

@@ -1,11 +1,11 @@
 //! One element of the generalised Maxwell-slip model: a spring in series with a Coulomb slider, `τ = W z/Δ`.
 //!
-//! The spring's deflection follows the joint and stops at the yield displacement: `z ← clamp(z + q_k - q_{k-1}, -Δ,
-//! Δ)`. Elements with a grid of `Δ` side by side give friction with hysteresis after reversals, linear in their yield
-//! torques `W`. The deflection is the one thing that a term remembers from sample to sample ([`HysteresisState`]); an
-//! uninterrupted recording starts undeflected, and the start is forgotten once the joint has moved by 2Δ in one
-//! direction. Source: Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its
-//! sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
+//! The spring's deflection follows the joint and is limited by the yield displacement: `z ← clamp(z + q_k - q_{k-1},
+//! -Δ, Δ)`. Parallel elements with a grid of `Δ` give friction with hysteresis after reversals, linear in their yield
+//! torques `W`. The deflection is the only state of a term between samples ([`HysteresisState`]). A recording starts
+//! undeflected, and the initial state is forgotten after a motion of 2Δ in one direction. Source: Al-Bender, Lampaert
+//! and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its sliding dynamics); Lampaert, Swevers and
+//! Al-Bender (2002).
 
 use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint};
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
@@ -25,29 +25,28 @@ pub struct MaxwellSlip {
     pub yield_displacement: f64,
 }
 
-/// What a term remembers of the samples before a block; [`Default`] is the start of a recording.
+/// State of a term before a block of samples; [`Default`] is the start of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HysteresisState {
-    /// Last position and deflection.
     last: Option<[f64; 2]>,
 }
 
 impl HysteresisState {
-    /// Forgets: the next sample starts a recording.
+    /// Resets the state: the next sample starts a recording.
     pub fn restart(&mut self) {
         self.last = None;
     }
 }
 
-/// Yield displacements of the elements that recordings choose from, rad, or m of a usual arm.
-const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
-/// Most elements of one joint: each is a column.
+/// Candidate yield displacements, rad, or m of a typical arm.
+const CANDIDATE_YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
+/// Maximum number of elements of one joint; each is a column.
 const MAX_ELEMENTS: f64 = 50.0;
 
 impl MaxwellSlip {
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
         let of = |usual| Self { joint: own.joint, yield_displacement: usual * own.position };
-        YIELDS.map(|usual| GridPoint::alone(TorqueTerm::MaxwellSlip(of(usual)))).to_vec()
+        CANDIDATE_YIELDS.map(|usual| GridPoint::alone(TorqueTerm::MaxwellSlip(of(usual)))).to_vec()
     }
 }
 

@@ -1,13 +1,13 @@
-//! Laws of friction as a study states them.
+//! Friction laws as stated in a study.
 
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
 use crate::OwnScale;
 use core::fmt::Debug;
 
-/// The joint that a law is stated for.
+/// The joint for which a law is stated.
 #[derive(Clone, Copy, Debug)]
 pub struct StatedJoint {
-    /// Its index.
+    /// Index of the joint.
     pub joint: usize,
     /// Its Coulomb step.
     pub step: CoulombShape,
@@ -17,73 +17,56 @@ pub struct StatedJoint {
     pub scale: OwnScale,
 }
 
-/// A constant of a stated law that is not possible.
+/// An invalid constant of a stated law.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum StatedFault {
     /// A number outside its range.
-    Range {
-        /// The key.
-        key: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least and greatest.
-        range: [f64; 2],
-    },
+    Range { key: &'static str, value: f64, range: [f64; 2] },
     /// A number that is listed twice.
-    Twice {
-        /// The key of the list.
-        key: &'static str,
-        /// The number.
-        value: f64,
-    },
-    /// Keys that leave nothing.
-    Empty {
-        /// What is wrong.
-        problem: &'static str,
-        /// What to do.
-        fix: &'static str,
-    },
+    Twice { key: &'static str, value: f64 },
+    /// Keys that disable the whole law.
+    Empty { problem: &'static str, fix: &'static str },
 }
 
-/// Velocities, rad/s or m/s.
-pub(super) const VELOCITIES: [f64; 2] = [1.0e-9, 1.0e6];
+/// Valid range of velocities, rad/s or m/s.
+pub(super) const VALID_VELOCITIES: [f64; 2] = [1.0e-9, 1.0e6];
 
-/// `value`, if it is in `range`; NaN never is.
+/// Checks that `value` is in `range` and not NaN.
 pub(super) fn check(key: &'static str, value: f64, range: [f64; 2]) -> Result<(), StatedFault> {
     let [least, most] = range;
     if (least..=most).contains(&value) { Ok(()) } else { Err(StatedFault::Range { key, value, range }) }
 }
 
-/// A law with the constants that a study states.
+/// A law with the constants stated in a study.
 pub trait StatedLaw: Debug {
-    /// Its terms at a joint.
+    /// Terms of the law at a joint.
     fn terms(&self, joint: &StatedJoint) -> Vec<TorqueTerm>;
 
-    /// Checks its constants.
+    /// Checks the constants.
     ///
     /// # Errors
-    /// The first that is not possible.
+    /// The first invalid constant.
     fn check(&self) -> Result<(), StatedFault> {
         Ok(())
     }
 
-    /// Whether it needs the joint's temperature.
+    /// Whether the law needs the joint's temperature.
     fn needs_temperature(&self) -> bool {
         false
     }
 
-    /// Adds the constants of `other` where both are one law with a list; false where they are two laws.
+    /// Appends the constants of `other` if both are the same law with a list; returns false for different laws.
     fn join(&mut self, _: &FrictionTerm) -> bool {
         false
     }
 }
 
-/// The smooth step of this width, or else the joint's.
+/// A smooth step of this width, or the joint's step.
 pub(super) fn step_or(width: Option<f64>, joint: &StatedJoint) -> CoulombShape {
     width.map_or(joint.step, |width| CoulombShape::Smooth { width })
 }
 
-/// The width of a smooth step.
 pub(super) fn width_of(step: CoulombShape) -> Option<f64> {
     match step {
         CoulombShape::Sign { .. } => None,

@@ -1,38 +1,38 @@
 //! The Stribeck effect: more friction near rest than in fast motion, `τ = F_s e^{-|q̇/v_s|^δ} s(q̇)` with a step `s`.
 //!
-//! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`.
-//! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
+//! `F_s` is the static friction in excess of Coulomb friction `F_c`. Linear in `F_s` at given `v_s` and `δ`. Source:
+//! Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
-use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, velocity_within, within};
+use super::candidate::{CandidateJoint, CandidateLaw, CandidateRole, GridPoint, clamped_exp, clamped_velocity};
 use super::kind::{StepRole, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::law::{Law, VelocityLaw};
-use super::stated::{StatedFault, StatedJoint, StatedLaw, VELOCITIES, check, step_or, width_of};
+use super::stated::{StatedFault, StatedJoint, StatedLaw, VALID_VELOCITIES, check, step_or, width_of};
 use super::{CoulombShape, FrictionTerm, TorqueTerm};
 use dynident_lanes::Real;
 use serde::{Deserialize, Serialize};
 
-/// Extra friction of one joint near rest, Nm (N).
+/// Additional friction of one joint near zero velocity, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Stribeck {
     /// The joint.
     pub joint: usize,
-    /// The velocity `v_s` at which a share of 1/e is left, rad/s or m/s, positive.
+    /// Stribeck velocity `v_s`, at which the torque has decreased to 1/e, rad/s or m/s, positive.
     pub speed: f64,
-    /// The exponent `δ`, positive; 1 to 2.8 are usual.
+    /// Exponent `δ`, positive; usually 1 to 2.8.
     pub exponent: f64,
     /// The step near zero velocity.
     pub shape: CoulombShape,
 }
 
-/// Velocities and exponents that recordings choose from; velocities in rad/s or m/s of a usual arm.
-const SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
-const EXPONENTS: [f64; 2] = [1.0, 2.0];
+/// Candidate velocities, rad/s or m/s of a typical arm, and exponents.
+const CANDIDATE_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
+const CANDIDATE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 /// Bounds of the exponent.
 const EXPONENT_BOUNDS: [f64; 2] = [0.5, 3.0];
-/// Width of a smooth step as a share of the Stribeck velocity while recordings choose: beyond half the velocity the
-/// step is done.
-const STEP_SHARE: f64 = 0.25;
+/// Width of a smooth step relative to the Stribeck velocity during the friction selection: the step saturates at half
+/// that velocity.
+const STEP_WIDTH_RATIO: f64 = 0.25;
 
 impl VelocityLaw for Stribeck {
     #[inline(always)]
@@ -44,10 +44,10 @@ impl VelocityLaw for Stribeck {
 
 impl Stribeck {
     fn grid(own: &CandidateJoint) -> Vec<GridPoint> {
-        let speeds = SPEEDS.map(|speed| speed * own.velocity).into_iter().enumerate();
+        let speeds = CANDIDATE_SPEEDS.map(|speed| speed * own.velocity).into_iter().enumerate();
         let of = |(step, speed): (usize, f64)| {
-            EXPONENTS.map(|exponent| {
-                let shape = CoulombShape::Smooth { width: STEP_SHARE * speed };
+            CANDIDATE_EXPONENTS.map(|exponent| {
+                let shape = CoulombShape::Smooth { width: STEP_WIDTH_RATIO * speed };
                 GridPoint::at(step, TorqueTerm::Stribeck(Self { joint: own.joint, speed, exponent, shape }))
             })
         };
@@ -70,7 +70,7 @@ impl Law for Stribeck {
 pub struct StatedStribeck {
     /// rad/s or m/s.
     pub speed: f64,
-    /// 1 to 2.8 are usual.
+    /// Exponent `δ`; usually 1 to 2.8.
     pub exponent: f64,
     /// Width of its smooth step, rad/s or m/s; by default the step is the joint's Coulomb step.
     #[serde(default)]
@@ -84,9 +84,9 @@ impl StatedLaw for StatedStribeck {
     }
 
     fn check(&self) -> Result<(), StatedFault> {
-        check("speed", self.speed, VELOCITIES)?;
+        check("speed", self.speed, VALID_VELOCITIES)?;
         check("exponent", self.exponent, [0.1, 10.0])?;
-        self.width.map_or(Ok(()), |width| check("width", width, VELOCITIES))
+        self.width.map_or(Ok(()), |width| check("width", width, VALID_VELOCITIES))
     }
 }
 
@@ -124,7 +124,7 @@ impl TermKind for Stribeck {
     }
 
     fn step_role(&self) -> StepRole {
-        StepRole::Own { width: STEP_SHARE * self.speed }
+        StepRole::Own { width: STEP_WIDTH_RATIO * self.speed }
     }
 
     fn coordinates(&self) -> Vec<f64> {
@@ -133,10 +133,10 @@ impl TermKind for Stribeck {
 
     fn move_to(&mut self, coordinates: &[f64], velocity: f64) {
         if let [speed, exponent] = coordinates {
-            self.speed = velocity_within(*speed, velocity);
-            self.exponent = within(*exponent, EXPONENT_BOUNDS);
+            self.speed = clamped_velocity(*speed, velocity);
+            self.exponent = clamped_exp(*exponent, EXPONENT_BOUNDS);
             if let CoulombShape::Smooth { width } = &mut self.shape {
-                *width = STEP_SHARE * self.speed;
+                *width = STEP_WIDTH_RATIO * self.speed;
             }
         }
     }

@@ -1,11 +1,11 @@
-//! Friction that changes with the temperature: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a step `s`.
+//! Friction that changes with temperature: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a step `s`.
 //!
-//! Beside viscous and Coulomb friction, which then are those at T₀: coefficients linear in the temperature, `F_v(T) =
-//! F_v + F_vT (T − T₀)`. Grease thins as it warms, so F_vT is usually negative; either sign is physical. A term knows
-//! motions only, so the temperature comes with them (see [`TermInput`](super::TermInput)); without one the joint counts
-//! as being at T₀ and the column is zero. Linear in a range of some 20 K; beyond, the viscous part falls exponentially.
-//! Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC PapersOnLine 48
-//! (2015) 183.
+//! The terms are added to viscous and Coulomb friction, which then apply at T₀: coefficients are linear in temperature,
+//! `F_v(T) = F_v + F_vT (T − T₀)`. Grease viscosity decreases with temperature, so F_vT is usually negative, but both
+//! signs are physical. The temperature is passed together with the motion (see [`TermInput`](super::TermInput));
+//! without it the joint is at T₀ and the column is zero. The linear law holds for a range of about 20 K; beyond it the
+//! viscous part decreases exponentially. Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014)
+//! 1484; Simoni et al., IFAC PapersOnLine 48 (2015) 183.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::law::{Law, VelocityLaw};
@@ -62,13 +62,13 @@ impl Law for TemperatureCoulomb {}
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StatedTemperature {
-    /// The temperature at which friction is what `viscous` and `coulomb` say, °C; 25 by default.
+    /// Reference temperature of `viscous` and `coulomb`, °C; 25 by default.
     #[serde(default = "room_temperature")]
     pub reference_c: f64,
-    /// Whether viscous friction changes. True by default.
+    /// Whether viscous friction depends on temperature. True by default.
     #[serde(default = "yes")]
     pub viscous: bool,
-    /// Whether Coulomb friction changes. True by default.
+    /// Whether Coulomb friction depends on temperature. True by default.
     #[serde(default = "yes")]
     pub coulomb: bool,
 }
@@ -168,7 +168,7 @@ impl TermKind for TemperatureCoulomb {
     }
 }
 
-/// A column from temperature and velocity, sample by sample; zero without a temperature.
+/// Column from temperature and velocity at every sample; zero without a temperature.
 fn by_temperature(
     joint: usize,
     motion: &JointMotion<'_>,

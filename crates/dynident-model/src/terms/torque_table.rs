@@ -1,21 +1,21 @@
-//! A torque measured at some positions, with a smooth curve between them: the characteristic of a spring.
+//! A torque measured at several positions, with smooth interpolation: the characteristic of a spring.
 //!
-//! Between points the curve is a cubic whose slopes at the points follow Fritsch and Butland: the weighted harmonic
-//! mean of the slopes to either side, zero at a peak. It is monotone where the points are and makes no torque of its
-//! own between two equal ones; its first derivative is continuous. Beyond the ends the torque stays that of the end, so
-//! that a design or a simulation that passes them goes on; a log that passes them is refused
-//! ([`TorqueTerm::undefined`](super::TorqueTerm::undefined)). Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5
-//! (1984) 300, with the three-point slopes at the ends that SciPy's `PchipInterpolator` has.
+//! The curve is piecewise cubic with slopes by Fritsch and Butland: weighted harmonic mean of the adjacent slopes, zero
+//! at a peak. It is monotone where the points are, has no overshoot between two equal points, and its first derivative
+//! is continuous. Beyond the ends the torque is constant, so that a design or a simulation beyond the range can
+//! continue; a log beyond the range is rejected ([`TorqueTerm::undefined`](super::TorqueTerm::undefined)). Source:
+//! Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, with three-point slopes at the ends as in SciPy's
+//! `PchipInterpolator`.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Points of a table: each piece is some lines of an exported program.
-const MOST_POINTS: usize = 200;
-/// Largest size of a position or torque.
-const LARGEST: f64 = 1e9;
+/// Maximum number of points; each piece is several lines of an exported program.
+const MAX_POINTS: usize = 200;
+/// Largest magnitude of a position or torque.
+const MAX_VALUE: f64 = 1e9;
 
-/// Torque by position, through points.
+/// Torque as a function of position, interpolated between points.
 ///
 /// ```
 /// use dynident_model::terms::TorqueTable;
@@ -33,64 +33,47 @@ pub struct TorqueTable {
     slopes: Vec<f64>,
 }
 
-/// A table that says no torque.
+/// Error of a torque table.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum TorqueTableError {
-    /// Too few or too many points.
-    #[error("{found} points: give 2 to {MOST_POINTS}")]
-    Points {
-        /// How many there are.
-        found: usize,
-    },
-    /// A number that is none, or far too large.
-    #[error("point {number}: {value}: give numbers of at most {LARGEST:e} in size")]
-    Number {
-        /// Which point, from 1.
-        number: usize,
-        /// The value.
-        value: f64,
-    },
-    /// Positions that do not ascend.
+    #[error("{found} points: give 2 to {MAX_POINTS}")]
+    Points { found: usize },
+    #[error("point {number}: {value}: give numbers of at most {MAX_VALUE:e} in size")]
+    Number { number: usize, value: f64 },
     #[error("point {number}: position {position} after {before}: sort the points by position, each once")]
-    Order {
-        /// Which point, from 1.
-        number: usize,
-        /// Its position.
-        position: f64,
-        /// That of the point before.
-        before: f64,
-    },
+    Order { number: usize, position: f64, before: f64 },
 }
 
 /// One cubic: `torque + b t + c t² + d t³` with `t` from zero to `width`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TablePiece {
-    /// Position where it begins, rad or m.
+    /// Start position, rad or m.
     pub from: f64,
-    /// How long it is, rad or m.
+    /// Length, rad or m.
     pub width: f64,
-    /// Torque where it begins.
+    /// Torque at the start.
     pub torque: f64,
-    /// `b`, `c`, `d`.
+    /// Coefficients `b`, `c`, `d`.
     pub factors: [f64; 3],
 }
 
 impl TorqueTable {
-    /// The curve through points of position (rad, m) and torque.
+    /// Curve through points of position (rad, m) and torque.
     ///
     /// # Errors
     /// Fewer than 2 or more than 200 points, numbers that are not finite or above 1e9, positions that do not ascend.
     pub fn new(points: Vec<[f64; 2]>) -> Result<Self, TorqueTableError> {
-        if !(2..=MOST_POINTS).contains(&points.len()) {
+        if !(2..=MAX_POINTS).contains(&points.len()) {
             return Err(TorqueTableError::Points { found: points.len() });
         }
         for (place, point) in points.iter().enumerate() {
-            if let Some(&value) = point.iter().find(|value| value.is_nan() || value.abs() > LARGEST) {
+            if let Some(&value) = point.iter().find(|value| value.is_nan() || value.abs() > MAX_VALUE) {
                 return Err(TorqueTableError::Number { number: place + 1, value });
             }
             let before = place.checked_sub(1).map_or(f64::NEG_INFINITY, |before| points[before][0]);
-            // Widths are divided by.
+            // Widths are denominators.
             if point[0] - before < 1e-9 {
                 return Err(TorqueTableError::Order { number: place + 1, position: point[0], before });
             }
@@ -99,7 +82,7 @@ impl TorqueTable {
         Ok(Self { points, slopes })
     }
 
-    /// Its points.
+    /// The points.
     pub fn points(&self) -> &[[f64; 2]] {
         &self.points
     }
@@ -109,7 +92,7 @@ impl TorqueTable {
         [self.points[0][0], self.points[self.points.len() - 1][0]]
     }
 
-    /// The cubics, one between each two points.
+    /// Cubic pieces between neighbouring points.
     pub fn pieces(&self) -> impl Iterator<Item = TablePiece> + '_ {
         (0..self.points.len() - 1).map(|place| self.piece(place))
     }
@@ -133,7 +116,7 @@ impl TorqueTable {
         piece.torque + t * (b + t * (c + t * d))
     }
 
-    /// Its derivative by the position; zero beyond the ends.
+    /// Derivative with respect to position; zero beyond the ends.
     pub fn slope(&self, q: f64) -> f64 {
         let [first, last] = self.range();
         if !(first..=last).contains(&q) {
@@ -144,13 +127,12 @@ impl TorqueTable {
         b + t * (2.0 * c + t * 3.0 * d)
     }
 
-    /// The piece of a position.
+    /// Index of the piece that contains a position.
     fn place(&self, q: f64) -> usize {
         self.points.partition_point(|point| point[0] <= q).clamp(1, self.points.len() - 1) - 1
     }
 }
 
-/// Slopes of the curve at the points.
 fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
     let count = points.len();
     let width: Vec<f64> = points.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
@@ -158,7 +140,7 @@ fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
     if count == 2 {
         return vec![mean[0]; 2];
     }
-    // Of the parabola through three points, if that keeps to the side of the first two.
+    // Slope of the parabola through three points, if it has the sign of the first secant.
     let at_end = |h: [f64; 2], m: [f64; 2]| {
         let slope = ((2.0 * h[0] + h[1]) * m[0] - h[0] * m[1]) / (h[0] + h[1]);
         if slope * m[0] <= 0.0 {

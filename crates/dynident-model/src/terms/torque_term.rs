@@ -1,4 +1,4 @@
-//! The questions that every torque term answers.
+//! Methods of all torque terms.
 
 use super::kind::{TermAction, TermConstant, TermJoints};
 use super::{
@@ -12,7 +12,7 @@ impl TorqueTerm {
         self.kind().label().kind
     }
 
-    /// Readable name of the parameter: its symbol, and the joint's number from 1 (`fv3`), as in the field's papers.
+    /// Symbol of the parameter with the joint's number from 1 (`fv3`), as in the literature.
     pub fn symbol(&self) -> String {
         self.kind().label().symbol
     }
@@ -22,12 +22,12 @@ impl TorqueTerm {
         self.kind().label().unit
     }
 
-    /// Its constants by name, beside joints and parameter.
+    /// Constants by name, in addition to joints and parameter.
     pub fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         self.kind().constants()
     }
 
-    /// The same law with another step near zero velocity, where it has one.
+    /// The same law with another step near zero velocity, if it has one.
     #[must_use]
     pub fn with_step(mut self, other: impl Fn(CoulombShape) -> CoulombShape) -> Self {
         if let Some(step) = self.kind_mut().step_mut() {
@@ -36,7 +36,7 @@ impl TorqueTerm {
         self
     }
 
-    /// The step near zero velocity, where the law has one.
+    /// The step near zero velocity, if the law has one.
     pub fn step(&self) -> Option<CoulombShape> {
         self.constants().into_iter().find_map(|(_, constant)| match constant {
             TermConstant::Step(step) => Some(step),
@@ -44,7 +44,7 @@ impl TorqueTerm {
         })
     }
 
-    /// Width of the step at rest, rad/s (m/s), 0 for a sign; `None` for a law without one.
+    /// Width of the Coulomb step, rad/s (m/s), 0 for a sign; `None` for a law without a step.
     pub fn step_width(&self) -> Option<f64> {
         self.constants().into_iter().find_map(|(name, constant)| match constant {
             TermConstant::Step(CoulombShape::Smooth { width }) => Some(width),
@@ -54,7 +54,8 @@ impl TorqueTerm {
         })
     }
 
-    /// The term with its constants at these coordinates, within bounds; `velocity` is a rad/s (m/s) of a usual arm.
+    /// The term with its constants set to these coordinates, within bounds; `velocity` corresponds to 1 rad/s (m/s) of
+    /// a typical arm.
     #[must_use]
     pub fn at(&self, coordinates: &[f64], velocity: f64) -> Self {
         let mut term = self.clone();
@@ -62,7 +63,7 @@ impl TorqueTerm {
         term
     }
 
-    /// Name of the constant behind a coordinate, and its value at these coordinates.
+    /// Name of the constant of a coordinate, and its value at these coordinates.
     pub fn constant_at(&self, place: usize, coordinates: &[f64], velocity: f64) -> (&'static str, f64) {
         match self.at(coordinates, velocity).constants().get(place) {
             Some((name, TermConstant::Number(value, _))) => (name, *value),
@@ -70,7 +71,7 @@ impl TorqueTerm {
         }
     }
 
-    /// The joints that feel this term.
+    /// Joints that the term acts on.
     pub fn joints(&self) -> Vec<usize> {
         match self.kind().joints() {
             TermJoints::One(joint) => vec![joint],
@@ -78,7 +79,7 @@ impl TorqueTerm {
         }
     }
 
-    /// The one joint that the term belongs to; none for a drive that turns with two.
+    /// The only joint that the term acts on; `None` for a drive that is coupled to two joints.
     pub fn own_joint(&self) -> Option<usize> {
         match self.kind().joints() {
             TermJoints::One(joint) => Some(joint),
@@ -86,7 +87,7 @@ impl TorqueTerm {
         }
     }
 
-    /// True when joint `joint` feels this term. Allocates nothing, unlike [`joints`](TorqueTerm::joints).
+    /// True if the term acts on joint `joint`. Does not allocate, unlike [`joints`](TorqueTerm::joints).
     pub fn acts_on(&self, joint: usize) -> bool {
         match self.kind().joints() {
             TermJoints::One(own) => own == joint,
@@ -94,23 +95,22 @@ impl TorqueTerm {
         }
     }
 
-    /// Where it enters the equation of motion.
+    /// How the term enters the equation of motion.
     pub fn action(&self) -> TermAction<'_> {
         self.kind().action()
     }
 
-    /// The functions of the motion that friction and declared torques add; none for inertia and offset.
+    /// Functions of the motion that friction and declared torques add; empty for inertia and offset.
     pub fn functions(&self) -> Vec<MotionFunction> {
         self.kind().functions()
     }
 
-    /// The property of its joint by which a robot's description states the parameter.
+    /// Corresponding property of the joint in a robot description.
     pub fn property(&self) -> Option<JointProperty> {
         self.kind().property()
     }
 
-    /// The parameter by the description of `model`, where that says anything of it; that of a declared torque by who
-    /// declared it.
+    /// Nominal value of the parameter in the description of `model`, if any; for a declared torque, the declared value.
     ///
     /// # Panics
     /// If the model does not have its joints.
@@ -127,14 +127,14 @@ impl TorqueTerm {
         }
     }
 
-    /// True when a negative parameter is not possible: friction takes power from the motion at every velocity, inertia
-    /// is positive. An offset may have either sign, and so may a change with temperature; a coupling's cross terms are
-    /// judged with their drive.
+    /// True if a negative parameter is impossible: friction dissipates power at every velocity, and inertia is
+    /// positive. An offset or a change with temperature may have either sign; the cross terms of a coupling are checked
+    /// together with their drive.
     pub fn is_nonnegative(&self) -> bool {
         self.kind().is_nonnegative()
     }
 
-    /// True when the column needs the joint's temperature.
+    /// True if the column needs the joint's temperature.
     pub fn needs_temperature(&self) -> bool {
         match self.action() {
             TermAction::Temperature => true,
@@ -147,7 +147,7 @@ impl TorqueTerm {
         }
     }
 
-    /// True when the column needs the joint's load.
+    /// True if the column needs the joint's load.
     pub fn needs_load(&self) -> bool {
         match self.action() {
             TermAction::Friction(friction) => friction.by_load,
@@ -165,7 +165,7 @@ impl TorqueTerm {
         self.state_function().is_some()
     }
 
-    /// The function of positions and velocities that a declared torque follows; none of all other terms.
+    /// Function of positions and velocities of a declared torque; `None` for all other terms.
     pub fn state_function(&self) -> Option<&dyn StateFunction> {
         match self.action() {
             TermAction::State(function) => Some(function),
@@ -178,13 +178,13 @@ impl TorqueTerm {
         }
     }
 
-    /// The first sample of a motion at which a declared torque is undefined: its expression has no value there, or its
-    /// table ends before. The column is zero there, or has the last value of the table.
+    /// First sample of a motion at which a declared torque is undefined: its expression has no value, or its table ends
+    /// before. The column is zero there, or has the last value of the table.
     pub fn undefined(&self, motion: &JointMotion<'_>) -> Option<usize> {
         self.state_function()?.first_outside(motion)
     }
 
-    /// True when the column depends on earlier samples.
+    /// True if the column depends on earlier samples.
     pub fn has_memory(&self) -> bool {
         match self.action() {
             TermAction::Hysteresis => true,
@@ -212,7 +212,7 @@ impl TorqueTerm {
         self.is_friction() && self.own_joint().is_some()
     }
 
-    /// True for the inertia of one joint's drive.
+    /// True for the drive inertia of one joint.
     pub fn is_drive_inertia(&self) -> bool {
         self.mass_matrix_factor().is_some() && self.own_joint().is_some()
     }
@@ -229,8 +229,8 @@ impl TorqueTerm {
         }
     }
 
-    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`.
-    /// The block is treated as a separate recording, without known load or temperature: see
+    /// Regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The
+    /// block is a separate recording, without known load or temperature; otherwise use
     /// [`column_following`](TorqueTerm::column_following).
     ///
     /// # Panics
@@ -240,7 +240,7 @@ impl TorqueTerm {
         self.column_following(row, motion, &mut input, out);
     }
 
-    /// The regressor column as [`column`](TorqueTerm::column), for a block that follows others; a simulation passes
+    /// Regressor column as [`column`](TorqueTerm::column), for a block that continues a recording; a simulation passes
     /// blocks of one sample.
     ///
     /// # Panics
@@ -253,9 +253,9 @@ impl TorqueTerm {
         self.kind().column(row, motion, input, out);
     }
 
-    /// Adds to the three parts of `gradient` (joint-major) the derivatives of `Σ weights[s] · column[s]` by positions,
-    /// velocities and accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint
-    /// `row`. The sign step and the deflection of a Maxwell-slip element are treated as constant.
+    /// Adds the derivatives of `Σ weights[s] · column[s]` with respect to positions, velocities and accelerations to
+    /// the three parts of `gradient` (joint-major), where `column` is that of [`column`](TorqueTerm::column) in the row
+    /// of joint `row`. The sign step and the deflection of a Maxwell-slip element are treated as constant.
     ///
     /// # Panics
     /// If lengths differ.

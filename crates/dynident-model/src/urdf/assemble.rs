@@ -1,4 +1,4 @@
-//! From links and joints to the tree of moving bodies.
+//! Builds the tree of moving bodies from links and joints.
 
 use super::elements::{JointElement, LinkElement};
 use super::{UrdfError, UrdfFault, UrdfIrregularity, fault_at};
@@ -8,7 +8,7 @@ use crate::spatial::Transform;
 use crate::tree::{Body, Link, Model};
 use std::collections::HashMap;
 
-/// The model: depth first from the one root, joints under a link in the order of the document, fixed joints lumped.
+/// Builds the model: depth first from the root, joints of a link in the order of the document, fixed joints merged.
 pub(super) fn model(
     name: &str,
     links: &[LinkElement<'_, '_>],
@@ -27,8 +27,8 @@ pub(super) fn model(
     let (mut tree_joints, mut bodies) = (Vec::new(), Vec::<Body>::new());
     let mut reached = vec![false; links.len()];
     reached[root] = true;
-    // Joints still to visit, with the body that carries their parent link and that link's place in it. A stack, not
-    // recursion: a chain may be as long as the file.
+    // Joints to be visited, with the body of their parent link and the link's pose in it. A stack avoids recursion,
+    // because a chain may be as long as the file.
     let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
     let visit_later = |ahead: &mut Vec<_>, link: usize, body: Option<usize>, placement: Transform| {
         ahead.extend(connections.joints_under[link].iter().rev().map(|&joint| (joint, body, placement)));
@@ -68,23 +68,18 @@ pub(super) fn model(
     Model::new(name, base, tree_joints, bodies).map_err(|error| robot_fault(UrdfFault::Model(error)))
 }
 
-/// A fault of the robot as a whole.
 fn robot_fault(fault: UrdfFault) -> UrdfError {
     Located { line: 1, column: 1, fault }
 }
 
-/// Which joints and links are connected, as places in the document.
 struct Connections {
-    /// For each joint the link that it carries.
     child_of: Vec<usize>,
-    /// For each link the joint that carries it.
     parent_joint: Vec<Option<usize>>,
-    /// For each link the joints that it carries.
     joints_under: Vec<Vec<usize>>,
 }
 
 impl Connections {
-    /// Looks up the links of all joints; unknown links and two joints that carry the same link are refused.
+    /// Resolves the links of all joints; rejects unknown links and two joints with the same child link.
     fn of(links: &[LinkElement<'_, '_>], joints: &[JointElement<'_, '_>]) -> Result<Self, UrdfError> {
         let index_of: HashMap<&str, usize> = links.iter().enumerate().map(|(index, link)| (link.name, index)).collect();
         let mut parent_joint: Vec<Option<usize>> = vec![None; links.len()];
@@ -111,7 +106,6 @@ impl Connections {
         Ok(Self { child_of, parent_joint, joints_under })
     }
 
-    /// The only link that no joint carries.
     fn root(&self, links: &[LinkElement<'_, '_>]) -> Result<usize, UrdfError> {
         let mut roots = (0..links.len()).filter(|&link| self.parent_joint[link].is_none());
         match (roots.next(), roots.next()) {
@@ -128,7 +122,6 @@ impl Connections {
     }
 }
 
-/// A joint may follow any other joint of the file.
 fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
     match joints.iter().find(|joint| joint.mimic.as_ref().is_some_and(|mimic| mimic.sources[0].joint == joint.name)) {
         None => Ok(()),
@@ -136,7 +129,7 @@ fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
     }
 }
 
-/// Joints that follow one the document does not hold: a part of a robot often keeps what referred to the rest.
+/// Joints whose mimic source is not in the document; this is frequent if the URDF is a part of a larger robot.
 pub(super) fn unknown_mimics(joints: &[JointElement<'_, '_>]) -> Vec<UrdfIrregularity> {
     let names: std::collections::HashSet<&str> = joints.iter().map(|joint| joint.name).collect();
     let unknown = joints.iter().filter_map(|joint| {

@@ -8,9 +8,9 @@ use crate::spatial::Transform;
 use crate::xml::shortened;
 use roxmltree::Node;
 
-/// All shapes of a link, in the order of the document, and the elements without a usable one: empty, of an unknown
-/// geometry, or with invalid sizes. Shapes play no part in dynamics, so that a faulty one is listed and not fatal; it
-/// stays among the shapes as [`CollisionGeometry::Unsupported`].
+/// All shapes of a link, in the order of the document, and the elements without a usable shape: empty, of an unknown
+/// geometry, or with invalid sizes. A faulty shape is not an error, because shapes have no influence on dynamics; it
+/// becomes [`CollisionGeometry::Unsupported`].
 pub(super) fn shapes<'a, 'input>(link: Node<'a, 'input>) -> (Vec<CollisionShape>, Vec<Node<'a, 'input>>) {
     let (mut shapes, mut faulty) = (Vec::new(), Vec::new());
     for node in link.children().filter(|child| child.has_tag_name("collision")) {
@@ -27,7 +27,7 @@ pub(super) fn shapes<'a, 'input>(link: Node<'a, 'input>) -> (Vec<CollisionShape>
     (shapes, faulty)
 }
 
-/// The shape, `None` of an empty element; else what is wrong.
+/// The shape (`None` for an empty element), or its fault.
 fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, String> {
     let Some(form) = child(node, "geometry").and_then(|node| node.children().find(Node::is_element)) else {
         return Ok(None);

@@ -12,7 +12,6 @@ use crate::spatial::{Mat3, Transform, Vec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// A `<link>`.
 pub(super) struct LinkElement<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) name: &'a str,
@@ -22,7 +21,6 @@ pub(super) struct LinkElement<'a, 'input> {
     pub(super) collision: Vec<CollisionShape>,
 }
 
-/// A `<joint>`.
 pub(super) struct JointElement<'a, 'input> {
     pub(super) node: Node<'a, 'input>,
     pub(super) name: &'a str,
@@ -39,18 +37,17 @@ pub(super) struct JointElement<'a, 'input> {
     pub(super) mimic: Option<Mimic>,
 }
 
-/// Elements that URDF and its common extensions define, by where they stand.
+/// Elements of URDF and its common extensions, by parent element.
 const IN_LINK: [&str; 6] = ["inertial", "visual", "collision", "sensor", "contact", "gazebo"];
 const IN_INERTIAL: [&str; 3] = ["origin", "mass", "inertia"];
 const IN_JOINT: [&str; 10] =
     ["origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller", "gazebo"];
 
-/// Elements of which the first is read.
+/// Elements of which only the first is read.
 const READ: [&str; 9] = ["origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"];
 
 type Unread<'a, 'input> = Vec<Node<'a, 'input>>;
 
-/// All links, in the order of the document.
 pub(super) fn links<'a, 'input>(
     robot: Node<'a, 'input>,
     unread: &mut Unread<'a, 'input>,
@@ -75,7 +72,6 @@ pub(super) fn links<'a, 'input>(
     Ok(links)
 }
 
-/// All joints, in the order of the document.
 pub(super) fn joints<'a, 'input>(
     robot: Node<'a, 'input>,
     unread: &mut Unread<'a, 'input>,
@@ -133,11 +129,11 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     if let Some(axis) = child(node, "axis") {
         let direction = Vec3(numbers(axis, "xyz")?.unwrap_or(element.axis.0));
         let norm = direction.norm();
-        // Below 1e-9 a direction is the rounding of zero, not a direction.
+        // Vectors shorter than 1e-9 are rounding errors of zero.
         if norm < 1e-9 {
             return Err(fault_at(axis, UrdfFault::ZeroAxis { joint: joint.to_owned() }));
         }
-        // Dividing would touch axes that are exact already.
+        // A division could change axes that are already exact.
         element.axis = if norm == 1.0 { direction } else { Vec3(direction.0.map(|x| x / norm)) };
     }
     if let Some(limit) = child(node, "limit") {
@@ -162,16 +158,16 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     Ok(element)
 }
 
-/// `<inertial>`: mass, centre of mass, and inertia about it in axes turned by the origin's rpy.
+/// `<inertial>`: mass, centre of mass, and inertia about it in axes rotated by the origin's rpy.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
-    const HINT: &str = ", or delete <inertial> so that the link counts as unknown";
+    const HINT: &str = ", or delete <inertial> so that the link is treated as unknown";
     let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;
     let [xx, xy, xz, yy, yz, zz] = stated_moments(element)?;
     let at_com = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
     let r = &link_from_com.rotation;
-    // Exact numbers stay exact where nothing turns.
+    // Without a rotation the numbers stay exact.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
 }
@@ -191,7 +187,7 @@ fn refuse_duplicate<'a, 'input>(
     }
 }
 
-/// The `<inertial>` of a link. A second one would leave open which of them the link has.
+/// The `<inertial>` of a link. A second one is an error, because the choice would be ambiguous.
 fn only_inertial<'a, 'input>(node: Node<'a, 'input>, link: &str) -> Result<Option<Node<'a, 'input>>, UrdfError> {
     let mut found = node.children().filter(|child| child.has_tag_name("inertial"));
     let first = found.next();
@@ -201,7 +197,7 @@ fn only_inertial<'a, 'input>(node: Node<'a, 'input>, link: &str) -> Result<Optio
     }
 }
 
-/// Notes children that are not `known`, or that repeat one of those that may stand once.
+/// Notes children that are not `known`, or that repeat an element of which only the first is read.
 fn note_unread<'a, 'input>(node: Node<'a, 'input>, known: &[&str], unread: &mut Unread<'a, 'input>) {
     let mut once = Vec::new();
     for child in node.children().filter(Node::is_element) {

@@ -1,4 +1,4 @@
-//! A URDF of a model that was read from something else, a D-H table say.
+//! Writes a model from another format, such as a D-H table, as URDF.
 
 use super::write::inertial_lines;
 use crate::joint::{Joint, JointKind};
@@ -7,11 +7,11 @@ use crate::tree::{Body, Model, STANDARD_GRAVITY};
 use core::fmt::Write;
 use dynident_text::xml::{comment, escaped};
 
-/// The model as URDF: links, joints with placement, axis, limits and friction, and the inertials of links that have
-/// any. Reading it gives the model again, with these differences: URDF holds no gravity; a revolute joint without stops
-/// becomes `continuous`, for readers of URDF take stops that are not there for zero; a velocity or effort that nobody
-/// knows is written as 0 where the format demands one, with a comment; a joint that follows two is said in a comment,
-/// for `mimic` knows one.
+/// Writes the model as URDF: links, joints with placement, axis, limits and friction, and the known inertials. Reading
+/// the result gives the same model, except for these limitations of URDF: gravity is lost; a revolute joint without
+/// position limits becomes `continuous`, because URDF readers use zero for missing limits; an unknown velocity or
+/// effort limit is written as 0, with a comment, where the format requires one; a mimic joint with two sources is
+/// described in a comment.
 ///
 /// Angles are the fixed-axis roll, pitch and yaw of the placement, `R = Rz(yaw) Ry(pitch) Rx(roll)`, in rad.
 pub fn write_urdf(model: &Model) -> String {
@@ -19,7 +19,7 @@ pub fn write_urdf(model: &Model) -> String {
     if model.gravity() != STANDARD_GRAVITY {
         let [x, y, z] = model.gravity().0;
         let _ =
-            writeln!(text, "  <!-- gravity in the base frame, which URDF does not hold: {x:?} {y:?} {z:?} m/s² -->");
+            writeln!(text, "  <!-- gravity in the base frame, which URDF does not support: {x:?} {y:?} {z:?} m/s² -->");
     }
     write_links(&mut text, model.base(), true);
     for (joint, body) in model.tree_joints().iter().zip(model.bodies()) {
@@ -30,12 +30,12 @@ pub fn write_urdf(model: &Model) -> String {
     text + "</robot>\n"
 }
 
-/// The links of a body; those fixed to the first one hang on it by fixed joints. Of the base the first link carries
-/// what does not move.
+/// Writes the links of a body; the other links are connected to the first one by fixed joints. The first link of the
+/// base carries everything fixed.
 fn write_links(text: &mut String, body: &Body, is_base: bool) {
     for (number, link) in body.links.iter().enumerate() {
         let name = escaped(&link.name);
-        // What URDF cannot say, moments without mass for one, is left unknown.
+        // Inertials that URDF cannot represent, such as moments without mass, are omitted.
         let inertial = link.inertial.filter(|_| !is_base);
         let lines = inertial.and_then(|inertial| inertial_lines(&link.name, &inertial, None).ok());
         let _ = match lines {
@@ -109,7 +109,7 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
         Some((sources, offset)) => {
             let shares = sources.iter().map(|s| format!("{:?} {} + ", s.multiplier, s.joint));
             let law = comment(&format!("{}{offset:?}", shares.collect::<String>()));
-            let _ = writeln!(text, "    <!-- follows {law}, which URDF does not hold -->");
+            let _ = writeln!(text, "    <!-- follows {law}, which URDF does not support -->");
         }
     }
     *text += "  </joint>\n";
@@ -120,13 +120,13 @@ fn origin(placement: &Transform) -> String {
     format!("<origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"{roll:?} {pitch:?} {yaw:?}\"/>")
 }
 
-/// The angles of [`Mat3::from_roll_pitch_yaw`]; where pitch is a right angle, only the sum of the two others counts and
-/// roll is zero.
+/// Angles of [`Mat3::from_roll_pitch_yaw`]. At a pitch of ±90° only the sum of the other angles is defined, and roll is
+/// set to zero.
 fn roll_pitch_yaw(r: &Mat3) -> [f64; 3] {
     let r = &r.0;
     let level = r[0][0].hypot(r[1][0]);
     let pitch = (-r[2][0]).atan2(level);
-    // Below this the sines of roll and yaw are rounding.
+    // Below this limit the sines of roll and yaw are rounding errors.
     if level < 1e-12 {
         return [0.0, pitch, (-r[0][1]).atan2(r[1][1])];
     }

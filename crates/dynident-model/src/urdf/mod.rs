@@ -1,9 +1,9 @@
 //! URDF, the Unified Robot Description Format: reading and writing back.
 //!
-//! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
-//! Fixed joints are lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>`
-//! is unknown, never zero. A joint with `mimic` is no degree of freedom: it follows its source. Joints stand depth
-//! first, in the order of the document under each link. A rotation of `<origin>` is `rpy` or, as in URDF 1.1,
+//! Supported are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
+//! Links connected by fixed joints are merged: [`Body::links`](crate::Body) keeps every link with its frame. A link
+//! without `<inertial>` is unknown, not massless. A joint with `mimic` is not a degree of freedom. Joints are ordered
+//! depth first, in the order of the document under each link. The rotation of `<origin>` is `rpy` or (URDF 1.1)
 //! `quat_xyzw`.
 //!
 //! ```
@@ -45,31 +45,31 @@ use crate::xml::{MAX_NODES, Malformed, flood, malformed};
 use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
-/// Most moving joints that a description may have.
+/// Maximum number of moving joints.
 pub const MAX_MOVING_JOINTS: usize = 1000;
 
-/// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and
-/// products of such numbers would leave the range of `f64`.
+/// Largest length, angle, mass or inertia accepted in a description. Larger numbers are mistakes, and their products
+/// would exceed the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
 
-/// What a URDF says.
+/// Result of reading a URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfRobot {
     /// The robot on a fixed base, gravity along -z.
     pub model: Model,
-    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a
-    /// misspelling) or because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
+    /// Elements inside links, inertials and joints that were ignored, because URDF does not define them (often a
+    /// misspelling) or because they repeat an earlier one. At most [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
-    /// What is against the rules of XML or URDF and yet leaves no doubt about the robot, in the order of the document.
+    /// Violations of the XML or URDF rules that do not make the robot ambiguous, in the order of the document.
     pub irregularities: Vec<UrdfIrregularity>,
 }
 
 impl UrdfRobot {
-    /// Most unread elements that are listed.
+    /// Maximum number of ignored elements in the list.
     pub const MAX_UNREAD: usize = 20;
 }
 
-/// An element that was not read.
+/// An ignored element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnreadElement {
     /// Line, from 1.
@@ -78,27 +78,25 @@ pub struct UnreadElement {
     pub column: u32,
     /// Name of the element.
     pub element: String,
-    /// Name of the element around it.
+    /// Name of the parent element.
     pub parent: String,
 }
 
-/// Something against the rules that leaves no doubt about the robot: other readers of URDF pass over it.
+/// A violation of the rules that does not make the robot ambiguous; other URDF readers ignore it.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfIrregularity {
-    /// Names with a namespace prefix that the document does not declare.
+    /// Names with an undeclared namespace prefix.
     UndeclaredPrefix {
-        /// Line of the first of them, from 1.
+        /// Line of the first one, from 1.
         line: u32,
-        /// The prefix.
         prefix: String,
     },
-    /// A joint follows a joint that the document does not hold. It counts as free, as every follower does.
+    /// A mimic joint whose source is not in the document; it is treated as independent.
     UnknownMimic {
         /// Line of the joint, from 1.
         line: u32,
-        /// The joint.
         joint: String,
-        /// The joint it should follow.
         source_joint: String,
     },
 }
@@ -106,197 +104,65 @@ pub enum UrdfIrregularity {
 /// Why a URDF could not be read, with line and column.
 pub type UrdfError = Located<UrdfFault>;
 
-/// What is wrong in a URDF, and the fix.
+/// A fault in a URDF, with the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfFault {
-    /// The XML is malformed.
     #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
-    Xml {
-        /// What the XML parser says.
-        reason: String,
-    },
-    /// More elements, texts and comments than a robot has.
+    Xml { reason: String },
     #[error("the document has more than {limit} nodes: name the URDF of one robot")]
-    TooLarge {
-        /// The limit.
-        limit: u32,
-    },
-    /// Thousands of attributes in one tag, or of namespaces.
-    #[error("more attributes in a tag, or namespaces in the document, than any robot has: name the URDF of one robot")]
+    TooLarge { limit: u32 },
+    #[error("too many attributes in a tag, or namespaces in the document: name the URDF of one robot")]
     Flood,
-    /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
-    /// The root element is not `<robot>`.
     #[error("the root element is <{root}>, not <robot>: give a URDF file{hint}")]
-    NotUrdf {
-        /// Name of the root element.
-        root: String,
-        /// What the file seems to be.
-        hint: &'static str,
-    },
-    /// Macros that were not expanded.
+    NotUrdf { root: String, hint: &'static str },
     #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
-    Xacro {
-        /// The macro.
-        what: String,
-    },
-    /// An element is missing.
+    Xacro { what: String },
     #[error("<{parent}> of `{owner}` has no <{element}>: add it{hint}")]
-    MissingElement {
-        /// The element around.
-        parent: &'static str,
-        /// Name of the link or joint.
-        owner: String,
-        /// The element that is missing.
-        element: &'static str,
-        /// More on the fix.
-        hint: &'static str,
-    },
-    /// A link with two inertials.
+    MissingElement { parent: &'static str, owner: String, element: &'static str, hint: &'static str },
     #[error("link `{link}` has a second <inertial>: keep one")]
-    RepeatedInertial {
-        /// The link.
-        link: String,
-    },
-    /// An attribute is missing.
+    RepeatedInertial { link: String },
     #[error("<{element}> has no attribute `{attribute}`: add it")]
-    MissingAttribute {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
-    /// A name without a character.
+    MissingAttribute { element: String, attribute: &'static str },
     #[error("<{element}> has an empty `{attribute}`: fill it in")]
-    EmptyName {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-    },
-    /// Something that is not a usable number.
+    EmptyName { element: String, attribute: &'static str },
     #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
-    Number {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// What stands there, shortened.
-        text: String,
-        /// What is wrong with it.
-        fault: &'static str,
-        /// What to write.
-        fix: &'static str,
-    },
-    /// Too many or too few numbers.
+    Number { element: String, attribute: String, text: String, fault: &'static str, fix: &'static str },
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
-    Count {
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: String,
-        /// How many are needed.
-        expected: usize,
-        /// How many stand there.
-        found: usize,
-    },
-    /// Two links or two joints with one name.
+    Count { element: String, attribute: String, expected: usize, found: usize },
     #[error("{kind} `{name}` is defined a second time (first in line {first_line}): rename or delete one")]
-    DuplicateName {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-        /// Line of the first definition.
-        first_line: u32,
-    },
-    /// A joint names a link that does not exist.
+    DuplicateName { kind: &'static str, name: String, first_line: u32 },
     #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or fix the name")]
-    UnknownLink {
-        /// The joint.
-        joint: String,
-        /// The name of the link.
-        link: String,
-    },
-    /// A joint follows itself.
+    UnknownLink { joint: String, link: String },
     #[error("joint `{joint}` mimics itself: fix the name or delete <mimic>")]
-    OwnMimic {
-        /// The joint.
-        joint: String,
-    },
-    /// A rotation that is given in two ways.
+    OwnMimic { joint: String },
     #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
-    TwoRotations {
-        /// What the origin belongs to.
-        owner: String,
-    },
-    /// A quaternion that is no rotation.
+    TwoRotations { owner: String },
     #[error(
         "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
     )]
-    NoRotation {
-        /// What the origin belongs to.
-        owner: String,
-        /// Its length.
-        norm: f64,
-    },
-    /// A link that is the child of two joints.
+    NoRotation { owner: String, norm: f64 },
     #[error(
         "link `{link}` is the child of joint `{first}` and of joint `{second}`: a link has one parent, delete one joint"
     )]
-    TwoParents {
-        /// The link.
-        link: String,
-        /// The earlier joint.
-        first: String,
-        /// The later joint.
-        second: String,
-    },
-    /// A joint type that cannot be used.
+    TwoParents { link: String, first: String, second: String },
     #[error("joint `{joint}` is of type `{kind}`: use revolute, continuous, prismatic or fixed{hint}")]
-    JointType {
-        /// The joint.
-        joint: String,
-        /// The type.
-        kind: String,
-        /// More on the fix.
-        hint: &'static str,
-    },
-    /// An axis of length zero.
+    JointType { joint: String, kind: String, hint: &'static str },
     #[error("the axis of joint `{joint}` has length zero: give its direction, such as `0 0 1`")]
-    ZeroAxis {
-        /// The joint.
-        joint: String,
-    },
-    /// No link at all.
+    ZeroAxis { joint: String },
     #[error("the robot has no <link>: add its links and joints")]
     NoLinks,
-    /// Nothing moves.
     #[error("the robot has no moving joint: give at least one of type revolute, continuous or prismatic")]
     NoMovingJoint,
-    /// A closed chain of joints.
     #[error("link `{link}` is its own ancestor: the joints form a loop; cut it at one joint")]
-    Loop {
-        /// A link of the loop.
-        link: String,
-    },
-    /// More than one link without a parent.
+    Loop { link: String },
     #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
-    SeveralRoots {
-        /// The first root.
-        first: String,
-        /// The second root.
-        second: String,
-    },
-    /// More moving joints than [`MAX_MOVING_JOINTS`].
-    #[error("the robot has more than {limit} moving joints: fix those that the log does not hold")]
-    TooManyJoints {
-        /// The limit.
-        limit: usize,
-    },
-    /// The parts do not make a model.
+    SeveralRoots { first: String, second: String },
+    #[error("the robot has more than {limit} moving joints: fix those that the log does not contain")]
+    TooManyJoints { limit: usize },
     #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }
@@ -304,7 +170,7 @@ pub enum UrdfFault {
 /// Reads a URDF.
 ///
 /// # Errors
-/// If the text is malformed XML, no URDF, or describes no tree of links on one fixed base; with line and column.
+/// Malformed XML, not a URDF, or no tree of links on one fixed base; with line and column.
 pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
     let (regular, undeclared) = prefixes::without_undeclared(text);
     let document = parse(&regular)?;
@@ -338,7 +204,6 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
     Ok(UrdfRobot { model, unread, irregularities })
 }
 
-/// The XML tree of a URDF, if it is one, whose prefixes are all declared.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
     if let Some(at) = flood(text) {
         return Err(Located::at(text, at, UrdfFault::Flood));
@@ -381,7 +246,6 @@ fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
     Located::at(text, at, fault)
 }
 
-/// `fault` at the start of an element.
 fn fault_at(node: Node<'_, '_>, fault: UrdfFault) -> UrdfError {
     let at = node.document().text_pos_at(node.range().start);
     Located { line: at.row, column: at.col, fault }

@@ -1,12 +1,12 @@
-//! `<origin>`: where a frame stands in another.
+//! `<origin>`: pose of a frame in another.
 
 use super::values::{child, numbers};
 use super::{UrdfError, UrdfFault, fault_at};
 use crate::spatial::{Mat3, Transform, Vec3};
 use roxmltree::Node;
 
-/// `<origin xyz rpy>` or, as URDF 1.1 has it, `<origin xyz quat_xyzw>`; the identity where it is missing. Both at once
-/// are refused, as the reference parser does.
+/// `<origin xyz rpy>` or, in URDF 1.1, `<origin xyz quat_xyzw>`; the identity if missing. Both at once are an error, as
+/// in the reference parser.
 pub(super) fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
@@ -14,7 +14,7 @@ pub(super) fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<T
         (Some(_), Some(_)) => return Err(fault_at(origin, UrdfFault::TwoRotations { owner: owner() })),
         (None, Some(quaternion)) => {
             let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
-            // Digits of a unit quaternion are lost in print, not a tenth of its length.
+            // Printed digits change the norm of a unit quaternion by far less than 0.1.
             if (norm - 1.0).abs() > 0.1 {
                 return Err(fault_at(origin, UrdfFault::NoRotation { owner: owner(), norm }));
             }

@@ -1,23 +1,22 @@
-//! Namespace prefixes that a document uses and does not declare (`<gazebo:plugin>`): the XML parser must refuse them,
-//! other readers of URDF know no namespaces and read on. Their colon becomes an underscore, so that every byte stays
-//! at its place and no such name is one of URDF's.
+//! Undeclared namespace prefixes (`<gazebo:plugin>`): the XML parser rejects them, but other URDF readers ignore
+//! namespaces. Their colon is replaced by an underscore, so that every byte keeps its place and no such name is one of
+//! URDF's.
 
-use crate::xml::length_beside_elements;
+use crate::xml::{outside_quotes, tags};
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-/// Most different prefixes that are mended; a document with more is left to the parser.
+/// Maximum number of different prefixes that are replaced; a document with more is passed to the parser unchanged.
 const MAX_PREFIXES: usize = 100;
 
-/// A prefix without a declaration.
 pub(super) struct Undeclared<'a> {
-    /// Byte at which it stands first.
+    /// Byte position of its first occurrence.
     pub(super) at: usize,
     pub(super) prefix: &'a str,
 }
 
-/// `text` with an underscore for the colon behind every prefix that no `xmlns:` declares, of the same length; and these
-/// prefixes, in the order of the text. One pass; malformed markup is left to the parser, and xacro to its own message.
+/// Replaces the colon after every undeclared prefix by an underscore, and returns the prefixes in the order of the
+/// text. Needs one pass; malformed markup is left to the parser, and xacro has a separate error.
 pub(super) fn without_undeclared(text: &str) -> (Cow<'_, str>, Vec<Undeclared<'_>>) {
     let declared: HashSet<&str> = text.match_indices("xmlns:").map(|(at, key)| name(&text[at + key.len()..])).collect();
     let known = |prefix: &str| matches!(prefix, "" | "xml" | "xmlns" | "xacro") || declared.contains(prefix);
@@ -34,53 +33,38 @@ pub(super) fn without_undeclared(text: &str) -> (Cow<'_, str>, Vec<Undeclared<'_
     if colons.is_empty() || found.len() > MAX_PREFIXES {
         return (Cow::Borrowed(text), Vec::new());
     }
-    let mut mended = String::with_capacity(text.len());
+    let mut replaced = String::with_capacity(text.len());
     let mut done = 0;
     for colon in colons {
-        mended.push_str(&text[done..colon]);
-        mended.push('_');
+        replaced.push_str(&text[done..colon]);
+        replaced.push('_');
         done = colon + 1;
     }
-    mended.push_str(&text[done..]);
-    (Cow::Owned(mended), found)
+    replaced.push_str(&text[done..]);
+    (Cow::Owned(replaced), found)
 }
 
-/// Hands every prefix of an element's or an attribute's name to `take`, with its place.
+/// Calls `take` with the place of every prefix in the name of an element or attribute.
 fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
-    let mut at = 0;
-    while let Some(start) = text[at..].find('<').map(|next| at + next) {
-        let rest = &text[start..];
-        if let Some(length) = length_beside_elements(rest) {
-            at = start + length;
-            continue;
-        }
-        let mut quote = None;
-        // Where the name that is being read began.
+    for (start, tag) in tags(text) {
+        // Start of the current name.
         let mut word = Some(start + 1);
-        at = text.len();
-        for (offset, byte) in rest.bytes().enumerate().skip(1) {
+        for (offset, byte) in outside_quotes(tag).skip(1) {
             let place = start + offset;
-            match (quote, byte) {
-                (Some(open), byte) if open == byte => quote = None,
-                (None, b'>') => {
-                    at = place + 1;
-                    break;
-                }
-                (None, b'"' | b'\'') => quote = Some(byte),
-                (None, b':') => {
+            match byte {
+                b':' => {
                     if let Some(begin) = word.take() {
                         take(begin, &text[begin..place]);
                     }
                 }
-                (None, b'/' | b' ' | b'\t' | b'\r' | b'\n') => word = Some(place + 1),
-                (None, b'=') => word = None,
-                (Some(_) | None, _) => {}
+                b'/' | b' ' | b'\t' | b'\r' | b'\n' => word = Some(place + 1),
+                b'=' => word = None,
+                _ => {}
             }
         }
     }
 }
 
-/// The name with which `text` begins.
 fn name(text: &str) -> &str {
     let end = text.find(|c: char| c.is_ascii_whitespace() || matches!(c, '=' | '>' | '/' | '"' | '\'' | '<'));
     &text[..end.unwrap_or(text.len())]
@@ -94,9 +78,9 @@ mod tests {
     fn only_names_without_a_declaration_change() {
         let text =
             "<?a b:c?><!-- <d:e> --><r xmlns:k='u:v' k:x=\"m:n\" p:x='q:r'><k:a/><p:b s:t = '1'\n/>z:z</p:b></r>";
-        let (mended, found) = without_undeclared(text);
+        let (replaced, found) = without_undeclared(text);
         let wanted = text.replace("p:", "p_").replace("s:t", "s_t");
-        assert_eq!(mended, wanted);
+        assert_eq!(replaced, wanted);
         let found: Vec<(&str, usize)> = found.iter().map(|one| (one.prefix, one.at)).collect();
         assert_eq!(found, [("p", text.find("p:").unwrap()), ("s", text.find("s:t").unwrap())]);
         for kept in ["<a", "<a b:c=", "<!-- a:b", "<xacro:if/>", "<:a/>", "<a :b='1'/>"] {

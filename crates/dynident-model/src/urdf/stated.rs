@@ -1,4 +1,4 @@
-//! `<inertial>` as it stands in a URDF, number by number, and single numbers of it changed in place.
+//! The numbers of `<inertial>` in a URDF, and changes of single numbers in place.
 
 use super::origin::origin;
 use super::prefixes::without_undeclared;
@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Names of the six moments in a URDF, in the order of [`StatedInertial::moments`].
 pub const MOMENT_NAMES: [&str; 6] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
 
-/// The `<inertial>` of one link as it stands in the file.
+/// The numbers of the `<inertial>` of one link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StatedInertial {
     /// Name of the link.
@@ -21,21 +21,21 @@ pub struct StatedInertial {
     pub mass_kg: f64,
     /// Centre of mass in the link's frame, m: `xyz` of `<origin>`.
     pub com_m: [f64; 3],
-    /// `link_from_inertial`: the axes that the moments are given in.
+    /// `link_from_inertial`: axes of the moments.
     pub axes: Mat3,
     /// Moments about the centre of mass, kg m², in the order [`MOMENT_NAMES`].
     pub moments: [f64; 6],
 }
 
 impl StatedInertial {
-    /// The inertia about the centre of mass in the axes of `<origin>`.
+    /// Inertia about the centre of mass in the axes of `<origin>`.
     pub fn inertia(&self) -> Mat3 {
         let [xx, xy, xz, yy, yz, zz] = self.moments;
         Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     }
 }
 
-/// The six moments of `<inertia>`, in the order of the names.
+/// The six moments of `<inertia>`, in the order of [`MOMENT_NAMES`].
 pub(super) fn stated_moments(element: Node<'_, '_>) -> Result<[f64; 6], UrdfError> {
     let mut moments = [0.0; 6];
     for (moment, attribute) in moments.iter_mut().zip(MOMENT_NAMES) {
@@ -47,7 +47,7 @@ pub(super) fn stated_moments(element: Node<'_, '_>) -> Result<[f64; 6], UrdfErro
 /// All `<inertial>` elements of a URDF, in the order of the document.
 ///
 /// # Errors
-/// As [`read_urdf`](super::read_urdf), as far as inertials are concerned.
+/// Those of [`read_urdf`](super::read_urdf) for inertials.
 pub fn stated_inertials(text: &str) -> Result<Vec<StatedInertial>, UrdfError> {
     const HINT: &str = "";
     let (regular, _) = without_undeclared(text);
@@ -68,12 +68,12 @@ pub fn stated_inertials(text: &str) -> Result<Vec<StatedInertial>, UrdfError> {
     Ok(stated)
 }
 
-/// `original` with the numbers of `<inertial>` that differ between `from` and `to` changed in place, every other byte
-/// as it was. `from` are its [`stated_inertials`], `to` the same links in the same order. A number whose sign alone
-/// changes keeps its digits; others are written in the shortest form that reads back to the same `f64`.
+/// Writes the numbers of `<inertial>` that differ between `from` and `to` into `original` and keeps all other bytes.
+/// `from` are its [`stated_inertials`], `to` the same links in the same order. If only the sign of a number changes,
+/// its digits are kept; other numbers have the shortest form that parses to the same `f64`.
 ///
 /// # Errors
-/// If the original is not readable, a link of `to` is not in it, or a number is not finite.
+/// An invalid original, a link of `to` that is not in it, or a number that is not finite.
 pub fn rewrite_inertials(
     original: &str,
     from: &[StatedInertial],
@@ -119,7 +119,7 @@ pub fn rewrite_inertials(
     Ok(edited(original, edits))
 }
 
-/// Where word number `word` of an attribute stands.
+/// Byte range of word number `word` of an attribute.
 fn word_range(text: &str, node: Node<'_, '_>, attribute: &str, word: usize) -> Option<Range<usize>> {
     let range = node.attribute_node(attribute)?.range_value();
     let value = &text[range.clone()];

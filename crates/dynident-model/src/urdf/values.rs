@@ -5,13 +5,11 @@ use crate::place::Located;
 use crate::xml::{parse_number, shortened};
 use roxmltree::{Attribute, Node};
 
-/// The first child called `element`; further ones are listed as unread, as the reference parser of URDF passes over
-/// them.
+/// The first child called `element`. Repetitions are reported as unread; the reference parser of URDF ignores them.
 pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option<Node<'a, 'input>> {
     node.children().find(|child| child.has_tag_name(element))
 }
 
-/// The child `element`, which must be there.
 pub(super) fn required_child<'a, 'input>(
     node: Node<'a, 'input>,
     owner: &str,
@@ -23,7 +21,6 @@ pub(super) fn required_child<'a, 'input>(
         .ok_or_else(|| fault_at(node, UrdfFault::MissingElement { parent, owner: owner.to_owned(), element, hint }))
 }
 
-/// A name, which must not be empty.
 pub(super) fn name<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result<&'a str, UrdfError> {
     let element = || node.tag_name().name().to_owned();
     let found = node
@@ -62,7 +59,7 @@ pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Re
     Ok(Some(numbers))
 }
 
-/// One finite number of any size (limits such as `1e16` mean "none"); `None` without the attribute.
+/// One finite number of any magnitude (limits such as `1e16` mean "unlimited"); `None` without the attribute.
 pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>, UrdfError> {
     let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
     refuse_xacro(node, found)?;
@@ -70,7 +67,6 @@ pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>,
     parse_number(word).map(Some).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))
 }
 
-/// One number that must be there.
 pub(super) fn required_number(node: Node<'_, '_>, attribute: &'static str) -> Result<f64, UrdfError> {
     numbers::<1>(node, attribute)?.map(|[number]| number).ok_or_else(|| {
         fault_at(node, UrdfFault::MissingAttribute { element: node.tag_name().name().to_owned(), attribute })

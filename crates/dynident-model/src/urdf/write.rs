@@ -1,26 +1,26 @@
-//! Writing identified values back into the user's own URDF.
+//! Writes identified values into an existing URDF.
 //!
-//! Only `<inertial>` and the two friction values of `<dynamics>` change; every other byte stays, with its comments,
-//! order, spacing and line ends, except invisible characters, which become references to them
-//! ([`dynident_text::xml::document`]). A body is lumped from links that are fixed to each other, and a log cannot
-//! distinguish them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the
-//! links fixed to it, and says so in a comment.
+//! Only `<inertial>` and the two friction values of `<dynamics>` change; all other bytes stay, except invisible
+//! characters, which become character references ([`dynident_text::xml::document`]). A body consists of links that are
+//! fixed to each other, and a log cannot distinguish them: [`link_changes`] assigns the whole body to the joint's own
+//! link, removes the `<inertial>` of the links fixed to it, and adds a comment.
 
 use super::prefixes::without_undeclared;
 use super::{MAX_MAGNITUDE, UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
-use crate::xml::edit::{Line, Source, edited, start_tag_length};
+use crate::xml::edit::{Line, Source, edited};
+use crate::xml::start_tag_length;
 use dynident_text::xml;
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use thiserror::Error;
 
-/// What becomes of one link's `<inertial>`.
+/// Change of one link's `<inertial>`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkChange {
-    /// The link gets these parameters.
+    /// Sets the parameters of a link.
     Set {
         /// Name of the link.
         link: String,
@@ -29,7 +29,7 @@ pub enum LinkChange {
         /// A comment inside `<inertial>`.
         note: Option<String>,
     },
-    /// The link loses its `<inertial>`: it becomes unknown.
+    /// Removes the `<inertial>` of a link, which becomes unknown.
     Remove {
         /// Name of the link.
         link: String,
@@ -44,7 +44,7 @@ impl LinkChange {
     }
 }
 
-/// New friction values of one joint; what is `None` stays as it is.
+/// New friction values of one joint; `None` keeps a value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointChange {
     /// Name of the joint.
@@ -53,75 +53,42 @@ pub struct JointChange {
     pub damping: Option<f64>,
     /// Coulomb friction, Nm (N).
     pub friction: Option<f64>,
-    /// Drive inertia, kg m² (kg), which only MJCF holds.
+    /// Drive inertia, kg m² (kg); only MJCF has it.
     pub drive_inertia: Option<f64>,
-    /// Stiffness of the joint's spring, Nm/rad (N/m), which MJCF and SDF hold.
+    /// Stiffness of the joint's spring, Nm/rad (N/m); only MJCF and SDF have it.
     pub stiffness: Option<f64>,
 }
 
-/// Why a URDF could not be rewritten.
+/// Why values could not be written into a URDF.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum UrdfWriteError {
     /// The original is not readable.
     #[error(transparent)]
     Original(#[from] UrdfError),
-    /// A change to something that the original does not hold.
     #[error("the URDF has no {kind} `{name}`: write into the file that the model was read from")]
-    Unknown {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// Two changes to one link or joint.
+    Unknown { kind: &'static str, name: String },
     #[error("two changes to {kind} `{name}`: give one")]
-    Repeated {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A value that is not finite.
+    Repeated { kind: &'static str, name: String },
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
-    NotFinite {
-        /// `link` or `joint`.
-        kind: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// Moments without mass have no centre of mass, and URDF has no other way to say them.
+    NotFinite { kind: &'static str, name: String },
     #[error("link `{link}` has moments but no mass, which URDF cannot express: use physically consistent parameters")]
-    NoMass {
-        /// The link.
-        link: String,
-    },
-    /// A value that no reader would take.
+    NoMass { link: String },
     #[error(
-        "the new values of link `{link}` hold {value:e}, beyond the {MAX_MAGNITUDE:e} that a description may hold: check its lengths and masses"
+        "the new values of link `{link}` contain {value:e}, more than the limit of {MAX_MAGNITUDE:e}: check its lengths and masses"
     )]
-    TooLarge {
-        /// The link.
-        link: String,
-        /// The value.
-        value: f64,
-    },
-    /// As many parameter sets as moving bodies are needed.
+    TooLarge { link: String, value: f64 },
     #[error("{found} parameter sets for {expected} moving bodies")]
-    Counts {
-        /// Number of moving bodies.
-        expected: usize,
-        /// Number of parameter sets.
-        found: usize,
-    },
+    Counts { expected: usize, found: usize },
 }
 
 /// The changes that give every moving body of `model` the parameters `inertials` (body frames, one per joint): the
-/// joint's own link gets them whole, the links fixed to it lose their `<inertial>`. Reading and lumping the result
+/// joint's own link gets all of them, and the links fixed to it lose their `<inertial>`. Reading and merging the result
 /// gives exactly the new parameters.
 ///
 /// # Errors
-/// If the count differs.
+/// A different count.
 pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<Vec<LinkChange>, UrdfWriteError> {
     if inertials.len() != model.body_count() {
         return Err(UrdfWriteError::Counts { expected: model.body_count(), found: inertials.len() });
@@ -154,14 +121,13 @@ pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<V
     Ok(changes)
 }
 
-/// `original` with the changes made and every other byte as it was. Inertia is written about the centre of mass in axes
-/// parallel to the link's (rpy = 0), every number in the shortest form that reads back to the same `f64`.
+/// Writes the changes into `original` and keeps all other bytes. Inertia is written about the centre of mass in axes
+/// parallel to the link's (rpy = 0). Every number has the shortest form that parses to the same `f64`.
 ///
 /// # Errors
-/// If the original is no URDF, a link or joint is unknown or named twice, a value is not finite, or a link has moments
-/// without mass.
+/// An invalid URDF, an unknown or repeated link or joint, a value that is not finite, or moments without mass.
 pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, UrdfWriteError> {
-    // Of the same length, so that its places are the original's.
+    // It has the same length, so that its places apply to the original.
     let (regular, _) = without_undeclared(original);
     let document = parse(&regular)?;
     let robot = document.root_element();
@@ -206,7 +172,7 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
     Ok(edited(original, edits))
 }
 
-/// An `<inertial>` about the centre of mass, in axes parallel to the link's.
+/// `<inertial>` about the centre of mass, in axes parallel to the link's.
 pub(super) fn inertial_lines(
     link: &str,
     inertial: &InertialParameters,
@@ -247,7 +213,7 @@ pub(super) fn inertial_lines(
     Ok(lines)
 }
 
-/// The two friction values of one joint, into its `<dynamics>` or a new one.
+/// Writes the two friction values of one joint into its `<dynamics>`, or into a new one.
 fn friction(
     source: &Source<'_>,
     joint: Node<'_, '_>,

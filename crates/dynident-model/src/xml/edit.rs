@@ -1,13 +1,14 @@
-//! Edits of a text that leave every other byte alone: elements replaced or put in, with the indentation around them.
+//! Edits of a text that keep all other bytes: replaced and inserted elements, with the surrounding indentation.
 
+use super::tags::start_tag_length;
 use roxmltree::Node;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays but for invisible
-/// characters, which become references and escape sequences ([`dynident_text::xml::document`]).
+/// Replaces parts of `original`. The parts must not overlap; all other bytes stay, except invisible characters, which
+/// become references and escape sequences ([`dynident_text::xml::document`]).
 pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
-    // What is put in before a piece that is replaced comes first.
+    // An insertion at the same place precedes a replacement.
     edits.sort_by_key(|(range, _)| (range.start, range.end));
     let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
     let mut done = 0;
@@ -26,34 +27,31 @@ pub(crate) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> 
 /// A line of a new element, with its depth below the element's own indentation.
 pub(crate) type Line = (usize, String);
 
-/// The original text and how it breaks lines.
 pub(crate) struct Source<'a> {
     pub(crate) text: &'a str,
     pub(crate) eol: &'a str,
 }
 
 impl<'a> Source<'a> {
-    /// With the line ends that the text has.
     pub(crate) fn new(text: &'a str) -> Self {
         Self { text, eol: if text.contains("\r\n") { "\r\n" } else { "\n" } }
     }
 }
 
 impl Source<'_> {
-    /// The white space before `at` on its line; `None` if something else stands there.
+    /// White space before `at` on its line; `None` if there is other text.
     pub(crate) fn indentation(&self, at: usize) -> Option<&str> {
         let start = self.text[..at].rfind('\n').map_or(0, |newline| newline + 1);
         let prefix = &self.text[start..at];
         prefix.chars().all(|c| c == ' ' || c == '\t').then_some(prefix)
     }
 
-    /// By how much the children of `node` stand further in than `node`.
     fn step(&self, node: Node<'_, '_>) -> String {
         let own = self.indentation(node.range().start).unwrap_or("");
         let child = node.children().find(Node::is_element).and_then(|child| self.indentation(child.range().start));
         match child.and_then(|child| child.strip_prefix(own)) {
             Some(step) if !step.is_empty() => step.to_owned(),
-            // Links are children of the root, so that their own indentation is one step.
+            // Links are children of the root, so that their indentation is one step.
             _ if !own.is_empty() && node.parent_element().is_some_and(|parent| parent.has_tag_name("robot")) => {
                 own.to_owned()
             }
@@ -71,7 +69,7 @@ impl Source<'_> {
         lines.iter().map(|(_, line)| line.as_str()).collect()
     }
 
-    /// The new element in the old one's place; on one line if the old one was.
+    /// Replaces the old element; on one line if the old one was on one line.
     pub(crate) fn replacement(&self, old: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
         let range = old.range();
         let new = match self.indentation(range.start) {
@@ -83,7 +81,7 @@ impl Source<'_> {
         (range, new)
     }
 
-    /// The new element as the first child of `node`.
+    /// Inserts the new element as the first child of `node`.
     pub(crate) fn insertion_at_start(&self, node: Node<'_, '_>, lines: &[Line]) -> (Range<usize>, String) {
         let range = node.range();
         let tag = &self.text[range.clone()];
@@ -101,12 +99,12 @@ impl Source<'_> {
             let kept = self.text[..tag_end - 2].trim_end().len();
             return (kept..tag_end, format!(">{new}{}{own}</{name}>", self.eol));
         }
-        // `<link name="a"></link>`: the end tag goes to a line of its own.
+        // For `<link name="a"></link>` the end tag moves to a new line.
         let closing = if self.text[tag_end..].starts_with("</") { format!("{}{own}", self.eol) } else { String::new() };
         (tag_end..tag_end, new + &closing)
     }
 
-    /// The element, and the line it stands on if it stands there alone.
+    /// Range of the element, including its line if nothing else is on it.
     pub(crate) fn with_own_line(&self, node: Node<'_, '_>) -> Range<usize> {
         let range = node.range();
         let Some(indentation) = self.indentation(range.start) else { return range };
@@ -120,18 +118,4 @@ impl Source<'_> {
         }
         start..range.end
     }
-}
-
-/// Length of the start tag with which `element` begins: to the first `>` outside quotes.
-pub(crate) fn start_tag_length(element: &str) -> usize {
-    let mut quote = None;
-    for (at, byte) in element.bytes().enumerate() {
-        match (quote, byte) {
-            (None, b'>') => return at + 1,
-            (None, b'"' | b'\'') => quote = Some(byte),
-            (Some(open), byte) if open == byte => quote = None,
-            _ => {}
-        }
-    }
-    element.len()
 }

@@ -1,8 +1,8 @@
-//! What the parser of XML says, and where.
+//! Converts errors of the XML parser, with their place.
 
 use roxmltree::{Error, TextPos};
 
-/// Why a text is no XML that is read.
+/// Why a text is not accepted as XML.
 pub(crate) enum Malformed {
     /// A document type declaration, by which entities could be defined.
     Doctype,
@@ -10,12 +10,12 @@ pub(crate) enum Malformed {
     TooLarge,
     /// The markup is faulty.
     Markup {
-        /// What the parser says, without the place.
+        /// Message of the parser, without the place.
         reason: String,
     },
 }
 
-/// The byte at which the parser stopped, and why.
+/// Byte position and reason of a parser error.
 pub(crate) fn malformed(text: &str, error: &Error) -> (usize, Malformed) {
     let at = error.pos();
     match error {
@@ -24,12 +24,12 @@ pub(crate) fn malformed(text: &str, error: &Error) -> (usize, Malformed) {
             (text.len(), Malformed::Markup { reason: "the document ends too early".to_owned() })
         }
         Error::NodesLimitReached => (0, Malformed::TooLarge),
-        // The parser's messages hold their position; ours lead with it.
+        // The parser's messages contain their position; ours start with it.
         _ => (byte_of(text, at), Malformed::Markup { reason: error.to_string().replacen(&format!(" at {at}"), "", 1) }),
     }
 }
 
-/// The byte at a line and column of the parser.
+/// Byte position of a line and column of the parser.
 fn byte_of(text: &str, at: TextPos) -> usize {
     let (row, column) = (at.row.max(1) as usize - 1, at.col.max(1) as usize - 1);
     let start = if row == 0 { 0 } else { text.match_indices('\n').nth(row - 1).map_or(text.len(), |(at, _)| at + 1) };

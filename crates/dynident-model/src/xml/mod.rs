@@ -1,25 +1,29 @@
-//! What readers and writers of XML descriptions share: guards, numbers, and edits that leave every other byte alone.
+//! Shared parts of the XML readers and writers: guards, numbers, and edits that keep all other bytes.
 
 pub(crate) mod edit;
 mod flood;
 mod malformed;
 mod number;
+mod tags;
 
-pub(crate) use flood::{flood, length_beside_elements};
+pub(crate) use flood::flood;
 pub(crate) use malformed::{Malformed, malformed};
 pub(crate) use number::{parse_number, shortened};
+pub(crate) use tags::{outside_quotes, start_tag_length, tags};
 
-/// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.
+use tags::length_beside_elements;
+
+/// Maximum number of elements, texts and comments in a document: a hundred times the largest known robot.
 pub(crate) const MAX_NODES: u32 = 2_000_000;
 
-/// Name of the root element of `text`, as far as it can be told without parsing the rest.
+/// Name of the root element of `text`, without parsing the rest.
 pub(crate) fn root_name(text: &str) -> Option<&str> {
     let mut rest = text;
     loop {
         rest = &rest[rest.find('<')?..];
         match length_beside_elements(rest) {
             Some(length) => rest = &rest[length..],
-            // A document type declaration; the parser refuses it.
+            // A document type declaration, which the parser rejects.
             None if rest.starts_with("<!") => rest = &rest[2..],
             None => break,
         }
@@ -34,7 +38,7 @@ mod tests {
     use super::root_name;
 
     #[test]
-    fn the_root_stands_behind_comments_and_instructions() {
+    fn root_is_found_after_comments_and_instructions() {
         assert_eq!(root_name("\u{feff}<?xml version='1.0'?>\n<!-- <robot> -->\n<mujoco model=\"a\">"), Some("mujoco"));
         assert_eq!(root_name("<robot>"), Some("robot"));
         assert_eq!(root_name("<mujoco/>"), Some("mujoco"));

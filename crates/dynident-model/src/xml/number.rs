@@ -1,12 +1,12 @@
-//! Numbers as descriptions write them.
+//! Numbers in robot descriptions.
 
-/// A finite number in plain decimal or exponent notation; else what is wrong and what to write.
+/// Parses a finite number in decimal or exponent notation; the error is the problem and the fix.
 pub(crate) fn parse_number(word: &str) -> Result<f64, (&'static str, &'static str)> {
     const PLAIN: &str = "a plain number such as 0.25";
     if word.contains(',') {
         return Err(("not a number", "a dot for the decimal comma and spaces between numbers"));
     }
-    // Rust also accepts `inf` and `nan`: only digits, signs, dots and exponents may pass.
+    // Rust also accepts `inf` and `nan`, so only digits, signs, dots and exponents are allowed.
     let looks_numeric =
         word.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'e' | b'E'));
     match word.parse::<f64>() {
@@ -16,7 +16,7 @@ pub(crate) fn parse_number(word: &str) -> Result<f64, (&'static str, &'static st
     }
 }
 
-/// At most forty characters of foreign text, so that a message stays a line.
+/// At most forty characters of foreign text, so that a message stays on one line.
 pub(crate) fn shortened(text: &str) -> String {
     let mut short: String = text.chars().take(40).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if text.chars().nth(40).is_some() {

@@ -1,4 +1,4 @@
-//! The audit: a clean arm passes, every seeded defect is found.
+//! The audit: a correct arm passes, and every seeded defect is found.
 
 use crate::common::{ARM, foreign_urdfs};
 use dynident_model::{AuditFinding, AuditLevel, audit, load_robot, read_urdf};
@@ -31,7 +31,7 @@ fn published_descriptions_of_common_arms_pass() {
 
 #[test]
 fn known_defects_of_published_descriptions_are_found() {
-    // Read off the files: what stands there is wrong, and for each we can say why.
+    // Known mistakes in published files.
     let known = [
         ("kuka_lwr4.urdf", "link lwr_7_link", "inertia-too-large", AuditLevel::Warning),
         ("tiago.urdf", "link arm_1_link", "triangle-inequality", AuditLevel::Problem),
@@ -56,7 +56,7 @@ fn every_seeded_defect_is_found() {
     let shoulder = r#"<limit lower="-2.5" upper="2.5" velocity="3" effort="120"/>"#;
     let fore_inertial = &ARM[ARM.find(r#"<origin xyz="0.15 0.01 0"/>"#).unwrap()..];
     let fore_inertial = &fore_inertial[..fore_inertial.find("    </inertial>").unwrap()];
-    // What stands in the clean arm, what is put there, and what must be found where.
+    // Original text, replacement, and expected finding.
     let defects: [(&str, &str, &str, &str, AuditLevel); 28] = [
         (r#"<mass value="3.25"/>"#, r#"<mass value="-3.25"/>"#, "mass-not-positive", "link upper", Problem),
         (r#"<mass value="3.25"/>"#, r#"<mass value="0"/>"#, "mass-not-positive", "link upper", Problem),
@@ -89,7 +89,7 @@ fn every_seeded_defect_is_found() {
             "link upper",
             Warning,
         ),
-        // kg mm^2 and g mm^2 for kg m^2; and the other way round.
+        // kg mm^2 and g mm^2 instead of kg m^2, and the inverse.
         (
             upper,
             r#"<inertia ixx="6000" ixy="0" ixz="300" iyy="50000" iyz="0" izz="51000"/>"#,
@@ -118,7 +118,7 @@ fn every_seeded_defect_is_found() {
             "link upper",
             Warning,
         ),
-        // 3.25 kg at 0.2 m: m r^2 = 0.13 added about y and z, as if the inertia were about the link's origin.
+        // 3.25 kg at 0.2 m: m r^2 = 0.13 is added about y and z, as for an inertia about the link's origin.
         (
             upper,
             r#"<inertia ixx="0.0063" ixy="0" ixz="-0.0062" iyy="0.1803" iyz="0" izz="0.181"/>"#,
@@ -219,7 +219,7 @@ fn every_seeded_defect_is_found() {
 
 #[test]
 fn unknown_and_equal_inertials_are_found() {
-    // Without any inertial, all bodies are unknown and all joints move nothing; the tip of the clean arm is only a
+    // Without any inertial, all bodies are unknown and all joints are massless; the tip of the correct arm is only a
     // frame.
     let is = |check: &'static str, level: AuditLevel| move |f: &&AuditFinding| f.check == check && f.level == level;
     let mut bare = ARM.to_owned();

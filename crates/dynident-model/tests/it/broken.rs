@@ -1,6 +1,6 @@
-//! Broken descriptions: each is refused with file, line, column and the fix, and nothing panics.
+//! Broken descriptions: each is rejected with file, line, column and the fix, and nothing panics.
 
-use crate::common::{ARM, mutate, mutations};
+use crate::common::{ARM, assert_truncations_are_refused, mutate, mutations};
 use dynident_model::{
     ReadError, audit, has_xacro_macros, link_changes, load_robot, load_robot_with, read_dh, read_urdf, rewrite_urdf,
 };
@@ -13,10 +13,10 @@ fn corpus() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken")
 }
 
-/// `file<TAB>line:column<TAB>what the message must say`, checked by eye against what is wrong in each file.
+/// `file<TAB>line:column<TAB>part of the message`, verified manually for each file.
 const EXPECTED: &str = include_str!("../broken.tsv");
 
-/// How a message says what to do.
+/// Beginnings of the fix in a message.
 const FIXES: [&str; 18] = [
     "; fix ",
     ": write ",
@@ -53,7 +53,7 @@ fn every_broken_file_is_refused_at_its_place_with_a_fix() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
         let (place, fragment) = expected.remove(name).unwrap_or_else(|| panic!("{name} is not in broken.tsv"));
-        // The file as a whole is refused for its macros; here the place of the first one is tested.
+        // `load_robot` rejects the file as a whole; here the place of the first macro is tested.
         let message = if name.starts_with("xacro_") {
             let text = std::fs::read_to_string(&path).unwrap();
             format!("{}:{}", path.display(), read_urdf(&text).expect_err(name))
@@ -69,7 +69,7 @@ fn every_broken_file_is_refused_at_its_place_with_a_fix() {
     assert!(expected.is_empty(), "not in the corpus: {expected:?}");
 }
 
-/// A file with macros is refused whole, with the program to run; `load_robot_with` takes its expanded text.
+/// A file with macros is rejected with the program to run; `load_robot_with` takes its expanded text.
 #[test]
 fn a_file_with_macros_is_refused_or_expanded_by_the_caller() {
     let folder = tempfile::tempdir().unwrap();
@@ -109,7 +109,7 @@ fn floods_of_nodes_attributes_and_tables_end_soon() {
     assert!(read_urdf(&nodes).unwrap_err().to_string().contains("more than 2000000 nodes"));
     let attributes = repeated(500_000, |i| format!(" a{i}=\"\""));
     assert!(
-        read_urdf(&format!("<robot name=\"r\"{attributes}/>")).unwrap_err().to_string().contains("more attributes")
+        read_urdf(&format!("<robot name=\"r\"{attributes}/>")).unwrap_err().to_string().contains("too many attributes")
     );
     let namespaces = repeated(500_000, |i| format!("<a xmlns:n{i}=\"u{i}\">"));
     assert!(read_urdf(&format!("<robot>{namespaces}")).unwrap_err().to_string().contains("namespaces"));
@@ -127,7 +127,7 @@ fn floods_of_nodes_attributes_and_tables_end_soon() {
 #[cfg(unix)]
 #[test]
 fn an_endless_file_is_refused() {
-    // A device that never ends is no regular file.
+    // An endless device is not a regular file.
     if Path::new("/dev/zero").exists() {
         let message = load_robot("/dev/zero").unwrap_err().to_string();
         assert!(message.starts_with("/dev/zero: ") && message.contains("a device, not a regular file"), "{message}");
@@ -160,7 +160,7 @@ const PIECES: [&str; 12] =
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(500, 4000) as u32) })]
 
-    /// What is read after all is finite, can be audited, and can be rewritten without a change.
+    /// If a mutated file can be read, it is finite, can be audited, and can be rewritten without a change.
     #[test]
     fn a_mutated_urdf_never_panics(mutations in mutations()) {
         let text = mutate(ARM, &mutations, &PIECES);
@@ -169,7 +169,7 @@ proptest! {
             audit(&robot.model);
             // Invisible characters become references.
             prop_assert_eq!(rewrite_urdf(&text, &[], &[]).unwrap(), dynident_text::xml::document(&text));
-            // Whatever the markup looks like, what is written is a URDF of the same joints.
+            // The written URDF has the same joints.
             let model = &robot.model;
             let changes = link_changes(model, model.inertials()).unwrap();
             if let Ok(written) = rewrite_urdf(&text, &changes, &[]) {
@@ -188,12 +188,11 @@ proptest! {
     }
 }
 
-/// Every prefix of a good file is refused or read, never a panic; a URDF without its end is always refused.
+/// Every prefix of a valid file is rejected or read without a panic; an incomplete URDF is always rejected.
 #[test]
 fn every_truncation_is_survived() {
-    let root_end = ARM.trim_end().len();
-    for end in (0..root_end).filter(|&end| ARM.is_char_boundary(end)) {
-        assert!(read_urdf(&ARM[..end]).is_err());
+    assert_truncations_are_refused(ARM, |text| read_urdf(text).is_err());
+    for end in 0..TABLE.len() {
         let _ = TABLE.get(..end).map(read_dh);
     }
     assert!(read_dh(TABLE).is_ok() && read_urdf(ARM).is_ok());

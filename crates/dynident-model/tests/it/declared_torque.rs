@@ -1,4 +1,4 @@
-//! Declared torques: the parser against another evaluation, slopes against differences, tables against SciPy.
+//! Declared torques: the parser compared with another evaluation, slopes with differences, tables with SciPy.
 
 use dynident_model::terms::{
     Declared, DeclaredLaw, Expression, ExpressionProblem, JointMotion, JointNames, TorqueTable, TorqueTableError,
@@ -29,7 +29,7 @@ fn term(law: DeclaredLaw) -> TorqueTerm {
     })
 }
 
-/// By the rules of arithmetic, worked out by hand.
+/// Expected values were computed by hand.
 #[test]
 fn precedence_is_that_of_arithmetic() {
     let cases = [
@@ -73,7 +73,7 @@ fn broken_expressions_name_the_place() {
         let error = Expression::parse(text, &JointNames { own: Some(0), names: &names }).unwrap_err();
         assert!(matches!(error.problem, ExpressionProblem::TooLong { .. }), "{error}");
     }
-    // As deep as may be reads back.
+    // The maximum depth is accepted.
     let signs = format!("{}q", "-".repeat(60));
     let read = Expression::parse(&signs, &JointNames { own: Some(0), names: &names }).unwrap();
     assert_eq!(Expression::try_from(read.to_string()), Ok(read));
@@ -82,15 +82,15 @@ fn broken_expressions_name_the_place() {
 }
 
 #[test]
-fn what_has_no_value_is_none() {
+fn undefined_values_are_none() {
     for text in ["sqrt(q - 4)", "1 / (q - 3)", "ln(0 * q)", "asin(q)", "(q - 4)^0.5", "exp(exp(q * 20))", "1e12 * q"] {
         assert_eq!(at(text, [3.0, 7.0], [5.0, 11.0]), None, "{text}");
     }
-    // Also where the whole would be a number again.
+    // Also if the whole expression would be a number again.
     assert_eq!(at("atan(1 / (q - 3))", [3.0, 7.0], [0.0; 2]), None);
     assert_eq!(at("max(sqrt(q - 4), 0)", [3.0, 7.0], [0.0; 2]), None);
     assert_eq!(at("sqrt(max(q - 4, 0))", [3.0, 7.0], [0.0; 2]), Some(0.0));
-    // Columns are zero there, and whoever asks is told.
+    // Columns are zero there, and the undefined sample is reported.
     let term = term(DeclaredLaw::Expression(parsed("sqrt(q)")));
     let (q, zeros) = ([4.0, -1.0, 9.0], [0.0; 3]);
     let motion = JointMotion { samples: 3, q: &q, dq: &zeros, ddq: &zeros };
@@ -107,7 +107,7 @@ fn expressions() -> Vec<&'static str> {
         "exp(-q^2) * ln(5 + q2) + sqrt(6 + q * q2)",
         "abs(q) * q + (5 + q)^1.5 - (5 + q)^-2",
         "atan2(sin(q), 2 + cos(q2)) + min(q, q2) * max(dq, dq2)",
-        // A cable from a point on the base to one on the link, by the law of cosines, with its stretch beyond 0.8 m.
+        // Cable from a point on the base to a point on the link (law of cosines), with elongation beyond 0.8 m.
         "0.3 * 0.7 * sin(q + 0.2) * max(sqrt(0.3^2 + 0.7^2 - 2 * 0.3 * 0.7 * cos(q + 0.2)) - 0.8, 0)",
     ]
 }
@@ -138,14 +138,14 @@ fn slopes_equal_central_differences() {
                     value(&moved)
                 };
                 let expected = 2.0 * (moved(h) - moved(-h)) / (2.0 * h);
-                // Rounding of 1e-16 / h, and h times second derivatives of about ten where a kink is near.
+                // Rounding error of 1e-16 / h, and h times second derivatives of about ten near a kink.
                 assert!((found - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{term:?}: {found} {expected}");
             }
         }
     }
 }
 
-/// `PchipInterpolator` of SciPy 1.17.1 at the same points.
+/// Reference: `PchipInterpolator` of SciPy 1.17.1 with the same points.
 #[test]
 fn tables_are_the_curves_of_scipy() {
     let points = [[-1.5, -3.0], [-1.0, -1.0], [-0.2, -1.2], [0.1, 0.4], [0.9, 2.0], [1.0, 2.5], [2.5, 2.5]];
@@ -178,7 +178,7 @@ fn tables_are_the_curves_of_scipy() {
         assert!((table.slope(q) - slope).abs() < 1e-13, "{q}: {} {slope}", table.slope(q));
     }
     assert_eq!([table.value(-9.0), table.value(9.0), table.slope(-9.0), table.slope(9.0)], [-3.0, 2.5, 0.0, 0.0]);
-    // Never beyond the points to either side.
+    // No overshoot beyond neighbouring points.
     for step in 0..4000 {
         let q = -1.5 + f64::from(step) * 1e-3;
         let place = points.iter().rposition(|point| point[0] <= q).unwrap().min(points.len() - 2);
@@ -199,7 +199,7 @@ fn broken_tables_name_the_point() {
 }
 
 #[test]
-fn declared_torques_stand_behind_all_other_terms() {
+fn declared_torques_follow_all_other_terms() {
     use dynident_model::terms::{Coupling, CouplingEffect, Offset};
     let coupling =
         Coupling { name: "m".into(), first: 0, second: 1, ratios: [1.0; 2], effect: CouplingEffect::Inertia };
@@ -211,7 +211,7 @@ fn declared_torques_stand_behind_all_other_terms() {
     assert!(!declared.is_friction() && declared.own_joint() == Some(0) && !declared.is_nonnegative());
 }
 
-/// A text with what it means: an evaluation that shares nothing with the parser.
+/// A text with its value, computed independently of the parser.
 type Meaning = Box<dyn Fn([f64; 4]) -> f64>;
 
 fn written(choices: &mut impl Iterator<Item = u32>, depth: usize) -> (String, Meaning) {
@@ -254,20 +254,20 @@ fn written(choices: &mut impl Iterator<Item = u32>, depth: usize) -> (String, Me
 
 proptest! {
     #[test]
-    fn expressions_mean_what_is_written(
+    fn expressions_have_the_expected_values(
         choices in proptest::collection::vec(any::<u32>(), 1..60), state in proptest::array::uniform4(-3.0..3.0_f64)
     ) {
         let (text, meaning) = written(&mut choices.into_iter(), 5);
         let expression = Expression::parse(&text, &JointNames { own: Some(0), names: &names() });
-        // Up to 63 parts are some hundred operations at most, but texts may be too long.
+        // Up to 63 parts have at most some hundred operations, but texts may be too long.
         let Ok(expression) = expression else { return Ok(()) };
         let (q, dq) = ([state[0], state[1]], [state[2], state[3]]);
         let expected = meaning(state);
         if let Some(found) = expression.value(|joint| q[joint], |joint| dq[joint]) {
-            // The same operations in the same order; two mathematics libraries may share no last bit.
+            // The operations and their order are the same, but mathematics libraries may differ in the last bit.
             prop_assert!((found - expected).abs() <= 1e-12 * (1.0 + expected.abs()), "{text}: {found} {expected}");
         }
-        // Its own text is the same expression.
+        // Its canonical text parses to the same expression.
         let again = Expression::try_from(expression.to_string());
         prop_assert_eq!(again.as_ref(), Ok(&expression), "{}", expression);
     }

@@ -1,4 +1,4 @@
-//! D-H tables: forward kinematics against products of textbook matrices, inertials, trees, the paper's arm.
+//! D-H tables: forward kinematics compared with products of textbook matrices, inertials, trees, the paper's arm.
 
 use dynident_model::{DhConvention, Model, Transform, Vec3, load_robot, read_dh, read_urdf};
 use nalgebra::{Matrix4, Vector4};
@@ -42,14 +42,14 @@ fn shift(x: f64, y: f64, z: f64) -> Matrix4<f64> {
     Matrix4::new(1., 0., 0., x, 0., 1., 0., y, 0., 0., 1., z, 0., 0., 0., 1.)
 }
 
-/// The textbook matrix of one row at joint position `q`.
+/// Textbook matrix of one row at joint position `q`.
 fn textbook(convention: &str, &(a, alpha, d, theta, slides, negative): &Row, q: f64) -> Matrix4<f64> {
     let q = if negative { -q } else { q };
     let (d, theta) = if slides { (d + q, theta) } else { (d, theta + q) };
     if convention == "modified" {
         rot_x(alpha) * shift(a, 0., 0.) * rot_z(theta) * shift(0., 0., d)
     } else {
-        // Written out, as in Spong, Hutchinson and Vidyasagar, eq. 3.10.
+        // As in Spong, Hutchinson and Vidyasagar, eq. 3.10.
         let ((st, ct), (sa, ca)) = (theta.sin_cos(), alpha.sin_cos());
         Matrix4::new(ct, -st * ca, st * sa, a * ct, st, ct * ca, -ct * sa, a * st, 0., sa, ca, d, 0., 0., 0., 1.)
     }
@@ -64,8 +64,7 @@ fn base_from_body(model: &Model, q: &[f64]) -> Vec<Transform> {
     frames
 }
 
-/// Compares the axis, centre of mass and inertia of every body, carried to the base frame, with what the textbook's
-/// matrices say.
+/// Compares the axis, centre of mass and inertia of every body in the base frame with those from the textbook matrices.
 fn assert_like_textbook(convention: &str, rows: &[Row], q: &[f64]) {
     let model = read_dh(&table(convention, rows)).expect("a good table");
     let mut frame = shift(0.1, -0.2, 0.3) * rot_z(-0.6) * rot_y(0.5) * rot_x(0.4);
@@ -73,12 +72,12 @@ fn assert_like_textbook(convention: &str, rows: &[Row], q: &[f64]) {
     for (i, body) in base_from_body(&model, q).iter().enumerate() {
         let before = frame;
         frame *= textbook(convention, &rows[i], q[i]);
-        // The joint's axis: z of D-H frame i (modified) or i-1 (standard), through that frame's origin.
+        // Joint axis: z of D-H frame i (modified) or i-1 (standard), through that frame's origin.
         let holder = if convention == "modified" { frame } else { before };
         let axis = body.rotation.mul_vec(model.joints()[i].axis);
         let sign = if rows[i].5 { -1.0 } else { 1.0 };
         for k in 0..3 {
-            // Six rows of rotations and lengths of order one leave a few 1e-15.
+            // Six rows of rotations and lengths of order one give errors of a few 1e-15.
             assert!((axis[k] - sign * holder[(k, 2)]).abs() < 1e-13);
         }
         let moved = model.inertials()[i].expressed_in(body);
@@ -89,7 +88,7 @@ fn assert_like_textbook(convention: &str, rows: &[Row], q: &[f64]) {
         for k in 0..3 {
             assert!((found_com[k] - com[k]).abs() < 1e-13, "body {i}: {found_com:?} {com}");
             for l in 0..3 {
-                // The parallel-axis term, up to 1.5 kg · (7 m)², cancels: 1e-16 of 75.
+                // Cancellation of the parallel-axis term, up to 1.5 kg · (7 m)²: 1e-16 of 75.
                 assert!((found_inertia.0[k][l] - at_com[(k, l)]).abs() < 1e-12);
             }
         }
@@ -107,7 +106,7 @@ proptest! {
         assert_like_textbook(if standard { "standard" } else { "modified" }, &rows, &q);
     }
 
-    /// As if it stated that one, with the same gravity and the same joint held.
+    /// Equal to a table that states the other convention, with the same gravity and the same locked joint.
     #[test]
     fn a_table_is_known_in_the_other_convention(rows in proptest::collection::vec(row(), 2..5)) {
         let mounted = |convention: &str| {

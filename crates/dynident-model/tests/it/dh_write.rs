@@ -1,5 +1,5 @@
-//! Identified values in D-H tables, and such tables as URDF: what is read back is what was written, and nothing else
-//! has changed.
+//! Writing into D-H tables, and D-H tables as URDF: the values read back are the written ones, and nothing else
+//! changes.
 
 use core::fmt::Write;
 use dynident_model::{
@@ -8,7 +8,7 @@ use dynident_model::{
 };
 use proptest::prelude::*;
 
-/// A table with every way to write a row's tables, and comments.
+/// A table with all syntaxes for the tables of a row, and comments.
 const TABLE: &str = r#"# my arm
 name = "arm"   # of the cell
 convention = "standard"
@@ -39,7 +39,7 @@ fn inertial(mass: f64) -> InertialParameters {
     InertialParameters::from_centre_of_mass(mass, Vec3([0.1, -0.2, 0.05]), &inertia)
 }
 
-/// Largest difference of two models in inertials, kg, m, kg m².
+/// Compares the inertials of two models; tolerance in kg, kg m, kg m².
 fn assert_same_inertials(a: &Model, b: &[InertialParameters], tolerance: f64) {
     for (a, b) in a.inertials().iter().zip(b) {
         assert!(a.0.iter().zip(&b.0).all(|(a, b)| (a - b).abs() <= tolerance), "{a:?}\n{b:?}");
@@ -68,7 +68,7 @@ fn only_inertials_and_friction_change() {
     ];
     let text = rewrite_dh(TABLE, &links, &joints).unwrap();
     let back = read_dh(&text).unwrap();
-    // Into the D-H frames and back: rounding of numbers below one.
+    // Tolerance: rounding error of transforms into the D-H frames and back.
     assert_same_inertials(&back, &new, 1e-14);
     let friction: Vec<_> = back.joints().iter().map(|joint| (joint.damping, joint.friction)).collect();
     assert_eq!(friction, [(Some(0.75), Some(2.0)), (None, None), (None, Some(1.5))]);
@@ -99,7 +99,7 @@ fn rows_on_one_line_and_a_byte_order_mark_stay() {
 }
 
 #[test]
-fn what_the_table_does_not_hold_is_refused() {
+fn unknown_parts_are_refused() {
     let link = LinkChange::Set { link: "d".to_owned(), inertial: inertial(1.0), note: None };
     assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("no link `d`"));
     let twice =
@@ -120,7 +120,7 @@ fn hostile_names_stay_inside_their_attributes() {
 }
 
 proptest! {
-    /// A D-H table, its model as URDF, that read again: the same motion and the same bodies.
+    /// A D-H table written as URDF and read again: same motion and same bodies.
     #[test]
     fn urdf_of_a_table_is_the_same_robot(
         rows in prop::collection::vec((-1.0..1.0_f64, -3.2..3.2_f64, -1.0..1.0_f64, -3.2..3.2_f64, 0..3_usize), 1..6),
@@ -141,7 +141,7 @@ proptest! {
         let model = read_dh(&table).unwrap();
         let text = write_urdf(&model);
         let back = read_urdf(&text).unwrap().model;
-        // Angles of a rotation and back lose half the digits' square root only near right angles of pitch; 1e-12 m.
+        // Angles computed from a rotation lose half of the digits only near a pitch of 90°; 1e-12 m.
         for (joint, (a, b)) in model.joints().iter().zip(back.joints()).enumerate() {
             prop_assert_eq!(&a.name, &b.name);
             prop_assert_eq!((a.kind, a.damping, a.parent), (b.kind, b.damping, b.parent));

@@ -1,4 +1,4 @@
-//! Friction laws against differences, limits and what is known of them by hand.
+//! Friction laws compared with differences, limits and known values.
 use dynident_lanes::Dual;
 use dynident_model::OwnScale;
 use dynident_model::terms::{
@@ -62,9 +62,9 @@ fn terms_of_all_kinds() -> Vec<TorqueTerm> {
     terms
 }
 
-/// What a simulation makes of a law is what its regressor column says.
+/// The simulated torque of a law equals its regressor column.
 #[test]
-fn columns_are_what_the_action_says() {
+fn columns_equal_the_simulated_torque() {
     let (q, dq, ddq) = ([0.3, -0.2], [0.07, 0.4], [2.0, -3.0]);
     let motion = JointMotion { samples: 1, q: &q, dq: &dq, ddq: &ddq };
     let load = 7.0;
@@ -81,7 +81,7 @@ fn columns_are_what_the_action_says() {
                 TermAction::Inertia { factor } => factor * across(&ddq),
                 TermAction::Damping { factor } => factor * across(&dq),
                 TermAction::Constant => 1.0,
-                // A spring that starts here, and a joint at its reference temperature.
+                // An undeflected spring, and a joint at its reference temperature.
                 TermAction::Hysteresis | TermAction::Temperature => 0.0,
                 TermAction::Friction(friction) => {
                     let speed: f64 = joints.iter().zip(friction.ratios).map(|(&joint, ratio)| ratio * dq[joint]).sum();
@@ -119,7 +119,7 @@ fn slopes_equal_central_differences() {
         term.apply_adjoint(0, &motion, &vec![2.0; speeds.len()], gradient);
         for k in 0..speeds.len() {
             let expected = 2.0 * (more[k] - less[k]) / (2.0 * h);
-            // h² times a third derivative of at most 1/(0.006)³ or so, at velocities half a step from rest.
+            // Error h² times a third derivative of about 1/(0.006)³, at velocities half a step from rest.
             let tolerance = 1e-3 * (1.0 + expected.abs());
             assert!((by_dq[k] - expected).abs() <= tolerance, "{term:?} at {}: {} {expected}", speeds[k], by_dq[k]);
             assert!(by_q[k] == 0.0 && by_ddq[k] == 0.0);
@@ -128,7 +128,7 @@ fn slopes_equal_central_differences() {
 }
 
 #[test]
-fn at_rest_and_at_any_speed_all_is_finite_and_friction_takes_power() {
+fn friction_is_finite_and_dissipative() {
     let speeds = [0.0, 1e-300, -1e-300, 1e-9, 1.0, -1.0, 1e6, -1e6];
     let zeros = [0.0; 8];
     for term in terms_of_velocity() {
@@ -157,13 +157,13 @@ fn both_directions_together_are_the_symmetric_term() {
 
 #[test]
 fn known_values() {
-    // Gaz with φ₃ = 0 is half a smooth step of width 2/φ₂.
+    // The sigmoid with φ₃ = 0 is half a smooth step of width 2/φ₂.
     let speeds = [-0.3, -0.02, 0.0, 0.05];
     let sigmoid = column(&TorqueTerm::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.0 }), &speeds);
     for (value, dq) in sigmoid.iter().zip(speeds) {
         assert!((value - 0.5 * (dq / 0.05).tanh()).abs() < 1e-14);
     }
-    // At its own velocity a share of 1/e is left.
+    // At the Stribeck velocity, the share 1/e remains.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
     let stribeck = TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.05, exponent: 1.6, shape });
     assert!((column(&stribeck, &[-0.05])[0] + (-1.0_f64).exp()).abs() < 1e-14);
@@ -191,17 +191,17 @@ fn friction_by_load() {
 }
 
 #[test]
-fn a_slipping_spring_makes_the_loop_of_masing_and_remembers_across_blocks() {
+fn maxwell_slip_follows_masing_loops_across_blocks() {
     let limit = 0.1;
     let term = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: limit });
-    // Out by three yields, back by one, back by three, out again.
+    // Forward by three yield displacements, back by one, back by three, forward again.
     let q: Vec<f64> = [0.0, 0.05, 0.1, 0.3, 0.2, 0.1, -0.1, 0.0].to_vec();
     let expected = [0.0, 0.5, 1.0, 1.0, 0.0, -1.0, -1.0, 0.0];
     let zeros = vec![0.0; q.len()];
     let mut whole = vec![f64::NAN; q.len()];
     term.column(0, &JointMotion { samples: q.len(), q: &q, dq: &zeros, ddq: &zeros }, &mut whole);
     for (value, expected) in whole.iter().zip(expected) {
-        // Differences of positions below one.
+        // Tolerance: differences of positions below one.
         assert!((value - expected).abs() < 1e-14, "{whole:?}");
     }
     for split in 0..=q.len() {
@@ -235,7 +235,7 @@ fn friction_changes_with_the_temperature_about_its_reference() {
             TermInput { load: None, temperature_c: Some(&temperature), memory: &mut HysteresisState::default() };
         term.column_following(0, &motion, &mut input, &mut out);
         assert_eq!(out, expected, "{}", term.symbol());
-        // Without a temperature the joint is at its reference.
+        // Without a temperature the joint is at the reference temperature.
         term.column(0, &motion, &mut out);
         assert_eq!(out, [0.0; 4]);
         assert!(term.needs_temperature() && term.is_joint_friction() && !term.is_nonnegative());
@@ -245,7 +245,7 @@ fn friction_changes_with_the_temperature_about_its_reference() {
 }
 
 #[test]
-fn a_term_is_where_its_coordinates_say() {
+fn coordinates_set_the_constants() {
     const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
     let stribeck = |shape| TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 1.5, shape });
     let sigmoid = TorqueTerm::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.01 });
@@ -253,10 +253,10 @@ fn a_term_is_where_its_coordinates_say() {
     for term in [stribeck(STEP), stribeck(SIGN), sigmoid, coulomb] {
         let own = term.kind().coordinates();
         let back = term.at(&own, 1.0).kind().coordinates();
-        // Logarithms and back: a few roundings.
+        // Tolerance: rounding error of logarithm and exponential.
         assert!(own.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-12) && own.len() == back.len(), "{term:?}");
     }
-    // A change of one coordinate is a change of the constant that it names, and of no other.
+    // A change of one coordinate changes only the named constant.
     let names = ["speed", "exponent"];
     let own = stribeck(STEP).kind().coordinates();
     for (place, name) in names.into_iter().enumerate() {
@@ -269,14 +269,14 @@ fn a_term_is_where_its_coordinates_say() {
     }
 }
 
-/// One expression: generated code, which is written over symbols, and simulation have the value of the column.
+/// Generated code and simulation use the same expression as the column.
 #[test]
 fn torque_over_any_scalar_is_the_column() {
     for term in terms_of_velocity() {
         for dq in [-0.3, -0.02, 0.0, 0.004, 0.7] {
             let (number, dual) = (term.torque(0, &[dq]).unwrap(), term.torque(0, &[Dual::variable(dq)]).unwrap());
             assert_eq!(dual.value, number);
-            // Lanes have a tangent and an exponential within 4 units of the last place.
+            // Tangent and exponential of lanes are accurate to 4 units in the last place.
             assert!((column(&term, &[dq])[0] - number).abs() < 1e-14, "{term:?} {dq}");
         }
     }
@@ -286,7 +286,7 @@ fn torque_over_any_scalar_is_the_column() {
     }
 }
 
-/// Recordings choose only what a study can state, and every candidate has its own name and place.
+/// Every candidate can be stated in a study, and has a unique name and place.
 #[test]
 fn every_candidate_can_be_stated() {
     let joint = CandidateJoint {
@@ -306,7 +306,7 @@ fn every_candidate_can_be_stated() {
             assert_eq!(term.candidate(), Some(law));
             let constants = term.kind().coordinates().len();
             assert!(constants == law.constants || law.constants == 0, "{term:?}");
-            // Viscous and Coulomb friction have keys of their own.
+            // Viscous and Coulomb friction have separate keys.
             let Some(stated) = term.kind().stated() else {
                 assert!(term.property().is_some(), "{term:?}");
                 continue;

@@ -1,7 +1,7 @@
-//! MJCF: rules of the format, what is refused, what is said. The torques of whole models are held against MuJoCo's in
-//! the tests of `dynident-dynamics`.
+//! MJCF: rules of the format, errors and notices. Torques of whole models are compared with MuJoCo in the tests of
+//! `dynident-dynamics`.
 
-use crate::common::{mutate, mutations};
+use crate::common::{assert_truncations_are_refused, mutate, mutations};
 use dynident_model::mjcf::Loss;
 use dynident_model::{
     DescriptionFormat, JointKind, JointSpring, Mimic, audit, load_robot, read_mjcf, read_mjcf_with, rewrite_mjcf,
@@ -9,7 +9,7 @@ use dynident_model::{
 use dynident_testing::{count, repository};
 use proptest::prelude::*;
 
-/// A document around the contents of a body that one hinge moves.
+/// A document around the contents of a body with one hinge.
 fn with_body(contents: &str) -> String {
     format!("<mujoco><worldbody><body name=\"b\"><joint name=\"j\"/>{contents}</body></worldbody></mujoco>")
 }
@@ -97,7 +97,7 @@ fn faults_are_named_at_their_place() {
 }
 
 #[test]
-fn included_files_stand_in_their_place_and_are_named_in_faults() {
+fn included_files_are_expanded_and_named_in_faults() {
     let main = "<mujoco>\n  <include file=\"a.xml\"/>\n</mujoco>";
     let mut files = |name: &str| match name {
         "a.xml" => Ok("<mujocoinclude><worldbody>\n<include file=\"b.xml\"/></worldbody></mujocoinclude>".to_owned()),
@@ -122,7 +122,7 @@ fn included_files_stand_in_their_place_and_are_named_in_faults() {
 }
 
 #[test]
-fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
+fn symmetric_effort_limits_are_read() {
     let text = r#"<mujoco><default><motor ctrlrange="-2 2"/></default><worldbody>
       <body><joint name="motor"/><joint name="joint" actuatorfrcrange="-5 5"/><joint name="one-sided"/>
         <joint name="servo"/><joint name="none"/><joint name="both"/><joint name="two"/></body></worldbody>
@@ -136,7 +136,8 @@ fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
       </actuator></mujoco>"#;
     let robot = read_mjcf(text).unwrap();
     let efforts: Vec<Option<f64>> = robot.model.joints().iter().map(|joint| joint.limits.effort).collect();
-    // The default of motors is that of all actuators: `general` states its own, `velocity` is no force.
+    // The default of motors applies to all actuators: `general` overrides it, and a `velocity` actuator has no force
+    // range.
     assert_eq!(efforts, [Some(60.0), Some(5.0), None, Some(7.0), None, Some(1.5), Some(6.0)]);
     assert!(
         matches!(&robot.notices[0].loss, Loss::OneSidedEffort { joint, high, .. } if joint == "`one-sided`" && *high == 3.0)
@@ -144,7 +145,7 @@ fn limits_of_joints_and_actuators_are_read_where_they_are_the_same_both_ways() {
     assert_eq!((robot.notices.len(), robot.notices[0].line), (1, 6));
 }
 
-/// A four-bar linkage: a crank of 1 m, a rod, and a rocker that the rod meets at `anchor`.
+/// A four-bar linkage: a crank of 1 m, a rod, and a rocker that is connected to the rod at `anchor`.
 fn linkage(actuator: &str, anchor: &str) -> String {
     format!(
         r#"<mujoco><worldbody>
@@ -158,7 +159,7 @@ fn linkage(actuator: &str, anchor: &str) -> String {
 }
 
 #[test]
-fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
+fn parallelograms_are_closed_and_other_chains_give_notices() {
     let drive = r#"<motor joint="drive"/>"#;
     let robot = read_mjcf(&linkage(drive, "2 0 0")).unwrap();
     assert!(robot.notices.is_empty() && robot.model.dof() == 1, "{:?}", robot.notices);
@@ -166,10 +167,10 @@ fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
     assert_eq!(followers, [Mimic::of("drive", -1.0, 0.0), Mimic::of("drive", 1.0, 0.0)]);
     let all = r#"<motor joint="drive"/><motor joint="rod_joint"/><motor joint="rocker_joint"/>"#;
     for (text, words) in [
-        (linkage("", "2 0 0"), "no actuator says which joints have a drive; name the others in [[robot.loop]]"),
+        (linkage("", "2 0 0"), "no joint has an actuator; name the passive joints in [[robot.loop]]"),
         (linkage(all, "2 0 0"), "every joint of the chain has an actuator"),
         (linkage(drive, "2 0 0.3"), "no parallelogram"),
-        (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "there is no body `rokcer`"),
+        (linkage(drive, "2 0 0").replace("body2=\"rocker\"", "body2=\"rokcer\""), "unknown body `rokcer`"),
     ] {
         let robot = read_mjcf(&text).unwrap();
         let said: Vec<String> = robot.notices.iter().map(|notice| notice.loss.to_string()).collect();
@@ -178,7 +179,7 @@ fn a_parallelogram_that_is_connected_follows_and_what_is_none_is_said() {
 }
 
 #[test]
-fn a_line_of_equality_is_a_follower_and_more_is_said() {
+fn linear_equalities_are_mimics_and_others_give_notices() {
     let text = r#"<mujoco><compiler angle="radian"/><worldbody>
       <body gravcomp="1"><joint name="a" ref="0.5"/><joint name="b" ref="-1"/><joint name="c" stiffness="3"/></body>
       </worldbody>
@@ -202,14 +203,14 @@ fn a_line_of_equality_is_a_follower_and_more_is_said() {
 }
 
 #[test]
-fn a_mass_by_a_mesh_is_unknown_and_said() {
+fn mesh_mass_is_unknown_with_a_notice() {
     let text =
         with_body("<geom type=\"mesh\" mesh=\"m\"/><geom size=\"1\"/><body name=\"tip\"><geom size=\"0.1\"/></body>");
     let robot = read_mjcf(&text).unwrap();
     let body = &robot.model.bodies()[0];
     assert!(body.links[0].inertial.is_none() && body.links[1].inertial.is_some());
     assert!(matches!(&robot.notices[0].loss, Loss::UnknownMass { body, .. } if body == "b"));
-    // Weightless, of a group that does not count, or beside an <inertial>: nothing is missing.
+    // Massless, of an excluded group, or in addition to an <inertial>: the mass is known.
     for geom in ["mass=\"0\"", "density=\"0\"", "group=\"7\""] {
         let text = with_body(&format!("<geom type=\"mesh\" mesh=\"m\" {geom}/><geom size=\"1\"/>"));
         let robot = read_mjcf(&text).unwrap();
@@ -220,7 +221,7 @@ fn a_mass_by_a_mesh_is_unknown_and_said() {
 }
 
 #[test]
-fn several_joints_of_a_body_are_a_chain_and_misspelt_words_are_said() {
+fn several_joints_form_a_chain_and_misspelt_words_give_notices() {
     let text = r#"<mujoco model="m"><worldbody><body name="b"><joint name="x" type="slide" axis="1 0 0"/><joint rang="0 1"/>
       <joint range="-90 90"/><geom size="1"/></body></worldbody></mujoco>"#;
     let robot = read_mjcf(text).unwrap();
@@ -244,7 +245,7 @@ fn files_are_recognised_by_their_content() {
         std::fs::write(&path, with_body("<geom size=\"1\"/>")).unwrap();
         assert_eq!(load_robot(&path).unwrap().format, DescriptionFormat::Mjcf, "{name}");
     }
-    // The folder of the document counts, not that of the program.
+    // Files are searched relative to the document, not to the working directory.
     std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\"arm.xml\"/></mujoco>").unwrap();
     assert_eq!(load_robot(folder.path().join("main.xml")).unwrap().model.dof(), 1);
     std::fs::write(folder.path().join("main.xml"), "<mujoco><include file=\"none.xml\"/></mujoco>").unwrap();
@@ -268,11 +269,7 @@ fn included(file: &str) -> Result<String, String> {
 #[test]
 fn every_truncation_is_refused() {
     for name in FILES {
-        let text = text_of(name);
-        let end = text.trim_end().len();
-        for end in (0..end).filter(|&end| text.is_char_boundary(end)) {
-            assert!(read_mjcf_with(&text[..end], included).is_err(), "{name} to {end}");
-        }
+        assert_truncations_are_refused(&text_of(name), |text| read_mjcf_with(text, included).is_err());
     }
 }
 
@@ -296,7 +293,7 @@ const PIECES: [&str; 14] = [
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(1000, 20_000) as u32) })]
 
-    /// What is read after all is finite, can be audited, and can be rewritten without a change.
+    /// If a mutated file can be read, it is finite, can be audited, and can be rewritten without a change.
     #[test]
     fn a_mutated_mjcf_never_panics(
         file in 0..FILES.len(),

@@ -1,5 +1,6 @@
-//! Writing back into an MJCF: the new values are read again, and everything else stays byte for byte.
+//! Writing into an MJCF: the new values can be read, and all other bytes stay.
 
+use crate::common::assert_same_inertials;
 use dynident_model::mjcf::included_from;
 use dynident_model::{
     DescriptionFormat, InertialParameters, JointChange, LinkChange, Mat3, Model, Vec3, link_changes, load_robot,
@@ -11,7 +12,7 @@ fn no_files(_: &str) -> Result<String, String> {
     Err("no files".to_owned())
 }
 
-/// Bodies that can be real and are no one's: the description's with a point mass beside them.
+/// Physically consistent bodies: those of the description plus a point mass.
 fn other_bodies(model: &Model) -> Vec<InertialParameters> {
     let beside = |(k, inertial): (usize, &InertialParameters)| {
         let place = Vec3([0.02 + 0.01 * k as f64, -0.03, 0.05]);
@@ -21,19 +22,8 @@ fn other_bodies(model: &Model) -> Vec<InertialParameters> {
     model.inertials().iter().enumerate().map(beside).collect()
 }
 
-/// 1e-12 relative to the largest of a body's ten parameters: moving the inertia to the centre of mass and back costs
-/// some ten roundings.
-fn assert_same_inertials(model: &Model, expected: &[InertialParameters], what: &str) {
-    for (found, expected) in model.inertials().iter().zip(expected) {
-        let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        for k in 0..10 {
-            assert!((found.0[k] - expected.0[k]).abs() <= 1e-12 * scale, "{what}: {found:?} {expected:?}");
-        }
-    }
-}
-
-/// Every model of `golden/mjcf`: given new bodies and drives, MuJoCo's own or said why not; without a change the same
-/// bytes.
+/// Every model of `golden/mjcf` accepts new bodies and drives or is rejected with a known reason; without a change all
+/// bytes stay.
 #[test]
 fn published_models_take_new_bodies_and_drives() {
     let mut written = 0;
@@ -72,10 +62,10 @@ fn published_models_take_new_bodies_and_drives() {
                 }
                 written += 1;
             }
-            // Two joints in one body, or a compiler that changes masses.
+            // Two joints in one body, or a compiler setting that changes masses.
             Err(error) => {
                 let message = error.to_string();
-                let known = ["stands between two joints", "of <compiler> changes the masses"];
+                let known = ["is between two joints", "of <compiler> changes the masses"];
                 assert!(known.iter().any(|known| message.contains(known)), "{}: {message}", path.display());
             }
         }
@@ -83,7 +73,7 @@ fn published_models_take_new_bodies_and_drives() {
     assert!(written >= 15, "{written}");
 }
 
-/// What MuJoCo has loaded and computed with (`golden/mjcf.py`) is what this writer writes, byte for byte.
+/// The writer gives exactly the file that MuJoCo has loaded and computed with (`golden/mjcf.py`).
 #[test]
 fn the_written_panda_is_the_one_that_mujoco_has_read() {
     let robot = load_robot(repository("golden/mjcf/robosuite_panda.xml")).unwrap();
@@ -110,7 +100,7 @@ const ARM: &str = "<mujoco>\r\n  <!-- mine -->\r\n  <worldbody>\r\n    <body nam
 #[test]
 fn only_inertials_and_drives_change() {
     let model = read_mjcf(ARM).unwrap().model;
-    // The link's frame stands at the hinge, half a metre along x.
+    // The link's frame is at the hinge, half a metre along x.
     let inertial = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
     let links = link_changes(&model, &[inertial]).unwrap();
     let joint = JointChange {
@@ -138,7 +128,7 @@ fn only_inertials_and_drives_change() {
 }
 
 #[test]
-fn what_mujoco_would_refuse_or_change_is_refused() {
+fn values_that_mujoco_rejects_or_changes_are_refused() {
     let set = |link: &str, inertial| LinkChange::Set { link: link.to_owned(), inertial, note: None };
     let ball = InertialParameters::from_centre_of_mass(1.0, Vec3::ZERO, &Mat3::IDENTITY);
     let refused =
@@ -167,7 +157,7 @@ fn what_mujoco_would_refuse_or_change_is_refused() {
         assert!(message.starts_with(&format!("`{setting}` of <compiler> changes the masses")), "{message}");
     }
     let two = ARM.replace("<joint ", "<joint name=\"i\"/><joint ");
-    assert!(refused(&two, set("a/i", ball)).contains("`a/i` stands between two joints"));
+    assert!(refused(&two, set("a/i", ball)).contains("`a/i` is between two joints"));
     let joint = |joint: &str, damping| JointChange {
         joint: joint.to_owned(),
         damping: Some(damping),
@@ -184,5 +174,5 @@ fn what_mujoco_would_refuse_or_change_is_refused() {
     let main = "<mujoco><include file=\"arm.xml\"/></mujoco>";
     let mut arm = |_: &str| Ok(ARM.to_owned());
     let error = rewrite_mjcf(main, &mut arm, &[set("a", ball)], &[]).unwrap_err().to_string();
-    assert!(error.contains("body `a` stands in an included file"), "{error}");
+    assert!(error.contains("body `a` is in an included file"), "{error}");
 }

@@ -1,11 +1,11 @@
-//! SDF: what is refused, with place and fix, and what is only said. Dynamics against Drake are in dynident-dynamics.
+//! SDF: errors with place and fix, and notices. Dynamics are compared with Drake in dynident-dynamics.
 
-use crate::common::{mutate, mutations};
+use crate::common::{assert_truncations_are_refused, mutate, mutations};
 use dynident_model::{DescriptionFormat, JointSpring, SdfLoss, audit, load_robot, read_sdf, write_urdf};
 use dynident_testing::{count, repository};
 use proptest::prelude::*;
 
-/// A pendulum; `link` and `joint` stand in its moving link and its joint, `more` in the model.
+/// A pendulum with contents of its moving link (`link`), its joint (`joint`) and the model (`more`).
 fn pendulum(link: &str, joint: &str, more: &str) -> String {
     format!(
         r#"<sdf version="1.9"><model name="p">
@@ -53,7 +53,7 @@ fn faults_name_the_place_and_the_fix() {
         (&changed("0 0 -0.5 0 0 0", "0 0 -0.5"), "<pose> holds 3 numbers: write 6"),
         (&changed("<pose>", "<pose rotation_format=\"euler\">"), "write euler_rpy or quat_xyzw"),
         (&changed("name=\"rod\"", "name=\"base\""), "`base` is defined a second time"),
-        (&pendulum(INERTIAL, AXIS, "<link name=\"loose\"/>"), "links `world` and `loose` are both carried by no joint"),
+        (&pendulum(INERTIAL, AXIS, "<link name=\"loose\"/>"), "links `world` and `loose` both have no parent joint"),
         (
             &pendulum(
                 INERTIAL,
@@ -83,22 +83,22 @@ fn faults_name_the_place_and_the_fix() {
     let loop_of_two = r#"<sdf version="1.9"><model name="m"><link name="a"/><link name="b"/>
 <joint name="j" type="fixed"><parent>a</parent><child>b</child></joint>
 <joint name="k" type="fixed"><parent>b</parent><child>a</child></joint></model></sdf>"#;
-    // Each joint's pose is relative to its child, whose pose is the model's: only the tree shows the loop.
-    assert!(read_sdf(loop_of_two).unwrap_err().to_string().contains("carried by itself"));
+    // Each joint's pose is relative to its child, so only the tree shows the loop.
+    assert!(read_sdf(loop_of_two).unwrap_err().to_string().contains("is its own ancestor"));
 }
 
 #[test]
-fn what_the_model_does_not_hold_is_said() {
+fn unsupported_contents_give_notices() {
     let spring = "<axis><xyz>0 1 0</xyz><dynamics><spring_stiffness>3</spring_stiffness></dynamics></axis>";
     let robot = read_sdf(&pendulum("<gravity>0</gravity>", spring, "<include><uri>hand</uri></include>")).unwrap();
     let mut said: Vec<&str> = robot.notices.iter().map(|notice| notice.loss.name()).collect();
     said.sort_unstable();
-    // Of the base nothing has to be known.
+    // Nothing has to be known of the base.
     assert_eq!(said, ["include", "unknown-mass", "weightless"]);
     let unknown = robot.notices.iter().find(|notice| matches!(notice.loss, SdfLoss::UnknownMass { .. })).unwrap();
     assert_eq!(unknown.line, 3);
     assert_eq!(robot.model.bodies_without_prior(), ["rod"]);
-    // A spring is held: it is a torque term.
+    // A spring is a torque term.
     assert_eq!(robot.model.joints()[0].spring, Some(JointSpring { stiffness: 3.0, reference: 0.0 }));
     let whole = read_sdf(&pendulum(INERTIAL, AXIS, "")).unwrap();
     assert!(whole.notices.is_empty(), "{:?}", whole.notices);
@@ -127,11 +127,7 @@ fn text_of(name: &str) -> String {
 #[test]
 fn every_truncation_is_refused() {
     for name in FILES {
-        let text = text_of(name);
-        let end = text.trim_end().len();
-        for end in (0..end).filter(|&end| text.is_char_boundary(end)) {
-            assert!(read_sdf(&text[..end]).is_err(), "{name} to {end}");
-        }
+        assert_truncations_are_refused(&text_of(name), |text| read_sdf(text).is_err());
     }
 }
 
@@ -155,7 +151,7 @@ const PIECES: [&str; 14] = [
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(1000, 20_000) as u32) })]
 
-    /// What is read after all is finite, can be audited, and can be written as a URDF.
+    /// If a mutated file can be read, it is finite, can be audited, and can be written as a URDF.
     #[test]
     fn a_mutated_sdf_never_panics(
         file in 0..FILES.len(),

@@ -1,4 +1,4 @@
-//! Writing back into an SDF: the new values are read again, and everything else stays byte for byte.
+//! Writing into an SDF: the new values can be read, and all other bytes stay.
 
 use dynident_model::{
     Body, InertialParameters, JointChange, LinkChange, Mat3, Model, Vec3, link_changes, load_robot, read_sdf,
@@ -6,14 +6,14 @@ use dynident_model::{
 };
 use dynident_testing::repository;
 
-/// The model with the own link of every moving body alone: what is fixed to it keeps its inertial.
+/// The model with only the own link of every moving body: fixed links keep their inertial.
 fn own_links(model: &Model) -> Model {
     let own = |body: &Body| Body { links: vec![body.links[0].clone()] };
     let bodies = model.bodies().iter().map(own).collect();
     Model::new(model.name(), model.base().clone(), model.joints().to_vec(), bodies).unwrap()
 }
 
-/// Bodies that can be real and are no one's.
+/// Physically consistent bodies of no particular robot.
 fn other_inertials(count: usize) -> Vec<InertialParameters> {
     let of = |k: usize| {
         let place = Vec3([0.02 + 0.01 * k as f64, -0.03, 0.05]);
@@ -23,7 +23,7 @@ fn other_inertials(count: usize) -> Vec<InertialParameters> {
     (0..count).map(of).collect()
 }
 
-/// Every model of `golden/sdf` takes new bodies and drives; without a change the same bytes.
+/// Every model of `golden/sdf` accepts new bodies and drives; without a change all bytes stay.
 #[test]
 fn every_model_takes_new_bodies_and_drives() {
     let mut written = 0;
@@ -50,7 +50,8 @@ fn every_model_takes_new_bodies_and_drives() {
         for (found, expected) in own_links(&again).bodies().iter().zip(&inertials) {
             let found = found.links[0].inertial.unwrap();
             let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            // To the link's origin, about the centre of mass and back: some ten roundings of lengths of a metre.
+            // Transform to the link's origin, to the centre of mass and back: about ten roundings of lengths of a
+            // metre.
             assert!((0..10).all(|k| (found.0[k] - expected.0[k]).abs() <= 1e-12 * scale.max(1.0)), "{name}: {found:?}");
         }
         for (new, old) in again.joints().iter().zip(model.joints()) {
@@ -60,7 +61,7 @@ fn every_model_takes_new_bodies_and_drives() {
         for (new, old) in again.bodies().iter().zip(model.bodies()) {
             assert_eq!(new.links[1..], old.links[1..], "{name}");
         }
-        // The same change again changes nothing.
+        // The same change again has no effect.
         assert_eq!(rewrite_sdf(&new, &links, &joints).unwrap(), new, "{name}");
         written += 1;
     }
@@ -78,7 +79,7 @@ fn set(inertial: InertialParameters) -> LinkChange {
 
 #[test]
 fn only_inertials_and_drives_change() {
-    // The link's frame stands at the joint, half a metre along x.
+    // The link's frame is at the joint, half a metre along x.
     let inertial = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
     let joint = JointChange {
         joint: "j".to_owned(),
@@ -97,7 +98,7 @@ fn only_inertials_and_drives_change() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused() {
+fn invalid_changes_are_refused() {
     let good = InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY);
     let refused =
         |links: &[LinkChange], joints: &[JointChange]| rewrite_sdf(ARM, links, joints).unwrap_err().to_string();
@@ -114,7 +115,7 @@ fn what_cannot_be_written_is_refused() {
     assert!(refused(&[set(broken)], &[]).contains("link `rod` are not all finite"));
     assert!(refused(&[set(good), set(good)], &[]).contains("two changes to link `rod`"));
     let remove = LinkChange::Remove { link: "rod".to_owned() };
-    assert!(refused(&[remove], &[]).contains("takes for 1 kg"));
+    assert!(refused(&[remove], &[]).contains("default is 1 kg"));
     let ghost = LinkChange::Set { link: "j".to_owned(), inertial: good, note: None };
     assert!(refused(&[ghost], &[]).contains("no link `j`"));
     assert!(refused(&[], &[joint("rod", 1.0)]).contains("no joint `rod`"));
@@ -123,7 +124,7 @@ fn what_cannot_be_written_is_refused() {
     assert!(rewrite_sdf("<sdf", &[], &[]).is_err());
 }
 
-/// What Drake has loaded and computed with (`golden/sdf.py`) is what this writer writes, byte for byte.
+/// The writer gives exactly the file that Drake has loaded and computed with (`golden/sdf.py`).
 #[test]
 fn the_written_model_is_the_one_that_drake_has_read() {
     let robot = load_robot(repository("golden/sdf/rules_poses.sdf")).unwrap();

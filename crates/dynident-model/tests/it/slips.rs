@@ -1,10 +1,10 @@
-//! Slips of known descriptions: named, explained and undone, and none seen where there is none.
+//! Seeded mistakes in known descriptions are found, explained and corrected; correct descriptions have none.
 
 use crate::common::ARM;
 use dynident_model::{SlipKind, Slips, StatedInertial, Vec3, read_urdf, rewrite_inertials, slips, stated_inertials};
 use dynident_testing::repository;
 
-/// Published descriptions without a slip: arms, humanoids, fingers.
+/// Published descriptions without a mistake: arms, humanoids, fingers.
 const ROBOTS: [&str; 9] =
     ["planar2r", "ur10", "panda", "panda_arm7", "iiwa14", "tx40", "g1_29dof", "talos_reduced", "talos_full_v2"];
 
@@ -16,7 +16,7 @@ fn look(text: &str) -> Slips {
     slips(text, &read_urdf(text).unwrap().model, None).unwrap()
 }
 
-/// The text with every inertial (or those that `chosen` takes) spoilt.
+/// The text with every inertial (selected by `chosen`) changed by `spoil`.
 fn spoilt(text: &str, chosen: impl Fn(&StatedInertial) -> bool, spoil: impl Fn(&mut StatedInertial)) -> String {
     let stated = stated_inertials(text).unwrap();
     let mut wrong = stated.clone();
@@ -24,31 +24,31 @@ fn spoilt(text: &str, chosen: impl Fn(&StatedInertial) -> bool, spoil: impl Fn(&
     rewrite_inertials(text, &stated, &wrong).unwrap()
 }
 
-/// That the slip is the only one found, and that its correction gives the original back: numbers to 1e-12 of the
-/// link's largest (some ten roundings), everything else byte for byte.
+/// Asserts that only this mistake is found, and that its correction restores the original: numbers to 1e-12 of the
+/// link's largest (about ten roundings), all other bytes exactly.
 fn undone(robot: &str, wrong: &str, kind: SlipKind) {
     let original = text(robot);
     let found = look(wrong);
     let kinds: Vec<&str> = found.found.iter().map(|slip| slip.kind.name()).collect();
     assert_eq!(kinds, [kind.name()], "{robot}: {:#?}", found.found);
     assert!(!found.found[0].corrections.is_empty() && !found.found[0].evidence.is_empty());
-    let mended = rewrite_inertials(wrong, &found.stated, &found.corrected).unwrap();
+    let repaired = rewrite_inertials(wrong, &found.stated, &found.corrected).unwrap();
     let numbers = |text: &str| -> Vec<Vec<f64>> {
         let stated = stated_inertials(text).unwrap();
         stated.iter().map(|one| one.com_m.into_iter().chain(one.moments).chain([one.mass_kg]).collect()).collect()
     };
-    for (ours, theirs) in numbers(&mended).iter().zip(numbers(&original)) {
+    for (ours, theirs) in numbers(&repaired).iter().zip(numbers(&original)) {
         let size = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         for (ours, theirs) in ours.iter().zip(&theirs) {
             assert!((ours - theirs).abs() <= 1e-12 * size, "{robot}, {}: {ours} {theirs}", kind.name());
         }
     }
-    // Without digits, signs, points and exponents nothing differs but inside of the numbers.
+    // Without digits, signs, points and exponents, the texts are equal.
     let frame = |text: &str| -> String {
         text.chars().filter(|c| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E'))).collect()
     };
-    assert_eq!(frame(&mended), frame(&original), "{robot}");
-    assert_eq!(mended.lines().count(), original.lines().count());
+    assert_eq!(frame(&repaired), frame(&original), "{robot}");
+    assert_eq!(repaired.lines().count(), original.lines().count());
 }
 
 #[test]
@@ -76,13 +76,13 @@ fn digits_of_a_turned_number_stay() {
     let turned = |one: &mut StatedInertial| one.moments = one.moments.map(|moment| 0.0 - moment);
     let wrong = spoilt(&original, |one| one.link == "iiwa_link_2", turned);
     let found = look(&wrong);
-    let mended = rewrite_inertials(&wrong, &found.stated, &found.corrected).unwrap();
-    // Zeros of the file stay zeros, so that not a byte differs.
-    assert_eq!(mended, original);
+    let repaired = rewrite_inertials(&wrong, &found.stated, &found.corrected).unwrap();
+    // Zeros of the file stay zeros, so that all bytes are equal.
+    assert_eq!(repaired, original);
 }
 
 #[test]
-fn a_row_major_walk_is_named() {
+fn row_major_moments_are_found() {
     let walk = |one: &mut StatedInertial| {
         let [xx, xy, xz, yy, yz, _] = one.moments;
         one.moments = [xx, xy, xz, xy, yy, yz];
@@ -92,7 +92,7 @@ fn a_row_major_walk_is_named() {
         let found = look(&wrong);
         let slip = found.found.iter().find(|slip| slip.kind == SlipKind::RowMajor).expect(robot);
         assert!(slip.message.contains("iyy repeats ixy") && slip.message.contains("izz is not in the file"));
-        // What is not in the file is not invented.
+        // Numbers that the file does not contain are not invented.
         assert!(slip.corrections.is_empty());
         let broken = found.stated.iter().filter(|one| one.mass_kg > 0.0).count();
         assert!(2 * slip.links.len() > broken, "{robot}: {} of {broken}: {:#?}", slip.links.len(), found.found);
@@ -110,7 +110,7 @@ fn a_lower_triangle_is_read_as_one() {
     }
 }
 
-/// Moments moved to the link's origin, in the axes of `<origin>`.
+/// Moves the moments to the link's origin, in the axes of `<origin>`.
 fn moved(one: &mut StatedInertial) {
     let c = one.axes.transpose_mul_vec(Vec3(one.com_m)).0;
     let (m, square) = (one.mass_kg, c.iter().map(|x| x * x).sum::<f64>());
@@ -134,7 +134,7 @@ fn moments_about_the_origin_are_moved() {
         for (ours, theirs) in found.corrected.iter().zip(&original) {
             let size = theirs.moments.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             for (ours, theirs) in ours.moments.iter().zip(theirs.moments) {
-                // What is taken away may be a hundred times what is left.
+                // The subtracted term may be a hundred times the result.
                 assert!((ours - theirs).abs() <= 1e-12 * size, "{robot}: {ours} {theirs}");
             }
         }
@@ -158,7 +158,7 @@ fn millimetres_and_grams_are_converted_back() {
             undone(robot, &spoilt(&original, |_| true, times(mass, com, moments)), SlipKind::Units);
         }
     }
-    // One link alone.
+    // Only one link.
     let wrong = spoilt(&text("iiwa14"), |one| one.link == "iiwa_link_4", times(1.0, 1.0, 1e6));
     undone("iiwa14", &wrong, SlipKind::Units);
     let wrong = spoilt(&text("iiwa14"), |one| one.link == "iiwa_link_4", times(1.0, 1e3, 1.0));
@@ -166,7 +166,7 @@ fn millimetres_and_grams_are_converted_back() {
 }
 
 #[test]
-fn defaults_are_named_and_not_replaced() {
+fn defaults_are_reported_and_not_corrected() {
     let default = |one: &mut StatedInertial| one.moments = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
     let found = look(&spoilt(&text("iiwa14"), |_| true, default)).found;
     assert_eq!(found.len(), 1, "{found:#?}");
@@ -180,7 +180,7 @@ fn a_stated_total_finds_the_wrong_mass() {
     let model = read_urdf(&original).unwrap().model;
     let total: f64 = stated_inertials(&original).unwrap().iter().map(|one| one.mass_kg).sum();
     assert!(slips(&original, &model, Some(total)).unwrap().found.is_empty());
-    // A slip of the point.
+    // A misplaced decimal point.
     let wrong = spoilt(&original, |one| one.link == "iiwa_link_2", |one| one.mass_kg *= 10.0);
     let found = slips(&wrong, &model, Some(total)).unwrap();
     assert_eq!(found.found.len(), 1, "{:#?}", found.found);
@@ -190,7 +190,7 @@ fn a_stated_total_finds_the_wrong_mass() {
         original.lines().count()
     );
     assert_eq!(found.corrected[2].mass_kg, stated_inertials(&original).unwrap()[2].mass_kg);
-    // As a comment says.
+    // With the total in a comment.
     let commented = wrong.replacen("<link", &format!("<!-- total mass: {total} kg -->\n<link"), 1);
     assert_eq!(look(&commented).found[0].links, ["iiwa_link_2"]);
     // A total that nothing explains.
@@ -204,10 +204,10 @@ fn a_stated_total_finds_the_wrong_mass() {
 }
 
 #[test]
-fn twins_that_differ_are_named() {
+fn different_twins_are_reported() {
     let original = text("g1_29dof");
     let knee = |one: &StatedInertial| one.link == "left_knee_link";
-    // One number wrong, so that no body is like that: the twin tells it.
+    // One wrong number makes the body impossible; its twin gives the correction.
     let wrong = spoilt(&original, knee, |one| one.moments[0] *= 10.0);
     let found = look(&wrong);
     let kinds: Vec<&str> = found.found.iter().map(|slip| slip.kind.name()).collect();
@@ -215,16 +215,16 @@ fn twins_that_differ_are_named() {
     assert_eq!(found.found[0].corrections.len(), 1, "{:#?}", found.found);
     let (to, before) = (found.found[0].corrections[0].to, stated_inertials(&original).unwrap());
     let before = before.iter().find(|one| knee(one)).unwrap().moments[0];
-    // The twins of this robot agree to a percent.
+    // The twins of this robot agree to one percent.
     assert!((to / before - 1.0).abs() < 0.01, "{to} {before}");
-    // Both can be bodies: named, and nothing is changed.
+    // Both bodies are possible, so that nothing is changed.
     let found = look(&spoilt(&original, knee, |one| one.mass_kg *= 1.3));
     assert!(found.found.len() == 1 && found.found[0].kind == SlipKind::Twins, "{:#?}", found.found);
     assert!(found.found[0].corrections.is_empty() && found.found[0].evidence.contains("mass"));
 }
 
 #[test]
-fn what_nothing_explains_is_said_to_be_so() {
+fn unexplained_inertials_are_reported() {
     let wrong =
         spoilt(&text("ur10"), |one| one.link == "forearm_link", |one| one.moments = [1.0, 0.1, 0.2, 5.0, 0.1, 1.0]);
     let found = look(&wrong).found;

@@ -1,10 +1,9 @@
-//! The URDF reader: against totals from Pinocchio, and by hand.
+//! The URDF reader: compared with totals from Pinocchio, and with values computed by hand.
 
 use crate::common::{ARM, foreign_urdfs};
 use dynident_model::{JointKind, LinkChange, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
 
-/// Degrees of freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files
-/// (`robots/README.md`).
+/// Degrees of freedom and mass of the moving bodies in kg, as read by Pinocchio 4.1.0 (`robots/README.md`).
 const TOTALS: [(&str, usize, f64); 8] = [
     ("planar2r", 2, 3.5),
     ("ur10", 6, 28.7),
@@ -22,15 +21,15 @@ fn totals_agree_with_pinocchio() {
     for (name, dof, mass) in TOTALS {
         let robot = load_robot(directory.join(format!("{name}.urdf"))).unwrap();
         let total: f64 = robot.model.inertials().iter().map(dynident_model::InertialParameters::mass_kg).sum();
-        // Pinocchio counted joints that follow others as well.
+        // Pinocchio includes mimic joints.
         assert_eq!(robot.model.body_count(), dof, "{name}");
-        // The totals are published with three digits after the point.
+        // The totals are published with three decimals.
         assert!((total - mass).abs() <= 0.0005 + 1e-12, "{name}: {total} kg, not {mass}");
     }
 }
 
 #[test]
-fn every_description_at_hand_is_read_and_kept_by_an_empty_rewrite() {
+fn every_description_is_unchanged_by_an_empty_rewrite() {
     for path in foreign_urdfs() {
         let robot = load_robot(&path).unwrap();
         assert!(robot.model.dof() > 0, "{}", path.display());
@@ -40,7 +39,7 @@ fn every_description_at_hand_is_read_and_kept_by_an_empty_rewrite() {
 }
 
 #[test]
-fn the_arm_is_read_as_it_stands() {
+fn arm_is_read_completely() {
     let robot = read_urdf(ARM).unwrap();
     let model = &robot.model;
     assert!(robot.unread.is_empty(), "{:?}", robot.unread);
@@ -48,14 +47,14 @@ fn the_arm_is_read_as_it_stands() {
     assert_eq!(names, ["lift", "shoulder", "elbow"]);
     let kinds: Vec<JointKind> = model.joints().iter().map(|joint| joint.kind).collect();
     assert_eq!(kinds, [JointKind::Prismatic, JointKind::Revolute, JointKind::Continuous]);
-    // The axis `0 0 2` is normalised; the elbow has none, which means x.
+    // The axis `0 0 2` is normalised; the elbow has no axis, and the default is x.
     assert_eq!(model.joints()[1].axis, Vec3([0.0, 0.0, 1.0]));
     assert_eq!(model.joints()[2].axis, Vec3([1.0, 0.0, 0.0]));
     assert_eq!(model.joints()[1].damping, Some(0.4));
     assert_eq!(model.joints()[0].damping, None);
     assert_eq!(model.joints()[0].limits.upper, Some(0.8));
     assert_eq!(model.joints()[2].limits.upper, None);
-    // The tool and its tip ride on the forearm; the tip at 0.3 + 0.1 sin 0.5.
+    // Tool and tip are fixed to the forearm; the tip is at 0.3 + 0.1 sin 0.5.
     let links = &model.bodies()[2].links;
     assert_eq!(links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(), ["fore", "tool", "tip"]);
     assert!(links[2].inertial.is_none());
@@ -68,8 +67,8 @@ fn the_arm_is_read_as_it_stands() {
 }
 
 #[test]
-fn a_turned_inertial_is_that_of_a_rod_laid_along_the_turned_axis() {
-    // A slender rod along x of the inertial frame, turned by 0.7 about y: its direction is u = (cos, 0, -sin), and its
+fn rotated_inertial_is_that_of_a_rotated_rod() {
+    // A slender rod along x of the inertial frame, rotated by 0.7 about y: its direction is u = (cos, 0, -sin), and its
     // inertia about the centre of mass is J (1 - u uᵀ).
     let text = r#"<robot name="r"><link name="b"/><joint name="j" type="continuous"><parent link="b"/><child link="l"/></joint>
         <link name="l"><inertial><origin rpy="0 0.7 0"/><mass value="2"/>
@@ -79,14 +78,14 @@ fn a_turned_inertial_is_that_of_a_rod_laid_along_the_turned_axis() {
     for a in 0..3 {
         for b in 0..3 {
             let expected = 0.3 * (f64::from(u8::from(a == b)) - u[a] * u[b]);
-            // A few roundings of numbers below one.
+            // Tolerance: a few roundings of numbers below one.
             assert!((inertia.0[a][b] - expected).abs() < 1e-15);
         }
     }
 }
 
 #[test]
-fn branches_stand_depth_first_in_document_order_wherever_links_stand() {
+fn branches_are_depth_first_in_document_order() {
     let text = r#"<robot name="r">
         <joint name="b1" type="continuous"><parent link="root"/><child link="b"/></joint>
         <joint name="a2" type="continuous"><parent link="a"/><child link="aa"/></joint>
@@ -108,7 +107,6 @@ fn misspelt_elements_are_reported() {
     assert_eq!((unread[0].element.as_str(), unread[0].parent.as_str(), unread[0].line), ("inertai", "inertial", 15));
 }
 
-/// A chain of `links` links under joints of one type.
 fn chain(links: usize, kind: &str) -> String {
     let link = |i: usize| {
         let before = i - 1;
@@ -124,7 +122,7 @@ fn chain(links: usize, kind: &str) -> String {
 fn a_hundred_thousand_links_neither_crash_nor_hang() {
     let error = read_urdf(&chain(100_000, "revolute")).unwrap_err();
     assert!(error.to_string().contains("more than 1000 moving joints"), "{error}");
-    // As many fixed links are only long.
+    // The same number of fixed links is accepted.
     let moving = "</robot>";
     let tail = "<link name=\"end\"/><joint name=\"last\" type=\"continuous\"><parent link=\"l99999\"/><child link=\"end\"/></joint></robot>";
     let model = read_urdf(&chain(100_000, "fixed").replace(moving, tail)).unwrap().model;
@@ -146,8 +144,8 @@ fn a_byte_order_mark_and_carriage_returns_do_not_matter() {
 
 #[test]
 fn a_quaternion_turns_as_its_angles_do() {
-    // 0.6 about z and then half a turn less 0.2 about x, as rpy and as the product of two half-angle quaternions;
-    // printed with another length, as some exporters do.
+    // 0.6 about z, then π - 0.2 about x, as rpy and as the product of two half-angle quaternions. The printed
+    // quaternion is not normalised, as from some exporters.
     let (a, b) = (0.3_f64, 0.5 * (core::f64::consts::PI - 0.2));
     let (z, x) = ([a.sin(), a.cos()], [b.sin(), b.cos()]);
     let quaternion = [z[1] * x[0], z[0] * x[0], z[0] * x[1], z[1] * x[1]].map(|c| 1.01 * c);
@@ -162,7 +160,7 @@ fn a_quaternion_turns_as_its_angles_do() {
         assert_ne!(by_angles, read_urdf(ARM).unwrap().model, "{body}");
         for (one, other) in by_angles.inertials().iter().zip(by_quaternion.inertials()) {
             for (one, other) in one.0.iter().zip(&other.0) {
-                // Some twenty roundings of numbers below one.
+                // About twenty roundings of numbers below one.
                 assert!((one - other).abs() < 1e-14, "{body}: {one} {other}");
             }
         }
@@ -183,11 +181,11 @@ fn undeclared_prefixes_and_lost_mimics_are_read_with_a_warning() {
     assert!(found[1].contains("drake"), "{found:?}");
     assert!(found[2].contains("UnknownMimic") && found[2].contains("ghost"), "{found:?}");
     assert_eq!(robot.model.inertials(), regular.model.inertials());
-    // The file keeps its own names when it is written.
+    // The written file keeps the original names.
     assert_eq!(rewrite_urdf(&text, &[], &[]).unwrap(), text);
     let removed = rewrite_urdf(&text, &[LinkChange::Remove { link: "tool".to_owned() }], &[]).unwrap();
     assert!(removed.contains("<gazebo:plugin drake:kind='a:b'/>") && removed.len() < text.len());
-    // An undeclared prefix in front of one of URDF's own names is none of them.
+    // An undeclared prefix before a name of URDF makes a different name.
     let other = ARM.replace("<link name=\"tip\"/>", "<link name=\"tip\"/><x:link name=\"tip\"/>");
     assert_eq!(read_urdf(&other).unwrap().model, regular.model);
 }

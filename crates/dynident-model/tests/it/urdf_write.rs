@@ -1,14 +1,14 @@
-//! Writing back: the new values are read again, and everything else stays byte for byte.
+//! Writing into a URDF: the new values can be read, and all other bytes stay.
 
-use crate::common::{ARM, foreign_urdfs};
+use crate::common::{ARM, assert_same_inertials, foreign_urdfs};
 use dynident_model::{
-    InertialParameters, JointChange, LinkChange, Mat3, Model, Vec3, link_changes, load_robot, read_urdf, rewrite_urdf,
+    InertialParameters, JointChange, LinkChange, Mat3, Vec3, link_changes, load_robot, read_urdf, rewrite_urdf,
 };
 use proptest::prelude::*;
 
-/// Physically consistent bodies: a few point masses each.
+/// Physically consistent bodies of a few point masses.
 fn bodies(seed: u64, count: usize) -> Vec<InertialParameters> {
-    // A linear congruential generator (Knuth's MMIX constants): the test needs variety, not quality.
+    // A linear congruential generator (Knuth's MMIX constants) is sufficient here.
     let mut state = seed;
     let mut uniform = || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -24,19 +24,8 @@ fn bodies(seed: u64, count: usize) -> Vec<InertialParameters> {
         .collect()
 }
 
-/// 1e-12 relative to the largest of a body's ten parameters: moving the inertia to the centre of mass and back costs
-/// some ten roundings.
-fn assert_same_inertials(model: &Model, expected: &[InertialParameters]) {
-    for (found, expected) in model.inertials().iter().zip(expected) {
-        let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        for k in 0..10 {
-            assert!((found.0[k] - expected.0[k]).abs() <= 1e-12 * scale, "{found:?} {expected:?}");
-        }
-    }
-}
-
-/// The text without `<inertial>...</inertial>`, `<dynamics .../>` and white space, with `<x></x>` as `<x/>`: what must
-/// not change. Written with plain string search, apart from the writer's XML tree.
+/// The text without `<inertial>...</inertial>`, `<dynamics .../>` and white space, with `<x></x>` as `<x/>`, which must
+/// not change. It is computed by string search, independent of the writer's XML tree.
 fn skeleton(text: &str) -> String {
     let mut rest = text.to_owned();
     for (open, close) in [("<inertial>", "</inertial>"), ("<inertial ", "</inertial>"), ("<dynamics ", "/>")] {
@@ -72,7 +61,7 @@ fn identified_bodies_are_read_back_and_nothing_else_changes() {
             .collect();
         let written = rewrite_urdf(text, &link_changes(&model, &new).unwrap(), &joints).unwrap();
         let again = read_urdf(&written).unwrap().model;
-        assert_same_inertials(&again, &new);
+        assert_same_inertials(&again, &new, "");
         for (old, new) in model.tree_joints().iter().zip(again.tree_joints()) {
             assert_eq!((new.damping, new.friction), (Some(0.125), Some(1.0 / 3.0)));
             assert_eq!((&old.placement, old.axis, old.limits), (&new.placement, new.axis, new.limits));
@@ -138,7 +127,7 @@ fn an_inertial_is_inserted_where_there_was_none() {
     let expected = format!("<link name=\"tip\">\n    <inertial>\n      {lines}\n    </inertial>\n  </link>");
     assert_eq!(written, ARM.replace(r#"<link name="tip"/>"#, &expected));
 
-    // One-line files stay one line; quotes may hold a `>`.
+    // One-line files stay on one line; quotes may contain a `>`.
     let one = r#"<robot name='r'><link name='b>'/><link name="l"></link><joint name='j' type='continuous'><parent link='b>'/><child link='l'/></joint></robot>"#;
     let flat = element.replace('|', "");
     let written = rewrite_urdf(one, &change("l"), &[]).unwrap();
@@ -164,7 +153,7 @@ fn friction_keeps_other_attributes() {
 }
 
 #[test]
-fn what_urdf_cannot_say_is_refused() {
+fn unrepresentable_inertials_are_refused() {
     let change = |link: &str, parameters: [f64; 10]| {
         let inertial = InertialParameters(parameters);
         rewrite_urdf(ARM, &[LinkChange::Set { link: link.to_owned(), inertial, note: None }], &[])
@@ -185,12 +174,12 @@ fn what_urdf_cannot_say_is_refused() {
     assert!(link_changes(&read_urdf(ARM).unwrap().model, &[]).is_err());
 }
 
-/// A tool 65 km away makes a body whose moments no reader would take: found by mutated descriptions.
+/// Found by mutated descriptions: a tool at a distance of 65 km gives moments that exceed the limit.
 #[test]
-fn what_could_not_be_read_again_is_refused() {
+fn unreadable_values_are_refused() {
     let model = read_urdf(&ARM.replace("<origin xyz=\"0.3 0 0\"", "<origin xyz=\"65536 0 0\"")).unwrap().model;
     let error = rewrite_urdf(ARM, &link_changes(&model, model.inertials()).unwrap(), &[]).unwrap_err();
-    assert!(error.to_string().contains("beyond the 1e9"), "{error}");
+    assert!(error.to_string().contains("more than the limit of 1e9"), "{error}");
 }
 
 #[test]
@@ -198,8 +187,8 @@ fn the_lumped_links_are_named_in_a_comment() {
     let model = read_urdf(ARM).unwrap().model;
     let written = rewrite_urdf(ARM, &link_changes(&model, model.inertials()).unwrap(), &[]).unwrap();
     assert!(written.contains("whose inertials were removed: tool; includes fixed links that had no inertial: tip"));
-    assert_same_inertials(&read_urdf(&written).unwrap().model, model.inertials());
-    // Writing once more replaces the comment too.
+    assert_same_inertials(&read_urdf(&written).unwrap().model, model.inertials(), "");
+    // Writing again replaces the comment.
     let model = read_urdf(&written).unwrap().model;
     let again = rewrite_urdf(&written, &link_changes(&model, model.inertials()).unwrap(), &[]).unwrap();
     assert_eq!(again.matches("<!--").count(), written.matches("<!--").count());
@@ -208,7 +197,7 @@ fn the_lumped_links_are_named_in_a_comment() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Any odd spacing between elements survives an empty rewrite, and a full one leaves the skeleton.
+    /// Unusual spacing between elements survives an empty rewrite; a full rewrite keeps the skeleton.
     #[test]
     fn odd_spacing_survives(gaps in prop::collection::vec("[ \t\r\n]{0,3}(<!-- [a-z ]* -->)?[ \n]{0,2}", 80), seed in 0_u64..1000) {
         let mut gap = gaps.iter();
@@ -217,7 +206,7 @@ proptest! {
         prop_assert_eq!(&rewrite_urdf(&text, &[], &[]).unwrap(), &text);
         let new = bodies(seed, model.dof());
         let written = rewrite_urdf(&text, &link_changes(&model, &new).unwrap(), &[]).unwrap();
-        assert_same_inertials(&read_urdf(&written).unwrap().model, &new);
+        assert_same_inertials(&read_urdf(&written).unwrap().model, &new, "");
         prop_assert_eq!(skeleton(&written), skeleton(&text));
     }
 }

@@ -1,4 +1,4 @@
-//! Consistent parameters of the online factor are those of a batch.
+//! Consistent parameters from the online factor equal those of a batch.
 
 use dynident_dynamics::{Panels, ParametricModel, TermHistory, Workspace, regressor_panels_of_sample};
 use dynident_estimation::{LinearProblem, SegmentSettings, SegmentedFactor};
@@ -12,7 +12,7 @@ use dynident_testing::repository;
 const STD: [f64; 2] = [0.3, 0.1];
 
 #[test]
-fn what_was_seen_so_far_gives_bodies_that_can_be_real() {
+fn online_rows_give_consistent_bodies() {
     let model = load_robot(repository("robots/planar2r.urdf")).unwrap().model;
     let terms = terms_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
     let robot = ParametricModel::new(model, terms).unwrap();
@@ -21,7 +21,7 @@ fn what_was_seen_so_far_gives_bodies_that_can_be_real() {
     let mut random = Random::new(2);
     let (mut workspace, mut panels) = (Workspace::new(robot.model()), Panels::default());
     let layout = robot.layout();
-    // Each joint's rows, as a batch has them.
+    // Rows of each joint, as in a batch.
     let mut rows: Vec<Vec<Vec<f64>>> =
         (0..2).map(|joint| vec![Vec::new(); layout.joint_columns(joint).len() + 1]).collect();
     for _ in 0..2000 {
@@ -60,7 +60,7 @@ fn what_was_seen_so_far_gives_bodies_that_can_be_real() {
     let (found, expected) = (robot.base().values(&fit.parameters), robot.base().values(&batch.parameters));
     for (place, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let std = covariance[(place, place)].sqrt();
-        // The same rows; only the prior's scales of friction differ, which speak where data do not.
+        // The rows are equal; only the prior scales of friction differ, which have little influence.
         assert!((found - expected).abs() < 0.05 * std, "{place}: {found} and {expected}, standard deviation {std}");
         assert!(
             (found - truth[place]).abs() < 5.0 * std,

@@ -1,4 +1,4 @@
-//! Contact is seen as often as was allowed where there is none, and soon where there is.
+//! Contact detection: false-alarm rate as allowed, and short detection times.
 
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_model::sample::Random;
@@ -10,7 +10,7 @@ const RATE_HZ: f64 = 125.0;
 /// Torque noise of the UR10's joints, Nm.
 const STD: [f64; 6] = [0.8, 0.8, 0.5, 0.2, 0.2, 0.15];
 
-/// Gaussian noise with a correlation of a few samples, as filtered residuals have it.
+/// Gaussian noise with a correlation of a few samples, like filtered residuals.
 struct Noise {
     random: Random,
     now: [f64; 6],
@@ -43,14 +43,14 @@ fn calibration(seed: u64, seconds: f64) -> Residuals {
 }
 
 #[test]
-fn false_alarms_come_as_often_as_was_allowed() {
-    // One a minute for an hour: sixty are expected, and their number scatters by eight.
+fn false_alarm_rate_is_as_allowed() {
+    // One per minute for an hour: sixty are expected, with a standard deviation of eight.
     let settings = ContactSettings { false_alarms_per_hour: 60.0, ..ContactSettings::new(RATE_HZ) };
     let mut monitor = ContactMonitor::new(settings, &calibration(1, 600.0)).unwrap();
     let mut noise = Noise::new(2);
     let (mut alarms, mut quiet) = (0, 0);
     for _ in 0..(3600.0 * RATE_HZ) as usize {
-        // What goes on is one alarm.
+        // Consecutive detections are one alarm.
         match monitor.add(&noise.next()).unwrap() {
             Some(_) if quiet > 250 => {
                 alarms += 1;
@@ -60,11 +60,11 @@ fn false_alarms_come_as_often_as_was_allowed() {
             None => quiet += 1,
         }
     }
-    // Rice's rate is that of high levels, and the safety for heavy tails makes alarms fewer.
+    // Rice's formula applies to high levels, and the factor for heavy tails reduces alarms.
     assert!((5..=90).contains(&alarms), "{alarms}");
 }
 
-/// The UR10 with a point mass in its hand.
+/// The UR10 with a point mass at its hand.
 fn carrying(model: &Model, mass_kg: f64) -> Model {
     let all = model.parameter_vector();
     let mut bodies: Vec<InertialParameters> =
@@ -77,7 +77,7 @@ fn carrying(model: &Model, mass_kg: f64) -> Model {
     model.with_inertials(&bodies).unwrap()
 }
 
-/// A slow motion with the arm stretched out.
+/// A slow motion of the outstretched arm.
 fn state(time_s: f64) -> [Vec<f64>; 3] {
     let mut motion = [vec![0.0; 6], vec![0.0; 6], vec![0.0; 6]];
     let rest = [0.0, -0.6, 0.5, 0.2, 0.4, 0.0];
@@ -90,7 +90,7 @@ fn state(time_s: f64) -> [Vec<f64>; 3] {
     motion
 }
 
-/// The UR10 as an identification would have it: every body's ten parameters off by 2 %.
+/// An identified UR10: all inertial parameters have errors of 2 %.
 fn identified(model: &Model) -> Model {
     let mut random = Random::new(7);
     let all = model.parameter_vector();
@@ -102,7 +102,7 @@ fn identified(model: &Model) -> Model {
     model.with_inertials(&bodies.collect::<Vec<_>>()).unwrap()
 }
 
-/// Ten minutes at work: what a model does not explain of the robot's torque, for each sample.
+/// Model errors of ten minutes of work, for each sample.
 fn unexplained(robot: &Model, model: &Model) -> Vec<[f64; 6]> {
     let (mut own, mut other) = (Workspace::new(robot), Workspace::new(model));
     let at = |sample: usize| {
@@ -114,7 +114,7 @@ fn unexplained(robot: &Model, model: &Model) -> Vec<[f64; 6]> {
     (0..(600.0 * RATE_HZ) as usize).map(at).collect()
 }
 
-/// A monitor that has seen ten minutes of undisturbed work, and what its model does not explain.
+/// A monitor calibrated with ten minutes of undisturbed work, and the model errors.
 fn at_work(model: &Model, seed: u64) -> (ContactMonitor, Vec<[f64; 6]>) {
     let off = unexplained(model, &identified(model));
     let mut calibration = calibration(seed, 600.0);
@@ -126,13 +126,13 @@ fn at_work(model: &Model, seed: u64) -> (ContactMonitor, Vec<[f64; 6]>) {
     (ContactMonitor::new(ContactSettings::new(RATE_HZ), &calibration).unwrap(), off)
 }
 
-/// Alarms in so many hours in which nothing touches the robot; what goes on for two seconds is one.
+/// Number of alarms in hours of undisturbed motion; detections within two seconds are one alarm.
 fn false_alarms(hours: usize, seed: u64) -> usize {
     let model = load_robot(repository("robots/ur10.urdf")).unwrap().model;
     let (mut monitor, off) = at_work(&model, 1000 + seed);
     let mut noise = Noise::new(seed);
     let (mut alarms, mut quiet) = (0, usize::MAX);
-    // Work is the same every ten minutes, its noise is not.
+    // The motion repeats every ten minutes, but the noise does not.
     for off in off.iter().cycle().take((3600.0 * RATE_HZ) as usize * hours) {
         let mut residuals = noise.next();
         for (residual, off) in residuals.iter_mut().zip(off) {
@@ -148,7 +148,7 @@ fn false_alarms(hours: usize, seed: u64) -> usize {
     alarms
 }
 
-/// Half of one in ten hours is expected by what is allowed.
+/// The settings allow one alarm in twenty hours.
 #[test]
 fn in_ten_hours_there_is_less_than_one_false_alarm() {
     let runs = dynident_testing::count(1, 30);
@@ -163,7 +163,7 @@ fn half_a_kilogram_and_a_push_at_the_wrist_are_seen() {
     let (monitor, off) = at_work(&model, 3);
     let carried: Vec<[f64; 6]> = unexplained(&carrying(&model, 0.5), &model);
     let mut noise = Noise::new(4);
-    // From a moment on a load or a push, until it is seen: after how many seconds, and how.
+    // Time from the start of a load or push until its detection, s, and the time scale.
     let mut detected = |from_s: f64, push: Option<f64>, look: Look| {
         let mut monitor = monitor.clone();
         let from = (from_s * RATE_HZ) as usize;
@@ -194,15 +194,16 @@ fn half_a_kilogram_and_a_push_at_the_wrist_are_seen() {
     let push = latest(Some(3.0), Look::Collision);
     let (up, payload) = (latest(Some(-3.0), Look::Collision), latest(None, Look::Payload));
     println!("3 Nm seen after {push:?} and {up:?} s, 0.5 kg after {payload:?} s: median and longest of forty");
-    // A time constant of 20 ms lets a push of twice its threshold through in 14 ms; five of them are enough for both.
+    // A time constant of 20 ms detects a push of twice the threshold within 14 ms; five time constants suffice for
+    // both.
     assert!(push.1 < 0.1 && up.1 < 0.1, "{push:?} {up:?}");
-    // Half a kilogram at a metre is 5 Nm at the shoulder: three of the payload's time constants.
+    // Half a kilogram at a metre is 5 Nm at the shoulder: detected within three time constants of the payload.
     assert!(payload.1 < 6.0, "{payload:?}");
 }
 
 #[test]
 fn the_band_of_a_model_gives_the_thresholds_of_its_noise() {
-    // Thresholds by what a model says of itself against those measured on noise of that size and correlation: two
+    // Compares thresholds from the model accuracy with thresholds measured on noise of that size and correlation: two
     // ways to Rice's rate of the same process.
     let settings = ContactSettings { false_alarms_per_hour: 10.0, ..ContactSettings::new(RATE_HZ) };
     let measured = ContactMonitor::new(settings.clone(), &calibration(8, 3600.0)).unwrap();
@@ -210,7 +211,8 @@ fn the_band_of_a_model_gives_the_thresholds_of_its_noise() {
     let stated = ContactMonitor::from_band(settings.clone(), &STD, correlation_s, None).unwrap();
     for (measured, stated) in measured.thresholds_nm().iter().zip(stated.thresholds_nm()) {
         for look in 0..2 {
-            // Samples 8 ms apart are not quite time that flows, and the largest of an hour raises what is measured.
+            // The 8 ms sampling is not exactly continuous time, and the largest mean in an hour raises the measured
+            // threshold.
             assert!((stated[look] / measured[look] - 1.0).abs() < 0.25, "{stated:?} and {measured:?}");
         }
     }
@@ -220,8 +222,8 @@ fn the_band_of_a_model_gives_the_thresholds_of_its_noise() {
 }
 
 #[test]
-fn noise_that_a_filter_hid_is_reckoned_with() {
-    // White noise of 1 Nm at 125 Hz. Behind a filter of 4 Hz its deviation is √(4/62.5): what the model knows of it.
+fn thresholds_include_filtered_noise() {
+    // White noise of 1 Nm at 125 Hz has a standard deviation of √(4/62.5) after a 4 Hz filter, as used by the model.
     let settings = ContactSettings { false_alarms_per_hour: 10.0, ..ContactSettings::new(RATE_HZ) };
     let mut random = Random::new(11);
     let white = (0..450_000).map(|_| (0..12).map(|_| random.uniform(-0.5, 0.5)).sum()).collect();
@@ -229,14 +231,15 @@ fn noise_that_a_filter_hid_is_reckoned_with() {
     let known = (4.0 / (0.5 * RATE_HZ)).sqrt();
     let stated = ContactMonitor::from_band(settings.clone(), &[known], 0.1, Some(4.0)).unwrap();
     let [measured, stated] = [measured, stated].map(|monitor| monitor.thresholds_nm()[0][0]);
-    // A mean over two samples and a half lets through a little less than its 12.5 Hz; the largest of an hour stood out.
+    // A mean over 2.5 samples passes slightly less than 12.5 Hz; the largest mean in an hour raises the measured
+    // threshold.
     assert!((stated / measured - 1.0).abs() < 0.2, "{stated} and {measured}");
     let blind = ContactMonitor::from_band(settings, &[known], 0.1, None).unwrap();
     assert!(blind.thresholds_nm()[0][0] < 0.7 * measured);
 }
 
 #[test]
-fn a_calibration_that_says_nothing_is_refused() {
+fn unusable_calibration_is_refused() {
     let settings = ContactSettings::new(RATE_HZ);
     let refused = ContactMonitor::new(settings.clone(), &calibration(1, 1.0));
     assert!(matches!(refused, Err(OnlineError::Number { .. })));

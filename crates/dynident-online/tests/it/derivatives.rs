@@ -1,4 +1,4 @@
-//! Local cubics are exact on cubics, and as good as theory on noise.
+//! Local cubics are exact for cubics, and have the theoretical variance for noise.
 
 use dynident_model::sample::Random;
 use dynident_online::{DelayedDerivatives, OnlineError};
@@ -21,7 +21,7 @@ fn cubics_come_back_exactly_in_the_middle_of_the_window() {
         let expected = at(then);
         for joint in 0..2 {
             let [q, dq, ddq] = expected[joint];
-            // Sums of fifteen numbers; accelerations are multiplied by the rate squared.
+            // Sums of fifteen numbers; accelerations are multiplied by the squared rate.
             assert!((found.q[joint] - q).abs() < 1e-12);
             assert!((found.dq[joint] - dq).abs() < 1e-10);
             assert!((found.ddq[joint] - ddq).abs() < 1e-7);
@@ -34,9 +34,9 @@ fn cubics_come_back_exactly_in_the_middle_of_the_window() {
     assert!(derivatives.add(&[0.0, 0.0], &[0.0, 0.0]).unwrap().is_none());
 }
 
-/// The variance of a slope over 2m + 1 white samples, of the quadratic in between and not the cubic's, bounds it below.
+/// The variance of a slope of a quadratic over 2m + 1 white samples is a lower bound for that of the cubic.
 #[test]
-fn noise_comes_through_as_much_as_weights_say() {
+fn noise_variance_follows_from_the_weights() {
     let (rate_hz, half, sigma) = (500.0, 10, 1e-4);
     let mut derivatives = DelayedDerivatives::new(1, rate_hz, half).unwrap();
     let mut random = Random::new(3);
@@ -52,12 +52,12 @@ fn noise_comes_through_as_much_as_weights_say() {
     let n = 2.0 * half as f64 + 1.0;
     let expected = sigma * rate_hz * rate_hz * (720.0 / (n * (n * n - 1.0) * (n * n - 4.0))).sqrt();
     let found = (squares / f64::from(count)).sqrt();
-    // The scatter of 10,000 independent windows is below 1 %.
+    // The relative scatter of 10,000 independent windows is below 1 %.
     assert!((found / expected - 1.0).abs() < 0.03, "{found} and {expected}");
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_input_is_refused() {
     assert!(matches!(DelayedDerivatives::new(2, 0.0, 5), Err(OnlineError::Number { .. })));
     assert!(matches!(DelayedDerivatives::new(2, 100.0, 1), Err(OnlineError::Number { .. })));
     let mut derivatives = DelayedDerivatives::new(2, 100.0, 2).unwrap();

@@ -1,5 +1,4 @@
-//! Drift is reported as often as was allowed where there is none, with errors that are correlated in time, and soon
-//! where there is.
+//! Drift detection with errors correlated in time: false-alarm rate as allowed, and short detection times.
 
 use dynident_dynamics::ParametricModel;
 use dynident_model::load_robot;
@@ -13,7 +12,7 @@ const RATE_HZ: f64 = 20.0;
 const HALF_LIFE_S: f64 = 5.0;
 const CHECK_S: f64 = 20.0;
 const STD: [f64; 2] = [0.3, 0.1];
-/// Correlation of errors from sample to sample: nineteen samples tell as much as one.
+/// Correlation of errors between samples: nineteen samples contain the information of one independent sample.
 const KEPT: f64 = 0.9;
 
 fn robot() -> ParametricModel {
@@ -22,7 +21,7 @@ fn robot() -> ParametricModel {
     ParametricModel::new(model, terms).unwrap()
 }
 
-/// The arm at work: its parameters, and errors that are correlated in time.
+/// An arm at work: its parameters, and errors correlated in time.
 struct AtWork {
     estimator: OnlineEstimator,
     random: Random,
@@ -33,7 +32,7 @@ struct AtWork {
 impl AtWork {
     fn new(seed: u64) -> Self {
         let half_life_samples = Some(HALF_LIFE_S * RATE_HZ);
-        // What errors are correlated is not told: it is learned.
+        // The correlation of errors is not given; it is learned.
         let settings = OnlineSettings { half_life_samples, ..OnlineSettings::new(STD.to_vec()) };
         let estimator = OnlineEstimator::new(robot(), settings, None).unwrap();
         Self { estimator, random: Random::new(seed), errors: [0.0; 2], sample: 0 }
@@ -56,7 +55,7 @@ impl AtWork {
                 self.errors[joint] = KEPT * self.errors[joint] + STD[joint] * (1.0 - KEPT * KEPT).sqrt() * white;
             }
             let [q, dq, ddq] = state;
-            // The torque of the truth: the regressor of the sample before it is absorbed.
+            // Torque for the true parameters: computes the regressor before the sample is added.
             let tau = self.torque(truth, [q, dq, ddq]);
             self.estimator.add(&q, &dq, &ddq, &tau).unwrap();
             self.sample += 1;
@@ -83,7 +82,7 @@ impl AtWork {
     }
 }
 
-/// The truth, and a reference that was identified from a minute of other errors.
+/// True parameters, and a reference identified from one minute with other errors.
 fn reference(seed: u64) -> (Vec<f64>, StartingPoint) {
     let robot = robot();
     let mut truth = robot.nominal_base().unwrap().to_vec();
@@ -100,15 +99,15 @@ fn reference(seed: u64) -> (Vec<f64>, StartingPoint) {
     let triangle = factor.regressor_triangle();
     let values: DVector<f64> = triangle.solve_upper_triangular(&factor.rotated_torque()).unwrap();
     let root = triangle.solve_upper_triangular(&DMatrix::identity(values.len(), values.len())).unwrap();
-    // Nineteen samples tell as much as one.
+    // Nineteen samples contain the information of one.
     let covariance = &root * root.transpose() * ((1.0 + KEPT) / (1.0 - KEPT));
     (truth, StartingPoint { values: values.as_slice().to_vec(), covariance })
 }
 
 fn learned(work: &mut AtWork, truth: &[f64], reference: StartingPoint, per_hour: f64) -> DriftMonitor {
-    let settings = DriftSettings { check_s: CHECK_S, false_alarms_per_hour: per_hour };
+    let settings = DriftSettings { false_alarms_per_hour: per_hour, ..DriftSettings::new(CHECK_S) };
     let mut monitor = DriftMonitor::new(settings, reference).unwrap();
-    // The first check still holds the start.
+    // The first check still depends on the start.
     work.work(truth);
     while monitor.learned() < 30 {
         assert!(monitor.check(&work.estimator).unwrap().is_none() || monitor.is_ready());
@@ -119,9 +118,9 @@ fn learned(work: &mut AtWork, truth: &[f64], reference: StartingPoint, per_hour:
 }
 
 #[test]
-fn false_alarms_come_no_more_often_than_was_allowed() {
-    // Nine an hour, one in twenty checks, for ten arms with a reference and thirty checks of learning each: of 1000
-    // checks fifty are allowed. What is not known of the scatter makes alarms fewer; none at all would be no test.
+fn false_alarm_rate_is_at_most_as_allowed() {
+    // Nine per hour are one in twenty checks, for ten arms with a reference and thirty learned checks each: fifty of
+    // 1000 checks are allowed. The uncertainty of the scatter reduces alarms, but zero alarms would not test anything.
     let (mut alarms, mut checks) = (0, 0);
     for arm in 0..10 {
         let (truth, reference) = reference(100 + arm);
@@ -133,8 +132,8 @@ fn false_alarms_come_no_more_often_than_was_allowed() {
             checks += 1;
         }
     }
-    // Fifty and three times their scatter of seven; a hundredth of what was allowed would be a threshold out of place.
-    println!("{alarms} false alarms in {checks} checks, of which 50 were allowed");
+    // Upper bound: fifty plus three standard deviations of seven; a threshold far too high would give no alarm.
+    println!("{alarms} false alarms in {checks} checks; 50 were allowed");
     assert!((1..=71).contains(&alarms), "{alarms} of {checks}");
 }
 
@@ -161,7 +160,7 @@ fn friction_that_doubles_in_an_hour_is_seen_within_it_and_a_payload_at_once() {
     println!("seen after {} minutes, at {} of the friction", share * 60.0, 1.0 + share);
     assert!(check < 90, "friction was {} of what it is", 1.0 + f64::from(check) / 180.0);
     assert_eq!(found.parameter, friction);
-    // Back, and then with a payload: the first moments and inertias of what half a kilogram at the tip adds.
+    // Back, and then with a payload: first moments and inertias of half a kilogram at the tip.
     for _ in 0..3 {
         work.work(&truth);
     }
@@ -183,17 +182,17 @@ fn friction_that_doubles_in_an_hour_is_seen_within_it_and_a_payload_at_once() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_input_is_refused() {
     let (_, reference) = reference(1);
     assert!(DriftSettings::new(0.0).validate().is_err());
-    assert!(DriftSettings { check_s: 60.0, false_alarms_per_hour: 40.0 }.validate().is_err());
+    assert!(DriftSettings { false_alarms_per_hour: 40.0, ..DriftSettings::new(60.0) }.validate().is_err());
     let small = StartingPoint { values: vec![0.0; 2], covariance: DMatrix::identity(2, 2) };
     let mut monitor = DriftMonitor::new(DriftSettings::new(60.0), small).unwrap();
     assert!(matches!(monitor.learn(&AtWork::new(1).estimator), Err(OnlineError::Length { .. })));
     let short = StartingPoint { covariance: DMatrix::identity(2, 2), ..reference.clone() };
     assert!(matches!(DriftMonitor::new(DriftSettings::new(60.0), short), Err(OnlineError::Length { .. })));
     let mut monitor = DriftMonitor::new(DriftSettings::new(60.0), reference).unwrap();
-    // Nothing was seen yet.
+    // The estimator has no samples yet.
     assert!(matches!(monitor.learn(&AtWork::new(1).estimator), Err(OnlineError::Number { .. })));
     assert!(monitor.threshold().is_none());
 }

@@ -1,4 +1,4 @@
-//! After n samples the recursive estimate is the batch's.
+//! After n samples the recursive estimate equals the batch estimate.
 
 use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
 use dynident_model::load_robot;
@@ -18,7 +18,7 @@ fn robot() -> ParametricModel {
 /// Random states with the torque of random parameters, and noise.
 struct Samples {
     states: Vec<[Vec<f64>; 4]>,
-    /// Rows of joint after joint and sample after sample, divided by the joint's deviation: `[W | τ]`.
+    /// Rows by joint and sample, divided by the joint's deviation: `[W | τ]`.
     rows: DMatrix<f64>,
 }
 
@@ -75,7 +75,7 @@ fn compare(estimator: &OnlineEstimator, rows: &DMatrix<f64>) {
     let (theta, covariance) = batch(rows);
     let mut values = vec![0.0; theta.len()];
     assert!(estimator.values(&mut values));
-    // Parameters of size 1; the regressor's condition number is some hundreds.
+    // Parameters of size 1; the condition number of the regressor is some hundreds.
     for (found, expected) in values.iter().zip(theta.iter()) {
         assert!((found - expected).abs() < 1e-10, "{found} and {expected}");
     }
@@ -85,7 +85,7 @@ fn compare(estimator: &OnlineEstimator, rows: &DMatrix<f64>) {
 }
 
 #[test]
-fn after_n_samples_it_is_the_batch() {
+fn recursive_estimate_equals_the_batch() {
     let robot = robot();
     assert!(robot.layout().columns().len() >= 55);
     let samples = samples(&robot, 600, 1);
@@ -95,7 +95,7 @@ fn after_n_samples_it_is_the_batch() {
 }
 
 #[test]
-fn old_samples_count_less_and_the_start_counts() {
+fn forgetting_weights_equal_those_of_a_batch() {
     let robot = robot();
     let (samples, columns, dof) = (samples(&robot, 800, 2), robot.layout().columns().len(), robot.dof());
     let start = StartingPoint {
@@ -105,7 +105,7 @@ fn old_samples_count_less_and_the_start_counts() {
     let half = 150.0;
     let settings = OnlineSettings { half_life_samples: Some(half), ..OnlineSettings::new(STD.to_vec()) };
     let estimator = fed(settings, &samples, Some(&start));
-    // The newest sample counts fully; the start was there before the first.
+    // The latest sample has full weight; the start precedes the first sample.
     let last = samples.states.len() - 1;
     let weight = |sample: usize| 0.5_f64.powf(0.5 * (last - sample) as f64 / half);
     let root = start.covariance.clone().cholesky().unwrap().inverse().cholesky().unwrap().l().transpose();
@@ -120,8 +120,8 @@ fn old_samples_count_less_and_the_start_counts() {
 }
 
 #[test]
-fn for_ever_is_no_longer_than_a_day() {
-    // A half-life of five samples: weights pass any number of bits many times over.
+fn rescaling_keeps_the_estimate_over_a_long_run() {
+    // A half-life of five samples: weights overflow many times without rescaling.
     let robot = robot();
     let samples = samples(&robot, 400, 3);
     let settings = OnlineSettings { half_life_samples: Some(5.0), ..OnlineSettings::new(STD.to_vec()) };
@@ -157,7 +157,7 @@ fn too_few_samples_determine_nothing_and_bad_ones_change_nothing() {
 }
 
 #[test]
-fn what_was_held_stays_and_the_rest_goes_on() {
+fn fixed_parameters_stay_while_others_change() {
     let robot = robot();
     let (samples, columns) = (samples(&robot, 300, 6), robot.layout().columns().len());
     let held = [3, 20];
@@ -169,7 +169,7 @@ fn what_was_held_stays_and_the_rest_goes_on() {
     let std: Vec<f64> = estimator.covariance().unwrap().diagonal().iter().map(|variance| variance.sqrt()).collect();
     for (column, (value, std)) in values.iter().zip(&std).enumerate() {
         if held.contains(&column) {
-            // A thousandth of 0.2, and some hundreds of such deviations that the samples pull with.
+            // A thousandth of 0.2, and some hundred such deviations of influence from the samples.
             assert!((value - 0.1).abs() < 0.05 && *std < 2.1e-4, "{value} and {std}");
         } else {
             assert!((value - 0.1).abs() > 1e-6 && *std < 0.2);
@@ -188,7 +188,8 @@ fn a_covariance_of_few_segments_is_a_start() {
     let before = OnlineEstimator::new(robot, OnlineSettings::new(STD.to_vec()), Some(&start)).unwrap();
     let (before, after) = (before.covariance().unwrap(), estimator.covariance().unwrap());
     for column in 0..columns {
-        // No parameter is known better than was said, but for what its floor adds, and samples add knowledge.
+        // No parameter is more certain than stated, except for the floor of the eigenvalues, and samples add
+        // information.
         assert!(before[(column, column)] >= 0.999 * start.covariance[(column, column)]);
         assert!(after[(column, column)] < before[(column, column)]);
     }

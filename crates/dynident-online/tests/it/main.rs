@@ -1,4 +1,4 @@
-//! The online crate against the batch, and against simulated contact.
+//! Tests of the online crate with the batch estimate and simulated contact as references.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod consistent;

@@ -1,7 +1,6 @@
-//! A command as a person types it into a POSIX shell.
+//! Quoting of commands for a POSIX shell.
 
-/// The words of a command, quoted so that a POSIX shell runs exactly this command: a copied line runs nothing else,
-/// whatever the words contain.
+/// Quotes the words of a command so that a POSIX shell runs exactly this command, for any content of the words.
 pub(super) fn shell_words(words: &[String]) -> String {
     words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ")
 }
@@ -11,7 +10,7 @@ fn shell_word(word: &str) -> String {
     if !word.is_empty() && word.chars().all(is_plain) {
         return word.to_owned();
     }
-    // Within single quotes a shell expands nothing; a single quote itself ends them and is escaped outside.
+    // A shell expands nothing within single quotes; a single quote in the word is escaped outside of them.
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 

@@ -1,14 +1,13 @@
-//! A program with all the processes that it starts: on Unix a separate process group, so that Ctrl-C on the terminal
-//! reaches it only through Dynident, and none of its processes outlives it.
+//! A program with all its child processes: on Unix a separate process group, so that Dynident handles Ctrl-C on the
+//! terminal, and no process outlives it.
 
 use super::permission::PermittedProgram;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Time between two looks at a process that should end.
-const POLL: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Which pipes lead to a program. Standard output and standard error always do.
+/// Pipes to a program. Standard output and standard error are always pipes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pipes {
     /// Whether its standard input is a pipe; otherwise it is empty.
@@ -16,13 +15,13 @@ pub struct Pipes {
 }
 
 impl Pipes {
-    /// Standard output and standard error.
+    /// Only standard output and standard error.
     pub const OUTPUT_ONLY: Self = Self { input: false };
-    /// All three.
+    /// Standard input, output and error.
     pub const ALL: Self = Self { input: true };
 }
 
-/// The processes of a started program. Dropping it does not end them: call [`end`](Self::end).
+/// The processes of a started program. They are not ended on drop: call [`end`](Self::end).
 #[derive(Debug)]
 pub struct ProcessGroup {
     child: Child,
@@ -33,7 +32,7 @@ impl ProcessGroup {
     /// Starts a permitted program in a separate group. This is the only place where Dynident starts a program.
     ///
     /// # Errors
-    /// The system's reason; [`NotFound`](std::io::ErrorKind::NotFound) if there is no such program.
+    /// Error of the operating system; [`NotFound`](std::io::ErrorKind::NotFound) if the program does not exist.
     pub fn start(program: &PermittedProgram, pipes: Pipes) -> std::io::Result<Self> {
         let mut command = Command::new(program.name());
         command.args(program.request().command.iter().skip(1));
@@ -45,7 +44,7 @@ impl ProcessGroup {
         Ok(Self { child, id })
     }
 
-    /// The program: its pipes.
+    /// The program, for access to its pipes.
     pub fn program(&mut self) -> &mut Child {
         &mut self.child
     }
@@ -55,12 +54,12 @@ impl ProcessGroup {
         self.id
     }
 
-    /// How the program ended, if it has ended. Processes that it started may still run and hold its pipes open.
+    /// Exit status, if the program has ended. Its child processes may still run and keep its pipes open.
     pub fn exit(&mut self) -> Option<String> {
         system::exit(&mut self.child)
     }
 
-    /// Waits for the program to end: how it ended, or `None` after the time limit.
+    /// Waits for the program to end: its exit status, or `None` after the time limit.
     pub fn exit_within(&mut self, limit: Duration) -> Option<String> {
         let start = Instant::now();
         loop {
@@ -68,18 +67,18 @@ impl ProcessGroup {
             if exit.is_some() || start.elapsed() >= limit {
                 return exit;
             }
-            std::thread::sleep(POLL);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 
-    /// Asks all processes of the group to end and kills those that still run after the time `grace`. None of them runs
-    /// afterwards. Returns whether the program ended with success.
+    /// Requests all processes of the group to end, and kills those that still run after `grace`. No process remains.
+    /// Returns whether the program ended with success.
     pub fn end(&mut self, grace: Duration) -> bool {
         if self.exit().is_none() {
             system::terminate(self.id);
             self.exit_within(grace);
         }
-        // A program that has ended keeps the number of its group until it is waited for: no other group is killed.
+        // The group number of an ended program stays reserved until it is waited for, so no other group is killed.
         self.id.kill();
         let _ = self.child.kill();
         self.child.wait().is_ok_and(|status| status.success())
@@ -94,7 +93,7 @@ mod system {
     use std::os::unix::process::CommandExt;
     use std::process::{Child, Command};
 
-    /// The number of a process group.
+    /// Number of a process group.
     #[derive(Clone, Copy, Debug)]
     pub struct GroupId(Option<Pid>);
 
@@ -119,12 +118,12 @@ mod system {
 
     fn send(GroupId(id): GroupId, signal: Signal) {
         if let Some(id) = id {
-            // A group that has ended already needs no signal.
+            // A signal to an ended group is unnecessary.
             let _ = kill_process_group(id, signal);
         }
     }
 
-    /// Does not reap the program, so that its number belongs to it until its group is killed.
+    /// Does not reap the program, so that its number stays reserved until its group is killed.
     pub(super) fn exit(child: &mut Child) -> Option<String> {
         let id = i32::try_from(child.id()).ok().and_then(Pid::from_raw)?;
         let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;

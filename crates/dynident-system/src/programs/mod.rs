@@ -1,4 +1,4 @@
-//! Programs that Dynident starts: who permits them, and how they are stopped.
+//! Permission, start and stop of programs.
 
 mod command_line;
 mod group;

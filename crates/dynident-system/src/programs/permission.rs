@@ -1,15 +1,15 @@
-//! Which programs may be started.
+//! Permission of programs.
 
 use super::command_line::shell_words;
 use core::fmt;
 use thiserror::Error;
 
-/// What a program is started for.
+/// Purpose of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ProgramPurpose {
-    /// It serves the robot of an iteration: `[iteration] robot = { kind = "process" }` of a study.
+    /// The robot program of an iteration: `[iteration] robot = { kind = "process" }` of a study.
     Robot,
-    /// It expands the xacro macros of a robot file. xacro evaluates Python expressions of that file.
+    /// Expansion of the xacro macros of a robot file. xacro evaluates Python expressions in that file.
     Xacro,
 }
 
@@ -22,10 +22,10 @@ impl fmt::Display for ProgramPurpose {
     }
 }
 
-/// A program that is to be started.
+/// A program to be started.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct ProgramRequest {
-    /// What it is started for.
+    /// Purpose of the program.
     pub purpose: ProgramPurpose,
     /// The program and its arguments.
     pub command: Vec<String>,
@@ -37,13 +37,13 @@ impl ProgramRequest {
         Self { purpose, command: command.into_iter().map(Into::into).collect() }
     }
 
-    /// The command as a person types it into a POSIX shell. May contain characters that control a terminal.
+    /// The command as typed into a POSIX shell. May contain terminal control characters.
     pub fn command_line(&self) -> String {
         shell_words(&self.command)
     }
 }
 
-/// A program was not permitted, and was not started.
+/// A program was not permitted and not started.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{} was not permitted and not started: {}", .request.purpose, .request.command_line())]
 pub struct ProgramRefused {
@@ -51,16 +51,16 @@ pub struct ProgramRefused {
     pub request: ProgramRequest,
 }
 
-/// Which programs Dynident may start. Files from strangers name or need programs (a study its robot's program, a robot
-/// file with macros `xacro`), so that nothing is permitted by default.
+/// Which programs Dynident may start. By default none, because files of unknown origin can name or require programs (a
+/// study its robot's program, a robot file with macros `xacro`).
 #[derive(Clone, Copy, Default)]
 pub enum ProgramPermission<'a> {
-    /// No program is started.
+    /// No program.
     #[default]
     Refuse,
-    /// Every program is started that the files of a job name or need.
+    /// Every program that the files of a job name or require.
     Allow,
-    /// A function decides on each program before it is started: `true` permits it.
+    /// A function decides before each start; `true` permits the program.
     Ask(&'a dyn Fn(&ProgramRequest) -> bool),
 }
 
@@ -80,10 +80,10 @@ impl ProgramPermission<'_> {
         if is_allowed { Self::Allow } else { Self::Refuse }
     }
 
-    /// Decides on a program.
+    /// Decides whether a program may be started.
     ///
     /// # Errors
-    /// [`ProgramRefused`] if it may not be started.
+    /// [`ProgramRefused`] if it is not permitted.
     pub fn permit(&self, request: ProgramRequest) -> Result<PermittedProgram, ProgramRefused> {
         let is_permitted = match self {
             Self::Refuse => false,
@@ -94,14 +94,14 @@ impl ProgramPermission<'_> {
     }
 }
 
-/// A program that may be started: only [`ProgramPermission::permit`] makes one.
+/// A permitted program, created only by [`ProgramPermission::permit`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PermittedProgram {
     request: ProgramRequest,
 }
 
 impl PermittedProgram {
-    /// What was permitted.
+    /// The permitted request.
     pub fn request(&self) -> &ProgramRequest {
         &self.request
     }

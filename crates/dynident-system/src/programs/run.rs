@@ -1,4 +1,4 @@
-//! A program that runs to its end, for what it writes to its standard output.
+//! Runs a program to its end and returns its standard output.
 
 use super::group::{Pipes, ProcessGroup};
 use super::permission::PermittedProgram;
@@ -7,18 +7,17 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Time between two looks at a running program.
-const POLL: Duration = Duration::from_millis(5);
-/// Time that a program has to end after it was asked to.
-const GRACE: Duration = Duration::from_millis(500);
-/// Time until a pipe ends after all processes of the group have ended.
-const DRAIN: Duration = Duration::from_secs(1);
-/// Largest part of the standard error that a message shows, bytes: its end, where the cause is.
-const SHOWN_BYTES: usize = 400;
-/// Largest standard error that is kept, bytes.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Time for a program to end after the request.
+const END_TIMEOUT: Duration = Duration::from_millis(500);
+/// Time for a pipe to close after all processes of the group have ended.
+const PIPE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Maximum length of the standard error in a message, bytes: its end, which shows the cause.
+const MAX_SHOWN_BYTES: usize = 400;
+/// Maximum size of the stored standard error, bytes.
 const MAX_ERROR_BYTES: u64 = 1 << 20;
 
-/// How long a program may run and how much it may write.
+/// Limits of running time and output of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunLimits {
     /// Time limit, s.
@@ -27,71 +26,32 @@ pub struct RunLimits {
     pub output_bytes: u64,
 }
 
-/// Why a program gave no output. The program and all the processes that it started have been stopped.
+/// Why a program gave no output. The program and all its child processes have been stopped.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum RunError {
-    /// There is no program by this name.
     #[error("the program {program} is not installed, or not in a folder of PATH")]
-    NotFound {
-        /// The program.
-        program: String,
-    },
-    /// The system cannot start it.
+    NotFound { program: String },
     #[error("the program {program} cannot be started: {source}")]
-    NotStarted {
-        /// The program.
-        program: String,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// It ran longer than its time limit.
+    NotStarted { program: String, source: io::Error },
     #[error("the program {program} did not end within {limit_s} s and was stopped")]
-    TimedOut {
-        /// The program.
-        program: String,
-        /// The time limit, s.
-        limit_s: f64,
-    },
-    /// A stop was requested while it ran.
+    TimedOut { program: String, limit_s: f64 },
     #[error("the program {program} was stopped on request")]
-    Stopped {
-        /// The program.
-        program: String,
-    },
-    /// It wrote more than its limit.
+    Stopped { program: String },
     #[error("the program {program} wrote more than {} MiB and was stopped", most_bytes >> 20)]
-    TooLarge {
-        /// The program.
-        program: String,
-        /// The limit, bytes.
-        most_bytes: u64,
-    },
-    /// It failed.
+    TooLarge { program: String, most_bytes: u64 },
     #[error("the program {program} failed ({exit}): {message}")]
-    Failed {
-        /// The program.
-        program: String,
-        /// How it ended.
-        exit: String,
-        /// The end of its standard error, on one line.
-        message: String,
-    },
-    /// Its output cannot be read.
+    Failed { program: String, exit: String, message: String },
     #[error("the output of the program {program} cannot be read: {source}")]
-    Output {
-        /// The program.
-        program: String,
-        /// The reason.
-        source: io::Error,
-    },
+    Output { program: String, source: io::Error },
 }
 
-/// Runs a program without standard input until it ends, and returns what it wrote to its standard output. Afterwards no
-/// process of its group runs.
+/// Runs a program without standard input until it ends, and returns its standard output. Afterwards no process of its
+/// group runs.
 ///
 /// # Errors
-/// [`RunError`]: also if `is_stopped` returns true while the program runs.
+/// See [`RunError`]; also if `is_stopped` returns true while the program runs.
 pub fn run_to_end(
     program: &PermittedProgram,
     limits: RunLimits,
@@ -103,9 +63,9 @@ pub fn run_to_end(
         _ => RunError::NotStarted { program: name(), source },
     })?;
     let child = group.program();
-    // Both pipes are read at once: a full pipe would stop the program.
-    let output = child.stdout.take().map(|pipe| read_beside(pipe, limits.output_bytes.saturating_add(1)));
-    let errors = child.stderr.take().map(|pipe| read_beside(pipe, MAX_ERROR_BYTES));
+    // Both pipes are read concurrently, because a full pipe would block the program.
+    let output = child.stdout.take().map(|pipe| read_in_thread(pipe, limits.output_bytes.saturating_add(1)));
+    let errors = child.stderr.take().map(|pipe| read_in_thread(pipe, MAX_ERROR_BYTES));
     let limit = Duration::try_from_secs_f64(limits.time_s).unwrap_or(Duration::MAX);
     let begin = Instant::now();
     let mut received = None;
@@ -127,21 +87,21 @@ pub fn run_to_end(
         if begin.elapsed() >= limit {
             break Err(RunError::TimedOut { program: name(), limit_s: limits.time_s });
         }
-        std::thread::sleep(POLL);
+        std::thread::sleep(POLL_INTERVAL);
     };
-    // Processes that it started may hold its pipes open; they end here too.
-    let is_success = group.end(if outcome.is_ok() { Duration::ZERO } else { GRACE });
+    // Child processes may keep the pipes open, so they are ended as well.
+    let is_success = group.end(if outcome.is_ok() { Duration::ZERO } else { END_TIMEOUT });
     let exit = outcome?;
     let drained = |pipe: &Receiver<io::Result<Vec<u8>>>| {
         let late = || io::Error::new(ErrorKind::TimedOut, "another process keeps its pipe open");
-        pipe.recv_timeout(DRAIN).unwrap_or_else(|_| Err(late()))
+        pipe.recv_timeout(PIPE_TIMEOUT).unwrap_or_else(|_| Err(late()))
     };
     let bytes = match (received, &output) {
         (Some(bytes), _) => bytes,
         (None, Some(output)) => drained(output),
         (None, None) => Ok(Vec::new()),
     };
-    // First: a program whose output is no longer read fails for that reason.
+    // Tested first: a program whose output is no longer read fails for that reason.
     if bytes.as_ref().is_ok_and(|bytes| bytes.len() as u64 > limits.output_bytes) {
         return Err(RunError::TooLarge { program: name(), most_bytes: limits.output_bytes });
     }
@@ -153,21 +113,20 @@ pub fn run_to_end(
 }
 
 /// Reads a pipe to its end on a separate thread, at most `most_bytes`.
-fn read_beside(pipe: impl Read + Send + 'static, most_bytes: u64) -> Receiver<io::Result<Vec<u8>>> {
+fn read_in_thread(pipe: impl Read + Send + 'static, most_bytes: u64) -> Receiver<io::Result<Vec<u8>>> {
     let (send, receive) = channel();
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
         let read = pipe.take(most_bytes).read_to_end(&mut bytes).map(|_| bytes);
-        // Nobody may wait for it any more.
+        // The receiver may be gone.
         let _ = send.send(read);
     });
     receive
 }
 
-/// The end of a message, on one line.
 fn end_of(message: &str) -> String {
     let message = message.trim();
-    let first = message.len().saturating_sub(SHOWN_BYTES);
+    let first = message.len().saturating_sub(MAX_SHOWN_BYTES);
     let start = (first..message.len()).find(|&at| message.is_char_boundary(at)).unwrap_or(0);
     message[start..].replace('\n', " ")
 }
@@ -191,7 +150,7 @@ mod tests {
     #[test]
     fn the_output_of_a_program_that_succeeds_is_returned() {
         assert_eq!(run_to_end(&shell("printf text"), LIMITS, &|| false).unwrap(), b"text");
-        // A process that it leaves behind keeps the pipe open, and is ended.
+        // A remaining child process keeps the pipe open, and is ended.
         let begin = Instant::now();
         assert_eq!(run_to_end(&shell("sleep 60 & printf text"), LIMITS, &|| false).unwrap(), b"text");
         assert!(begin.elapsed() < Duration::from_secs(15));
@@ -212,7 +171,7 @@ mod tests {
     fn a_program_that_does_not_end_is_stopped() {
         let short = RunLimits { time_s: 0.2, ..LIMITS };
         assert_eq!(failure("sleep 60", short), "the program sh did not end within 0.2 s and was stopped");
-        // Also one that closes its pipes, and one that ignores the request to end.
+        // Also for a program that closes its pipes, and one that ignores the request to end.
         assert!(failure("exec >&- 2>&-; sleep 60", short).contains("0.2 s"));
         assert!(failure("trap '' TERM; sleep 60; sleep 60", short).contains("0.2 s"));
         let stopped = run_to_end(&shell("sleep 60"), LIMITS, &|| true).unwrap_err();

@@ -2,8 +2,7 @@
 
 use super::{Search, SlipKind};
 
-/// Links whose moments are exactly 1 about every axis, which no designed body has.
-pub(super) fn look(search: &mut Search) {
+pub(super) fn find(search: &mut Search) {
     let is_default = |place: &usize| search.now[*place].moments == [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
     let places: Vec<usize> = (0..search.now.len()).filter(is_default).collect();
     if places.is_empty() {
@@ -16,8 +15,8 @@ pub(super) fn look(search: &mut Search) {
         search.now.len()
     );
     let message = format!(
-        "moments of {} are an exporter's default: the true ones are not in the file; measure them, or delete <inertial> so that the link counts as unknown",
+        "moments of {} are an exporter's default, and the file does not contain the true ones: measure them, or delete <inertial> so that the link is treated as unknown",
         search.names(&places)
     );
-    search.name(SlipKind::Defaults, &places, message, evidence);
+    search.note_uncorrected(SlipKind::Defaults, &places, message, evidence);
 }

@@ -1,17 +1,19 @@
-//! Which slip of the pen, or of an exporter, explains inertials that no body has or that no robot of this size has; and
-//! the numbers that were meant.
+//! Finds the mistake in a URDF that explains impossible or implausible inertials, and computes the intended numbers.
 //!
-//! Hypotheses are tried in the order in which slips pile up: what stands in which slot and with which sign
-//! ([`Slots`](SlipKind::NegatedMoments) and its kin), units, the point that moments are about, then what only other
-//! links or a stated total can show. Each works on the numbers that those before it have mended. A slip has new numbers
-//! only where one hypothesis alone explains what is there.
+//! Hypotheses are tried in a fixed order, because mistakes can occur together: slots and signs of the numbers
+//! ([`NegatedMoments`](SlipKind::NegatedMoments) to [`LowerTriangle`](SlipKind::LowerTriangle)), units, reference point
+//! of the moments, then comparison with other links and a stated total. Each hypothesis uses the numbers corrected by
+//! the previous ones. A mistake is corrected only if exactly one hypothesis explains the numbers.
 
 mod about_origin;
 mod defaults;
+mod settings;
 mod slots;
 mod total_mass;
 mod twins;
 mod units;
+
+pub use settings::SlipSettings;
 
 use super::Lengths;
 use crate::spatial::{Mat3, Vec3};
@@ -19,33 +21,33 @@ use crate::tree::Model;
 use crate::urdf::{MOMENT_NAMES, StatedInertial, UrdfError, stated_inertials};
 use nalgebra::Matrix3;
 
-/// What went wrong.
+/// Kind of mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlipKind {
     /// All moments (or the mass) have the wrong sign.
     NegatedMoments,
-    /// Products of inertia have the other convention's sign, so that no body has them.
+    /// Products of inertia have the sign of the other convention, which makes the body impossible.
     NegatedProducts,
-    /// A matrix of nine, read row by row, stands in the six slots of the upper triangle.
+    /// A full 3 x 3 matrix, read row by row, was written into the six slots of the upper triangle.
     RowMajor,
-    /// A lower triangle, read row by row, stands in the slots of the upper one.
+    /// A lower triangle, read row by row, was written into the slots of the upper triangle.
     LowerTriangle,
-    /// Millimetres or grams stand where metres and kilograms are meant.
+    /// Millimetres or grams instead of metres and kilograms.
     Units,
-    /// Moments about the frame's origin stand where those about the centre of mass are meant.
+    /// Moments about the frame's origin instead of the centre of mass.
     AboutOrigin,
     /// An exporter's default of 1.
     Defaults,
     /// Masses do not add up to the stated total.
     TotalMass,
-    /// A mirrored link has other values than its twin.
+    /// A mirrored link has different values than its twin.
     Twins,
-    /// No body is like that, and none of these slips explains it, or several do.
+    /// An impossible body that none of these mistakes explains, or that several explain.
     Unexplained,
 }
 
 impl SlipKind {
-    /// The name in reports and in JSON.
+    /// Name in reports and in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::NegatedMoments => "negated-moments",
@@ -62,74 +64,87 @@ impl SlipKind {
     }
 }
 
-/// A slip, its evidence, and the numbers that were meant.
+/// A mistake in a URDF, its evidence, and the corrected numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slip {
-    /// What went wrong.
+    /// Kind of mistake.
     pub kind: SlipKind,
-    /// The links it concerns.
+    /// Affected links.
     pub links: Vec<String>,
-    /// What it is and, where the numbers cannot be had from the file, what to do.
+    /// Problem and, where the file does not determine the correct numbers, what to do.
     pub message: String,
-    /// Why it is believed, in numbers.
+    /// Evidence in numbers.
     pub evidence: String,
-    /// The numbers that were meant; empty where they cannot be known.
+    /// Corrected numbers; empty if they are not known.
     pub corrections: Vec<Correction>,
 }
 
-/// One number of one `<inertial>`, as it stands and as it was meant.
+/// Correction of one number of one `<inertial>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Correction {
-    /// The link.
+    /// Name of the link.
     pub link: String,
-    /// `mass`, `x`, `y`, `z` of the centre of mass, or a moment's name.
+    /// `mass`; `x`, `y` or `z` of the centre of mass; or the name of a moment.
     pub number: &'static str,
-    /// As it stands.
+    /// Value in the file.
     pub from: f64,
-    /// As it was meant.
+    /// Corrected value.
     pub to: f64,
 }
 
-/// What was found in a URDF.
+/// Result of the search for mistakes in a URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slips {
-    /// The slips, in the order in which they were looked for.
+    /// Mistakes, in the order of the search.
     pub found: Vec<Slip>,
-    /// The inertials as they stand.
+    /// Inertials in the file.
     pub stated: Vec<StatedInertial>,
-    /// The same with all corrections made.
+    /// Inertials with all corrections.
     pub corrected: Vec<StatedInertial>,
 }
 
-/// Looks for slips in the inertials of a URDF, whose model is `model`; `total_kg` is what its masses should add up to,
-/// where somebody has said so (a comment of the file that says `total mass 12.3 kg` counts as well).
+/// Searches the inertials of a URDF, whose model is `model`, for mistakes. `total_kg` is the known total mass, if
+/// available; a comment of the form `total mass 12.3 kg` in the file is also used.
 ///
 /// # Errors
-/// If the text is no URDF.
+/// Invalid URDF.
 pub fn slips(text: &str, model: &Model, total_kg: Option<f64>) -> Result<Slips, UrdfError> {
+    slips_with(text, model, total_kg, &SlipSettings::default())
+}
+
+/// As [`slips`], with other thresholds, which have to be [valid](SlipSettings::validate).
+///
+/// # Errors
+/// Invalid URDF.
+pub fn slips_with(
+    text: &str,
+    model: &Model,
+    total_kg: Option<f64>,
+    settings: &SlipSettings,
+) -> Result<Slips, UrdfError> {
     let stated = stated_inertials(text)?;
-    let lengths = lengths_of(&stated, model);
-    let mut search = Search { now: stated.clone(), lengths, found: Vec::new() };
-    slots::look(&mut search);
-    defaults::look(&mut search);
-    units::look(&mut search);
-    about_origin::look(&mut search);
-    twins::look(&mut search);
-    total_mass::look(&mut search, text, total_kg);
+    let lengths = body_lengths(&stated, model, settings.max_joint_offset_m);
+    let mut search = Search { settings: settings.clone(), now: stated.clone(), lengths, found: Vec::new() };
+    slots::find(&mut search);
+    defaults::find(&mut search);
+    units::find(&mut search);
+    about_origin::find(&mut search);
+    twins::find(&mut search);
+    total_mass::find(&mut search, text, total_kg);
     Ok(Slips { found: search.found, stated, corrected: search.now })
 }
 
-/// The numbers so far, and what was found.
 struct Search {
+    settings: SlipSettings,
     now: Vec<StatedInertial>,
-    /// Size of the body that each link belongs to, m; none if all joints stand further apart than any robot's, so that
-    /// there is nothing to compare with.
+    /// Size of each link's body, m; `None` if all joints are implausibly far apart, so that no length is available for
+    /// comparison.
     lengths: Option<Vec<f64>>,
     found: Vec<Slip>,
 }
 
 impl Search {
-    /// Notes a slip and makes its changes: link by link its place and new numbers.
+    /// Records a mistake and applies its corrections, given as index and new numbers of each link.
     fn note(&mut self, kind: SlipKind, message: String, evidence: String, changed: Vec<(usize, StatedInertial)>) {
         let links = changed.iter().map(|(place, _)| self.now[*place].link.clone()).collect();
         let mut corrections = Vec::new();
@@ -140,19 +155,18 @@ impl Search {
         self.found.push(Slip { kind, links, message, evidence, corrections });
     }
 
-    /// Notes a slip whose numbers cannot be known.
-    fn name(&mut self, kind: SlipKind, places: &[usize], message: String, evidence: String) {
+    fn note_uncorrected(&mut self, kind: SlipKind, places: &[usize], message: String, evidence: String) {
         let links = places.iter().map(|&place| self.now[place].link.clone()).collect();
         self.found.push(Slip { kind, links, message, evidence, corrections: Vec::new() });
     }
 
-    /// Places of the links that say something: neither all zero nor without a centre of mass.
+    /// Indices of the links with a nonzero inertial and a centre of mass.
     fn with_mass(&self) -> Vec<usize> {
-        let says = |stated: &StatedInertial| stated.mass_kg > 0.0 && trace(&stated.moments) > 0.0;
-        (0..self.now.len()).filter(|&place| says(&self.now[place])).collect()
+        let is_stated = |stated: &StatedInertial| stated.mass_kg > 0.0 && trace(&stated.moments) > 0.0;
+        (0..self.now.len()).filter(|&place| is_stated(&self.now[place])).collect()
     }
 
-    /// `a, b, c and 4 more` of the links at these places.
+    /// Names of these links: `a, b, c, d and 4 more`.
     fn names(&self, places: &[usize]) -> String {
         const SHOWN: usize = 4;
         let shown: Vec<&str> = places.iter().take(SHOWN).map(|&place| self.now[place].link.as_str()).collect();
@@ -170,11 +184,8 @@ fn differences(old: &StatedInertial, new: &StatedInertial) -> Vec<Correction> {
     pairs.map(|((number, from), (_, to))| Correction { link: old.link.clone(), number, from, to }).collect()
 }
 
-/// No common robot has two joints further apart, m.
-const LARGEST_OFFSET_M: f64 = 10.0;
-
-fn lengths_of(stated: &[StatedInertial], model: &Model) -> Option<Vec<f64>> {
-    if model.tree_joints().iter().any(|joint| joint.placement.translation.norm() > LARGEST_OFFSET_M) {
+fn body_lengths(stated: &[StatedInertial], model: &Model, max_joint_offset_m: f64) -> Option<Vec<f64>> {
+    if model.tree_joints().iter().any(|joint| joint.placement.translation.norm() > max_joint_offset_m) {
         return None;
     }
     let lengths = Lengths::of(model);
@@ -184,22 +195,22 @@ fn lengths_of(stated: &[StatedInertial], model: &Model) -> Option<Vec<f64>> {
         .zip(&lengths.bodies)
         .flat_map(|(body, length)| body.links.iter().map(move |link| (link.name.as_str(), *length)))
         .collect();
-    // The base is about as large as what stands on it is far.
+    // The size of the base is estimated by the distance of the joints mounted on it.
     let on_base = model.tree_joints().iter().filter(|joint| joint.parent.is_none());
     let base = on_base.map(|joint| joint.placement.translation.norm()).fold(0.1, f64::max);
     Some(stated.iter().map(|one| of_body.get(one.link.as_str()).copied().unwrap_or(base)).collect())
 }
 
-/// A violation of the triangle inequality by less than this share is rounding in the file.
-const ROUNDING: f64 = 1e-2;
+/// Tolerance of the triangle inequality, relative: rounding in the file.
+const TRIANGLE_TOLERANCE: f64 = 1e-2;
 
-/// Whether a body can have these moments about its centre of mass: none negative, none above the sum of the others.
-fn possible(moments: &[f64; 6]) -> bool {
+/// Whether a body can have these moments about its centre of mass: none negative, none above the sum of the other two.
+fn is_possible(moments: &[f64; 6]) -> bool {
     let [least, middle, most] = principal(moments);
-    least >= -1e-9 * trace(moments).abs() && most - least - middle <= ROUNDING * most
+    least >= -1e-9 * trace(moments).abs() && most - least - middle <= TRIANGLE_TOLERANCE * most
 }
 
-/// Principal moments, ascending.
+/// Ascending.
 fn principal(inertia: &[f64; 6]) -> [f64; 3] {
     let [xx, xy, xz, yy, yz, zz] = inertia;
     let matrix = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
@@ -216,20 +227,18 @@ fn shown(moments: [f64; 3]) -> String {
     moments.map(|moment| format!("{moment:.3e}")).join(", ")
 }
 
-/// The six moments of a matrix.
-fn six(m: &Mat3) -> [f64; 6] {
+fn upper_triangle(m: &Mat3) -> [f64; 6] {
     [m.0[0][0], m.0[0][1], m.0[0][2], m.0[1][1], m.0[1][2], m.0[2][2]]
 }
 
-/// `m (rᵀr 1 - r rᵀ)`: what moving the moments from the centre of mass to the frame's origin adds, in the axes of
-/// `<origin>`.
+/// Parallel-axis term `m (rᵀr 1 - r rᵀ)` from the centre of mass to the frame's origin, in the axes of `<origin>`.
 fn parallel_axis(stated: &StatedInertial) -> Mat3 {
     let com = stated.axes.transpose_mul_vec(Vec3(stated.com_m));
     (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(stated.mass_kg)
 }
 
-/// `value · 10^power` as its decimal digits shifted, so that 12.3 and -3 give 0.0123.
-fn shifted(value: f64, power: i32) -> f64 {
+/// `value · 10^power`, computed on decimal digits so that 12.3 and -3 give exactly 0.0123.
+fn scaled_by_power(value: f64, power: i32) -> f64 {
     let text = format!("{value:e}");
     let exact = text.split_once('e').and_then(|(digits, exponent)| {
         format!("{digits}e{}", exponent.parse::<i32>().ok()? + power).parse::<f64>().ok()
@@ -239,19 +248,19 @@ fn shifted(value: f64, power: i32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{possible, shifted};
+    use super::{is_possible, scaled_by_power};
 
     #[test]
     fn digits_are_kept() {
         assert_eq!(
-            [shifted(12.3, -3), shifted(-0.7, -6), shifted(0.0, 9), shifted(1e-3, 3)],
+            [scaled_by_power(12.3, -3), scaled_by_power(-0.7, -6), scaled_by_power(0.0, 9), scaled_by_power(1e-3, 3)],
             [0.0123, -7e-7, 0.0, 1.0]
         );
     }
 
     #[test]
     fn bodies_are_possible() {
-        assert!(possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.0]) && possible(&[0.0; 6]));
-        assert!(!possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.1]) && !possible(&[1.0, 2.0, 0.0, 1.0, 0.0, 1.0]));
+        assert!(is_possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.0]) && is_possible(&[0.0; 6]));
+        assert!(!is_possible(&[1.0, 0.0, 0.0, 1.0, 0.0, 2.1]) && !is_possible(&[1.0, 2.0, 0.0, 1.0, 0.0, 1.0]));
     }
 }

@@ -1,26 +1,27 @@
-//! Numbers in the wrong slot or with the wrong sign: what makes a body of moments that no body has.
+//! Moments in the wrong slot or with the wrong sign.
 
-use super::{Search, SlipKind, possible, principal, shown};
+use super::{Search, SlipKind, is_possible, principal, shown};
 use crate::urdf::StatedInertial;
 
-/// One way to read the six numbers, if they look like it and it gives a body.
-struct Reading {
+struct Interpretation {
     kind: SlipKind,
-    /// The numbers that were meant; none where one of them is not in the file.
+    /// Corrected numbers; `None` if the file does not contain one of them.
     meant: Option<StatedInertial>,
     evidence: String,
 }
 
-/// Reads every link that no body is like in each of the ways. A way that alone explains a link is its slip; where
-/// several do, the one that explains most links of the file counts, if there is only one such.
-pub(super) fn look(search: &mut Search) {
+/// Tries all interpretations for every impossible link. If several explain a link, the one that explains most links of
+/// the file is used, provided it is unique.
+pub(super) fn find(search: &mut Search) {
     let broken: Vec<usize> = (0..search.now.len()).filter(|&place| !is_body(&search.now[place])).collect();
-    let readings: Vec<Vec<Reading>> = broken.iter().map(|&place| readings(&search.now[place])).collect();
-    let explained = |kind: SlipKind| readings.iter().filter(|ways| ways.iter().any(|way| way.kind == kind)).count();
-    let mut of_kind: Vec<(SlipKind, Vec<(usize, &Reading)>)> = Vec::new();
+    let interpretations: Vec<Vec<Interpretation>> =
+        broken.iter().map(|&place| interpretations(&search.now[place])).collect();
+    let explained =
+        |kind: SlipKind| interpretations.iter().filter(|ways| ways.iter().any(|way| way.kind == kind)).count();
+    let mut of_kind: Vec<(SlipKind, Vec<(usize, &Interpretation)>)> = Vec::new();
     let mut open = Vec::new();
-    for (&place, ways) in broken.iter().zip(&readings) {
-        let mut ways: Vec<&Reading> = ways.iter().collect();
+    for (&place, ways) in broken.iter().zip(&interpretations) {
+        let mut ways: Vec<&Interpretation> = ways.iter().collect();
         let most = ways.iter().map(|way| explained(way.kind)).max().unwrap_or(0);
         if most > 1 && ways.iter().filter(|way| explained(way.kind) == most).count() == 1 {
             ways.retain(|way| explained(way.kind) == most);
@@ -41,36 +42,36 @@ pub(super) fn look(search: &mut Search) {
         let evidence =
             format!("principal moments {} kg m^2, mass {} kg", shown(principal(&stated.moments)), stated.mass_kg);
         let message = if ways.is_empty() {
-            "no body is like that, and no slip that is known here (signs, order of the numbers) makes one of it: measure it, or delete <inertial>".to_owned()
+            "impossible body, which no known mistake (signs, order of the numbers) explains: measure it, or delete <inertial>".to_owned()
         } else {
             format!(
-                "no body is like that, and several slips would explain it ({}): look at where the numbers came from",
+                "impossible body, which several mistakes explain ({}): check the source of the numbers",
                 ways.join(", ")
             )
         };
-        search.name(SlipKind::Unexplained, &[place], message, evidence);
+        search.note_uncorrected(SlipKind::Unexplained, &[place], message, evidence);
     }
 }
 
 fn is_body(stated: &StatedInertial) -> bool {
     let nothing = stated.mass_kg == 0.0 && stated.moments == [0.0; 6];
-    nothing || stated.mass_kg > 0.0 && possible(&stated.moments)
+    nothing || stated.mass_kg > 0.0 && is_possible(&stated.moments)
 }
 
-fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Reading)]) {
+fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Interpretation)]) {
     let places: Vec<usize> = members.iter().map(|(place, _)| *place).collect();
     let evidence: Vec<String> =
         members.iter().take(3).map(|(place, way)| format!("{}: {}", search.now[*place].link, way.evidence)).collect();
     let evidence = evidence.join("; ");
     let whose = search.names(&places);
     let message = match kind {
-        SlipKind::NegatedMoments => format!("mass or moments of {whose} have the wrong sign: turn it"),
+        SlipKind::NegatedMoments => format!("mass or moments of {whose} have the wrong sign: change it"),
         SlipKind::NegatedProducts => format!(
-            "products of inertia of {whose} have the other convention's sign (URDF has ixy = -∫ x y dm): turn ixy, ixz and iyz"
+            "products of inertia of {whose} have the sign of the other convention (URDF has ixy = -∫ x y dm): change the signs of ixy, ixz and iyz"
         ),
         SlipKind::RowMajor => format!(
             "moments of {whose} are a 3 x 3 matrix read row by row into the slots ixx ixy ixz iyy iyz izz: iyy repeats ixy, iyz is iyy and izz is iyz; \
-             the true izz is not in the file, take it from where the numbers came from"
+             the true izz is not in the file, take it from the source of the numbers"
         ),
         SlipKind::LowerTriangle => format!(
             "moments of {whose} are a lower triangle read row by row (xx, xy, yy, xz, yz, zz) into the slots of an upper one: exchange ixz and iyy"
@@ -80,59 +81,58 @@ fn note(search: &mut Search, kind: SlipKind, members: &[(usize, &Reading)]) {
     let changed: Vec<(usize, StatedInertial)> =
         members.iter().filter_map(|(place, way)| Some((*place, way.meant.clone()?))).collect();
     if changed.is_empty() {
-        search.name(kind, &places, message, evidence);
+        search.note_uncorrected(kind, &places, message, evidence);
     } else {
         search.note(kind, message, evidence, changed);
     }
 }
 
-/// Every way in which the numbers of one link make a body.
-fn readings(stated: &StatedInertial) -> Vec<Reading> {
+fn interpretations(stated: &StatedInertial) -> Vec<Interpretation> {
     let [xx, xy, xz, yy, yz, zz] = stated.moments;
     let before = shown(principal(&stated.moments));
     let with = |mass_kg: f64, moments: [f64; 6]| StatedInertial { mass_kg, moments, ..stated.clone() };
     let mut ways = Vec::new();
     let mut way = |kind, mass_kg: f64, moments: [f64; 6], known: bool| {
         let evidence =
-            format!("principal moments {before} kg m^2 become {}, which a body can have", shown(principal(&moments)));
+            format!("principal moments {before} kg m^2 become {}, which is possible", shown(principal(&moments)));
         let meant = known.then(|| with(mass_kg, moments));
-        ways.push(Reading { kind, meant, evidence });
+        ways.push(Interpretation { kind, meant, evidence });
     };
     let negated = stated.moments.map(|moment| if moment == 0.0 { moment } else { -moment });
     let all_negative = [xx, yy, zz].iter().all(|moment| *moment <= 0.0) && xx + yy + zz < 0.0;
-    if all_negative && possible(&negated) {
+    if all_negative && is_possible(&negated) {
         way(SlipKind::NegatedMoments, stated.mass_kg.abs(), negated, stated.mass_kg != 0.0);
     }
-    if stated.mass_kg < 0.0 && possible(&stated.moments) && xx + yy + zz > 0.0 {
+    if stated.mass_kg < 0.0 && is_possible(&stated.moments) && xx + yy + zz > 0.0 {
         way(SlipKind::NegatedMoments, -stated.mass_kg, stated.moments, true);
     }
     if stated.mass_kg <= 0.0 {
         return ways;
     }
     let products = [xx, -xy, -xz, yy, -yz, zz];
-    if products.map(|x| x + 0.0) != stated.moments && possible(&products) {
+    if products.map(|x| x + 0.0) != stated.moments && is_possible(&products) {
         way(SlipKind::NegatedProducts, stated.mass_kg, products.map(|x| x + 0.0), true);
     }
-    // The row-major walk: ixy stands again where iyy belongs, and the true iyy (large) where iyz does.
+    // In a matrix written row by row, ixy is repeated in the slot of iyy, and the true iyy (large) is in that of iyz.
     if yy == xy && yz > 0.0 && yz.abs() > zz.abs() {
-        // Any izz between |xx - yy| and xx + yy makes a body of the upper left block, if that is one.
+        // Any izz between |xx - yy| and xx + yy is possible if the upper left block is positive definite.
         let middle = (xx * xx + yz * yz).sqrt();
         let moments = [xx, xy, xz, yz, zz, middle];
-        if possible(&moments) {
+        if is_possible(&moments) {
             let (least, most) = ((xx - yz).abs(), xx + yz);
-            ways.push(Reading {
+            ways.push(Interpretation {
                 kind: SlipKind::RowMajor,
                 meant: None,
-                evidence: format!("iyy = ixy = {xy}, and with iyy = {yz}, iyz = {zz} a body has an izz between {least:.3e} and {most:.3e}"),
+                evidence: format!("iyy = ixy = {xy}, and with iyy = {yz}, iyz = {zz} a possible izz is between {least:.3e} and {most:.3e}"),
             });
             return ways.into_iter().filter(|way| way.kind == SlipKind::RowMajor).collect();
         }
     }
     let lower = [xx, xy, yy, xz, yz, zz];
-    if xz > 0.0 && xz != yy && possible(&lower) {
+    if xz > 0.0 && xz != yy && is_possible(&lower) {
         let evidence =
-            format!("principal moments {before} kg m^2 become {}, which a body can have", shown(principal(&lower)));
-        ways.push(Reading { kind: SlipKind::LowerTriangle, meant: Some(with(stated.mass_kg, lower)), evidence });
+            format!("principal moments {before} kg m^2 become {}, which is possible", shown(principal(&lower)));
+        ways.push(Interpretation { kind: SlipKind::LowerTriangle, meant: Some(with(stated.mass_kg, lower)), evidence });
     }
     ways
 }

@@ -1,29 +1,25 @@
 //! Masses that do not add up to a stated total.
 
-use super::{Search, SlipKind, shifted, trace};
+use super::{Search, SlipKind, scaled_by_power, trace};
 use crate::urdf::StatedInertial;
 
-/// A total is stated to some digits, and screws are left out.
-const NEAR: f64 = 0.015;
-/// One explanation among many must fit better than that.
-const EXACT: f64 = 0.003;
-
-/// Units of a total, and the power of ten that makes kilograms.
+/// Units of a total, with the power of ten to kilograms.
 const UNITS: [(&str, i32); 2] = [("kg", 0), ("g", -3)];
 
-/// Compares the sum with the total that the caller or a comment of the file states.
-pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
-    let Some(total) = total_kg.or_else(|| commented(text)).filter(|total| *total > 0.0 && total.is_finite()) else {
+pub(super) fn find(search: &mut Search, text: &str, total_kg: Option<f64>) {
+    let Some(total) = total_kg.or_else(|| stated_in_comment(text)).filter(|total| *total > 0.0 && total.is_finite())
+    else {
         return;
     };
     let sum: f64 = search.now.iter().map(|one| one.mass_kg).sum();
     let near = |sum: f64, share: f64| (sum - total).abs() <= share * total;
-    if near(sum, NEAR) {
+    if near(sum, search.settings.total_mass_tolerance) {
         return;
     }
     let evidence = format!("masses add up to {sum} kg, the stated total is {total} kg");
-    // All in another unit.
-    if let Some(power) = [-3, 3].into_iter().find(|&power| near(shifted(sum, power), NEAR)) {
+    if let Some(power) =
+        [-3, 3].into_iter().find(|&power| near(scaled_by_power(sum, power), search.settings.total_mass_tolerance))
+    {
         let all: Vec<(usize, StatedInertial)> = (0..search.now.len())
             .map(|place| (place, scaled(&search.now[place], power)))
             .filter(|(place, new)| search.now[*place] != *new)
@@ -33,24 +29,29 @@ pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
         search.note(SlipKind::TotalMass, message, evidence, all);
         return;
     }
-    // One of them with the point in another place.
+    // One mass with a misplaced decimal point.
     let mut ways: Vec<(usize, i32)> = Vec::new();
     for (place, one) in search.now.iter().enumerate().filter(|(_, one)| one.mass_kg > 0.0) {
         let powers = [-3, -2, -1, 1, 2, 3];
         ways.extend(
             powers
                 .into_iter()
-                .filter(|&power| near(sum - one.mass_kg + shifted(one.mass_kg, power), EXACT))
-                .filter(|&power| nearer_to_the_others(search, place, power))
+                .filter(|&power| {
+                    near(
+                        sum - one.mass_kg + scaled_by_power(one.mass_kg, power),
+                        search.settings.corrected_mass_tolerance,
+                    )
+                })
+                .filter(|&power| improves_gyration(search, place, power))
                 .map(|power| (place, power)),
         );
     }
-    // One that stands there twice.
+    // A duplicated link.
     let twice: Vec<usize> = (0..search.now.len())
         .filter(|&place| {
             let one = &search.now[place];
             one.mass_kg > 0.0
-                && near(sum - one.mass_kg, EXACT)
+                && near(sum - one.mass_kg, search.settings.corrected_mass_tolerance)
                 && search.now[..place].iter().any(|other| (other.mass_kg, other.moments) == (one.mass_kg, one.moments))
         })
         .collect();
@@ -58,30 +59,34 @@ pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
         (&[(place, power)], []) => {
             let new = scaled(&search.now[place], power);
             let message = format!(
-                "the mass of {} has its decimal point in the wrong place: {} kg instead of {} kg makes the total",
+                "the mass of {} has its decimal point in the wrong place: {} kg instead of {} kg gives the total",
                 new.link, new.mass_kg, search.now[place].mass_kg
             );
             search.note(SlipKind::TotalMass, message, evidence, vec![(place, new)]);
         }
         ([], &[place]) => {
             let message = format!(
-                "{} has the mass and moments of another link, and without it the masses make the total: it seems to be counted twice; delete its <inertial> if so",
+                "{} has the mass and moments of another link, and without it the masses give the total: if the link is a duplicate, delete its <inertial>",
                 search.now[place].link
             );
-            search.name(SlipKind::TotalMass, &[place], message, evidence);
+            search.note_uncorrected(SlipKind::TotalMass, &[place], message, evidence);
         }
         _ => {
             let several = ways.len() + twice.len();
-            let why = if several == 0 { "no single mass explains it" } else { "several masses would explain it" };
+            let why = if several == 0 {
+                "no change of a single mass explains it"
+            } else {
+                "changes of several single masses explain it"
+            };
             let message = format!("masses do not add up to the stated total, and {why}: weigh the parts");
-            search.name(SlipKind::TotalMass, &[], message, evidence);
+            search.note_uncorrected(SlipKind::TotalMass, &[], message, evidence);
         }
     }
 }
 
-/// Whether the radius of gyration over the link's length comes nearer to that of the other links: among some ten links
-/// and six powers one fits a total by chance often enough.
-fn nearer_to_the_others(search: &Search, place: usize, power: i32) -> bool {
+/// Whether the correction brings the radius of gyration over link length closer to that of the other links. This check
+/// is needed because among ten links and six powers one matches a total by chance often enough.
+fn improves_gyration(search: &Search, place: usize, power: i32) -> bool {
     let Some(lengths) = &search.lengths else { return true };
     let figure = |place: usize| {
         let one = &search.now[place];
@@ -91,16 +96,16 @@ fn nearer_to_the_others(search: &Search, place: usize, power: i32) -> bool {
     others.sort_by(f64::total_cmp);
     let Some(&middle) = others.get(others.len() / 2) else { return true };
     let before = figure(place) - middle;
-    // The radius goes with the root of the mass.
+    // The radius of gyration scales with 1/√mass.
     (before - 0.5 * f64::from(power)).abs() < before.abs()
 }
 
 fn scaled(stated: &StatedInertial, power: i32) -> StatedInertial {
-    StatedInertial { mass_kg: shifted(stated.mass_kg, power), ..stated.clone() }
+    StatedInertial { mass_kg: scaled_by_power(stated.mass_kg, power), ..stated.clone() }
 }
 
-/// The total that a comment states: `total mass` or `total weight`, then a number and its unit.
-fn commented(text: &str) -> Option<f64> {
+/// The total in a comment: `total mass` or `total weight`, then a number and its unit.
+fn stated_in_comment(text: &str) -> Option<f64> {
     let mut rest = text;
     while let Some(start) = rest.find("<!--") {
         let comment = &rest[start + 4..];
@@ -121,20 +126,20 @@ fn total_in(comment: &str) -> Option<f64> {
     let value = after[number..end].trim_end_matches('.').parse::<f64>().ok()?;
     let unit: String = after[end..].trim_start().chars().take_while(char::is_ascii_alphabetic).collect();
     let (_, power) = UNITS.iter().find(|(name, _)| *name == unit)?;
-    Some(shifted(value, *power))
+    Some(scaled_by_power(value, *power))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::commented;
+    use super::stated_in_comment;
 
     #[test]
     fn a_total_is_read_from_a_comment() {
-        assert_eq!(commented("<a/><!-- arm --><!-- Total mass: 12.5 kg, with cables -->"), Some(12.5));
-        assert_eq!(commented("<!-- total weight of the arm = 900 g -->"), Some(0.9));
+        assert_eq!(stated_in_comment("<a/><!-- arm --><!-- Total mass: 12.5 kg, with cables -->"), Some(12.5));
+        assert_eq!(stated_in_comment("<!-- total weight of the arm = 900 g -->"), Some(0.9));
         for none in ["<!-- total mass unknown -->", "total mass 3 kg", "<!-- total mass 3 -->", "<!-- total mass 3 lb"]
         {
-            assert_eq!(commented(none), None, "{none}");
+            assert_eq!(stated_in_comment(none), None, "{none}");
         }
     }
 }

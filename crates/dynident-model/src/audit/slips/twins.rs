@@ -1,56 +1,51 @@
-//! Mirrored links whose twins differ.
+//! Mirrored links with different values.
 
-use super::{Search, SlipKind, possible, principal, trace};
+use super::{Search, SlipKind, is_possible, principal, trace};
 use crate::urdf::{MOMENT_NAMES, StatedInertial};
 use std::collections::HashMap;
 
-/// Twins agree to this share of their size: CAD programs leave some tenths of a percent.
-const ALIKE: f64 = 0.02;
-/// Most numbers in which twins may differ for the others to say which mirror image is meant.
-const FEW: usize = 3;
-
-/// Words of names that mean the two sides.
 const SIDES: [[&str; 2]; 6] = [["left", "right"], ["l", "r"], ["fl", "fr"], ["rl", "rr"], ["hl", "hr"], ["bl", "br"]];
 
-/// Pairs of a left and a right link with other masses, distances of the centre of mass or principal moments.
-pub(super) fn look(search: &mut Search) {
+/// Reports pairs of left and right links with different masses, distances of the centre of mass or principal moments.
+pub(super) fn find(search: &mut Search) {
+    let tolerance = search.settings.twin_tolerance;
     for (left, right) in pairs(&search.now) {
         let [a, b] = [left, right].map(|place| search.now[place].clone());
-        if alike(&a, &b) {
+        if are_equal(&a, &b, tolerance) {
             continue;
         }
-        let (signs, differing) = mirror(&a, &b);
+        let (signs, differing) = mirror(&a, &b, tolerance);
         let list: Vec<String> =
             differing.iter().map(|&k| format!("{} {} and {}", NAMES[k], numbers(&a)[k], numbers(&b)[k])).collect();
         let evidence = format!("{} and {}: {}", a.link, b.link, list.join(", "));
         let bodies = [is_body(&a), is_body(&b)];
-        if differing.len() > FEW || bodies[0] == bodies[1] {
+        if differing.len() > search.settings.max_differing_values || bodies[0] == bodies[1] {
             let message = format!(
-                "{} and {} are mirror images by name but not by numbers, and nothing says which is right: compare with the drawing",
+                "{} and {} are mirror images by name, but their numbers differ: compare both with the drawing",
                 a.link, b.link
             );
-            search.name(SlipKind::Twins, &[left, right], message, evidence);
+            search.note_uncorrected(SlipKind::Twins, &[left, right], message, evidence);
             continue;
         }
-        // The one that can be a body tells the other.
+        // The possible one of the two gives the values of the other.
         let (good, wrong, place) = if bodies[0] { (&a, &b, right) } else { (&b, &a, left) };
         let mut meant = numbers(wrong);
         for &k in &differing {
             meant[k] = signs[k] * numbers(good)[k] + 0.0;
         }
         let message = format!(
-            "{} differs from its mirror image {}, and only the latter can be a body: take over its numbers",
+            "{} is impossible and differs from its mirror image {}: use the numbers of the mirror image",
             wrong.link, good.link
         );
         let new = with_numbers(wrong, meant);
-        // What slots found nothing for is explained now.
+        // This explains the link, so that its earlier `Unexplained` entry is removed.
         search.found.retain(|slip| !(slip.kind == SlipKind::Unexplained && slip.links == [wrong.link.clone()]));
         search.note(SlipKind::Twins, message, evidence, vec![(place, new)]);
     }
 }
 
 fn is_body(stated: &StatedInertial) -> bool {
-    stated.mass_kg > 0.0 && possible(&stated.moments)
+    stated.mass_kg > 0.0 && is_possible(&stated.moments)
 }
 
 fn pairs(stated: &[StatedInertial]) -> Vec<(usize, usize)> {
@@ -65,7 +60,8 @@ fn pairs(stated: &[StatedInertial]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// `name` with the word `left` as `right`; `None` where it has no such word. Long words may stand inside of others.
+/// `name` with the word `left` replaced by `right`; `None` if `left` does not occur as a word. Long words may be part
+/// of other words.
 fn replaced(name: &str, left: &str, right: &str) -> Option<String> {
     if left.len() > 2 {
         return name.contains(left).then(|| name.replace(left, right));
@@ -75,15 +71,15 @@ fn replaced(name: &str, left: &str, right: &str) -> Option<String> {
     Some(words.iter().enumerate().map(|(k, word)| if k == at { right } else { *word }).collect::<Vec<_>>().join("_"))
 }
 
-/// Whether two links are mirror images or turned ones, whatever their frames.
-fn alike(a: &StatedInertial, b: &StatedInertial) -> bool {
-    let near = |x: f64, y: f64, scale: f64| (x - y).abs() <= ALIKE * scale;
+/// Whether two links have equal mass, centre-of-mass distance and principal moments, in any frame.
+fn are_equal(a: &StatedInertial, b: &StatedInertial, tolerance: f64) -> bool {
+    let near = |x: f64, y: f64, scale: f64| (x - y).abs() <= tolerance * scale;
     let distance = |one: &StatedInertial| one.com_m.iter().map(|x| x * x).sum::<f64>().sqrt();
     let (of_a, of_b) = (principal(&a.moments), principal(&b.moments));
     let size = of_a.iter().chain(&of_b).fold(0.0_f64, |most, moment| most.max(moment.abs()));
     near(a.mass_kg, b.mass_kg, a.mass_kg.abs().max(b.mass_kg.abs()))
-        // A tenth of a millimetre is none.
-        && (distance(a) - distance(b)).abs() <= ALIKE * distance(a).max(distance(b)) + 1e-4
+        // Differences below 0.1 mm are ignored.
+        && (distance(a) - distance(b)).abs() <= tolerance * distance(a).max(distance(b)) + 1e-4
         && of_a.iter().zip(&of_b).all(|(a, b)| near(*a, *b, size))
 }
 
@@ -100,13 +96,14 @@ fn with_numbers(of: &StatedInertial, numbers: [f64; 10]) -> StatedInertial {
     StatedInertial { mass_kg, com_m: [x, y, z], moments: [a, b, c, d, e, f], ..of.clone() }
 }
 
-/// The mirror (signs of the axes) in which fewest numbers differ: the sign of each number, and those that differ.
-fn mirror(a: &StatedInertial, b: &StatedInertial) -> ([f64; 10], Vec<usize>) {
+/// The reflection (signs of the axes) with the fewest differing numbers: sign of each number, and indices of the
+/// differing ones.
+fn mirror(a: &StatedInertial, b: &StatedInertial, tolerance: f64) -> ([f64; 10], Vec<usize>) {
     let (of_a, of_b) = (numbers(a), numbers(b));
     let size = trace(&a.moments).abs().max(trace(&b.moments).abs());
     let length = of_a[1..4].iter().chain(&of_b[1..4]).fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut best: Option<([f64; 10], Vec<usize>)> = None;
-    // The plain copy and the mirror in the plane of x and z first: the usual ones.
+    // The most common cases first: copy, and reflection in the xz plane.
     for [x, y, z] in [
         [1.0, 1.0, 1.0],
         [1.0, -1.0, 1.0],
@@ -124,7 +121,7 @@ fn mirror(a: &StatedInertial, b: &StatedInertial) -> ([f64; 10], Vec<usize>) {
                 1..=3 => length + 0.005,
                 _ => size,
             };
-            (signs[k] * of_a[k] - of_b[k]).abs() > ALIKE * scale
+            (signs[k] * of_a[k] - of_b[k]).abs() > tolerance * scale
         };
         let differing: Vec<usize> = (0..10).filter(|&k| differs(k)).collect();
         if best.as_ref().is_none_or(|(_, least)| differing.len() < least.len()) {

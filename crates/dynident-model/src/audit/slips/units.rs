@@ -1,14 +1,14 @@
 //! Millimetres and grams.
 //!
-//! Three figures say whether masses, centres of mass and moments fit the distances between the joints (`L`, of the body
-//! that a link belongs to): the radius of gyration `√(½ tr I / m)` over L, the mass over L³, and the distance of the
-//! centre of mass over L. On the published descriptions of arms and humanoids their medians are 0.26 to 0.44 (1.7 where
-//! many links are wheels and fingers), 10 to 500 kg/m³, and at most 0.5; single centres of mass are up to 4.5 L away.
+//! Three figures are compared with the distances between the joints (`L`, size of the link's body): radius of gyration
+//! `√(½ tr I / m)` over L, mass over L³, and distance of the centre of mass over L. In published descriptions of arms
+//! and humanoids the medians are 0.26 to 0.44 (1.7 with many wheels and fingers), 10 to 500 kg/m³, and at most 0.5;
+//! single centres of mass are up to 4.5 L away.
 
-use super::{Search, SlipKind, shifted, trace};
+use super::{Search, SlipKind, SlipSettings, scaled_by_power, trace};
 use crate::urdf::StatedInertial;
 
-/// Units that numbers may be in, by the powers of ten that make kg, m and kg m² of them.
+/// A hypothesis about units, as powers of ten to kg, m and kg m².
 struct Units {
     what: &'static str,
     mass: i32,
@@ -29,101 +29,88 @@ const CANDIDATES: [Units; 10] = [
     Units { what: "masses in g, centres of mass in mm and moments in g mm^2", mass: -3, com: -3, moments: -9 },
 ];
 
-/// Decimal logarithms of what the figures are on published descriptions, and of what they may be: for all links
-/// together, and for one.
-const GYRATION: f64 = -0.45;
-const GYRATIONS: [[f64; 2]; 2] = [[-1.2, 0.8], [-1.7, 1.3]];
-const DENSITY: f64 = 2.2;
-const DENSITIES: [[f64; 2]; 2] = [[-0.7, 3.7], [-0.7, 4.2]];
-/// Largest distance of a centre of mass over L (the median of those that are not zero), and the least where it was
-/// changed.
-const FARTHEST: f64 = 20.0;
-const NEAREST: f64 = 0.005;
-/// A second explanation that fits within this much (in decades) of the best makes it ambiguous.
-const APART: f64 = 0.4;
-
 impl Units {
     fn of(&self, stated: &StatedInertial) -> StatedInertial {
         StatedInertial {
-            mass_kg: shifted(stated.mass_kg, self.mass),
-            com_m: stated.com_m.map(|x| shifted(x, self.com)),
-            moments: stated.moments.map(|moment| shifted(moment, self.moments)),
+            mass_kg: scaled_by_power(stated.mass_kg, self.mass),
+            com_m: stated.com_m.map(|x| scaled_by_power(x, self.com)),
+            moments: stated.moments.map(|moment| scaled_by_power(moment, self.moments)),
             ..stated.clone()
         }
     }
 }
 
-/// All links together if their figures fit no robot, else link by link.
-pub(super) fn look(search: &mut Search) {
+/// Tests all links together; if their figures are plausible, tests each link alone.
+pub(super) fn find(search: &mut Search) {
     let Some(lengths) = search.lengths.clone() else { return };
     let places: Vec<usize> =
-        search.with_mass().into_iter().filter(|&place| search.now[place].moments != DEFAULT).collect();
+        search.with_mass().into_iter().filter(|&place| search.now[place].moments != DEFAULT_MOMENTS).collect();
     if places.len() >= 2 && explain(search, &places, &lengths, false) {
         return;
     }
     for place in places {
-        // Sensors and frames have a mass for the simulator's sake, of no body.
+        // Sensors and frames often have an arbitrary mass for the simulator.
         let one = Figures::of(core::iter::once((search.now[place].clone(), lengths[place])));
-        if one.density < DENSITIES[1][0] {
+        if one.density < search.settings.link_log10_density_range[0] {
             continue;
         }
         explain(search, &[place], &lengths, true);
     }
 }
 
-/// The default of 1 kg m², which is not a matter of units.
-const DEFAULT: [f64; 6] = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
+/// An exporter's default of 1 kg m², which is not a unit error.
+const DEFAULT_MOMENTS: [f64; 6] = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
 
-/// Whether these links together do not fit a robot; if so, the units in which they do are noted.
+/// Whether the figures of these links are implausible; if so, the matching units are recorded.
 fn explain(search: &mut Search, places: &[usize], lengths: &[f64], single: bool) -> bool {
     let as_stated = Figures::of(places.iter().map(|&place| (search.now[place].clone(), lengths[place])));
-    if as_stated.misfit(single, false).is_some() {
+    if as_stated.misfit(&search.settings, single, false).is_some() {
         return false;
     }
     let mut fits: Vec<(f64, &Units, Figures)> = CANDIDATES
         .iter()
         .filter_map(|units| {
             let figures = Figures::of(places.iter().map(|&place| (units.of(&search.now[place]), lengths[place])));
-            Some((figures.misfit(single, units.com != 0)?, units, figures))
+            Some((figures.misfit(&search.settings, single, units.com != 0)?, units, figures))
         })
         .collect();
     fits.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whose = search.names(places);
-    let stated = format!("as they stand, {as_stated}");
+    let stated = format!("in the file, {as_stated}");
     match &fits[..] {
-        [(_, units, figures), rest @ ..] if rest.first().is_none_or(|next| next.0 > fits[0].0 + APART) => {
+        [(_, units, figures), rest @ ..]
+            if rest.first().is_none_or(|next| next.0 > fits[0].0 + search.settings.min_misfit_margin) =>
+        {
             let message = format!("{whose}: {}: write kg, m and kg m^2", units.what);
             let evidence = format!("{stated}; in kg, m and kg m^2, {figures}");
-            // Of all links together also those without moments, whose figures say nothing.
+            // If all links are tested, links without moments get the same units.
             let all: Vec<usize> = (0..search.now.len()).collect();
             let changed = if single { places } else { &all };
             let changed: Vec<(usize, StatedInertial)> = changed
                 .iter()
-                .filter(|&&place| search.now[place].moments != DEFAULT)
+                .filter(|&&place| search.now[place].moments != DEFAULT_MOMENTS)
                 .map(|&place| (place, units.of(&search.now[place])))
                 .filter(|(place, new)| search.now[*place] != *new)
                 .collect();
             search.note(SlipKind::Units, message, evidence, changed);
         }
         [] => {
-            let message = format!(
-                "{whose}: does not fit the distances between the joints, in no units that are known here: check it"
-            );
-            search.name(SlipKind::Unexplained, places, message, stated);
+            let message = format!("{whose}: does not fit the distances between the joints in any known unit: check it");
+            search.note_uncorrected(SlipKind::Unexplained, places, message, stated);
         }
         several => {
             let names: Vec<&str> = several.iter().map(|(_, units, _)| units.what).collect();
             let message = format!(
-                "{whose}: not in kg, m and kg m^2; several units would do ({}): look at where the numbers came from",
+                "{whose}: not in kg, m and kg m^2; several units fit ({}): check the source of the numbers",
                 names.join("; or ")
             );
-            search.name(SlipKind::Unexplained, places, message, stated);
+            search.note_uncorrected(SlipKind::Unexplained, places, message, stated);
         }
     }
     true
 }
 
-/// The three figures of some links; decimal logarithms but for the last.
+/// The three figures of a set of links; decimal logarithms except for the last.
 struct Figures {
     gyration: f64,
     density: f64,
@@ -137,23 +124,30 @@ impl Figures {
             gyrations.push((0.5 * trace(&stated.moments) / stated.mass_kg).sqrt().log10() - length.log10());
             densities.push(stated.mass_kg.log10() - 3.0 * length.log10());
             let distance = stated.com_m.iter().map(|x| x * x).sum::<f64>().sqrt() / length;
-            // Many frames stand in the centre of mass.
+            // Many links have their frame at the centre of mass.
             distances.extend((distance > 0.0).then_some(distance));
         }
         let com = if distances.is_empty() { 0.0 } else { median(distances) };
         Self { gyration: median(gyrations), density: median(densities), com }
     }
 
-    /// How far they are from those of published robots, in decades; none if they are outside of what any has.
-    fn misfit(&self, single: bool, com_changed: bool) -> Option<f64> {
-        let window = usize::from(single);
+    /// Distance to published robots, decades; `None` outside their range.
+    fn misfit(&self, settings: &SlipSettings, single: bool, com_changed: bool) -> Option<f64> {
+        let (gyration_range, density_range) = if single {
+            (settings.link_log10_gyration_range, settings.link_log10_density_range)
+        } else {
+            (settings.log10_gyration_range, settings.log10_density_range)
+        };
         let within = |[least, most]: [f64; 2], value: f64| (least..=most).contains(&value);
-        let fits = within(GYRATIONS[window], self.gyration)
-            && within(DENSITIES[window], self.density)
-            && self.com <= FARTHEST
-            && (!com_changed || self.com >= NEAREST);
-        // Masses scatter more than radii.
-        fits.then(|| (self.gyration - GYRATION).abs() + 0.3 * (self.density - DENSITY).abs())
+        let fits = within(gyration_range, self.gyration)
+            && within(density_range, self.density)
+            && self.com <= settings.max_com_lengths
+            && (!com_changed || self.com >= settings.min_corrected_com_lengths);
+        // Masses vary more than radii of gyration.
+        fits.then(|| {
+            (self.gyration - settings.typical_log10_gyration).abs()
+                + 0.3 * (self.density - settings.typical_log10_density).abs()
+        })
     }
 }
 
@@ -161,7 +155,7 @@ impl core::fmt::Display for Figures {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             f,
-            "radii of gyration are {:.2e} of the links' lengths, masses {:.2e} kg per cubed length, centres of mass {:.2e} lengths away",
+            "radii of gyration are {:.2e} link lengths, masses {:.2e} kg per cubed link length in m, distances of centres of mass {:.2e} link lengths",
             10_f64.powf(self.gyration),
             10_f64.powf(self.density),
             self.com

@@ -1,8 +1,8 @@
-//! Expressions of the joints' positions and velocities that a user writes: `25 * sin(q - 0.3)`.
+//! User expressions of the joints' positions and velocities: `25 * sin(q - 0.3)`.
 //!
-//! [`parse`] makes a list of operations from a text; here is what it means: values, slopes by one reverse sweep, and
-//! the text in which every joint stands by its number. A value that does not exist (the root of a negative number, a
-//! division by zero) is none, never NaN.
+//! [`parse`] converts a text into a list of operations. This module evaluates them, computes slopes by one reverse
+//! sweep, and writes the canonical text with joint numbers. A value that does not exist (square root of a negative
+//! number, division by zero) is `None`, never NaN.
 
 mod operations;
 mod parse;
@@ -14,14 +14,13 @@ pub use parse::{ExpressionError, ExpressionProblem, JointNames};
 use operations::{slopes, value};
 use serde::{Deserialize, Serialize};
 
-/// The most operations of an expression.
-const MOST_NODES: usize = 256;
-/// Values beyond this size are none: squares and sums of them would leave the range of numbers.
-pub(super) const LARGEST: f64 = 1e12;
+const MAX_OPERATIONS: usize = 256;
+/// Largest valid magnitude, so that squares and sums stay within the range of numbers.
+pub(super) const MAX_VALUE: f64 = 1e12;
 
 /// An expression of the joints' positions and velocities, SI units.
 ///
-/// Serialised as its text, with joints by their numbers from 1.
+/// Serialised as text, with joint numbers from 1.
 ///
 /// ```
 /// use dynident_model::terms::{Expression, JointNames};
@@ -37,7 +36,7 @@ pub(super) const LARGEST: f64 = 1e12;
 #[cfg_attr(feature = "schema", schemars(with = "String"))]
 #[serde(try_from = "String", into = "String")]
 pub struct Expression {
-    /// Every one after its parts; the last is the value.
+    /// Operations, each after its operands; the last one is the value.
     nodes: Vec<ExpressionNode>,
 }
 
@@ -49,17 +48,17 @@ impl Expression {
     /// third joint, `q(elbow)` or `q("elbow joint")` those of a joint by its name. An exponent is a number.
     ///
     /// # Errors
-    /// With the character and what belongs there. At most 10 000 characters and 256 operations.
+    /// Syntax error with its character and the expected element; more than 10 000 characters or 256 operations.
     pub fn parse(text: &str, joints: &JointNames<'_>) -> Result<Self, ExpressionError> {
         parse::parse(text, joints).map(|nodes| Self { nodes })
     }
 
-    /// Its operations, every one after its parts; the last is the value.
+    /// Operations, each after its operands; the last one is the value.
     pub fn nodes(&self) -> &[ExpressionNode] {
         &self.nodes
     }
 
-    /// The joints whose positions or velocities it follows, ascending.
+    /// Joints whose position or velocity occurs, ascending.
     pub fn joints(&self) -> Vec<usize> {
         let of_node = |node: &ExpressionNode| match *node {
             ExpressionNode::Position(joint) | ExpressionNode::Velocity(joint) => Some(joint),
@@ -71,10 +70,10 @@ impl Expression {
         joints
     }
 
-    /// Its value where joint `j` stands at `q(j)` and moves at `dq(j)` (rad, rad/s; m, m/s). `None` where one of its
-    /// operations has no finite value, or one beyond 1e12 in size. Allocates nothing.
+    /// Value at positions `q(j)` and velocities `dq(j)` of the joints `j` (rad, rad/s; m, m/s). `None` if an operation
+    /// has no finite value, or a magnitude beyond 1e12. Does not allocate.
     pub fn value(&self, q: impl Fn(usize) -> f64, dq: impl Fn(usize) -> f64) -> Option<f64> {
-        let mut values = [0.0; MOST_NODES];
+        let mut values = [0.0; MAX_OPERATIONS];
         self.values(q, dq, &mut values)
     }
 
@@ -82,7 +81,7 @@ impl Expression {
         &self,
         q: impl Fn(usize) -> f64,
         dq: impl Fn(usize) -> f64,
-        values: &mut [f64; MOST_NODES],
+        values: &mut [f64; MAX_OPERATIONS],
     ) -> Option<f64> {
         for (place, node) in self.nodes.iter().enumerate() {
             let of_node = match *node {
@@ -90,8 +89,8 @@ impl Expression {
                 ExpressionNode::Velocity(joint) => dq(joint),
                 operation => value(operation, values),
             };
-            // Not a number is no smaller than anything.
-            if of_node.is_nan() || of_node.abs() > LARGEST {
+            // NaN compares false, so it is checked first.
+            if of_node.is_nan() || of_node.abs() > MAX_VALUE {
                 return None;
             }
             values[place] = of_node;
@@ -99,14 +98,15 @@ impl Expression {
         self.nodes.len().checked_sub(1).map(|last| values[last])
     }
 
-    /// Hands `∂value/∂q_j` and `∂value/∂q̇_j` of every place where a joint stands to `take(joint, is_velocity, slope)`,
-    /// by a reverse sweep; nothing where it has no value, and no slope that is not finite (that of a root at zero).
+    /// Calls `take(joint, is_velocity, slope)` with `∂value/∂q_j` or `∂value/∂q̇_j` for every occurrence of a joint, by
+    /// a reverse sweep. Does nothing where the expression has no value, and skips slopes that are not finite (square
+    /// root at zero).
     pub fn slopes(&self, q: impl Fn(usize) -> f64, dq: impl Fn(usize) -> f64, mut take: impl FnMut(usize, bool, f64)) {
-        let mut values = [0.0; MOST_NODES];
+        let mut values = [0.0; MAX_OPERATIONS];
         if self.values(q, dq, &mut values).is_none() {
             return;
         }
-        let mut pulls = [0.0_f64; MOST_NODES];
+        let mut pulls = [0.0_f64; MAX_OPERATIONS];
         pulls[self.nodes.len() - 1] = 1.0;
         for (place, node) in self.nodes.iter().enumerate().rev() {
             let pull = pulls[place];

@@ -1,6 +1,6 @@
-//! The operations of expressions: their values and slopes.
+//! Operations of expressions: values and slopes.
 
-/// One operation; parts are places in the list of operations.
+/// One operation; operands are indices into the list of operations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ExpressionNode {
     /// A number.
@@ -19,17 +19,17 @@ pub enum ExpressionNode {
     Divide(usize, usize),
     /// `-a`.
     Negate(usize),
-    /// `a^p` with a whole number `p`, of any `a`.
+    /// `a^p` with an integer `p` and any `a`.
     WholePower(usize, i32),
-    /// `a^p`, of `a` that are not negative.
+    /// `a^p` with a nonnegative `a`.
     Power(usize, f64),
-    /// A function of one value.
+    /// A function of one argument.
     Call(ExpressionFunction, usize),
-    /// A function of two values.
+    /// A function of two arguments.
     Call2(ExpressionFunction2, usize, usize),
 }
 
-/// Functions of one value.
+/// Functions of one argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExpressionFunction {
     /// Sine.
@@ -56,18 +56,18 @@ pub enum ExpressionFunction {
     Ln,
     /// Square root.
     Sqrt,
-    /// Size.
+    /// Absolute value.
     Abs,
 }
 
-/// Functions of two values.
+/// Functions of two arguments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExpressionFunction2 {
     /// Angle of the point (second, first) from the first axis.
     Atan2,
-    /// The smaller.
+    /// The smaller value.
     Min,
-    /// The larger.
+    /// The larger value.
     Max,
 }
 
@@ -89,7 +89,7 @@ impl ExpressionFunction {
         Self::Abs,
     ];
 
-    /// Its name in expressions.
+    /// Name in expressions.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sin => "sin",
@@ -150,7 +150,7 @@ impl ExpressionFunction2 {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Atan2, Self::Min, Self::Max];
 
-    /// Its name in expressions.
+    /// Name in expressions.
     pub fn name(self) -> &'static str {
         match self {
             Self::Atan2 => "atan2",
@@ -160,7 +160,7 @@ impl ExpressionFunction2 {
     }
 }
 
-/// Value of an operation on `values`; the motion's are not its own to know and count as zero.
+/// Value of an operation, given `values` of the previous ones; positions and velocities give zero here.
 pub(super) fn value(node: ExpressionNode, values: &[f64]) -> f64 {
     match node {
         ExpressionNode::Number(number) => number,
@@ -179,7 +179,7 @@ pub(super) fn value(node: ExpressionNode, values: &[f64]) -> f64 {
     }
 }
 
-/// Hands the derivatives of an operation by its parts to `add(part, slope)`.
+/// Calls `add(operand, slope)` with the partial derivatives of an operation.
 pub(super) fn slopes(node: ExpressionNode, values: &[f64], mut add: impl FnMut(usize, f64)) {
     match node {
         ExpressionNode::Number(_)
@@ -211,7 +211,7 @@ pub(super) fn slopes(node: ExpressionNode, values: &[f64], mut add: impl FnMut(u
             add(a, values[b] / square);
             add(b, -values[a] / square);
         }
-        // Where both are equal, the first.
+        // For equal values, the first operand.
         ExpressionNode::Call2(ExpressionFunction2::Min, a, b) => add(if values[b] < values[a] { b } else { a }, 1.0),
         ExpressionNode::Call2(ExpressionFunction2::Max, a, b) => add(if values[b] > values[a] { b } else { a }, 1.0),
     }

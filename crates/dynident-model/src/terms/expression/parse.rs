@@ -1,91 +1,60 @@
-//! Reads expressions: a descent by precedence. `-q^2` is `-(q^2)`, `2^-1` is a half, `a^b^c` is `a^(b^c)`.
+//! Recursive-descent parser of expressions. `-q^2` is `-(q^2)`, `2^-1` is 0.5, `a^b^c` is `a^(b^c)`.
 
 use super::operations::{ExpressionFunction, ExpressionFunction2, ExpressionNode, value};
-use super::{LARGEST, MOST_NODES};
+use super::{MAX_OPERATIONS, MAX_VALUE};
 use thiserror::Error;
 
-/// The longest text, in characters: that of the most operations, with all digits of their numbers, is shorter.
-const MOST_CHARACTERS: usize = 10_000;
-/// So many characters of it stand in a message.
-const MOST_SHOWN: usize = 2000;
-/// The deepest nesting of parentheses, functions and signs: each takes a frame of the stack.
-const MOST_DEPTH: usize = 64;
-/// Whole exponents up to this are products; beyond, powers of what is not negative.
-const MOST_PRODUCT: f64 = 64.0;
+/// Maximum length, characters; longer than the maximum number of operations with all digits of their numbers.
+const MAX_CHARACTERS: usize = 10_000;
+const MAX_SHOWN_CHARACTERS: usize = 2000;
+/// Maximum nesting of parentheses, functions and signs, each of which uses a stack frame.
+const MAX_DEPTH: usize = 64;
+/// Largest integer exponent that is computed by products; larger ones are powers with a nonnegative base.
+const MAX_INTEGER_EXPONENT: f64 = 64.0;
 
-/// What the joints are called in an expression.
+/// Names of joints in an expression.
 #[derive(Clone, Copy, Debug)]
 pub struct JointNames<'a> {
     /// The joint whose position and velocity are `q` and `dq`.
     pub own: Option<usize>,
-    /// The joints' names; where there are none, joints stand by numbers only, and of any size.
+    /// Names of the joints; if empty, joints have numbers only, without an upper limit.
     pub names: &'a [String],
 }
 
-/// An expression that cannot be read, with the place.
+/// A parse error of an expression, with its place.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("`{text}`, character {character}: {problem}")]
 pub struct ExpressionError {
     /// The expression.
     pub text: String,
-    /// Where, in characters from 1.
+    /// Place, in characters from 1.
     pub character: usize,
-    /// What is wrong, and the fix.
+    /// The error, with the fix.
     pub problem: ExpressionProblem,
 }
 
-/// What can be wrong with an expression.
+/// Kind of a parse error.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages describe variants and fields")]
 pub enum ExpressionProblem {
-    /// Too long.
     #[error("more than {most} {of}: write a shorter expression, or a table")]
-    TooLong {
-        /// How many there may be.
-        most: usize,
-        /// Of what.
-        of: &'static str,
-    },
-    /// Something else is needed here.
+    TooLong { most: usize, of: &'static str },
     #[error("{found} where {expected} is expected")]
-    Expected {
-        /// What belongs here.
-        expected: &'static str,
-        /// What stands here.
-        found: String,
-    },
-    /// A name that means nothing.
+    Expected { expected: &'static str, found: String },
     #[error(
-        "nothing is called `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
+        "unknown name `{name}`: position and velocity are q and dq, those of other joints q(NAME) or q1, q2, ..; functions are {}",
         functions()
     )]
-    Name {
-        /// The name.
-        name: String,
-    },
-    /// A joint that is not there.
+    Name { name: String },
     #[error("there is no joint {joint}: the joints are {}", known.join(", "))]
-    Joint {
-        /// The joint.
-        joint: String,
-        /// The joints that are there.
-        known: Vec<String>,
-    },
-    /// `q` where there is no own joint.
-    #[error("whose {name} is not said: write {name}1, {name}2, ..")]
-    WhichJoint {
-        /// `q` or `dq`.
-        name: &'static str,
-    },
-    /// An exponent that moves.
-    #[error("the exponent is no number: write exp(exponent * ln(base))")]
+    Joint { joint: String, known: Vec<String> },
+    #[error("the joint of {name} is missing: write {name}1, {name}2, ..")]
+    WhichJoint { name: &'static str },
+    #[error("the exponent is not a constant: write exp(exponent * ln(base))")]
     Exponent,
-    /// A number that is none, or beyond 1e12.
-    #[error("{what} has no value of at most 1e12 in size")]
-    Value {
-        /// The part.
-        what: &'static str,
-    },
+    #[error("{what} is not finite or exceeds 1e12 in magnitude")]
+    Value { what: &'static str },
 }
 
 fn functions() -> String {
@@ -94,10 +63,10 @@ fn functions() -> String {
 }
 
 pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<ExpressionNode>, ExpressionError> {
-    let shown: String = text.chars().take(MOST_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let mut parser = Parser { characters: text.chars().take(MOST_CHARACTERS + 1).collect(), ..Parser::new(joints) };
-    let parsed = if parser.characters.len() > MOST_CHARACTERS {
-        Err(ExpressionProblem::TooLong { most: MOST_CHARACTERS, of: "characters" })
+    let shown: String = text.chars().take(MAX_SHOWN_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let mut parser = Parser { characters: text.chars().take(MAX_CHARACTERS + 1).collect(), ..Parser::new(joints) };
+    let parsed = if parser.characters.len() > MAX_CHARACTERS {
+        Err(ExpressionProblem::TooLong { most: MAX_CHARACTERS, of: "characters" })
     } else {
         parser.whole()
     };
@@ -107,9 +76,8 @@ pub(super) fn parse(text: &str, joints: &JointNames<'_>) -> Result<Vec<Expressio
 
 struct Parser<'a> {
     characters: Vec<char>,
-    /// The next character.
     at: usize,
-    /// Where the word began that is being read: the place of a fault.
+    /// Start of the current word, which is the place of a fault.
     begin: usize,
     depth: usize,
     nodes: Vec<ExpressionNode>,
@@ -131,7 +99,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The next character that is no space, where a fault would be.
+    /// The next character that is not a space; it becomes the place of a fault.
     fn peek(&mut self) -> Option<char> {
         while self.characters.get(self.at).is_some_and(|c| c.is_whitespace()) {
             self.at += 1;
@@ -156,16 +124,16 @@ impl<'a> Parser<'a> {
     }
 
     fn push(&mut self, node: ExpressionNode) -> Parsed {
-        if self.nodes.len() == MOST_NODES {
-            return Err(ExpressionProblem::TooLong { most: MOST_NODES, of: "operations" });
+        if self.nodes.len() == MAX_OPERATIONS {
+            return Err(ExpressionProblem::TooLong { most: MAX_OPERATIONS, of: "operations" });
         }
         self.nodes.push(node);
         Ok(self.nodes.len() - 1)
     }
 
     fn deeper<T>(&mut self, read: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {
-        if self.depth == MOST_DEPTH {
-            return Err(ExpressionProblem::TooLong { most: MOST_DEPTH, of: "parentheses and signs within each other" });
+        if self.depth == MAX_DEPTH {
+            return Err(ExpressionProblem::TooLong { most: MAX_DEPTH, of: "parentheses and signs within each other" });
         }
         self.depth += 1;
         let result = read(self);
@@ -229,10 +197,10 @@ impl<'a> Parser<'a> {
         self.nodes.truncate(first);
         self.begin = place;
         let exponent = exponent.ok_or(ExpressionProblem::Exponent)?;
-        if exponent.is_nan() || exponent.abs() > LARGEST {
+        if exponent.is_nan() || exponent.abs() > MAX_VALUE {
             return Err(ExpressionProblem::Value { what: "the exponent" });
         }
-        let is_product = exponent.fract() == 0.0 && exponent.abs() <= MOST_PRODUCT;
+        let is_product = exponent.fract() == 0.0 && exponent.abs() <= MAX_INTEGER_EXPONENT;
         self.push(if is_product {
             ExpressionNode::WholePower(base, exponent as i32)
         } else {
@@ -275,7 +243,7 @@ impl<'a> Parser<'a> {
         }
         let text: String = self.characters[begin..self.at].iter().collect();
         match text.parse::<f64>() {
-            Ok(number) if number <= LARGEST => self.push(ExpressionNode::Number(number)),
+            Ok(number) if number <= MAX_VALUE => self.push(ExpressionNode::Number(number)),
             _ => Err(ExpressionProblem::Value { what: "the number" }),
         }
     }
@@ -341,7 +309,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Behind `q(`: a name up to `)`, or in quotes.
+    /// Parses a name after `q(`, up to `)` or in quotes.
     fn joint_by_name(&mut self) -> Parsed {
         let quote = self.peek().filter(|c| matches!(c, '"' | '\''));
         self.at += usize::from(quote.is_some());
@@ -368,7 +336,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// The value of operations in which no joint stands; `first` is the place of the first of them.
+/// Value of operations without joints; `first` is the index of the first operation.
 fn number_of(nodes: &[ExpressionNode], first: usize) -> Option<f64> {
     if nodes.iter().any(|node| matches!(node, ExpressionNode::Position(_) | ExpressionNode::Velocity(_))) {
         return None;

@@ -1,11 +1,10 @@
-//! The text of an expression in which joints stand by their numbers: it reads back to the same operations.
+//! Canonical text of an expression with joint numbers; it parses to the same operations.
 
 use super::{Expression, ExpressionNode};
 use core::fmt;
 
-/// How tightly a text holds together.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
-enum Strength {
+enum Precedence {
     Sum,
     Product,
     Sign,
@@ -15,7 +14,7 @@ enum Strength {
 
 impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut texts: Vec<(String, Strength)> = Vec::with_capacity(self.nodes.len());
+        let mut texts: Vec<(String, Precedence)> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
             let text = written(*node, &mut texts);
             texts.push(text);
@@ -24,42 +23,44 @@ impl fmt::Display for Expression {
     }
 }
 
-/// The text of an operation. Every part is used once, so its text is taken.
-fn written(node: ExpressionNode, texts: &mut [(String, Strength)]) -> (String, Strength) {
-    let mut part = |place: usize, least: Strength| {
-        let (text, strength) = core::mem::replace(&mut texts[place], (String::new(), Strength::Atom));
+/// Text of an operation. Every operand is used once, so its text is moved.
+fn written(node: ExpressionNode, texts: &mut [(String, Precedence)]) -> (String, Precedence) {
+    let mut part = |place: usize, least: Precedence| {
+        let (text, strength) = core::mem::replace(&mut texts[place], (String::new(), Precedence::Atom));
         if strength >= least { text } else { format!("({text})") }
     };
     match node {
-        // A number with a sign is no atom: `-2^x` is not `(-2)^x`.
+        // A signed number is not an atom: `-2^x` differs from `(-2)^x`.
         ExpressionNode::Number(x) => {
-            (format!("{x:?}"), if x.is_sign_negative() { Strength::Sign } else { Strength::Atom })
+            (format!("{x:?}"), if x.is_sign_negative() { Precedence::Sign } else { Precedence::Atom })
         }
-        ExpressionNode::Position(joint) => (format!("q{}", joint + 1), Strength::Atom),
-        ExpressionNode::Velocity(joint) => (format!("dq{}", joint + 1), Strength::Atom),
+        ExpressionNode::Position(joint) => (format!("q{}", joint + 1), Precedence::Atom),
+        ExpressionNode::Velocity(joint) => (format!("dq{}", joint + 1), Precedence::Atom),
         ExpressionNode::Add(a, b) => {
-            (format!("{} + {}", part(a, Strength::Sum), part(b, Strength::Product)), Strength::Sum)
+            (format!("{} + {}", part(a, Precedence::Sum), part(b, Precedence::Product)), Precedence::Sum)
         }
         ExpressionNode::Subtract(a, b) => {
-            (format!("{} - {}", part(a, Strength::Sum), part(b, Strength::Product)), Strength::Sum)
+            (format!("{} - {}", part(a, Precedence::Sum), part(b, Precedence::Product)), Precedence::Sum)
         }
         ExpressionNode::Multiply(a, b) => {
-            (format!("{} * {}", part(a, Strength::Product), part(b, Strength::Sign)), Strength::Product)
+            (format!("{} * {}", part(a, Precedence::Product), part(b, Precedence::Sign)), Precedence::Product)
         }
         ExpressionNode::Divide(a, b) => {
-            (format!("{} / {}", part(a, Strength::Product), part(b, Strength::Sign)), Strength::Product)
+            (format!("{} / {}", part(a, Precedence::Product), part(b, Precedence::Sign)), Precedence::Product)
         }
-        ExpressionNode::Negate(a) => (format!("-{}", part(a, Strength::Sign)), Strength::Sign),
+        ExpressionNode::Negate(a) => (format!("-{}", part(a, Precedence::Sign)), Precedence::Sign),
         ExpressionNode::WholePower(a, exponent) => {
-            (format!("{}^{:?}", part(a, Strength::Atom), f64::from(exponent)), Strength::Power)
+            (format!("{}^{:?}", part(a, Precedence::Atom), f64::from(exponent)), Precedence::Power)
         }
-        ExpressionNode::Power(a, exponent) => (format!("{}^{exponent:?}", part(a, Strength::Atom)), Strength::Power),
+        ExpressionNode::Power(a, exponent) => {
+            (format!("{}^{exponent:?}", part(a, Precedence::Atom)), Precedence::Power)
+        }
         ExpressionNode::Call(function, a) => {
-            (format!("{}({})", function.name(), part(a, Strength::Sum)), Strength::Atom)
+            (format!("{}({})", function.name(), part(a, Precedence::Sum)), Precedence::Atom)
         }
         ExpressionNode::Call2(function, a, b) => {
-            let arguments = format!("{}, {}", part(a, Strength::Sum), part(b, Strength::Sum));
-            (format!("{}({arguments})", function.name()), Strength::Atom)
+            let arguments = format!("{}, {}", part(a, Precedence::Sum), part(b, Precedence::Sum));
+            (format!("{}({arguments})", function.name()), Precedence::Atom)
         }
     }
 }
