@@ -1,4 +1,4 @@
-//! What a description holds of a joint's drive: damping, friction, drive inertia and stiffness.
+//! Joint values in a robot description: damping, friction, drive inertia and stiffness.
 
 use crate::jobs::recorded_velocities::recorded_velocities;
 use dynident_dynamics::ParametricModel;
@@ -7,21 +7,21 @@ use dynident_identification::Identification;
 use dynident_model::terms::JointProperty;
 use dynident_model::{InertialParameters, JointChange};
 
-/// The new values of the joints, and where they are not the law itself.
+/// New joint values, and approximations of friction.
 pub(super) struct JointValues {
     /// New damping, friction, drive inertia and stiffness.
     pub(super) changes: Vec<JointChange>,
-    /// For each joint whose friction follows a law that no description holds, the damping and friction nearest to it.
+    /// Best approximation by damping and friction for each joint whose friction law the robot description cannot
+    /// express.
     pub(super) nearest: Vec<Option<NearestFriction>>,
 }
 
 impl JointValues {
-    /// Values of the terms that a description has a place for. A joint with another law of friction gets the damping
-    /// and friction nearest to it over the motion that was fitted to, for what the description said before is no
-    /// longer true.
+    /// Values of the terms that a robot description can express. Joints with other friction laws get the best
+    /// approximation by damping and friction over the fitted motion, because the previous values are no longer valid.
     ///
     /// # Errors
-    /// Values that no robot has.
+    /// Values that are physically inconsistent.
     pub(super) fn of(
         found: &Identification,
         inertials: &[InertialParameters],
@@ -29,7 +29,7 @@ impl JointValues {
     ) -> Result<Self, String> {
         let model = &found.model().parametric;
         let values = &parameters[model.model().inertial_count()..];
-        let laws = not_described(model);
+        let laws = has_other_friction(model);
         let mut nearest = vec![None; laws.len()];
         if laws.contains(&true) {
             let robot = model.model().with_inertials(inertials).map_err(|error| error.to_string())?;
@@ -53,9 +53,9 @@ impl JointValues {
     }
 }
 
-/// For each joint whether its friction follows a law other than viscous and Coulomb friction. What follows a load or a
-/// temperature stands beside these two.
-fn not_described(model: &ParametricModel) -> Vec<bool> {
+/// Whether each joint has friction other than viscous and Coulomb. Load- and temperature-dependent friction is
+/// additional to these two and ignored here.
+fn has_other_friction(model: &ParametricModel) -> Vec<bool> {
     let mut joints = vec![false; model.dof()];
     for term in model.terms() {
         let is_other = term.is_friction() && term.property().is_none();
@@ -82,7 +82,7 @@ fn changes_of_terms(model: &ParametricModel, values: &[f64]) -> Vec<JointChange>
     changes
 }
 
-/// The change of the joint `name`, a new one where there is none yet.
+/// The change of the joint `name`; appended if missing.
 fn change_of<'a>(changes: &'a mut Vec<JointChange>, name: &str) -> &'a mut JointChange {
     let place = changes.iter().position(|change| change.joint == name).unwrap_or_else(|| {
         let joint = name.to_owned();

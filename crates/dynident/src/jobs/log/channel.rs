@@ -1,9 +1,9 @@
-//! One channel in figures: range, count, course.
+//! Statistics of one channel: range, count, course.
 
-/// Parts that the course has at most; an even number.
-const PARTS: usize = 48;
+/// Maximum number of averaged parts of the course; must be even.
+const MAX_PARTS: usize = 48;
 
-/// A channel under way.
+/// Running statistics of a channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tally {
     pub(super) samples: u64,
@@ -11,7 +11,7 @@ pub(super) struct Tally {
     first: Option<f64>,
     last: Option<f64>,
     rows: u64,
-    /// Rows in a part; a power of two that doubles when the parts are full.
+    /// Rows per part: a power of two that doubles when all parts are full.
     rows_of_part: u64,
     /// Sum and count of the values in each part.
     parts: Vec<(f64, u64)>,
@@ -22,7 +22,7 @@ impl Tally {
         if self.rows_of_part == 0 {
             self.rows_of_part = 1;
         }
-        if self.rows == self.rows_of_part * PARTS as u64 {
+        if self.rows == self.rows_of_part * MAX_PARTS as u64 {
             self.parts =
                 self.parts.chunks(2).map(|pair| pair.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1))).collect();
             self.rows_of_part *= 2;
@@ -42,12 +42,12 @@ impl Tally {
         self.range = Some([low.min(value), high.max(value)]);
     }
 
-    /// From the first value to the last; `None` if the channel does not grow.
-    pub(super) fn steps(&self) -> Option<f64> {
+    /// Difference from the first to the last value; `None` if it is not positive.
+    pub(super) fn increase(&self) -> Option<f64> {
         Some(self.last? - self.first?).filter(|span| *span > 0.0 && span.is_finite())
     }
 
-    /// Means of the parts, in order.
+    /// Mean of each part, in order.
     pub(super) fn course(&self) -> Vec<Option<f64>> {
         let mean =
             |(sum, count): &(f64, u64)| (*count > 0).then(|| sum / *count as f64).filter(|mean| mean.is_finite());
@@ -65,7 +65,7 @@ mod tests {
             let mut tally = Tally::default();
             (0..rows).for_each(|row| tally.add(f64::from(row)));
             let course: Vec<f64> = tally.course().into_iter().map(Option::unwrap).collect();
-            assert!(course.len() <= PARTS && course.windows(2).all(|pair| pair[0] < pair[1]), "{rows}: {course:?}");
+            assert!(course.len() <= MAX_PARTS && course.windows(2).all(|pair| pair[0] < pair[1]), "{rows}: {course:?}");
             assert_eq!((tally.samples, tally.range), (rows as u64, Some([0.0, f64::from(rows - 1)])));
         }
         let mut gap = Tally::default();
@@ -73,6 +73,6 @@ mod tests {
             gap.add(value);
         }
         assert_eq!(gap.course(), [Some(1.0), None, None, Some(-2.0)]);
-        assert_eq!((gap.samples, gap.steps()), (2, None));
+        assert_eq!((gap.samples, gap.increase()), (2, None));
     }
 }

@@ -1,4 +1,4 @@
-//! What a recording holds.
+//! `log`: contents of a recording.
 
 mod channel;
 mod clock;
@@ -13,8 +13,7 @@ use dynident_recording::RecordingError;
 use dynident_recording::log::{FileLog, LogGroup, LogTable};
 use std::path::Path;
 
-/// Reads a recording of any format, once, and says what it holds. Memory does not grow with its
-/// length.
+/// Reads a recording of any format once and summarises its contents, with constant memory.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -47,7 +46,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     for (index, (group, Tallies { rows, channels, clock })) in groups.iter().zip(read).enumerate() {
         let names = &names[group.columns.clone()];
         let time = times[index];
-        let seconds = time.and_then(|(column, unit_s)| Some((channels[column].steps()?, unit_s)));
+        let seconds = time.and_then(|(column, unit_s)| Some((channels[column].increase()?, unit_s)));
         let span_s = seconds.map(|(span, unit_s)| span * unit_s);
         let rate_hz = seconds.and_then(|(span, unit_s)| Some(clock.rate(rows, span)? / unit_s));
         found.channels.extend(channels.iter().zip(names).map(|(tally, name)| LogChannel {
@@ -72,7 +71,7 @@ fn contents(path: &Path) -> Result<LogContents, RecordingError> {
     Ok(found)
 }
 
-/// What columns are called in a study: their names, or their 0-based indices.
+/// Names of the columns in a study: their names, or their 0-based indices.
 fn column_names(table: &dyn LogTable) -> Vec<String> {
     match table.names() {
         Some(names) => names.to_vec(),
@@ -97,7 +96,7 @@ fn time_column(group: &LogGroup, names: &[String]) -> Option<(usize, f64)> {
     }
 }
 
-/// A group under way.
+/// Running statistics of a group.
 struct Tallies {
     rows: u64,
     channels: Vec<Tally>,
@@ -109,7 +108,7 @@ impl Tallies {
         Self { rows: 0, channels: vec![Tally::default(); columns], clock: Clock::default() }
     }
 
-    /// A row, whose point in time is that of column `time`.
+    /// Adds a row; column `time` contains the time.
     fn add(&mut self, row: &[f64], time: Option<usize>) {
         self.rows += 1;
         self.channels.iter_mut().zip(row).for_each(|(tally, value)| tally.add(*value));

@@ -1,8 +1,8 @@
-//! A path as seen from a folder.
+//! Relative paths.
 
 use std::path::{Component, Path, PathBuf};
 
-/// `path` as a study in `folder` names it: relative where both can be found, with strokes as on Unix; else as it is.
+/// `path` relative to `folder` if both exist, with `/` as separator; otherwise unchanged.
 pub(super) fn seen_from(path: &Path, folder: &Path) -> String {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let seen = match (path.canonicalize(), folder.canonicalize()) {
@@ -13,7 +13,7 @@ pub(super) fn seen_from(path: &Path, folder: &Path) -> String {
     seen.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/")
 }
 
-/// From one absolute path to another; none between drives.
+/// Relative path between absolute paths; `None` between drives.
 fn relative(path: &Path, folder: &Path) -> Option<PathBuf> {
     let (to, from): (Vec<Component<'_>>, Vec<Component<'_>>) =
         (path.components().collect(), folder.components().collect());
