@@ -1,4 +1,4 @@
-//! The pages and pictures that people look at: what stands in each `report.html`, and beside a design.
+//! Contents of each `report.html`, and plots of designs.
 
 mod check;
 pub(crate) mod design;

@@ -1,4 +1,4 @@
-//! What speaks against loading a result's model into a robot.
+//! Reasons against loading a result's model into a robot.
 
 use super::{CheckFinding, LogSummary, ResultFile, StudyCheck};
 use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
@@ -24,7 +24,7 @@ const GOOD_PERCENT: f64 = 1.0;
 const LEAST_SHARE: f64 = 1.0e-3;
 
 impl LogSummary {
-    /// What was found in the log and speaks against what is made of it, a sentence each.
+    /// Problems found in the log.
     pub(crate) fn problems(&self) -> Vec<String> {
         let findings = self.import.findings.iter().chain(&self.model_findings);
         let problems = findings.filter(|finding| finding.level == Level::Problem);
@@ -33,8 +33,7 @@ impl LogSummary {
 }
 
 impl ResultFile {
-    /// Everything that speaks against loading the model that was written into a robot, a sentence each; empty where
-    /// nothing does: [`problems_of_the_model`](Self::problems_of_the_model), then the problems of the logs.
+    /// All problems: [`problems_of_the_model`](Self::problems_of_the_model), then the problems of the logs.
     pub(crate) fn found_problems(&self) -> Vec<String> {
         let mut problems = self.problems_of_the_model();
         problems.extend(self.logs.iter().flat_map(LogSummary::problems));
@@ -49,7 +48,7 @@ impl ResultFile {
         let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {
             problems.push(format!(
-                "the estimator {} did not settle: its values are those of its last iteration",
+                "the estimator {} did not converge: the values are those of its last iteration",
                 self.method.estimator
             ));
         }
@@ -65,7 +64,7 @@ impl ResultFile {
         problems.extend(tested);
         problems.extend(self.stray_torques());
         problems.extend(self.validation.iter().filter_map(|log| self.overfit(log)));
-        // On the rows that it was fitted to the estimate is the better by itself: only what is more than chance counts.
+        // On training rows the estimate always has the smaller error, so only a significant difference is a problem.
         let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
         let is_tested = self.validation.is_empty() && difference.is_none_or(|test| test.is_significant);
         if let (true, Some(physical)) = (is_tested, &self.training.physical) {
@@ -82,15 +81,15 @@ impl ResultFile {
         problems
     }
 
-    /// An estimate that noise in the regressor biases by more than its error bars say, whichever estimator made it.
+    /// Bias by noise in the regressor beyond the error bars, for any estimator.
     fn noise_problem(&self, noise: &NoiseInRegressor) -> Option<String> {
         let by_instruments = self.method.estimator == "instrumental";
         if by_instruments && noise.instruments.weak {
             let column = noise.instruments.weakest_column.as_deref().unwrap_or("some parameter");
             let f = noise.instruments.weakest_f.unwrap_or_default();
             return Some(format!(
-                "the instruments are weak: they tell nearly nothing of {column} (first-stage F {f:.1}), and the estimate is biased as least squares is; \
-                 give estimator.instruments a higher cutoff_hz or leave it out, or move the robot faster"
+                "weak instruments: they hardly determine {column} (first-stage F {f:.1}), so the estimate is biased like least squares; \
+                 raise or remove cutoff_hz of estimator.instruments, or move the robot faster"
             ));
         }
         let is_plain = ["weighted", "ordinary", "generalized"].contains(&&self.method.estimator[..]);
@@ -99,19 +98,19 @@ impl ResultFile {
         }
         let followed = noise.fast_motion.map_or(0.0, |fast| 100.0 * fast.followed.clamp(0.0, 1.0));
         let apart = noise.least_squares.as_ref().map_or(String::new(), |contrast| {
-            format!(", and instruments put {} {:.0} of their error bars away", contrast.column, contrast.largest)
+            format!(", and with instruments {} differs by {:.0} error bars", contrast.column, contrast.largest)
         });
         let fix = if noise.instruments.weak {
-            "instruments of the logs' own motion are too weak to mend that: lower motion.differentiator's cutoff_hz, or record with less noise of the positions or a faster motion"
+            "instruments from the logs' motion are too weak to correct this: lower cutoff_hz of motion.differentiator, or record with less position noise or a faster motion"
         } else {
-            "take estimator.method = \"auto\", or lower motion.differentiator's cutoff_hz"
+            "use estimator.method = \"auto\", or lower cutoff_hz of motion.differentiator"
         };
         Some(format!(
             "noise in the regressor biases least squares beyond its error bars: torque follows {followed:.0} % of the fast motion{apart}; {fix}"
         ))
     }
 
-    /// A written model that leaves most of the torque that it was fitted to, or that it was tested on.
+    /// A model that leaves most of the training or held-out torque unexplained.
     fn unexplained(&self) -> Option<String> {
         let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
         let percent = physical.unwrap_or(self.training.relative_error_percent)?;
@@ -119,36 +118,35 @@ impl ResultFile {
             let percent = log.physical.as_ref().unwrap_or(&log.model).relative_error_percent?;
             (percent > MOST_LEFT_PERCENT).then(|| {
                 format!(
-                    "the model leaves {percent:.0} % of the torque of log `{}`: it does not describe this robot, or that log is not of this robot \
-                     and motion; run `dynident check`",
+                    "{percent:.0} % of the torque of log `{}` is unexplained: the model does not fit this robot, or the log is of another robot \
+                     or motion; run `dynident check`",
                     log.log
                 )
             })
         };
         let of_training = (percent > MOST_LEFT_PERCENT).then(|| {
             format!(
-                "the model leaves {percent:.0} % of the torque that it was fitted to: the study does not describe this robot or these logs, or noise of \
-                 the positions covers the motion; run `dynident check`, and see `position_noise` of the logs"
+                "{percent:.0} % of the training torque is unexplained: the study does not describe this robot or these logs, or position \
+                 noise exceeds the motion; run `dynident check`, and see `position_noise` of the logs"
             )
         });
         of_training.or_else(|| self.validation.iter().find_map(tested))
     }
 
-    /// A held-out log that the written model explains far worse than the logs it was fitted to.
+    /// A held-out log with a much larger error than the training logs.
     fn overfit(&self, log: &LogValidation) -> Option<String> {
         let times = self.times_of_fit(log)?;
         if times <= MOST_TIMES_OF_FIT {
             return None;
         }
         Some(format!(
-            "log `{}`: what the model leaves of the joints' torque is {times:.1} times what is left of the logs it was fitted to: the fit follows \
-             their noise, or the logs differ (payload, temperature, motion); record training logs for longer, with a motion that `design` makes",
+            "log `{}`: its residual is {times:.1} times that of the training logs: the fit follows \
+             their noise, or the logs differ (payload, temperature, motion); record longer training logs, with a motion from `design`",
             log.log
         ))
     }
 
-    /// A torque that one robot explains badly beside the others, where a held-out log is explained badly as well:
-    /// either may have its reasons, both together are no model.
+    /// Inconsistent joint torques, if a held-out log also has a large error: each alone may have other reasons.
     fn stray_torques(&self) -> impl Iterator<Item = String> + '_ {
         let worst = self.validation.iter().filter_map(|log| self.times_of_fit(log)).fold(0.0, f64::max);
         let findings = self.check.iter().flat_map(|check| &check.findings);
@@ -158,10 +156,9 @@ impl ResultFile {
             .map(CheckFinding::sentence)
     }
 
-    /// Times what the fit leaves of the joints' torque that the written model leaves of a held-out log's; none where
-    /// that is little of it.
+    /// Residual of a held-out log relative to the training logs; `None` if the held-out error is small.
     fn times_of_fit(&self, log: &LogValidation) -> Option<f64> {
-        // In one band: where figures are for the motion's own, the fit's is at hand for the unconstrained estimate.
+        // Both must use the same band: in the band of the fit, only the unconstrained estimate has figures.
         let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
         let (fitted, held_out) = match &log.in_fit_band {
             Some(report) => (&self.training.joints, report),
@@ -175,14 +172,13 @@ impl ResultFile {
     }
 }
 
-/// Errors of one set of parameters.
 struct Errors<'a> {
     relative_percent: Option<f64>,
-    /// Joint, root mean square, relative error in percent.
+    /// Joint, root mean square error (Nm or N), relative error in percent.
     joints: Vec<(&'a str, f64, Option<f64>)>,
 }
 
-/// The consistent set beside the estimate on the same rows, where it is clearly worse.
+/// Message if the consistent set is clearly worse than the estimate on the same rows.
 fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -> Option<String> {
     let largest = free.joints.iter().map(torque_norm).fold(0.0, f64::max);
     let times = |before: f64, after: f64| if before > 0.0 { after / before } else { 1.0 };
@@ -195,9 +191,9 @@ fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -
     let percent = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |value| format!("{value:.2}"));
     let sentence = |place: String, before: Option<f64>, after: Option<f64>| {
         format!(
-            "{place}: the consistent set that is written leaves {} % of the torque, the estimate alone {} %; no \
-             physically consistent robot moves as this log says: a reversed or exchanged channel, a wrong unit, or a \
-             wrong description",
+            "{place}: {} % of the torque is unexplained by the consistent set (exported), {} % by the unconstrained estimate; no \
+             physically consistent robot explains this log: check for a reversed or exchanged channel, a wrong unit, or a \
+             wrong robot description",
             percent(after),
             percent(before)
         )
@@ -205,12 +201,12 @@ fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -
     if let Some((_, free, held)) = worst {
         return Some(sentence(format!("{place}, joint `{}`", free.0), free.2, held.2));
     }
-    // All joints together: on the same rows the errors' ratio is that of the root mean squares.
+    // All joints: on the same rows, the ratio of relative errors equals that of the root mean squares.
     let ratio = free.relative_percent.zip(written.relative_percent).map(|(before, after)| times(before, after));
     (ratio? > MOST_TIMES_OF_ALL).then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))
 }
 
-/// Root mean square of a joint's measured torque.
+/// Root mean square of a joint's measured torque, Nm (N).
 fn torque_norm(joint: &(&str, f64, Option<f64>)) -> f64 {
     let (_, rmse_nm, relative) = joint;
     relative.map_or(0.0, |percent| if percent > 0.0 { 100.0 * rmse_nm / percent } else { 0.0 })
