@@ -77,7 +77,7 @@ pub use dynident_text::shortened_message;
 pub use error::{Error, Expected, FactorsError, NewStudyError, StudyError, XacroError};
 pub use factors::{FactorLog, Factors, seconds_of};
 pub use inputs::{MAX_RESULT_BYTES, read_result, refuse_overwriting, study_inputs};
-pub use jobs::check::check;
+pub use jobs::check::{CheckSettings, check, check_with};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::export::{

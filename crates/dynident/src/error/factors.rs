@@ -8,7 +8,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum FactorsError {
     /// Not a factor file.
-    #[error("not a factor file: give a file written by `reduce`")]
+    #[error("this is no file of factors: give a file that `reduce` wrote")]
     Kind,
     /// An unsupported version.
     #[error("version {found} of the format; this program reads version {known}: reduce the logs again with it")]

@@ -67,7 +67,7 @@ pub enum StudyError {
         expected: &'static str,
     },
     /// A list whose length differs from the number of joints.
-    #[error("{key} has {found} entries, but the robot has {expected} joints: give one entry per joint")]
+    #[error("{key} has {found} entries, the robot {expected} joints: give one entry per joint")]
     Length {
         /// The key.
         key: &'static str,
@@ -122,7 +122,7 @@ pub enum StudyError {
     },
     /// A held-out log that contains training samples.
     #[error(
-        "validation log `{held_out}` contains samples of the training log `{training}`: give parts of the file that do not overlap (both by rows, by fraction, or by time_range_s), or another file"
+        "log `{held_out}` is to test what `{training}` is fitted to, and has samples of it: give parts of the file that do not overlap (both by rows, by fraction, or by time_range_s), or another file"
     )]
     Overlap {
         /// The training log.
@@ -179,7 +179,7 @@ pub enum StudyError {
     Xacro(Box<XacroError>),
     /// A joint without a limit on its speed.
     #[error(
-        "joint `{joint}` has no limit on speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
+        "joint `{joint}` has no limit of speed, acceleration, jerk, torque or power, so its motion could be infinitely fast; give one: joints = [{{ joint = \"{joint}\", acceleration = ... }}]"
     )]
     Unbounded {
         /// The joint.

@@ -32,7 +32,7 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
         r.method.covariance
     ));
     if !r.problems.is_empty() {
-        let mut against = Text::new("Problems of this model; do not load it into a robot before they are solved:");
+        let mut against = Text::new("What speaks against loading this model into a robot:");
         for problem in &r.problems {
             against = against.point(Tone::Bad, problem);
         }

@@ -42,6 +42,7 @@ pub use iterations::{
 };
 pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use new_study::{NEW_STUDY_SCHEMA, NewStudyFile, Unsure};
+pub use problems::ProblemSettings;
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 // Types of lower crates in these files.

@@ -1,27 +1,67 @@
 //! Reasons against loading a result's model into a robot.
 
 use super::{CheckFinding, LogSummary, ResultFile, StudyCheck};
+use crate::error::{Expected, StudyError};
 use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
 
-/// Times the estimate's error that the consistent set may have on a held-out log. On the real logs that Dynident is
-/// tested on it lies between 0.8 and 1.14, with dead torque channels at 1.6.
-const MOST_TIMES_OF_ALL: f64 = 1.5;
-/// The same for a single joint, of which some have little torque to be judged by: 0.6 to 1.7, dead channels at 5.2.
-const MOST_TIMES_OF_JOINT: f64 = 2.5;
-/// Share of the fitted torque, and of a held-out log's, percent, that no model worth writing leaves.
-const MOST_LEFT_PERCENT: f64 = 60.0;
-/// Times what the fit leaves of the joints' torque (root mean square over the joints) that the written model may leave
-/// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds
-/// has 6.
-const MOST_TIMES_OF_FIT: f64 = 4.0;
-/// The same where a joint's torque did not belong to one robot with the others before.
-const MOST_TIMES_OF_DOUBTED_FIT: f64 = 2.0;
-/// Percent of a held-out log's torque below which a model is good, however much better the fit may be.
-const GOOD_PERCENT: f64 = 1.0;
-/// A joint's torque that errors count against, as a share of the largest joint's: below it, friction alone is left.
-const LEAST_SHARE: f64 = 1.0e-3;
+/// Thresholds of [`ResultFile::problems_of_the_model_with`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProblemSettings {
+    /// Largest ratio of the torque errors of the consistent set and the estimate on the same rows, all joints. Default
+    /// 1.5: real test logs have 0.8 to 1.14, dead torque channels 1.6.
+    pub max_error_ratio: f64,
+    /// The same for a single joint. Default 2.5: real test logs have 0.6 to 1.7, dead torque channels 5.2.
+    pub max_joint_error_ratio: f64,
+    /// Largest unexplained torque of training or held-out logs, percent. Default 60.
+    pub max_unexplained_percent: f64,
+    /// Largest ratio of held-out and training residuals (root mean square over the joints). Default 4: ten real data
+    /// sets have 0.9 to 2.4, a fit of 58 parameters to 3 s has 6.
+    pub max_held_out_ratio: f64,
+    /// The same if `check` found an inconsistent joint torque. Default 2.
+    pub max_held_out_ratio_if_inconsistent: f64,
+    /// Unexplained torque of a held-out log below which its residual ratio is ignored, percent. Default 1.
+    pub min_held_out_percent: f64,
+    /// Smallest torque of a joint for the comparison of errors, relative to the largest joint torque. Default 1e-3:
+    /// smaller torques are friction only.
+    pub min_torque_share: f64,
+}
+
+impl Default for ProblemSettings {
+    fn default() -> Self {
+        Self {
+            max_error_ratio: 1.5,
+            max_joint_error_ratio: 2.5,
+            max_unexplained_percent: 60.0,
+            max_held_out_ratio: 4.0,
+            max_held_out_ratio_if_inconsistent: 2.0,
+            min_held_out_percent: 1.0,
+            min_torque_share: 1.0e-3,
+        }
+    }
+}
+
+impl ProblemSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// The first setting that is not a positive number, with its value.
+    pub fn validate(&self) -> Result<(), StudyError> {
+        for (key, value) in [
+            ("max_error_ratio", self.max_error_ratio),
+            ("max_joint_error_ratio", self.max_joint_error_ratio),
+            ("max_unexplained_percent", self.max_unexplained_percent),
+            ("max_held_out_ratio", self.max_held_out_ratio),
+            ("max_held_out_ratio_if_inconsistent", self.max_held_out_ratio_if_inconsistent),
+            ("min_held_out_percent", self.min_held_out_percent),
+            ("min_torque_share", self.min_torque_share),
+        ] {
+            Expected::Positive.check(key, value)?;
+        }
+        Ok(())
+    }
+}
 
 impl LogSummary {
     /// Problems found in the log.
@@ -40,11 +80,15 @@ impl ResultFile {
         problems
     }
 
-    /// Of [`problems`](Self::problems) those that no single log's findings name: what the examiner of studies found, an
-    /// estimator that did not settle, and a consistent set (which is what is written) that predicts clearly worse than
-    /// the estimate it was made from; on the held-out logs, or, where none was held out, on the rows that were fitted
-    /// to if the logs tell the two apart.
+    /// Those of [`problems`](Self::problems) that are not findings of a single log, with default thresholds.
     pub fn problems_of_the_model(&self) -> Vec<String> {
+        self.problems_of_the_model_with(&ProblemSettings::default())
+    }
+
+    /// Problems that are not findings of a single log: those of the study examination, an estimator that did not
+    /// converge, and a consistent set (which is exported) with clearly larger errors than the estimate. The errors are
+    /// those on held-out logs; without held-out logs those on the training rows, if the difference is significant.
+    pub fn problems_of_the_model_with(&self, settings: &ProblemSettings) -> Vec<String> {
         let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {
             problems.push(format!(
@@ -53,17 +97,17 @@ impl ResultFile {
             ));
         }
         problems.extend(self.noise_in_regressor.as_ref().and_then(|noise| self.noise_problem(noise)));
-        problems.extend(self.unexplained());
+        problems.extend(self.unexplained(settings));
         let tested = self.validation.iter().filter_map(|log| {
             let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
                 relative_percent: report.relative_error_percent,
                 joints: report.joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
             });
-            worse_when_consistent(&format!("log `{}`", log.log), &free, &written)
+            worse_when_consistent(&format!("log `{}`", log.log), &free, &written, settings)
         });
         problems.extend(tested);
-        problems.extend(self.stray_torques());
-        problems.extend(self.validation.iter().filter_map(|log| self.overfit(log)));
+        problems.extend(self.inconsistent_torques(settings));
+        problems.extend(self.validation.iter().filter_map(|log| self.overfit(log, settings)));
         // On training rows the estimate always has the smaller error, so only a significant difference is a problem.
         let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
         let is_tested = self.validation.is_empty() && difference.is_none_or(|test| test.is_significant);
@@ -76,7 +120,7 @@ impl ResultFile {
                 relative_percent,
                 joints: joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
             });
-            problems.extend(worse_when_consistent("logs that were fitted to", &free, &written));
+            problems.extend(worse_when_consistent("training logs", &free, &written, settings));
         }
         problems
     }
@@ -111,12 +155,13 @@ impl ResultFile {
     }
 
     /// A model that leaves most of the training or held-out torque unexplained.
-    fn unexplained(&self) -> Option<String> {
+    fn unexplained(&self, settings: &ProblemSettings) -> Option<String> {
         let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
         let percent = physical.unwrap_or(self.training.relative_error_percent)?;
+        let most = settings.max_unexplained_percent;
         let tested = |log: &LogValidation| {
             let percent = log.physical.as_ref().unwrap_or(&log.model).relative_error_percent?;
-            (percent > MOST_LEFT_PERCENT).then(|| {
+            (percent > most).then(|| {
                 format!(
                     "{percent:.0} % of the torque of log `{}` is unexplained: the model does not fit this robot, or the log is of another robot \
                      or motion; run `dynident check`",
@@ -124,7 +169,7 @@ impl ResultFile {
                 )
             })
         };
-        let of_training = (percent > MOST_LEFT_PERCENT).then(|| {
+        let of_training = (percent > most).then(|| {
             format!(
                 "{percent:.0} % of the training torque is unexplained: the study does not describe this robot or these logs, or position \
                  noise exceeds the motion; run `dynident check`, and see `position_noise` of the logs"
@@ -134,9 +179,9 @@ impl ResultFile {
     }
 
     /// A held-out log with a much larger error than the training logs.
-    fn overfit(&self, log: &LogValidation) -> Option<String> {
-        let times = self.times_of_fit(log)?;
-        if times <= MOST_TIMES_OF_FIT {
+    fn overfit(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<String> {
+        let times = self.held_out_ratio(log, settings)?;
+        if times <= settings.max_held_out_ratio {
             return None;
         }
         Some(format!(
@@ -147,17 +192,17 @@ impl ResultFile {
     }
 
     /// Inconsistent joint torques, if a held-out log also has a large error: each alone may have other reasons.
-    fn stray_torques(&self) -> impl Iterator<Item = String> + '_ {
-        let worst = self.validation.iter().filter_map(|log| self.times_of_fit(log)).fold(0.0, f64::max);
+    fn inconsistent_torques<'a>(&'a self, settings: &'a ProblemSettings) -> impl Iterator<Item = String> + 'a {
+        let worst = self.validation.iter().filter_map(|log| self.held_out_ratio(log, settings)).fold(0.0, f64::max);
         let findings = self.check.iter().flat_map(|check| &check.findings);
         let is_doubted = |finding: &&CheckFinding| finding.kind == "torque" && finding.level == Level::Warning;
         findings
-            .filter(move |finding| worst > MOST_TIMES_OF_DOUBTED_FIT && is_doubted(finding))
+            .filter(move |finding| worst > settings.max_held_out_ratio_if_inconsistent && is_doubted(finding))
             .map(CheckFinding::sentence)
     }
 
     /// Residual of a held-out log relative to the training logs; `None` if the held-out error is small.
-    fn times_of_fit(&self, log: &LogValidation) -> Option<f64> {
+    fn held_out_ratio(&self, log: &LogValidation, settings: &ProblemSettings) -> Option<f64> {
         // Both must use the same band: in the band of the fit, only the unconstrained estimate has figures.
         let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
         let (fitted, held_out) = match &log.in_fit_band {
@@ -167,7 +212,7 @@ impl ResultFile {
         let pairs = fitted.iter().zip(&held_out.joints).filter(|(fitted, _)| fitted.rmse_nm > 0.0);
         let squares: Vec<f64> = pairs.map(|(fitted, held)| (held.rmse_nm / fitted.rmse_nm).powi(2)).collect();
         let times = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        let is_good = held_out.relative_error_percent.is_none_or(|percent| percent < GOOD_PERCENT);
+        let is_good = held_out.relative_error_percent.is_none_or(|percent| percent < settings.min_held_out_percent);
         (!is_good).then_some(times)
     }
 }
@@ -179,14 +224,19 @@ struct Errors<'a> {
 }
 
 /// Message if the consistent set is clearly worse than the estimate on the same rows.
-fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -> Option<String> {
+fn worse_when_consistent(
+    place: &str,
+    free: &Errors<'_>,
+    written: &Errors<'_>,
+    settings: &ProblemSettings,
+) -> Option<String> {
     let largest = free.joints.iter().map(torque_norm).fold(0.0, f64::max);
     let times = |before: f64, after: f64| if before > 0.0 { after / before } else { 1.0 };
     let joints = free.joints.iter().zip(&written.joints);
     let worst = joints
-        .filter(|(free, _)| torque_norm(free) > LEAST_SHARE * largest)
+        .filter(|(free, _)| torque_norm(free) > settings.min_torque_share * largest)
         .map(|(free, held)| (times(free.1, held.1), free, held))
-        .filter(|(ratio, ..)| *ratio > MOST_TIMES_OF_JOINT)
+        .filter(|(ratio, ..)| *ratio > settings.max_joint_error_ratio)
         .max_by(|a, b| a.0.total_cmp(&b.0));
     let percent = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |value| format!("{value:.2}"));
     let sentence = |place: String, before: Option<f64>, after: Option<f64>| {
@@ -203,7 +253,8 @@ fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -
     }
     // All joints: on the same rows, the ratio of relative errors equals that of the root mean squares.
     let ratio = free.relative_percent.zip(written.relative_percent).map(|(before, after)| times(before, after));
-    (ratio? > MOST_TIMES_OF_ALL).then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))
+    (ratio? > settings.max_error_ratio)
+        .then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))
 }
 
 /// Root mean square of a joint's measured torque, Nm (N).

@@ -1,4 +1,4 @@
-//! What `simulate` writes as `truth.json`.
+//! Content of `truth.json`, an output of `simulate`.
 
 use super::provenance::Provenance;
 use dynident_iteration::RobotStatus;

@@ -63,7 +63,7 @@ pub struct FunctionChoice {
 impl FunctionChoice {
     pub(super) fn family(&self, joints: usize, duration_s: f64) -> Result<FunctionFamily, FamilyError> {
         let Some(code) = &self.code.0 else {
-            let problem = "a study file cannot contain code: set it in the calling program";
+            let problem = "no file holds code: set it in the calling program";
             return Err(FamilyError::Function { name: self.function.clone(), problem });
         };
         let Self { parameters, linear, .. } = *self;

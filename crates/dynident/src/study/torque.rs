@@ -82,7 +82,7 @@ impl TorqueSection {
     /// The law with code of the caller; it may depend on all joints.
     fn own_law(&self, name: &str, joints: usize) -> Result<DeclaredLaw, StudyError> {
         let code = self.code.0.as_ref().ok_or_else(|| {
-            let fix = "a study file cannot contain code: set it in the calling program, or give an expression";
+            let fix = "no file holds code: set it in the calling program, or give an expression";
             StudyError::conflict(format!("function = \"{name}\""), fix)
         })?;
         Ok(DeclaredLaw::Function(TorqueFunction::new(name, (0..joints).collect(), Arc::clone(code))))

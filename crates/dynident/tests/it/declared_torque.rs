@@ -126,7 +126,7 @@ fn a_counterbalance_and_a_spring_are_found_within_their_bars() {
     let declared = DECLARED.replace("q + 0.3", "q + 0.2");
     let moved = Job::new(folder.path(), &study(&format!("[drive]\nfriction = \"stated\"\n{declared}")));
     let refused = validate(&path, &moved.study, &moved.path, &Job::options(1)).unwrap_err().to_string();
-    assert!(refused.contains("`counterbalance` was `sin(q3 + 0.3)`, and the study says `sin(q3 + 0.2)`"), "{refused}");
+    assert!(refused.contains("`counterbalance` was `sin(q3 + 0.3)`, but is `sin(q3 + 0.2)`"), "{refused}");
 }
 
 /// What the logs choose of friction leaves declared torques alone.
@@ -297,10 +297,10 @@ fn what_cannot_be_is_said_with_its_place() {
     }
     for (torque, fragment) in [
         ("", "torque `spring`: no expression: give expression, table or table_file"),
-        ("expression = \"q\"\ntable = [[0.0, 1.0]]", "expression and table are both given: keep one"),
+        ("expression = \"q\"\ntable = [[0.0, 1.0]]", "expression and table are exclusive: remove one"),
         ("expression = \"q\"\nnominal = nan", "torque `spring`: nominal: give a finite number"),
         ("expression = \"q\"\nstiffness = 2.0", "unknown field `stiffness`"),
-        ("expression = \"q\"\n[[torque]]\nname = \"spring\"\njoint = \"hinge\"\nexpression = \"q\"", "stands twice"),
+        ("expression = \"q\"\n[[torque]]\nname = \"spring\"\njoint = \"hinge\"\nexpression = \"q\"", "is given twice"),
     ] {
         let message = Job::new_error(here, &pendulum(here, torque));
         assert!(message.contains(fragment), "{message}");

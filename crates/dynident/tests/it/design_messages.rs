@@ -52,7 +52,7 @@ fn a_start_that_cannot_be_is_named() {
         .replace("shoulder_lift_joint\",", "shoulder_lift_joint\", torque = 20.0,");
     assert_named(folder.path(), &weak, &["start_posture", "torque", "shoulder_lift_joint"]);
     let both = "start_posture = { elbow_joint = 1.0 }\nfamily = { kind = \"joined\", start = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], parts = [{ kind = \"fourier\" }] }";
-    assert_named(folder.path(), &text(both), &["keep one"]);
+    assert_named(folder.path(), &text(both), &["remove one"]);
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn a_prior_that_does_not_fit_is_named() {
         ("{}".to_owned(), &["result.json", "line 1"][..]),
         ("{\"schema\": \"dynident/result/9\", \"base_parameters\": []}".to_owned(), &["dynident/result/9"]),
         (result(&["Izz1", "Izz9"]).to_string(), &["result.json", "Izz9", "same robot"]),
-        (result(&["Izz1"]).to_string(), &["result.json", "does not hold", "same robot"]),
+        (result(&["Izz1"]).to_string(), &["result.json", "missing or duplicate", "same robot"]),
     ] {
         std::fs::write(folder.path().join("result.json"), contents).unwrap();
         assert_named(folder.path(), &study, names);
@@ -211,7 +211,7 @@ fn a_trajectory_or_log_that_is_none_is_named() {
         + "[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..6}\" }\ntorque = { columns = \"tau{1..6}\" }\n[[log]]\nfile = \"a.csv\"\nname = \"twin\"\n[[log]]\nfile = \"b.csv\"\nname = \"twin\"\n";
     let study = Study::parse(&logged, &path).unwrap();
     for (name, named) in
-        [("third", "no log is called `third`"), ("twin", "2 logs are called"), ("a.csv", "a.csv is in none")]
+        [("third", "unknown log `third`"), ("twin", "2 logs have the name"), ("a.csv", "a.csv is in none")]
     {
         let error = check_log(&study, &path, name, &Job::options(1)).unwrap_err();
         assert!(error.to_string().contains(named), "{error}");

@@ -191,7 +191,7 @@ fn a_way_without_its_reference_is_refused_by_name() {
     let missing = message("method = \"deviation\", reference = \"nowhere.csv\"");
     assert!(missing.contains("nowhere.csv"), "{missing}");
     let one = "method = \"logistic-map\", reference = { joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }";
-    assert!(message(one).contains("it moves 1 joints, the robot has 6"), "{}", message(one));
+    assert!(message(one).contains("the reference moves 1 joints, but the robot has 6"), "{}", message(one));
 }
 
 /// The paper's arm on the paper's strokes, both joints late: the map is exact under a pure lag.

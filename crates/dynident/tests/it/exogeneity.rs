@@ -122,7 +122,7 @@ fn instruments_left_to_the_data_hold_the_motion() {
     let below = "estimator = { method = \"instrumental\", instruments = { cutoff_hz = 0.06 } }\n";
     let below = Job::new(folder.path(), &text(below)).identify();
     let problems = &below.result.problems;
-    assert!(problems.iter().any(|problem| problem.contains("the instruments are weak")), "{problems:?}");
+    assert!(problems.iter().any(|problem| problem.contains("weak instruments")), "{problems:?}");
 }
 
 #[test]

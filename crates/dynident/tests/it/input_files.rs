@@ -82,7 +82,7 @@ fn a_file_that_is_replaced_during_a_job_is_an_error() {
             let error = run(name, work, Some(file)).unwrap_or_else(|| panic!("{name}: {file}"));
             let Error::Changed { path } = &error else { panic!("{name}, {file}: {error}") };
             assert_eq!(path.file_name().unwrap(), file, "{name}");
-            assert!(error.to_string().contains("changed while it was read; wait"), "{error}");
+            assert!(error.to_string().contains("changed while it was read; run"), "{error}");
         }
     }
 }

@@ -96,7 +96,7 @@ fn what_is_wrong_with_a_home_is_said() {
     let error = wrong(
         "warm_up_s = 60.0\nmodel_free = { kind = \"joint-pd\", kp = 400.0, kd = 40.0 }\nrobot = { kind = \"folder\", folder = \"exchange\" }",
     );
-    assert!(error.contains("warm_up_s") && error.contains("without a log"), "{error}");
+    assert!(error.contains("warm_up_s") && error.contains("before you record"), "{error}");
 }
 
 /// A motion that is never fitted judges the model, tests the robot that is found, and is told of.

@@ -131,7 +131,7 @@ fn legs_that_make_no_sense_are_refused_with_the_place() {
     let text = std::fs::read_to_string(&path).unwrap();
     let out = tempfile::tempdir().unwrap();
     for (from, to, what) in [
-        ("hold = { joint1 = 0.0 }", "hold = { elbow = 0.0 }", "leg 1: hold: there is no joint `elbow`"),
+        ("hold = { joint1 = 0.0 }", "hold = { elbow = 0.0 }", "leg 1: hold: unknown joint `elbow`"),
         ("hold = { joint2 = 0.0 }", "hold = { joint1 = 0.0, joint2 = 0.0 }", "leg 2: hold: all joints are held"),
         ("hold = { joint1 = 0.0 }", "hold = { joint1 = nan }", "leg 1: hold.joint1 = NaN"),
         (

@@ -99,7 +99,7 @@ fn a_refused_iteration_says_why_run_by_run() {
     );
     assert_eq!(file.status, "refused");
     assert_eq!(page.matches("run 1: stopped").count(), 1);
-    assert!(page.contains("No run determines the parameters") && page.contains("rejected") && page.contains("stiffer"));
+    assert!(page.contains("No run determines the parameters") && page.contains("rejected") && page.contains("gains times"));
 }
 
 /// An iteration ends with the robot that all good runs tell, as `identify` writes one, and `validate` takes it.

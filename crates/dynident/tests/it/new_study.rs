@@ -153,13 +153,13 @@ fn a_recording_without_a_clock_needs_its_rate() {
     let logs: Vec<PathBuf> = logs.iter().map(without_clock).collect();
     let found = written(&robot, &logs, None);
     assert!(found.unsure.iter().any(|line| line.contains("rate_hz")), "{:?}", found.unsure);
-    assert!(found.text.contains("# UNSURE: no column is a time"), "{}", found.text);
+    assert!(found.text.contains("# UNSURE: no time column recognised"), "{}", found.text);
 
     // A recording with other columns is not passed over in silence.
     let alien = folder.path().join("alien.csv");
     std::fs::write(&alien, "t_s,speed_of_wind\n0,1\n1,2\n").unwrap();
     let found = written(&robot, &[repository("examples/ur10_simulated/train.csv"), alien], None);
-    assert!(found.unsure.iter().any(|line| line.contains("alien.csv is left out")), "{:?}", found.unsure);
+    assert!(found.unsure.iter().any(|line| line.contains("alien.csv is not in the study")), "{:?}", found.unsure);
 
     let other = repository("robots/panda.urdf");
     let few = folder.path().join("few.csv");

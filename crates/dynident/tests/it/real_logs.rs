@@ -80,7 +80,7 @@ fn panda_has_43_base_parameters_of_bodies() {
     let of_bodies = found.result.base_parameters.iter().filter(|parameter| parameter.unit.starts_with("kg")).count();
     assert_eq!(of_bodies, 43);
     let urdf = found.urdf.unwrap();
-    assert!(urdf.contains("holds with the joints locked behind which stand: panda_leftfinger, panda_rightfinger"));
+    assert!(urdf.contains("valid only with the joints locked that carry: panda_leftfinger, panda_rightfinger"));
 }
 
 #[test]

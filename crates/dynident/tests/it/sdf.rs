@@ -55,5 +55,5 @@ fn a_fixed_link_of_unknown_mass_is_named() {
     let found = identified(&path);
     assert!(found.sdf.is_none() && found.urdf.is_some());
     let reason = found.result.no_sdf.unwrap();
-    assert!(reason.contains("`tool` has no mass, which SDF takes for 1 kg"), "{reason}");
+    assert!(reason.contains("`tool` has no mass, for which SDF assumes 1 kg"), "{reason}");
 }

@@ -136,7 +136,7 @@ fn locked_joints_and_a_tilted_base() {
     let found = job.identify();
     assert_recovered(&found, &five.base_values(&job.robot()), NOISE_FREE);
     let urdf = found.urdf.unwrap();
-    assert!(urdf.contains("holds with the joints locked behind which stand: wrist_3_link"), "{urdf}");
+    assert!(urdf.contains("valid only with the joints locked that carry: wrist_3_link"), "{urdf}");
 }
 
 #[test]

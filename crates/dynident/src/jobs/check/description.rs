@@ -1,23 +1,14 @@
 //! Findings on the robot description: its units, its masses, or another robot.
 
-use super::wording::finding;
+use super::wording::{Words, finding};
 use crate::result::{CheckFinding, StudyChange};
-use dynident_identification::diagnosis::{DescriptionFit, StudyKeys, WrongMass};
+use dynident_identification::diagnosis::{DescriptionFit, WrongMass};
 use dynident_model::{AuditFinding, Model, audit};
 use dynident_recording::Level;
 
-/// Largest ratio between joint factors for one common unit or motor currents: motor constants times gear ratios of one
-/// arm differ by at most five.
-const MAX_FACTOR_RATIO: f64 = 10.0;
-
 /// Torque magnitude that differs from the robot description's: another torque unit, or another unit of the masses.
-pub(super) fn torque_unit(
-    fit: &DescriptionFit,
-    far: &[usize],
-    model: &Model,
-    joints: &[String],
-    keys: Option<&StudyKeys>,
-) -> CheckFinding {
+pub(super) fn torque_unit(fit: &DescriptionFit, far: &[usize], model: &Model, words: &Words<'_>) -> CheckFinding {
+    let Words { joints, keys, thresholds } = *words;
     let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], fit.scale[joint].unwrap_or(1.0)));
     let factors = factors.collect::<Vec<_>>().join(", ");
     let common = fit.common_unit();
@@ -41,7 +32,7 @@ pub(super) fn torque_unit(
     let (least, most) = (scales().fold(f64::INFINITY, f64::min), scales().fold(0.0, f64::max));
     // A single joint may have one wrong body.
     let is_alone = far.len() == 1 && joints.len() > 1;
-    if is_alone || (common.is_none() && most > MAX_FACTOR_RATIO * least) {
+    if is_alone || (common.is_none() && most > thresholds.max_factor_ratio * least) {
         return finding(
             "description",
             "wrong masses in the robot description, or torques of some joints in another unit".to_owned(),

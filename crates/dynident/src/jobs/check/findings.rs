@@ -1,27 +1,20 @@
 //! Converts a diagnosis to findings.
 
+use super::CheckSettings;
 use super::changes::{changes, keys_of_log, keys_of_study};
 use super::description::{another_robot, torque_unit, wrong_mass};
-use super::wording::{alternative, evidence, finding};
+use super::wording::{Words, alternative, evidence, finding};
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{
     BeyondLimit, Channels, DescriptionFit, Diagnosis, DuplicateChannel, HeldOutHypothesis, Hypothesis,
-    InconsistentTorque, Mistake, Search, StudyKeys, UnmodelledPayload,
+    InconsistentTorque, Mistake, Search, UnmodelledPayload,
 };
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_model::Model;
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
-
-/// Largest unexplained share of all torque for an accepted explanation; about 0.1 on most real data sets.
-const MAX_UNEXPLAINED_SHARE: f64 = 0.3;
-/// The same relative to the study as written, for noisy logs.
-const MAX_UNEXPLAINED_RATIO: f64 = 0.75;
-/// Unexplained share of all torque above which torque and motion are unrelated. A correct study with a noisy log of a
-/// slow pendulum has 0.81.
-const MIN_UNRELATED_SHARE: f64 = 0.92;
 
 /// Findings of a diagnosis, with the scores of the study as written and of the best hypothesis.
 pub(super) fn study_check(
@@ -29,14 +22,15 @@ pub(super) fn study_check(
     robot: &StudyRobot,
     settings: &IdentificationSettings,
     diagnosis: &Diagnosis,
+    thresholds: &CheckSettings,
 ) -> StudyCheck {
     let joints = robot.parametric.joint_names();
     let keys = keys_of_study(study, robot);
-    let words = Words { joints: &joints, keys: keys.as_ref() };
+    let words = Words { joints: &joints, keys: keys.as_ref(), thresholds };
     let search = &diagnosis.search;
     let spoilt = spoilt_columns(diagnosis, &joints);
     let is_spoilt = !spoilt.is_empty();
-    let best = explanation(search).filter(|_| !is_spoilt);
+    let best = explanation(search, thresholds).filter(|_| !is_spoilt);
     let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
     let mut findings = if is_spoilt {
         spoilt
@@ -63,7 +57,7 @@ pub(super) fn study_check(
     if findings.is_empty() && diagnosis.is_unexplained() {
         findings.push(unexplained(search, &joints));
     }
-    if findings.is_empty() && search.believed().left_of_all > MIN_UNRELATED_SHARE {
+    if findings.is_empty() && search.believed().left_of_all > thresholds.min_unrelated_share {
         findings.push(unrelated_torques(search));
     }
     StudyCheck {
@@ -76,22 +70,16 @@ pub(super) fn study_check(
 }
 
 /// The best hypothesis, if it explains the logs well enough.
-fn explanation(search: &Search) -> Option<&Hypothesis> {
-    let most_left = MAX_UNEXPLAINED_SHARE.max(MAX_UNEXPLAINED_RATIO * search.as_written.left_of_all);
+fn explanation<'a>(search: &'a Search, thresholds: &CheckSettings) -> Option<&'a Hypothesis> {
+    let most_left =
+        thresholds.max_unexplained_share.max(thresholds.max_unexplained_ratio * search.as_written.left_of_all);
     search.best.as_ref().filter(|best| !best.is_unexplained() && best.left_of_all < most_left)
-}
-
-/// Names of joints and study keys for the texts.
-#[derive(Clone, Copy)]
-struct Words<'a> {
-    joints: &'a [String],
-    keys: Option<&'a StudyKeys>,
 }
 
 impl Words<'_> {
     /// One finding per mistake of the best hypothesis; the last finding lists indistinguishable hypotheses.
     fn mistakes(self, search: &Search, best: &Hypothesis) -> Vec<CheckFinding> {
-        let Self { joints, keys } = self;
+        let Self { joints, keys, .. } = self;
         let one = |(number, mistake): (usize, &Mistake)| {
             let evidence = evidence(mistake, &search.as_written, best, joints);
             let mut found = finding(mistake.key(), mistake.sentence(joints), evidence);
@@ -108,7 +96,7 @@ impl Words<'_> {
     /// Finding for the robot description of another robot. The best hypothesis is listed only as an alternative,
     /// because some mistake always explains slightly more.
     fn another_robot(self, fit: &DescriptionFit, best: Option<&Hypothesis>) -> CheckFinding {
-        let Self { joints, keys } = self;
+        let Self { joints, keys, .. } = self;
         let mut found = another_robot(fit, joints);
         let others = best.iter().flat_map(|best| best.mistakes.iter().map(|mistake| (mistake, best.factors_alike)));
         let text = |(mistake, range): (&Mistake, Option<[f64; 2]>)| {
@@ -124,7 +112,7 @@ impl Words<'_> {
         let far = fit.joints_in_another_unit();
         match &fit.wrong_mass {
             Some(wrong) => Some(wrong_mass(wrong, model)),
-            None => (!far.is_empty()).then(|| torque_unit(fit, &far, model, self.joints, self.keys)),
+            None => (!far.is_empty()).then(|| torque_unit(fit, &far, model, &self)),
         }
     }
 }

@@ -3,7 +3,10 @@
 mod changes;
 mod description;
 mod findings;
+mod settings;
 mod wording;
+
+pub use settings::CheckSettings;
 
 use crate::error::Error;
 use crate::inputs::InputFiles;
@@ -17,10 +20,6 @@ use dynident_recording::{ImportReport, Level};
 use findings::{currents_without_scale, study_check};
 use std::path::Path;
 
-/// Equations per parameter below which the logs are too short (problem) and short (warning). Ten seconds of slow motion
-/// have 2.7, and about half of the fits to such logs are usable.
-const EQUATIONS_PER_PARAMETER: [usize; 2] = [2, 3];
-
 /// Audit checks for physically inconsistent bodies, independent of the robot's size.
 const INCONSISTENT_BODY_CHECKS: [&str; 4] =
     ["mass-not-positive", "inertia-not-positive", "triangle-inequality", "inertia-too-large"];
@@ -33,6 +32,20 @@ const MAX_POINT_INERTIA_RATIO: f64 = 1e-12;
 /// # Errors
 /// Every variant of [`Error`] for files, study and logs. Mistakes that are found are not errors.
 pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<CheckFile, Error> {
+    check_with(study, study_path, options, &CheckSettings::default())
+}
+
+/// As [`check()`], with other thresholds.
+///
+/// # Errors
+/// As [`check()`], and invalid thresholds.
+pub fn check_with(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    thresholds: &CheckSettings,
+) -> Result<CheckFile, Error> {
+    thresholds.validate().map_err(Error::section(study_path, "check"))?;
     study.require_training_log(study_path)?;
     let files = InputFiles::of(study, study_path, options.data.as_deref());
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -46,7 +59,7 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
 
     let mut check = examined.diagnosis.as_ref().map_or_else(
         || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
-        |diagnosis| diagnosis_check(study, &robot, &task.settings, diagnosis),
+        |diagnosis| diagnosis_check(study, &robot, &task.settings, diagnosis, thresholds),
     );
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
@@ -56,14 +69,15 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
         check.findings.retain(|finding| !["description", "torque"].contains(&&finding.kind[..]));
     }
     check.findings.extend(impossible_bodies(&robot));
-    check.findings.extend(too_few_rows(&examined));
+    check.findings.extend(too_few_rows(&examined, thresholds));
     check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
     Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
 }
 
 /// Finding for logs that are too short for the number of parameters.
-fn too_few_rows(examined: &StudyExamination) -> Option<CheckFinding> {
-    let [too_few, few] = EQUATIONS_PER_PARAMETER.map(|each| examined.rows < each * examined.parameters);
+fn too_few_rows(examined: &StudyExamination, thresholds: &CheckSettings) -> Option<CheckFinding> {
+    let [too_few, few] =
+        [thresholds.too_few_equations, thresholds.few_equations].map(|each| examined.rows < each * examined.parameters);
     let what = if too_few { "are too short" } else { "are short" };
     few.then(|| CheckFinding {
         level: if too_few { Level::Problem } else { Level::Warning },
@@ -123,8 +137,9 @@ pub(super) fn diagnosis_check(
     robot: &StudyRobot,
     settings: &IdentificationSettings,
     diagnosis: &Diagnosis,
+    thresholds: &CheckSettings,
 ) -> StudyCheck {
-    let mut check = study_check(study, robot, settings, diagnosis);
+    let mut check = study_check(study, robot, settings, diagnosis, thresholds);
     if let Some(currents) = currents_without_scale(study, settings) {
         check.findings.retain(|finding| finding.kind != "unit" || finding.what.contains("position"));
         check.findings.insert(0, currents);

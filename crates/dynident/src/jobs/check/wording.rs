@@ -1,5 +1,6 @@
 //! Wording of findings, alternatives and evidence.
 
+use super::CheckSettings;
 use super::changes::changes;
 use crate::result::CheckFinding;
 use core::fmt::Write;
@@ -8,6 +9,14 @@ use dynident_recording::Level;
 
 /// Smallest evidence: natural logarithm of the ratio of a joint's unexplained torque before and after the correction.
 const MIN_LOG_RATIO: f64 = 0.2;
+
+/// Names of joints and study keys for the texts, with the thresholds.
+#[derive(Clone, Copy)]
+pub(super) struct Words<'a> {
+    pub(super) joints: &'a [String],
+    pub(super) keys: Option<&'a StudyKeys>,
+    pub(super) thresholds: &'a CheckSettings,
+}
 
 /// A problem without study keys.
 pub(super) fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {

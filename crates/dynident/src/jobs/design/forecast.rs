@@ -7,7 +7,8 @@ use nalgebra::DMatrix;
 
 /// Number of worst directions in the result.
 const MAX_DIRECTIONS: usize = 3;
-/// Number of terms per direction.\nconst MAX_TERMS: usize = 6;
+/// Number of terms per direction.
+const MAX_TERMS: usize = 6;
 
 /// Nominal values below this fraction of the largest are rounding errors of zero.
 const MIN_RELATIVE_NOMINAL: f64 = 1e-9;

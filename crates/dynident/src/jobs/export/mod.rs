@@ -136,7 +136,7 @@ pub fn export_payload_of(
     };
     let inconsistent = || {
         let why = found.failure.as_deref().unwrap_or("its mass is zero");
-        wrong(format!("payload `{}` is not physically consistent: {why}", found.name))
+        wrong(format!("payload `{}` has no body that can be real: {why}", found.name))
     };
     let body = found.possible.as_ref().ok_or_else(inconsistent)?;
     let [xx, xy, xz, yy, yz, zz] = body.inertia_at_com_kgm2;

@@ -7,7 +7,7 @@ mod sections;
 use crate::clock::now;
 use crate::error::Error;
 use crate::inputs::InputFiles;
-use crate::jobs::check::diagnosis_check;
+use crate::jobs::check::{CheckSettings, diagnosis_check};
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::jobs::provenance::{concurrently, provenance, seen_from};
@@ -355,7 +355,10 @@ fn result_file(
         validation: held_out.map(|log| log.validation.clone()).collect(),
         physical: parts.verdict,
         logs: log_summaries(task, found),
-        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis)),
+        check: found
+            .diagnosis
+            .as_ref()
+            .map(|diagnosis| diagnosis_check(study, robot, &task.settings, diagnosis, &CheckSettings::default())),
         no_urdf: parts.no_urdf,
         no_mjcf: parts.no_mjcf,
         no_sdf: parts.no_sdf,

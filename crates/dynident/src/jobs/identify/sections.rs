@@ -45,7 +45,7 @@ pub(super) fn method_summary(study: &Study, identification: &Identification) -> 
         covariance: match &identification.estimator {
             _ if estimate.clusters > 0 => "time segments: accounts for residuals correlated in time",
             Estimator::Function(_) if estimate.covariance_method != study.estimator.covariance => {
-                "from the estimator function"
+                "as the function gave it"
             }
             _ => "white residuals",
         }

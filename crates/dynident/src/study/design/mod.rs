@@ -283,7 +283,7 @@ impl DesignSection {
     /// The first key with an invalid value, with its valid range.
     pub fn validate(&self) -> Result<(), StudyError> {
         let within = |key: &str, value: f64, least: f64, most: f64| Expected::Range(least, most).check(key, value);
-        within("duration_s", self.duration_s, 1e-3, MOST_DURATION_S)?;
+        within("duration_s", self.duration_s, 1e-3, MAX_DURATION_OF_ANY_ROBOT_S)?;
         self.optimiser.validate()?;
         if !self.parameters.is_empty() && !matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
             let fix = "these are strokes of a windowed design: set criterion = { kind = \"windowed-condition\" }";
@@ -310,8 +310,8 @@ impl DesignSection {
         if let Some(limit) = search.time_limit_s {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
         }
-        within("defaults.stop_margin_percent", self.defaults.stop_margin_percent, 0.0, MOST_STOP_MARGIN)?;
-        within("defaults.continuous_turns", self.defaults.continuous_turns, 0.0, MOST_TURNS)?;
+        within("defaults.stop_margin_percent", self.defaults.stop_margin_percent, 0.0, MAX_STOP_MARGIN_PERCENT)?;
+        within("defaults.continuous_turns", self.defaults.continuous_turns, 0.0, MAX_CONTINUOUS_TURNS)?;
         self.prior.validate()?;
         if !self.prior.is_empty() && self.criterion.ignores_torque_noise() {
             let fix = "a condition number does not use a prior: set the criterion to \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction";

@@ -83,14 +83,14 @@ fn columns_that_belong_together_are_named() {
             rows: |rows| each(rows, |row| row[9] = row[8]),
             study: SAME,
             kind: "order",
-            named: &["the torque of joints `shoulder_lift_joint` and `elbow_joint` is one and the same column"],
+            named: &["the torque of joints `shoulder_lift_joint` and `elbow_joint` is the same column"],
         },
         Case {
             name: "one position for two joints, as revolutions",
             rows: |rows| each(rows, |row| row[3] = row[2] / TAU),
             study: SAME,
             kind: "order",
-            named: &["the position of joints `shoulder_lift_joint` and `elbow_joint` is one and the same column"],
+            named: &["the position of joints `shoulder_lift_joint` and `elbow_joint` is the same column"],
         },
         Case {
             name: "magnitudes of the torques",

@@ -156,7 +156,7 @@ fn channels_that_say_nothing_of_the_motion_are_named() {
             rows: |rows| rows.iter_mut().enumerate().for_each(|(k, row)| row[9] = 50.0 * noise(k)),
             study: SAME,
             kind: "torque",
-            named: &["the torque of joint `elbow_joint` has nothing to do with its motion"],
+            named: &["the torque of joint `elbow_joint` is unrelated to its motion"],
         },
         Case {
             name: "positions in place of torques",
@@ -164,7 +164,7 @@ fn channels_that_say_nothing_of_the_motion_are_named() {
             study: SAME,
             kind: "order",
             named: &[
-                "the position of joint `shoulder_pan_joint` and the torque of joint `shoulder_pan_joint` are one and the same column",
+                "the position of joint `shoulder_pan_joint` and the torque of joint `shoulder_pan_joint` are the same column",
             ],
         },
         Case {

@@ -65,7 +65,7 @@ fn torques_of_nothing_are_named() {
         },
         study: SAME,
         kind: "torque",
-        named: &["nothing to do with the motion"],
+        named: &["unrelated to the motion"],
     };
     all_are_named(&[case]);
 }
