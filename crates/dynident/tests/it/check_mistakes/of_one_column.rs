@@ -1,4 +1,4 @@
-//! Mistakes of one joint's column, or of two that belong together.
+//! Mistakes of one column, or of two related columns.
 
 use super::{Case, SAME, TAU, all_are_named, each};
 
@@ -24,7 +24,7 @@ fn units_of_one_joint_are_named() {
             rows: |rows| each(rows, |row| row[2] *= 101.0),
             study: SAME,
             kind: "unit",
-            // 1/101 within three per cent.
+            // 1/101 within 3 %.
             named: &["scale = [1.0, 0.0102", "scale = [1.0, 0.0101", "scale = [1.0, 0.0100", "scale = [1.0, 0.0099"],
         },
         Case {
