@@ -89,7 +89,7 @@ pub use jobs::inspect::{
 };
 pub use jobs::iterate::{IterationWatch, RobotMaker, iterate_study, iterate_with_robot};
 pub use jobs::log::log_contents;
-pub use jobs::new_study::{NewStudy, new_study};
+pub use jobs::new_study::{NewStudy, NewStudySettings, new_study, new_study_with};
 pub use jobs::options::RunOptions;
 pub use jobs::predict::{PredictedTorque, TorquePredictor};
 pub use jobs::reduce::{ReduceSettings, factors_errors, identify_factors, reduce};

@@ -205,7 +205,7 @@ fn a_full_disk_leaves_the_old_set() {
         };
         let out = String::from_utf8_lossy(&ran.stdout).into_owned() + &String::from_utf8_lossy(&ran.stderr);
         if ran.status.code() == Some(77) || out.contains("unshare") {
-            println!("skipped: no file system of its own: {out}");
+            println!("skipped: no separate file system: {out}");
             return;
         }
         assert!(ran.status.success(), "{out}");

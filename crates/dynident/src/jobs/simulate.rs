@@ -14,6 +14,7 @@ use dynident_simulation::controllers::JointPdSettings;
 use dynident_simulation::{ControllerModel, ControllerSettings};
 use std::path::Path;
 
+/// A finished simulation.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     /// Content of `truth.json`.

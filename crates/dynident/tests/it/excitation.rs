@@ -137,7 +137,7 @@ fn noise_at_rest_is_no_excitation() {
         let [nominal, written] = cell.held_out;
         assert!(written <= nominal.hypot(TORQUE_NOISE), "{place}: {written} instead of {nominal} Nm");
         let hanging = result.base_parameters.iter().filter(|parameter| !parameter.conditional_on.is_empty()).count();
-        assert_eq!(hanging == 0, count == DOF, "{place}: {hanging} estimates hang on nominal values");
+        assert_eq!(hanging == 0, count == DOF, "{place}: {hanging} estimates depend on nominal values");
         let rests = result.method.resting_joints.len();
         assert_eq!(rests, DOF - count, "{place}: {:?}", result.method.resting_joints);
     }

@@ -290,5 +290,5 @@ fn bars_with_constants_chosen_before(load: f64) {
         assert!(without < with, "{symbol}: {without} without, {with} with");
     }
     let narrowed = dry.iter().filter(|symbol| bar(&without, symbol) < 0.7 * bar(&with, symbol)).count();
-    assert!(narrowed > 0, "no bar hangs on the constants");
+    assert!(narrowed > 0, "no error bar depends on the constants");
 }

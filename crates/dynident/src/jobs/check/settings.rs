@@ -9,8 +9,8 @@ pub struct CheckSettings {
     pub max_unexplained_share: f64,
     /// The same relative to the study as written, for noisy logs. Default 0.75.
     pub max_unexplained_ratio: f64,
-    /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with a
-    /// noisy log of a slow pendulum has 0.81.
+    /// Unexplained share of all torque above which torque and motion are unrelated. Default 0.92: a correct study with
+    /// a noisy log of a slow pendulum has 0.81.
     pub min_unrelated_share: f64,
     /// Largest ratio between joint factors for one common unit or motor currents. Default 10: motor constants times
     /// gear ratios of one arm differ by at most 5.

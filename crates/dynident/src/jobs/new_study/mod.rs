@@ -4,6 +4,9 @@ mod channels;
 mod draft;
 mod drives;
 mod paths;
+mod settings;
+
+pub use settings::NewStudySettings;
 
 use crate::error::{Error, NewStudyError};
 use crate::jobs::check::check;
@@ -24,11 +27,6 @@ use std::path::{Path, PathBuf};
 
 /// Maximum number of rounds of check and correction.
 const MAX_ROUNDS: usize = 3;
-/// Parts of a single recording for training and validation, with a gap, because neighbouring samples are correlated.
-const TRAINING_FRACTION: [f64; 2] = [0.0, 0.65];
-const VALIDATION_FRACTION: [f64; 2] = [0.7, 1.0];
-/// Larger positions, in turns, are assumed not to be radians.
-const MAX_RADIAN_TURNS: f64 = 4.0;
 
 /// Inputs of a new study.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,13 +64,26 @@ impl NewStudy {
 /// # Errors
 /// A robot description or recording that cannot be read, or without recognisable columns of positions and torques.
 pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStudyFile, Error> {
+    new_study_with(request, options, &NewStudySettings::default())
+}
+
+/// As [`new_study()`], with other thresholds.
+///
+/// # Errors
+/// As [`new_study()`], and invalid thresholds.
+pub fn new_study_with(
+    request: &NewStudy,
+    options: &RunOptions<'_>,
+    thresholds: &NewStudySettings,
+) -> Result<NewStudyFile, Error> {
+    thresholds.validate().map_err(Error::section(&request.out, "new"))?;
     let robot = match &request.description {
         Some(robot) => (**robot).clone(),
         None => load_robot(&request.robot, &LoadSettings { xacro: request.xacro.clone(), ..LoadSettings::default() })?,
     };
     let logs: Vec<(&Path, LogContents)> =
         request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
-    let recorded = Recorded::find(&robot.model, &logs).map_err(Error::NewStudy)?;
+    let recorded = Recorded::find(&robot.model, &logs, thresholds).map_err(Error::NewStudy)?;
     let mut draft = recorded.draft(request, &robot.model, &logs);
     for change in &request.stated {
         draft.apply(change, "As stated");
@@ -136,6 +147,7 @@ fn apply_corrections(draft: &mut Draft, found: &StudyCheck) -> bool {
 }
 
 struct Recorded {
+    thresholds: NewStudySettings,
     /// Joint assignment, in the order of the columns.
     logged: LoggedJoints,
     position: Family,
@@ -151,7 +163,11 @@ struct Recorded {
 }
 
 impl Recorded {
-    fn find(model: &Model, logs: &[(&Path, LogContents)]) -> Result<Self, NewStudyError> {
+    fn find(
+        model: &Model,
+        logs: &[(&Path, LogContents)],
+        thresholds: &NewStudySettings,
+    ) -> Result<Self, NewStudyError> {
         let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
         let missing = |quantity| NewStudyError::NotRecognised {
@@ -196,6 +212,7 @@ impl Recorded {
         let time = group.and_then(|group| Some((group.time.clone()?, group.rate_hz)));
         let files = (0..logs.len()).filter(holds).collect();
         Ok(Self {
+            thresholds: thresholds.clone(),
             columns: [of_position, of_torque],
             velocity_columns: velocity.and_then(ordered),
             files,
@@ -302,7 +319,7 @@ impl Recorded {
         };
         let pairs = self.logged.joints.iter().zip(columns);
         let most = pairs.filter_map(|(&joint, name)| largest(joint, name)).fold(0.0, f64::max);
-        if self.position.unit.is_none() && most > MAX_RADIAN_TURNS * core::f64::consts::TAU {
+        if self.position.unit.is_none() && most > self.thresholds.max_radian_turns * core::f64::consts::TAU {
             let reason = format!(
                 "a joint moves to {most:.1}, which is implausible in radians: degrees, or motor-side positions"
             );
@@ -359,10 +376,10 @@ impl Recorded {
             return vec![
                 Table::new("[[log]]", "One recording: the first part is for training, the last for validation")
                     .with("file", file(only), "")
-                    .with("fraction", part(TRAINING_FRACTION), ""),
+                    .with("fraction", part(self.thresholds.training_fraction), ""),
                 Table::new("[[log]]", "")
                     .with("file", file(only), "")
-                    .with("fraction", part(VALIDATION_FRACTION), "")
+                    .with("fraction", part(self.thresholds.validation_fraction), "")
                     .with("role", quoted("validate"), ""),
             ];
         }

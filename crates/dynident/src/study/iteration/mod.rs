@@ -76,7 +76,7 @@ pub enum PriorChoice {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
-#[allow(clippy::struct_excessive_bools, reason = "keys of a file, each a choice of its own")]
+#[allow(clippy::struct_excessive_bools, reason = "independent keys of a file")]
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of one from `[design]`.
     pub trajectory: Option<PathBuf>,

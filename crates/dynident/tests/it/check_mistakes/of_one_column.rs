@@ -28,7 +28,7 @@ fn units_of_one_joint_are_named() {
             named: &["scale = [1.0, 0.0102", "scale = [1.0, 0.0101", "scale = [1.0, 0.0100", "scale = [1.0, 0.0099"],
         },
         Case {
-            name: "the lift counted by halves",
+            name: "half of the positions of the lift",
             rows: |rows| each(rows, |row| row[2] *= 0.5),
             study: SAME,
             kind: "unit",
