@@ -2,7 +2,7 @@
 
 use crate::error::ReportError;
 use crate::pen::tenth;
-use crate::ticks::{short, ticks};
+use crate::ticks::{short, shortened, ticks};
 use serde::Serialize;
 
 /// Maximum number of characters of a label; the tooltip has the full label.
@@ -86,7 +86,7 @@ impl BarPlot {
     fn in_words(&self) -> String {
         let bars = self.bars.iter().map(|bar| {
             let half = bar.half_width.map_or_else(String::new, |half| format!(" ± {}", short(half, 2)));
-            format!("{}: {}{half}", shortened(&bar.label), short(bar.value, 4))
+            format!("{}: {}{half}", shortened(&bar.label, MAX_LABEL_CHARS), short(bar.value, 4))
         });
         let shown: Vec<String> = bars.take(MAX_SPOKEN_BARS).collect();
         let more = self.bars.len().saturating_sub(MAX_SPOKEN_BARS);
@@ -113,7 +113,7 @@ impl BarPlot {
             let half = bar.half_width.filter(|half| finite(*half) && shown.is_some());
             BarView {
                 y: 26.0 + ROW_HEIGHT * k as f64,
-                label: shortened(&bar.label),
+                label: shortened(&bar.label, MAX_LABEL_CHARS),
                 whole: &bar.label,
                 from: at(shown.unwrap_or(0.0).min(0.0)),
                 length: (at(shown.unwrap_or(0.0).max(0.0)) - at(shown.unwrap_or(0.0).min(0.0))).max(0.0),
@@ -140,13 +140,6 @@ impl BarPlot {
         };
         crate::templates::rendered("bar_plot.svg", &view)
     }
-}
-
-fn shortened(label: &str) -> String {
-    if label.chars().count() <= MAX_LABEL_CHARS {
-        return label.to_owned();
-    }
-    label.chars().take(MAX_LABEL_CHARS - 1).chain(['…']).collect()
 }
 
 #[derive(Serialize)]

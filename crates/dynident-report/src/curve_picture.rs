@@ -3,7 +3,7 @@
 use crate::decimation::kept_samples;
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};
-use crate::ticks::{short, ticks};
+use crate::ticks::{short, shortened, ticks};
 use core::fmt::Write;
 use serde::Serialize;
 
@@ -126,7 +126,7 @@ fn strip_view(name: &str, values: &[f64], colour: String, samples: &Samples<'_>,
     let (top, bottom) = (above.bottom + STRIP_GAP, above.bottom + STRIP_GAP + STRIP_HEIGHT);
     let frame = Frame { top, bottom, low, high, ..*above };
     StripView {
-        name: shortened(name),
+        name: shortened(name, MAX_NAME_CHARS),
         colour,
         top,
         bottom,
@@ -268,7 +268,7 @@ impl CurvePicture<'_> {
     fn legend(&self, left: f64, right: f64, first: f64) -> Vec<LegendView> {
         let (mut x, mut y) = (left, first);
         let entries = self.curves.iter().map(|curve| {
-            let name = shortened(curve.name);
+            let name = shortened(curve.name, MAX_NAME_CHARS);
             let width = LINE_SAMPLE_WIDTH + CHAR_WIDTH * name.chars().count() as f64 + 14.0;
             if x > left && x + width > right {
                 (x, y) = (left, y + LEGEND_ROW_HEIGHT);
@@ -280,13 +280,6 @@ impl CurvePicture<'_> {
         });
         entries.collect()
     }
-}
-
-fn shortened(name: &str) -> String {
-    if name.chars().count() <= MAX_NAME_CHARS {
-        return name.to_owned();
-    }
-    name.chars().take(MAX_NAME_CHARS - 1).chain(['…']).collect()
 }
 
 /// Smallest and largest finite value.

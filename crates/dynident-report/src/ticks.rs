@@ -1,4 +1,4 @@
-//! Ticks of axes, and numbers as text.
+//! Ticks of axes, and numbers and labels as text.
 
 /// About `count` round numbers (multiples of 1, 2 or 5 times a power of ten) in `[low, high]`, ascending; empty unless
 /// both are finite and low < high.
@@ -39,6 +39,14 @@ pub fn short(value: f64, digits: usize) -> String {
     }
     let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
     without_zeros(&format!("{value:.decimals$}")).to_owned()
+}
+
+/// The first `most` characters of a label, with an ellipsis if it is longer.
+pub(crate) fn shortened(label: &str, most: usize) -> String {
+    if label.chars().count() <= most {
+        return label.to_owned();
+    }
+    label.chars().take(most - 1).chain(['…']).collect()
 }
 
 fn without_zeros(text: &str) -> &str {

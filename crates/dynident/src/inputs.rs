@@ -108,16 +108,16 @@ fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: im
     let folders = Folders::new(study, study_path, data);
     let mut texts = Vec::new();
     if let Ok(Value::Object(all)) = serde_json::to_value(study) {
-        all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| gather(value, &mut texts));
+        all.iter().filter(|(section, _)| chosen(section)).for_each(|(_, value)| collect_texts(value, &mut texts));
     }
     let mut files: Vec<PathBuf> = texts.iter().filter_map(|text| folders.find(Path::new(text), None).ok()).collect();
-    let beside: Vec<PathBuf> = files
+    let siblings: Vec<PathBuf> = files
         .iter()
         .filter_map(|file| file.parent())
         .flat_map(|folder| texts.iter().map(move |text| folder.join(text)))
         .filter(|path| path.is_file())
         .collect();
-    files.extend(beside);
+    files.extend(siblings);
     files.push(study_path.to_owned());
     files.sort();
     files.dedup();
@@ -125,11 +125,11 @@ fn named_files(study: &Study, study_path: &Path, data: Option<&Path>, chosen: im
 }
 
 /// Collects all texts in `value` that could name a file.
-fn gather(value: &Value, texts: &mut Vec<String>) {
+fn collect_texts(value: &Value, texts: &mut Vec<String>) {
     match value {
         Value::String(text) if !text.is_empty() => texts.push(text.clone()),
-        Value::Array(values) => values.iter().for_each(|value| gather(value, texts)),
-        Value::Object(entries) => entries.values().for_each(|value| gather(value, texts)),
+        Value::Array(values) => values.iter().for_each(|value| collect_texts(value, texts)),
+        Value::Object(entries) => entries.values().for_each(|value| collect_texts(value, texts)),
         Value::String(_) | Value::Null | Value::Bool(_) | Value::Number(_) => {}
     }
 }

@@ -155,7 +155,7 @@ fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
         }
     }
     let sha256 = hexadecimal(&hash.finalize());
-    Ok(InputFile { what: what.to_owned(), file: seen_from(folder, path), bytes, sha256 })
+    Ok(InputFile { what: what.to_owned(), file: relative_path(folder, path), bytes, sha256 })
 }
 
 /// Describes data in memory: numbers as 8-byte IEEE 754, little-endian, row by row; texts as UTF-8.
@@ -175,7 +175,7 @@ fn input_in_memory<B: AsRef<[u8]>>(what: &str, label: &str, parts: impl Iterator
 }
 
 /// Relative path from a folder to a file, with `/`; only the file name if there is none (another drive).
-pub(crate) fn seen_from(folder: &Path, path: &Path) -> String {
+pub(crate) fn relative_path(folder: &Path, path: &Path) -> String {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let name = || path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let (Ok(from), Ok(to)) = (folder.canonicalize(), path.canonicalize()) else { return name() };
@@ -200,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hashes_are_those_of_the_standard_and_paths_are_seen_from_the_study() {
+    fn hashes_are_those_of_the_standard_and_paths_are_relative_to_the_study() {
         let folder = tempfile::tempdir().unwrap();
         let study = folder.path().join("studies");
         std::fs::create_dir(&study).unwrap();
@@ -210,6 +210,6 @@ mod tests {
         let found = input("log", &file, &study).unwrap();
         assert_eq!(found.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
         assert_eq!((found.bytes, found.file.as_str()), (3, "../abc.csv"));
-        assert_eq!(seen_from(folder.path(), &file), "abc.csv");
+        assert_eq!(relative_path(folder.path(), &file), "abc.csv");
     }
 }

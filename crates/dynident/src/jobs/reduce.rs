@@ -4,7 +4,7 @@ use crate::clock::now;
 use crate::error::{Error, FactorsError};
 use crate::factors::{FactorLog, Factors, name_alone};
 use crate::inputs::InputFiles;
-use crate::jobs::identify::{IdentificationOutcome, Made, written};
+use crate::jobs::identify::{FitMetadata, IdentificationOutcome, build_outcome};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::factors_provenance;
 use crate::result::{ResultFile, Timings};
@@ -107,8 +107,8 @@ pub fn identify_factors(factors: &Factors, options: &RunOptions<'_>) -> Result<I
     let recordings = logs.iter().map(|log| Recording::without_samples(log.name.clone())).collect();
     let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
     task.settings = settings;
-    let made = Made { timings, provenance: factors_provenance(factors), is_payload: false };
-    written(study, path, &robot, &task, found, made)
+    let metadata = FitMetadata { timings, provenance: factors_provenance(factors), is_payload: false };
+    build_outcome(study, path, &robot, &task, found, metadata)
 }
 
 /// Residual of each log of `factors` with a model's base parameters, percent of the root mean square torque. `None` for

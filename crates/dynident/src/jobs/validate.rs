@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::inputs::InputFiles;
 use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{read_input, seen_from};
+use crate::jobs::provenance::{read_input, relative_path};
 use crate::result::{InputFile, LogSummary, ResultFile, VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyInput, StudyRobot};
 use dynident_identification::examination::{HeldOutExamination, ModelUnderTest, examine_held_out};
@@ -71,7 +71,7 @@ pub fn validate_result(
     let folder = study_path.parent().unwrap_or(Path::new(""));
     let summary = |log: &HeldOutExamination| {
         let mut summary = held_out_summary(&recordings[log.index], log, &joints);
-        summary.import.file = seen_from(folder, Path::new(&summary.import.file));
+        summary.import.file = relative_path(folder, Path::new(&summary.import.file));
         summary
     };
     let logs: Vec<LogSummary> = tested.iter().map(summary).collect();

@@ -19,7 +19,7 @@ pub(super) fn examination(page: &mut Report, check: &StudyCheck) {
     }
     page.add(text);
     if let Some(as_written) = &check.as_written {
-        page.add(left(&check.joints, as_written, check.best.as_ref()));
+        page.add(unexplained_torque(&check.joints, as_written, check.best.as_ref()));
     }
 }
 
@@ -32,7 +32,7 @@ fn tone(finding: &CheckFinding) -> Tone {
 }
 
 /// Unexplained torque of each joint, as written and with the correction.
-fn left(joints: &[String], as_written: &ReadingResult, best: Option<&ReadingResult>) -> BarPlot {
+fn unexplained_torque(joints: &[String], as_written: &ReadingResult, best: Option<&ReadingResult>) -> BarPlot {
     let title = "Unexplained torque with the best physically consistent fit";
     let label = "unexplained torque of the joint, %";
     let shown = best.unwrap_or(as_written);

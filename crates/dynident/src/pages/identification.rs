@@ -1,5 +1,6 @@
 //! `report.html` of an identification.
 
+use super::unit;
 use crate::error::Error;
 use crate::result::{
     BaseParameterResult, BodyResult, ErrorTermResult, JointFrictionResult, LogSummary, ResultFile, TermResult,
@@ -32,21 +33,21 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
         r.method.covariance
     ));
     if !r.problems.is_empty() {
-        let mut against = Text::new("What speaks against loading this model into a robot:");
+        let mut problems = Text::new("What speaks against loading this model into a robot:");
         for problem in &r.problems {
-            against = against.point(Tone::Bad, problem);
+            problems = problems.point(Tone::Bad, problem);
         }
-        page.add(against);
+        page.add(problems);
     }
-    page.add(figures(r));
-    page.add(judged_model(r));
+    page.add(key_figures(r));
+    page.add(model_description(r));
     if let Some(check) = &r.check {
         super::check::examination(&mut page, check);
     }
     page.add(Heading::new("Torque"));
-    page.add(errors(r));
+    page.add(error_table(r));
     for log in &r.validation {
-        page.add(held_out(log));
+        page.add(held_out_table(log));
     }
     torques(&mut page, &r.robot.joints, traces, r.validation.iter().any(|log| log.physical.is_some()));
     page.add(Heading::new("Parameters"));
@@ -77,16 +78,11 @@ pub fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<Stri
     Ok(page.html()?)
 }
 
-/// Prevents line breaks in a unit and raises its exponents.
-fn unit(unit: &str) -> String {
-    unit.replace(' ', "\u{a0}").replace("^2", "²")
-}
-
 fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{}\u{a0}%", short(value, 3)))
 }
 
-fn figures(r: &ResultFile) -> KeyFigures {
+fn key_figures(r: &ResultFile) -> KeyFigures {
     let mut figures = KeyFigures::new();
     for log in r.validation.iter().take(3) {
         let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
@@ -97,7 +93,7 @@ fn figures(r: &ResultFile) -> KeyFigures {
         if prior.is_some() {
             note = format!("{note}; robot description {}", percent(prior));
         }
-        figures = figures.figure("held-out torque error", percent(written(log).relative_error_percent), note);
+        figures = figures.figure("held-out torque error", percent(exported_report(log).relative_error_percent), note);
     }
     if r.validation.is_empty() {
         figures = figures.judged("held-out torque error", "–", "no held-out log", Tone::Warning);
@@ -133,12 +129,12 @@ fn figures(r: &ResultFile) -> KeyFigures {
 }
 
 /// Errors of the exported model: the physically consistent set, or the estimate without one.
-fn written(log: &LogValidation) -> &ValidationReport {
+fn exported_report(log: &LogValidation) -> &ValidationReport {
     log.physical.as_ref().unwrap_or(&log.model)
 }
 
 /// Describes the model in the figures, and whether it differs significantly from the unconstrained estimate.
-fn judged_model(r: &ResultFile) -> Text {
+fn model_description(r: &ResultFile) -> Text {
     let Some(fit) = &r.physical.fit else {
         return Text::new("All figures use the unconstrained estimate, because there is no physically consistent set.");
     };
@@ -153,15 +149,15 @@ fn judged_model(r: &ResultFile) -> Text {
         short(test.f, 3),
         short(test.p_value, 2)
     );
-    let (tone, says) = if test.is_significant {
+    let (tone, verdict) = if test.is_significant {
         (Tone::Warning, "The difference is significant: no physically consistent model explains these logs completely")
     } else {
         (Tone::Plain, "The difference is not significant")
     };
-    Text::new(figures).point(tone, format!("{says} ({numbers})."))
+    Text::new(figures).point(tone, format!("{verdict} ({numbers})."))
 }
 
-fn errors(r: &ResultFile) -> Table {
+fn error_table(r: &ResultFile) -> Table {
     let mut columns = vec!["joint".to_owned(), "fit, Nm (N)".to_owned(), "fit, %".to_owned()];
     for log in &r.validation {
         columns.extend([format!("{}, Nm (N)", log.log), format!("{}, %", log.log)]);
@@ -174,7 +170,7 @@ fn errors(r: &ResultFile) -> Table {
     for (j, joint) in joints.iter().enumerate() {
         let mut row = vec![Cell::from(&joint.name), number(Some(joint.rmse_nm)), number(joint.relative_error_percent)];
         for log in &r.validation {
-            let joint = &written(log).joints[j];
+            let joint = &exported_report(log).joints[j];
             row.extend([number(Some(joint.rmse_nm)), number(joint.relative_error_percent)]);
         }
         table = table.rows([row]);
@@ -183,7 +179,7 @@ fn errors(r: &ResultFile) -> Table {
 }
 
 /// One held-out log with all parameter sets.
-fn held_out(log: &LogValidation) -> Table {
+fn held_out_table(log: &LogValidation) -> Table {
     let sets = [
         ("consistent set (exported)", log.physical.as_ref()),
         ("unconstrained estimate", Some(&log.model)),
@@ -412,7 +408,7 @@ fn lags(page: &mut Report, r: &ResultFile) {
 const MARKS: &str = "~: identified only in sums; =: not identified, nominal value";
 
 /// Mark of a body's value, in the order of the ten parameters.
-fn mark(body: &BodyResult, parameter: usize) -> &'static str {
+fn source_mark(body: &BodyResult, parameter: usize) -> &'static str {
     match body.sources.map(|sources| sources[parameter]) {
         Some(ValueSource::Partly) => "\u{a0}~",
         Some(ValueSource::Nominal) => "\u{a0}=",
@@ -442,7 +438,7 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     page.add(verdict);
     let rows = r.bodies.iter().map(|body| {
         let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));
-        let marked = |text: String, k: usize| Cell::from(text + mark(body, k));
+        let marked = |text: String, k: usize| Cell::from(text + source_mark(body, k));
         let bar = body.std.map_or_else(String::new, |std| short(HALF_WIDTH_95 * std[0], 3));
         let mut row = vec![Cell::from(&body.name), marked(short(body.mass_kg, 4), 0), bar.into(), prior.into()];
         row.extend((0..3).map(|k| body.com_m.map_or_else(|| Cell::from(""), |com| marked(short(com[k], 4), k + 1))));
@@ -457,7 +453,7 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
     let rows = r.bodies.iter().map(|body| {
         let inertia = body.inertia_at_origin_kgm2.iter().enumerate();
-        let inertia = inertia.map(|(k, value)| Cell::from(short(*value, 4) + mark(body, k + 4)));
+        let inertia = inertia.map(|(k, value)| Cell::from(short(*value, 4) + source_mark(body, k + 4)));
         [Cell::from(&body.name)].into_iter().chain(inertia).collect()
     });
     let note = format!("kg m², in the body frame, about its origin; {MARKS}");

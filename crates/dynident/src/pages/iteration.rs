@@ -1,6 +1,6 @@
 //! `report.html` of an iteration.
 
-use super::iteration_parameters::{found, parameters};
+use super::iteration_parameters::{add_parameters, identified_parameters};
 use super::iteration_remarks::{log_remarks, motion_remarks, run_remarks, unmet_conditions};
 use super::run_figures::{MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name, worst};
 use super::torque_check::torque_section;
@@ -86,9 +86,9 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     tracking(&mut page, file, traces);
     page.add(Heading::new("Parameters"));
     if !file.base_parameters.is_empty() {
-        page.add(found(file));
+        page.add(identified_parameters(file));
     }
-    parameters(&mut page, file);
+    add_parameters(&mut page, file);
     page.add(Heading::new("Time"));
     page.add(computing_times(file, time));
     Ok(page.html()?)

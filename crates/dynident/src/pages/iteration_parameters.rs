@@ -1,14 +1,12 @@
 //! Parameters on the page of an iteration, with error bars, run by run.
 
-use super::run_figures::{MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name};
+use super::run_figures::{HALF_WIDTH_95, MAX_CURVES, error_in_bars, is_known, largest_error, last_good, run_name};
+use super::unit;
 use crate::result::{IterationParameter, IterationRun, IterationsFile};
 use dynident_report::{BarPlot, Cell, ConvergencePlot, Report, Table, Text, Tone, short};
 
-/// Half-width of a 95 % error bar, in standard deviations.
-const HALF_WIDTH_95: f64 = 1.96;
-
 /// The base parameters from all accepted runs.
-pub(super) fn found(file: &IterationsFile) -> Table {
+pub(super) fn identified_parameters(file: &IterationsFile) -> Table {
     let columns = ["parameter", "expression", "unit", "value", "± (95 %)", "consistent set"];
     let mut table = Table::new("Identified parameters from all accepted runs", columns)
         .note("result.json contains bodies and friction, identification.html the torques, controller.json the controller with this model");
@@ -26,13 +24,8 @@ pub(super) fn found(file: &IterationsFile) -> Table {
     table
 }
 
-/// Prevents line breaks in a unit and raises its exponents.
-fn unit(unit: &str) -> String {
-    unit.replace(' ', "\u{a0}").replace("^2", "²")
-}
-
 /// Adds the parameters of all runs: errors, error bars, values per run, and a table.
-pub(super) fn parameters(page: &mut Report, file: &IterationsFile) {
+pub(super) fn add_parameters(page: &mut Report, file: &IterationsFile) {
     let Some(last) = last_good(file) else {
         page.add(Text::new("No run determines the parameters."));
         return;

@@ -10,3 +10,8 @@ mod payloads;
 mod provenance;
 mod run_figures;
 mod torque_check;
+
+/// Prevents line breaks in a unit and raises its exponents.
+fn unit(unit: &str) -> String {
+    unit.replace(' ', "\u{a0}").replace("^2", "²")
+}

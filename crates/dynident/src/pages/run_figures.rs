@@ -2,6 +2,9 @@
 
 use crate::result::{IterationRun, IterationsFile};
 
+/// Half-width of a 95 % error bar, in standard deviations.
+pub(super) const HALF_WIDTH_95: f64 = 1.96;
+
 /// Maximum number of distinguishable curves in a plot.
 pub(super) const MAX_CURVES: usize = 6;
 

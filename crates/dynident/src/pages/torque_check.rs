@@ -1,11 +1,10 @@
 //! Page section about logged and commanded torque.
 
+use super::run_figures::HALF_WIDTH_95;
 use crate::result::{IterationRun, IterationsFile};
 use dynident_iteration::{CommandSource, JointTorqueCheck, TorqueCheck};
 use dynident_report::{Bar, BarPlot, Heading, LinePlot, Report, Text, Tone};
 
-/// Half-width of a 95 % error bar, in standard deviations.
-const HALF_WIDTH_95: f64 = 1.96;
 /// Maximum number of joints with plots.
 const MAX_PLOTS: usize = 8;
 

@@ -139,6 +139,19 @@ pub struct Study {
     pub log: Vec<LogSection>,
 }
 
+/// Checks that no earlier entry of a list has this name.
+fn check_unique<'a>(
+    list: &str,
+    name: &str,
+    mut earlier: impl Iterator<Item = &'a str>,
+    fix: &'static str,
+) -> Result<(), StudyError> {
+    if earlier.any(|other| other == name) {
+        return Err(StudyError::Twice { what: list.to_owned(), name: name.to_owned(), fix });
+    }
+    Ok(())
+}
+
 /// TOML has no null.
 fn drop_nulls(value: &mut serde_json::Value) {
     match value {
@@ -273,33 +286,18 @@ impl Study {
         self.drive.validate()?;
         self.check_temperature()?;
         for (index, coupling) in self.coupling.iter().enumerate() {
-            if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
-                return Err(StudyError::Twice {
-                    what: "coupling".to_owned(),
-                    name: coupling.name.clone(),
-                    fix: "give each drive a unique name",
-                });
-            }
+            let earlier = self.coupling[..index].iter().map(|other| &other.name[..]);
+            check_unique("coupling", &coupling.name, earlier, "give each drive a unique name")?;
             coupling.validate().map_err(StudyError::at(format!("coupling `{}`", coupling.name)))?;
         }
         for (index, torque) in self.torque.iter().enumerate() {
-            if self.torque[..index].iter().any(|other| other.name == torque.name) {
-                return Err(StudyError::Twice {
-                    what: "torque".to_owned(),
-                    name: torque.name.clone(),
-                    fix: "give each a unique name",
-                });
-            }
+            let earlier = self.torque[..index].iter().map(|other| &other.name[..]);
+            check_unique("torque", &torque.name, earlier, "give each a unique name")?;
             torque.validate().map_err(StudyError::at(format!("torque `{}`", torque.name)))?;
         }
         for (index, payload) in self.payload.iter().enumerate() {
-            if self.payload[..index].iter().any(|other| other.name == payload.name) {
-                return Err(StudyError::Twice {
-                    what: "payload".to_owned(),
-                    name: payload.name.clone(),
-                    fix: "give each a unique name",
-                });
-            }
+            let earlier = self.payload[..index].iter().map(|other| &other.name[..]);
+            check_unique("payload", &payload.name, earlier, "give each a unique name")?;
             payload.validate().map_err(StudyError::at(format!("payload `{}`", payload.name)))?;
         }
         self.robot.validate()?;

@@ -6,7 +6,7 @@ use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{motion_provenance, seen_from};
+use crate::jobs::provenance::{motion_provenance, relative_path};
 use crate::study::{DesignSection, Folders, Study, StudyInput, StudyLogSource, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
@@ -64,7 +64,7 @@ pub fn check_trajectory(
     let information = setup.information(&times, &motion_at);
     // An absolute path is stored relative to the study.
     let name = match study_path.parent().filter(|_| trajectory.is_absolute()) {
-        Some(folder) => seen_from(folder, trajectory),
+        Some(folder) => relative_path(folder, trajectory),
         None => trajectory.display().to_string(),
     };
     let origin = MotionOrigin::given(&setup, name, given, &information);

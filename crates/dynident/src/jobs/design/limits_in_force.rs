@@ -70,7 +70,7 @@ pub(super) fn in_force(
             if !joints.is_empty() {
                 in_force.assumed.push(format!(
                     "torque limits include typical friction and drive inertia of geared drives for {}, because theirs are unknown",
-                    listed(&joints)
+                    join_names(&joints)
                 ));
             }
             all
@@ -191,7 +191,7 @@ pub(super) fn included(limits: &Limits, model: &Model) -> Option<String> {
         by_kind.entry(kind).or_default().extend(joints);
     }
     let parts: Vec<String> =
-        by_kind.into_iter().map(|(kind, joints)| format!("{kind} of {}", listed(&joints))).collect();
+        by_kind.into_iter().map(|(kind, joints)| format!("{kind} of {}", join_names(&joints))).collect();
     let is_limited = limits.joints.iter().any(|limit| limit.torque.or(limit.power_w).is_some());
     (is_limited && !parts.is_empty())
         .then(|| format!("torque limits include, in addition to the rigid bodies: {}", parts.join("; ")))
@@ -223,7 +223,7 @@ pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[Limit
         if !joints.is_empty() {
             lines.push(format!(
                 "torque of {what} (unknown); margin of each torque limit at the peak: {}",
-                listed(&joints)
+                join_names(&joints)
             ));
         }
     }
@@ -237,13 +237,13 @@ pub(super) fn not_included(limits: &Limits, robot: &StudyRobot, reports: &[Limit
     });
     let unvalued: Vec<String> = unvalued.map(TorqueTerm::symbol).collect();
     if !unvalued.is_empty() {
-        lines.push(format!("torque of terms without a known value: {}", listed(&unvalued)));
+        lines.push(format!("torque of terms without a known value: {}", join_names(&unvalued)));
     }
     lines
 }
 
 /// Joins names, with a maximum number.
-fn listed(names: &[String]) -> String {
+fn join_names(names: &[String]) -> String {
     const MAX_SHOWN: usize = 8;
     match names.len().checked_sub(MAX_SHOWN) {
         Some(more) if more > 0 => format!("{} and {more} more", names[..MAX_SHOWN].join(", ")),

@@ -41,7 +41,7 @@ pub(super) fn information(
     };
     if let Some(result) = &section.result {
         let path = folders.find(result, None)?;
-        add(of_result(&path, robot)?);
+        add(information_of_result(&path, robot)?);
         notes.push(format!("prior: the covariance of {}", result.display()));
     }
     if let Some(percent) = section.cad_std_percent {
@@ -138,7 +138,7 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Inverse covariance of an earlier result in the order of the robot's columns; zero for unexcited columns.
-fn of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
+fn information_of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let stored: EarlierEstimate = read_part(path)?;
     let place = places(&stored.base_parameters, robot).map_err(wrong)?;

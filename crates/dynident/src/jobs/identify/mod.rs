@@ -10,7 +10,7 @@ use crate::inputs::InputFiles;
 use crate::jobs::check::{CheckSettings, diagnosis_check};
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::jobs::provenance::{concurrently, provenance, seen_from};
+use crate::jobs::provenance::{concurrently, provenance, relative_path};
 use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyInput, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
@@ -73,7 +73,7 @@ impl IdentificationOutcome {
 /// # Errors
 /// Every variant of [`Error`] for files, study and logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<IdentificationOutcome, Error> {
-    identified(study, study_path, options, None)
+    identify_unchanged(study, study_path, options, None)
 }
 
 /// Like [`identify()`] with the method `"instrumental"`, regardless of the study, and instruments from `source`: a
@@ -90,20 +90,20 @@ pub fn identify_with_instruments(
 ) -> Result<IdentificationOutcome, Error> {
     let mut study = study.clone();
     study.estimator.method = EstimatorMethod::Instrumental;
-    identified(&study, study_path, options, Some(source))
+    identify_unchanged(&study, study_path, options, Some(source))
 }
 
-fn identified(
+fn identify_unchanged(
     study: &Study,
     study_path: &Path,
     options: &RunOptions<'_>,
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<IdentificationOutcome, Error> {
     let files = InputFiles::of(study, study_path, options.data.as_deref());
-    files.while_unchanged(|| identified_from_files(study, study_path, options, source))
+    files.while_unchanged(|| identify_from_files(study, study_path, options, source))
 }
 
-fn identified_from_files(
+fn identify_from_files(
     study: &Study,
     study_path: &Path,
     options: &RunOptions<'_>,
@@ -159,12 +159,12 @@ fn identified_from_files(
     timings.total = start.elapsed().as_secs_f64();
     timings.made_at = now();
 
-    let made = Made { timings, provenance, is_payload: arm.is_some() };
-    written(study, study_path, &robot, &task, found, made)
+    let metadata = FitMetadata { timings, provenance, is_payload: arm.is_some() };
+    build_outcome(study, study_path, &robot, &task, found, metadata)
 }
 
 /// Metadata of an identification.
-pub(in crate::jobs) struct Made {
+pub(in crate::jobs) struct FitMetadata {
     pub(in crate::jobs) timings: Timings,
     pub(in crate::jobs) provenance: Provenance,
     /// Whether payloads on a known arm were estimated.
@@ -175,13 +175,13 @@ pub(in crate::jobs) struct Made {
 ///
 /// # Errors
 /// Rows that do not match the estimate.
-pub(in crate::jobs) fn written(
+pub(in crate::jobs) fn build_outcome(
     study: &Study,
     study_path: &Path,
     robot: &StudyRobot,
     task: &IdentificationTask,
     found: Identification,
-    Made { timings, provenance, is_payload }: Made,
+    FitMetadata { timings, provenance, is_payload }: FitMetadata,
 ) -> Result<IdentificationOutcome, Error> {
     let in_study = Error::identification::<IdentificationError>(study_path);
     let inertials = found.inertials();
@@ -219,9 +219,9 @@ pub(in crate::jobs) fn written(
     let mut result = result_file(study, robot, task, &found, parts);
     result.problems = result.found_problems();
     let folder = study_path.parent().unwrap_or(Path::new(""));
-    result.robot.file = seen_from(folder, &robot.robot.path);
+    result.robot.file = relative_path(folder, &robot.robot.path);
     for log in &mut result.logs {
-        log.import.file = seen_from(folder, Path::new(&log.import.file));
+        log.import.file = relative_path(folder, Path::new(&log.import.file));
     }
     result.seal();
     let mut traces = found.examination.traces;

@@ -11,7 +11,7 @@ pub(super) fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOption
     let mut study = study.clone();
     // The name does not affect the runs.
     study.name = None;
-    study.iteration = study.iteration.map(|section| section.of_runs());
+    study.iteration = study.iteration.map(|section| section.without_unrelated_settings());
     let (model, version) = (format!("{:?}", robot.model()), env!("CARGO_PKG_VERSION"));
     let all = number(&format!("{study:?} {model} {:?} {version}", options.data));
     let mut parts = vec![format!("{all:016x}"), format!("description:{:08x}", number(&model) as u32)];

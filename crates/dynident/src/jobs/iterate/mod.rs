@@ -30,11 +30,11 @@ use inputs::{Inputs, permitted_program};
 use job::Job;
 use model::{RobotFiles, robot_found};
 use plan::Plan;
-use report::joined;
+use report::merged;
 use stages::Stages;
 use std::path::Path;
 use std::time::Instant;
-use trajectories::{Trajectories, kept};
+use trajectories::{Trajectories, load_or_make};
 
 /// Iterates a study's robot and writes the results to `out`: `trajectory.json` (trajectories at the controller's rate),
 /// `runs/run_k/` (each run is written completely or not at all; with sequential legs `leg_n/runs/run_k/`),
@@ -96,7 +96,7 @@ fn iterated(
     let files = ResultFiles::of(out);
     let stores = opened_stores(&job, &files, members.len(), &fingerprint)?;
     let make = || Trajectories::of_study(&job, &inputs, watch);
-    let trajectories = kept(&files.trajectory(), &fingerprint, resume, make)?;
+    let trajectories = load_or_make(&files.trajectory(), &fingerprint, resume, make)?;
     let plan = Plan::of(&job, &inputs, &trajectories)?;
     let before_runs_s = begin.elapsed().as_secs_f64();
 
@@ -105,7 +105,7 @@ fn iterated(
     let results = stages.run(watch, own_robot)?;
 
     let missing = || job.section_error(StudyError::missing("leg", "no leg was run"));
-    let mut file = joined(results.files).ok_or_else(missing)?;
+    let mut file = merged(results.files).ok_or_else(missing)?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == members.len()));
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: results.runs_made };
     // The runs remain valid if the robot files cannot be written.

@@ -2,9 +2,9 @@
 
 use crate::clock::now;
 use crate::error::Error;
-use crate::jobs::identify::{IdentificationOutcome, Made, written};
+use crate::jobs::identify::{FitMetadata, IdentificationOutcome, build_outcome};
 use crate::jobs::options::RunOptions;
-use crate::jobs::provenance::{later_provenance, seen_from};
+use crate::jobs::provenance::{later_provenance, relative_path};
 use crate::output_set::OutputSet;
 use crate::result::{BaseParameterResult, Provenance, Timings};
 use crate::study::{Study, StudyInput, StudyRobot};
@@ -108,11 +108,12 @@ pub(super) fn robot_found(
         ..Timings::default()
     };
     let parameters = found.consistent.parameters.clone();
-    let made = Made { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
-    let mut outcome = written(study, study_path, robot, &task, found, made)?;
+    let metadata =
+        FitMetadata { timings, provenance: later_provenance(study, study_path, begun, &read)?, is_payload: false };
+    let mut outcome = build_outcome(study, study_path, robot, &task, found, metadata)?;
     let folder = study_path.parent().unwrap_or(Path::new(""));
     for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {
-        summary.import.file = seen_from(folder, path);
+        summary.import.file = relative_path(folder, path);
     }
     outcome.result.seal();
     let mut files = vec![

@@ -230,7 +230,7 @@ fn unmet(shortfall: &Shortfall) -> UnmetCondition {
 }
 
 /// Merges sequential iterations of legs: converged if all are, with the status of the last.
-pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
+pub(super) fn merged(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let converged = stages.iter().all(|stage| stage.converged);
     let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);
     let unmet =

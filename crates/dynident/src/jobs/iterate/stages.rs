@@ -5,7 +5,7 @@ use super::inputs::Inputs;
 use super::job::Job;
 use super::model::{EndedStage, RobotFiles};
 use super::plan::Plan;
-use super::report::{Stage, joined};
+use super::report::{Stage, merged};
 use super::watch::{IterationWatch, Watched};
 use crate::error::{Error, StudyError};
 use crate::pages::iteration::{RunName, RunTrace};
@@ -78,7 +78,7 @@ impl<'a> Stages<'a> {
             results.ended.push(EndedStage { records: outcome.runs.clone(), iteration, store });
             let last = outcome.runs.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
             match last {
-                Some(last) if !ends_iteration(&outcome.status) => results.hold(last),
+                Some(last) if !ends_iteration(&outcome.status) => results.fix_parameters(last),
                 _ => break,
             }
         }
@@ -141,7 +141,7 @@ impl<'a> Stages<'a> {
             known_std: &results.known_std,
         });
         let all: Vec<IterationsFile> = results.files.iter().cloned().chain([now]).collect();
-        joined(all).map_or(Ok(()), |file| self.files.write(&file, None, RobotFiles::none()))
+        merged(all).map_or(Ok(()), |file| self.files.write(&file, None, RobotFiles::none()))
     }
 
     fn report(
@@ -185,7 +185,7 @@ impl StageResults<'_> {
     }
 
     /// Fixes parameters that this estimate determined first.
-    fn hold(&mut self, estimate: &RunEstimate) {
+    fn fix_parameters(&mut self, estimate: &RunEstimate) {
         let determined = self.known_std.len().min(estimate.values.len());
         for column in (0..determined).filter(|column| !estimate.fixed.contains(column)) {
             if self.known_std[column].is_none() {

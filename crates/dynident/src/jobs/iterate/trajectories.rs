@@ -43,7 +43,7 @@ impl Trajectories {
 }
 
 /// Trajectories of an earlier call, or new ones, which are stored before the first run.
-pub(super) fn kept(
+pub(super) fn load_or_make(
     path: &Path,
     fingerprint: &str,
     resume: bool,

@@ -22,7 +22,7 @@ use drives::{DriveInertiaFinding, drive_inertia};
 use dynident_model::{JointKind, Model, Robot};
 use dynident_recording::Level;
 use dynident_text::quoted;
-use paths::seen_from;
+use paths::path_in_study;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of rounds of check and correction.
@@ -91,7 +91,7 @@ pub fn new_study_with(
 
     let mut examined = None;
     let mut unsure = draft.unsure();
-    unsure.extend(recorded.left_out(&logs));
+    unsure.extend(recorded.unused_recordings(&logs));
     let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
     if !unsure.iter().any(without_rate) {
         for _ in 0..MAX_ROUNDS {
@@ -182,19 +182,19 @@ impl Recorded {
         let ordered = |family: &Family| in_order(family, position, &logged.joints);
 
         // In the file of the positions if present, otherwise in another file with the same number of rows.
-        let beside = |family: &Family| family.file == position.file && ordered(family).is_some();
+        let in_same_file = |family: &Family| family.file == position.file && ordered(family).is_some();
         let rows = |family: &Family| logs[family.file].1.groups.get(family.group).map(|group| group.rows);
-        let elsewhere = |family: &Family| {
+        let in_other_file = |family: &Family| {
             family.file != position.file && rows(family) == rows(position) && ordered(family).is_some()
         };
         let measured = |quantity, fits: &dyn Fn(&Family) -> bool| best(&all, quantity, fits);
-        let torque = measured(Quantity::Torque, &beside)
-            .or_else(|| measured(Quantity::Current, &beside))
-            .or_else(|| measured(Quantity::Torque, &elsewhere))
-            .or_else(|| measured(Quantity::Current, &elsewhere))
+        let torque = measured(Quantity::Torque, &in_same_file)
+            .or_else(|| measured(Quantity::Current, &in_same_file))
+            .or_else(|| measured(Quantity::Torque, &in_other_file))
+            .or_else(|| measured(Quantity::Current, &in_other_file))
             .ok_or_else(|| missing("torques or currents"))?;
-        let velocity = measured(Quantity::Velocity, &beside)
-            .or_else(|| measured(Quantity::Velocity, &elsewhere))
+        let velocity = measured(Quantity::Velocity, &in_same_file)
+            .or_else(|| measured(Quantity::Velocity, &in_other_file))
             .filter(|family| family.source != Source::Commanded);
 
         let (Some(of_position), Some(of_torque)) = (ordered(position), ordered(torque)) else {
@@ -225,9 +225,10 @@ impl Recorded {
     }
 
     /// Recordings that the study does not use.
-    fn left_out(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
-        let beside = [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
-        let used: Vec<usize> = self.files.iter().copied().chain(beside).collect();
+    fn unused_recordings(&self, logs: &[(&Path, LogContents)]) -> Vec<Unsure> {
+        let channel_files =
+            [Some(&self.torque), self.velocity.as_ref()].into_iter().flatten().map(|family| family.file);
+        let used: Vec<usize> = self.files.iter().copied().chain(channel_files).collect();
         let unused = logs.iter().enumerate().filter(|(number, _)| !used.contains(number));
         let reason = |path: &Path| {
             format!("{} is not in the study: its columns differ from those of the other recordings", path.display())
@@ -239,11 +240,11 @@ impl Recorded {
         let from = request.out.parent().unwrap_or_else(|| Path::new(""));
         let joints = model.joints();
         let tables = [
-            vec![self.of_robot(request, model, from), self.of_time(request)],
-            vec![self.of_position(model, &logs[self.position.file].1)],
-            self.of_velocity(logs, from).into_iter().collect(),
-            vec![self.of_torque(logs, from)],
-            self.of_logs(logs, from),
+            vec![self.robot_table(request, model, from), self.time_table(request)],
+            vec![self.position_table(model, &logs[self.position.file].1)],
+            self.velocity_table(logs, from).into_iter().collect(),
+            vec![self.torque_table(logs, from)],
+            self.log_tables(logs, from),
         ];
         let mut tables = tables.concat();
         let known = |limit: fn(&dynident_model::JointLimits) -> Option<f64>| {
@@ -260,9 +261,9 @@ impl Recorded {
         Draft { tables }
     }
 
-    fn of_robot(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
+    fn robot_table(&self, request: &NewStudy, model: &Model, from: &Path) -> Table {
         let LoggedJoints { joints, reason, is_sure } = &self.logged;
-        let mut table = Table::new("[robot]", "").with("file", quoted(&seen_from(&request.robot, from)), "");
+        let mut table = Table::new("[robot]", "").with("file", quoted(&path_in_study(&request.robot, from)), "");
         if !request.xacro.arguments.is_empty() {
             let arguments: Vec<String> = request
                 .xacro
@@ -283,7 +284,7 @@ impl Recorded {
         table.with_line("joints", format!("[{}]", names.join(", ")), reason, *is_sure)
     }
 
-    fn of_time(&self, request: &NewStudy) -> Table {
+    fn time_table(&self, request: &NewStudy) -> Table {
         let table = Table::new("[format]", "");
         match (&self.time, request.rate_hz) {
             (Some((name, rate_hz)), _) => {
@@ -301,7 +302,7 @@ impl Recorded {
         }
     }
 
-    fn of_position(&self, model: &Model, log: &LogContents) -> Table {
+    fn position_table(&self, model: &Model, log: &LogContents) -> Table {
         let [columns, _] = &self.columns;
         let table = Table::new("[format.position]", basis(&self.position, "positions")).with(
             "columns",
@@ -328,7 +329,7 @@ impl Recorded {
         table
     }
 
-    fn of_velocity(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
+    fn velocity_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
         let (family, columns) = self.velocity.as_ref().zip(self.velocity_columns.as_ref())?;
         let table = Table::new("[format.velocity]", "Compared with the derivative of the positions");
         let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
@@ -338,7 +339,7 @@ impl Recorded {
         })
     }
 
-    fn of_torque(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+    fn torque_table(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
         let table = Table::new("[format.torque]", basis(&self.torque, "torques"));
         let table = self.with_file(table, &self.torque, logs, from);
@@ -365,12 +366,12 @@ impl Recorded {
             return table;
         }
         let folder = logs[self.position.file].0.parent().unwrap_or(from);
-        let file = quoted(&seen_from(logs[family.file].0, folder));
+        let file = quoted(&path_in_study(logs[family.file].0, folder));
         table.with("file", file, "a separate file with the same number of rows")
     }
 
-    fn of_logs(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
-        let file = |number: usize| quoted(&seen_from(logs[number].0, from));
+    fn log_tables(&self, logs: &[(&Path, LogContents)], from: &Path) -> Vec<Table> {
+        let file = |number: usize| quoted(&path_in_study(logs[number].0, from));
         if let [only] = self.files[..] {
             let part = |[from, to]: [f64; 2]| format!("[{from:?}, {to:?}]");
             return vec![

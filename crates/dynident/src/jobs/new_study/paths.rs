@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 /// `path` relative to `folder` if both exist, with `/` as separator; otherwise unchanged.
-pub(super) fn seen_from(path: &Path, folder: &Path) -> String {
+pub(super) fn path_in_study(path: &Path, folder: &Path) -> String {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let seen = match (path.canonicalize(), folder.canonicalize()) {
         (Ok(path), Ok(folder)) => relative(&path, &folder),
@@ -34,6 +34,6 @@ mod tests {
         let seen = |path: &str, folder: &str| relative(Path::new(path), Path::new(folder)).unwrap();
         assert_eq!(seen("/a/b/c.csv", "/a/b"), Path::new("c.csv"));
         assert_eq!(seen("/a/b/c.csv", "/a/d/e"), Path::new("../../b/c.csv"));
-        assert_eq!(seen_from(Path::new("nowhere/x.csv"), Path::new("nor_here")), "nowhere/x.csv");
+        assert_eq!(path_in_study(Path::new("nowhere/x.csv"), Path::new("nor_here")), "nowhere/x.csv");
     }
 }

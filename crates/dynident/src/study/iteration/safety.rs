@@ -199,7 +199,7 @@ impl IterationSection {
 
     /// The section without settings that do not affect the data of a run: program of the robot and its time limits,
     /// stop conditions, warm-up, home, end of the iteration. Earlier runs remain valid when these change.
-    pub(crate) fn of_runs(&self) -> Self {
+    pub(crate) fn without_unrelated_settings(&self) -> Self {
         let mut own = self.clone();
         match &mut own.robot {
             RobotChoice::Simulation | RobotChoice::Function => {}
