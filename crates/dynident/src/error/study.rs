@@ -99,7 +99,7 @@ pub enum StudyError {
         known: Vec<String>,
     },
     /// A duplicate name in a list.
-    #[error("{what} `{name}` is given twice: {fix}")]
+    #[error("{what} `{name}` stands twice: {fix}")]
     Twice {
         /// The kind of list.
         what: String,
@@ -109,7 +109,7 @@ pub enum StudyError {
         fix: &'static str,
     },
     /// A joint under two exclusive keys.
-    #[error("{key}: joint `{joint}` is also {state}: remove it from {key} or from {other}")]
+    #[error("{key}: joint `{joint}` is {state} as well: remove it from {key} or from {other}")]
     JointInBoth {
         /// The joint.
         joint: String,
@@ -145,7 +145,7 @@ pub enum StudyError {
         held_out_row: u64,
     },
     /// Exclusive keys.
-    #[error("{} are exclusive: remove one", keys.join(" and "))]
+    #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {
         /// The stated keys.
         keys: Vec<&'static str>,

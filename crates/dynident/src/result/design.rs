@@ -202,7 +202,7 @@ impl WindowedFile {
                     StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
                 };
                 sentences.push(format!(
-                    "Stroke of `{}`, {what}: {} exceeds the limit {} by {:.0} %.",
+                    "Stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
                     stroke.joint,
                     digits(limit.value),
                     digits(limit.limit),

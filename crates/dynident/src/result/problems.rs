@@ -120,7 +120,7 @@ impl ResultFile {
                 relative_percent,
                 joints: joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
             });
-            problems.extend(worse_when_consistent("training logs", &free, &written, settings));
+            problems.extend(worse_when_consistent("logs that were fitted to", &free, &written, settings));
         }
         problems
     }

@@ -138,7 +138,7 @@ impl ResultFile {
         let expressions = model.base().expressions();
         if self.base_parameters.len() != expressions.len() {
             return Err(wrong(format!(
-                "{} base parameters, but the study's robot has {}: use the study of the result",
+                "{} base parameters, but the study's robot has {}: use the study that the result was made with",
                 self.base_parameters.len(),
                 expressions.len()
             )));
@@ -147,7 +147,7 @@ impl ResultFile {
         for (stored, expression) in self.base_parameters.iter().zip(&expressions) {
             if stored.expression != *expression {
                 return Err(wrong(format!(
-                    "base parameter `{}`, but the study's robot has `{expression}`: use the study of the result",
+                    "base parameter `{}`, but the study's robot has `{expression}`: use the study that the result was made with",
                     stored.expression
                 )));
             }
@@ -169,7 +169,7 @@ impl ResultFile {
             let own = function.description();
             if law != own {
                 let message =
-                    format!("torque `{symbol}` was `{law}`, but is `{own}` in the study: use the study of the result");
+                    format!("torque `{symbol}` was `{law}`, but is `{own}` in the study: use the study that the result was made with");
                 return Err(Error::Result { path: path.to_owned(), message });
             }
         }

@@ -293,10 +293,10 @@ fn what_cannot_be_is_said_with_its_place() {
     }
     for (torque, fragment) in [
         ("", "torque `spring`: no expression: give expression, table or table_file"),
-        ("expression = \"q\"\ntable = [[0.0, 1.0]]", "expression and table are exclusive: remove one"),
+        ("expression = \"q\"\ntable = [[0.0, 1.0]]", "expression and table are both given: keep one"),
         ("expression = \"q\"\nnominal = nan", "torque `spring`: nominal: give a finite number"),
         ("expression = \"q\"\nstiffness = 2.0", "unknown field `stiffness`"),
-        ("expression = \"q\"\n[[torque]]\nname = \"spring\"\njoint = \"hinge\"\nexpression = \"q\"", "is given twice"),
+        ("expression = \"q\"\n[[torque]]\nname = \"spring\"\njoint = \"hinge\"\nexpression = \"q\"", "stands twice"),
     ] {
         let message = Job::new_error(here, &pendulum(here, torque));
         assert!(message.contains(fragment), "{message}");

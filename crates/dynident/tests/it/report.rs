@@ -49,7 +49,7 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
     let page = found.report().unwrap();
     // Two joints per log, with residuals in a strip of the same plot.
     assert_eq!(page.matches("data-plot=\"plot-").count(), 2 * 2);
-    assert!(page.matches("measured less predicted").count() >= 2 * 2, "residuals are drawn");
+    assert!(page.matches("measured minus predicted").count() >= 2 * 2, "residuals are drawn");
     assert!(!page.contains(NAME) && !page.contains("</script><b>") && !page.contains("joints </title>"));
     for heading in ["Torque", "Parameters", "Friction and drives", "Bodies", "Logs", "Origin and time"] {
         assert!(page.contains(&format!(">{heading}</h2>")), "{heading}");

@@ -194,8 +194,8 @@ mod tests {
     fn names_of_real_recordings_are_understood() {
         let joints = ["arm_1_joint", "arm_11_joint", "shoulder_pan_joint", "Joint_1"].map(str::to_owned);
         let cases = [
-            ("q1_rad", Some(Position), Number(1), Source::Unsaid, Some("rad")),
-            ("qd1_rad_s", Some(Velocity), Number(1), Source::Unsaid, Some("rad/s")),
+            ("q1_rad", Some(Position), Number(1), Source::Unstated, Some("rad")),
+            ("qd1_rad_s", Some(Velocity), Number(1), Source::Unstated, Some("rad/s")),
             ("qdd7_rad_s2", Some(Acceleration), Number(7), Source::Unstated, Some("rad/s^2")),
             ("tau3_Nm", Some(Torque), Number(3), Source::Unstated, Some("N m")),
             ("tau_cmd1_Nm", Some(Torque), Number(1), Source::Commanded, Some("N m")),

@@ -82,7 +82,7 @@ pub(crate) fn step_wise(
 /// Settings of the family; only `spliced-logistic` has strokes with mid-points.
 fn spliced_settings(section: &DesignSection) -> Result<&SplicedLogisticSettings, StudyError> {
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
-        let fix = "the criterion windowed-condition needs kind = \"spliced-logistic\"";
+        let fix = "the criterion windowed-condition needs kind = \"spliced-logistic\", whose strokes have mid-points";
         return Err(StudyError::conflict(format!("family.kind = \"{}\"", section.family.name()), fix));
     };
     if settings.periods_s.is_some() {
